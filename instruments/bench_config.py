@@ -223,7 +223,7 @@ class BenchFile(Strict):
     @model_validator(mode="after")
     def _standards_are_distinct(self) -> BenchFile:
         """Reject one quantity stated twice under one name: its uncertainty would count twice."""
-        stated = [(each.quantity, each.name) for each in self.standards]
+        stated = [(standard.quantity, standard.name) for standard in self.standards]
         if twice := next((one for one in stated if stated.count(one) > 1), None):
             raise ValueError(
                 f"two [[standards]] have the quantity {twice[0]!r} and the name {twice[1]!r}; remove one, or "
@@ -270,7 +270,7 @@ class BenchFile(Strict):
     @property
     def sections(self) -> dict[str, DeviceSettings]:
         """Every device, by its name: table, chamber, references, gyros."""
-        references = {each.name: each for each in self.references}
+        references = {reference.name: reference for reference in self.references}
         return {**self.instruments, **references, **{gyro.name: gyro for gyro in self.gyros}}
 
     @property

@@ -87,9 +87,9 @@ def installed() -> tuple[Plugin, ...]:
             text = distribution.read_text("entry_points.txt") or ""
             if f"[{PREFIX}" in text and (name := distribution.metadata["Name"]) not in installed_plugins:
                 installed_plugins[name] = [
-                    Plugin(each.group, each.name, each.value, name, distribution.version)
-                    for each in distribution.entry_points
-                    if each.group.startswith(PREFIX)
+                    Plugin(entry_point.group, entry_point.name, entry_point.value, name, distribution.version)
+                    for entry_point in distribution.entry_points
+                    if entry_point.group.startswith(PREFIX)
                 ]
         except Exception as error:  # noqa: BLE001  the metadata of others may hold anything
             _log.warning("entry points of %s cannot be read: %s; it is left out", distribution, summary(error))

@@ -234,7 +234,7 @@ def check(
 
 def _sections(bench: BenchFile) -> Iterator[tuple[str, DeviceSettings, Kind]]:
     kinds: dict[str, Kind] = {"table": "table", "chamber": "chamber"}
-    kinds |= dict.fromkeys((each.name for each in bench.references), "reference")
+    kinds |= dict.fromkeys((reference.name for reference in bench.references), "reference")
     kinds |= dict.fromkeys((gyro.name for gyro in bench.gyros), "gyro")
     for name, section in bench.sections.items():
         yield name, section, kinds.get(name, "other")

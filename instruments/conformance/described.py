@@ -53,7 +53,7 @@ def requests_of(description: Described) -> list[tuple[str, str]]:
             requests += [(key, each) for each in given]
     if isinstance(description, ReferenceDescription):
         requests += [("identity", description.identity)] if description.identity else []
-        requests += [(f"quantities.{name}", each.ask) for name, each in description.quantities.items()]
+        requests += [(f"quantities.{name}", quantity.ask) for name, quantity in description.quantities.items()]
     if description.line.check is not None:
         requests.append(("line.check", description.line.check.send))
     return requests
@@ -191,5 +191,6 @@ def _moved_set_point(chamber: DescribedChamber) -> str:
 def _quantities(readout: LineReference) -> str:
     state = readout.read()
     return ", ".join(
-        f"{each.name} {each.value(np.array([state.raw[each.name]]))[0]:g} {each.unit}" for each in readout.channels
+        f"{channel.name} {channel.value(np.array([state.raw[channel.name]]))[0]:g} {channel.unit}"
+        for channel in readout.channels
     )

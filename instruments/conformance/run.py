@@ -55,7 +55,7 @@ def says_who_it_is(stand: Stand) -> None:
     """Check the identity."""
     identity = stand.driver.identify()
     if stand.kind == "gyro":
-        given = next(each.serial for each in stand.file.gyros if each.name == stand.driver.name)
+        given = next(gyro.serial for gyro in stand.file.gyros if gyro.name == stand.driver.name)
         require(
             identity.serial == given,
             f"identify() returns the serial number {identity.serial!r}, but the bench file gives {given!r}",

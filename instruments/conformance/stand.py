@@ -67,7 +67,7 @@ def place_of(name: str) -> BenchFile:
         return _with_trial(name, kind, trial)
     for path in shipped_benches().values():
         bench = read_bench(path)
-        if bench.is_simulated and name in [each.driver for each in bench.sections.values()]:
+        if bench.is_simulated and name in [section.driver for section in bench.sections.values()]:
             return resolve(bench)
     raise ValueError(
         f"driver {name!r} has no simulated bench to be checked on; give the driver a Trial "
@@ -106,7 +106,7 @@ def open_stand(name: str, file: BenchFile) -> Stand:
     Raises ValueError for a bench that does not have the driver, or has it on a real address, and what open_bench does.
     """
     kind = kind_of(name)
-    entry = next(((key, each) for key, each in file.sections.items() if each.driver == name), None)
+    entry = next(((key, section) for key, section in file.sections.items() if section.driver == name), None)
     if entry is None:
         raise ValueError(f"bench {file.name!r} has no {kind} with driver {name!r}; name a bench that has one")
     url = entry[1].port or entry[1].host or ""

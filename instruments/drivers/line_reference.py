@@ -33,8 +33,8 @@ class LineReference:
         self.settings = settings
         self._clock, self._model = clock, settings.known
         self.channels: tuple[Channel, ...] = tuple(
-            Channel(column_of(settings, name), each.unit, each.resolution, settings.corrections.get(name, 0.0))
-            for name, each in self._model.quantities.items()
+            Channel(column_of(settings, name), quantity.unit, quantity.resolution, settings.corrections.get(name, 0.0))
+            for name, quantity in self._model.quantities.items()
         )
         described = settings.format
         syntax = LineSyntax() if described is None else described.line.syntax

@@ -27,11 +27,16 @@ def resolve(bench: BenchFile) -> BenchFile:
     fixed = {name: _section(section, (name,), kinds[name], wrong) for name, section in bench.instruments.items()}
     gyros = [_section(gyro, ("gyros", number), GyroDriver, wrong) for number, gyro in enumerate(bench.gyros)]
     references = [
-        _section(each, ("references", number), ReferenceDriver, wrong) for number, each in enumerate(bench.references)
+        _section(reference, ("references", number), ReferenceDriver, wrong)
+        for number, reference in enumerate(bench.references)
     ]
     if wrong:
         raise ValidationError.from_exception_data(type(bench).__name__, wrong)
-    used = {**fixed, **{each.name: each for each in bench.gyros}, **{each.name: each for each in bench.references}}
+    used = {
+        **fixed,
+        **{each.name: each for each in bench.gyros},
+        **{reference.name: reference for reference in bench.references},
+    }
     drivers = {device: _release(section.driver) for device, section in used.items()}
     return bench.model_copy(
         update={**fixed, "gyros": tuple(gyros), "references": tuple(references), "drivers": drivers}

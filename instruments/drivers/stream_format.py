@@ -28,13 +28,13 @@ class StreamFormatGyro:
         self.limits = GyroLimits(settings.max_rate_dps, settings.min_c, settings.max_c)
         decoder: Decoder = LineDecoder(format_) if format_.line is not None else FrameDecoder(format_)
         unused = {f"gyro_{axis}" for axis in format_.axes} - {f"gyro_{axis}" for axis in self.axes}
-        self._fields = [each for each in format_.fields if each.unit is not None and each.name not in unused]
+        self._fields = [field for field in format_.fields if field.unit is not None and field.name not in unused]
         self._stream = SerialStream(
             self.name, settings.port or "", ports, clock, baudrate=self._baudrate, timeout_s=SILENCE_S,
             line=line_of(settings.options),
         )  # fmt: skip
         law = StreamLaw(
-            self.sample_rate_hz, [each.name for each in self._fields], format_.counter, stamp_ticks(format_)
+            self.sample_rate_hz, [field.name for field in self._fields], format_.counter, stamp_ticks(format_)
         )
         self._readings = StreamedReadings(
             self.name, settings.port or "", self._stream, decoder, law, clock, self._unread
@@ -43,7 +43,7 @@ class StreamFormatGyro:
     @property
     def channels(self) -> tuple[Channel, ...]:
         """What a message holds: the fields with a unit, in deg/s, deg C and g."""
-        scales = [(each.name, scale_of(each, self.sample_rate_hz)) for each in self._fields]
+        scales = [(field.name, scale_of(field, self.sample_rate_hz)) for field in self._fields]
         return tuple(Channel(name, scale.unit, scale.scale, scale.offset) for name, scale in scales)
 
     def identify(self) -> GyroIdentity:

@@ -74,9 +74,9 @@ def _core(parent: ET.Element, given: Certificate) -> None:
     if given.state_address:
         name = "Address of the state of this certificate"
         _identification(identifications, "calibrationLaboratory", given.state_address, name)
-    for each in given.manifests:
-        name = f"SHA-256 of manifest {each.manifest}: {each.record}"
-        _identification(identifications, "calibrationLaboratory", each.hash, name)
+    for manifest in given.manifests:
+        name = f"SHA-256 of manifest {manifest.manifest}: {manifest.record}"
+        _identification(identifications, "calibrationLaboratory", manifest.hash, name)
     if given.customer.order:
         _identification(identifications, "customer", given.customer.order, "Order")
     if given.item.received is not None:
@@ -135,7 +135,7 @@ def _statements(parent: ET.Element, given: Certificate) -> None:
         made = _statement(parent, "Next calibration", "Agreed with the customer.", ref_type="basic_recalibration")
         child(made, "date", given.due.isoformat())
     if given.conformity is not None:
-        _conformity(parent, given.conformity, max(each.k for each in given.results))
+        _conformity(parent, given.conformity, max(result.k for result in given.results))
 
 
 def _conformity(parent: ET.Element, judged: Conformity, k: float) -> None:
@@ -177,8 +177,8 @@ def _measured(parent: ET.Element, given: Certificate) -> None:
     child(stated, "norm", "JCGM 100:2008")
     _software(child(made, "usedSoftware"), given.method.software)
     equipment = child(made, "measuringEquipments")
-    for each in given.standards:
-        _standard(equipment, each)
+    for standard in given.standards:
+        _standard(equipment, standard)
     conditions = child(made, "influenceConditions")
     for condition in given.environment:
         _condition(conditions, condition)
@@ -251,12 +251,12 @@ def _results(parent: ET.Element, given: Certificate) -> None:
         "Of the error model that the method names; standard uncertainties contain the standards of the bench, or are "
         "those of the fit alone where the name says so.",
     )
-    for each in given.coefficients:
-        where = "" if each.temperature_c is None else f" at {each.temperature_c:g} °C"
-        alone = "" if each.has_standards or each.u is None else ", u of the fit alone"
-        own = each.name_text if each.unit == "s" else each.name
-        name = f"Axis {each.axis}: {own}{where}{alone}"
-        quantity(made, name, [each.value], each.unit, u=each.u)
+    for coefficient in given.coefficients:
+        where = "" if coefficient.temperature_c is None else f" at {coefficient.temperature_c:g} °C"
+        alone = "" if coefficient.has_standards or coefficient.u is None else ", u of the fit alone"
+        own = coefficient.name_text if coefficient.unit == "s" else coefficient.name
+        name = f"Axis {coefficient.axis}: {own}{where}{alone}"
+        quantity(made, name, [coefficient.value], coefficient.unit, u=coefficient.u)
     _budget(parent, given)
     for sensor in given.sensors:
         _sensor(parent, sensor, probability)
@@ -274,9 +274,15 @@ def _sensor(parent: ET.Element, given: SensorResult, probability: float) -> None
     )
     reference = given.reference
     quantity(made, f"Reference: {reference.quantity}", [reference.value], reference.unit, u=reference.u)
-    for each in given.coefficients:
+    for coefficient in given.coefficients:
         quantity(
-            made, each.name, [each.value], each.unit, expanded=[each.expanded], k=[each.k], probability=probability
+            made,
+            coefficient.name,
+            [coefficient.value],
+            coefficient.unit,
+            expanded=[coefficient.expanded],
+            k=[coefficient.k],
+            probability=probability,
         )
 
 

@@ -62,7 +62,7 @@ def _pages(given: Certificate) -> dict[str, object]:
             [each.name, _signed(f"{each.low:.2f}"), _signed(f"{each.high:.2f}"), each.unit]
             for each in given.environment
         ],
-        "standards": [_standard(each) for each in given.standards],
+        "standards": [_standard(standard) for standard in given.standards],
         "uncertainty": uncertainty_text(given),
         "budget": [
             [
@@ -81,8 +81,8 @@ def _pages(given: Certificate) -> dict[str, object]:
             _state("As left, after adjustment", given.as_left),
         ],
         "adjustment": given.adjustment,
-        "coefficients": [_coefficient(each) for each in given.coefficients],
-        "sensors": [_sensor(each) for each in given.sensors],
+        "coefficients": [_coefficient(coefficient) for coefficient in given.coefficients],
+        "sensors": [_sensor(sensor) for sensor in given.sensors],
         "conformity": _conformity(given),
         "external": given.external,
         "due": given.due.isoformat() if given.due else "",
@@ -90,7 +90,9 @@ def _pages(given: Certificate) -> dict[str, object]:
         "hash": given.calibration.hash,
         "address": given.calibration.address,
         "page": given.state_address,
-        "manifests": [[f"Manifest {each.manifest}, {each.record}", each.hash] for each in given.manifests],
+        "manifests": [
+            [f"Manifest {manifest.manifest}, {manifest.record}", manifest.hash] for manifest in given.manifests
+        ],
     }
 
 
@@ -186,7 +188,7 @@ def _method(given: Certificate) -> list[list[str]]:
         ["Additions to, deviations or exclusions from the method", method.deviations],
         ["Results of external providers", given.external],
     ]
-    return [each for each in rows if each[1]]
+    return [row for row in rows if row[1]]
 
 
 def uncertainty_text(given: Certificate) -> str:
@@ -272,8 +274,13 @@ def _sensor(given: SensorResult) -> Mapping[str, object]:
         ],
         "formula": given.formula,
         "rows": [
-            [each.name, *rounded(each.value, each.expanded), f"{each.k:.2f}", readable(each.unit)]
-            for each in given.coefficients
+            [
+                coefficient.name,
+                *rounded(coefficient.value, coefficient.expanded),
+                f"{coefficient.k:.2f}",
+                readable(coefficient.unit),
+            ]
+            for coefficient in given.coefficients
         ],
     }
 
@@ -294,7 +301,7 @@ def _conformity(given: Certificate) -> Mapping[str, object] | None:
     if judged is None:
         return None
     return {"specification": judged.specification, "statement": judged.statement, "outcome": _outcome(judged.passed),
-            "results": [_verified(each) for each in judged.results]}  # fmt: skip
+            "results": [_verified(result) for result in judged.results]}  # fmt: skip
 
 
 def percent(probability: float) -> str:

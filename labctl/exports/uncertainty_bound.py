@@ -23,7 +23,7 @@ def any_axis_bounds_dps(calibration: Calibration) -> dict[str, float | None]:
 
     It holds in the frame of the case.
     """
-    return {axis: None if one is None else one["bound_dps"] for axis, one in _vectors(calibration).items()}
+    return {axis: None if vector is None else vector["bound_dps"] for axis, vector in _vectors(calibration).items()}
 
 
 def _vectors(calibration: Calibration) -> dict[str, VectorBoundJson | None]:
@@ -56,8 +56,8 @@ def _any_axis_lines(calibration: Calibration) -> list[str]:
     vectors, bounds = _vectors(calibration), any_axis_bounds_dps(calibration)
     lines = []
     if known := _listed(bounds):
-        reach = max(one["reach_dps"] for one in vectors.values() if one is not None)
-        aligned = _listed({axis: one and one["aligned_bound_dps"] for axis, one in vectors.items()})
+        reach = max(vector["reach_dps"] for vector in vectors.values() if vector is not None)
+        aligned = _listed({axis: vector and vector["aligned_bound_dps"] for axis, vector in vectors.items()})
         lines.append(
             f"U turned about any axis at up to {reach:.4g} deg/s, in the frame of the case, at most: {known}; up to a "
             f"rotation of the frame: {aligned}."

@@ -37,7 +37,7 @@ def secrets_of(environment: Mapping[str, str] = os.environ, locations: Iterable[
         except ValueError:  # a path that looks like an address
             continue
         secrets |= {password, unquote(password)}
-    return frozenset(each for each in secrets if len(each) >= SHORTEST_SECRET)
+    return frozenset(secret for secret in secrets if len(secret) >= SHORTEST_SECRET)
 
 
 class Redaction:

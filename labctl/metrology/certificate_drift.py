@@ -61,7 +61,7 @@ def predicted(certificates: Sequence[CertifiedValue], on: date) -> Prediction:
     """
     if not certificates:
         raise BadInput(f"no certificate to predict from on {on}; add one with `labctl standards certificate`")
-    ordered = sorted(certificates, key=lambda each: each.on)
+    ordered = sorted(certificates, key=lambda certificate: certificate.on)
     for each in ordered:
         if not (math.isfinite(each.u) and each.u > 0):
             raise BadInput(f"certificate of {each.on}: u = {each.u:g} is no uncertainty; give a number above 0")

@@ -115,7 +115,7 @@ def _px4(values: Mapping[str, float], gyro: int) -> tuple[Array, Array]:
     warm = _temperatures(values[f"{prefix}TMIN"], values[f"{prefix}TMAX"])
     d = warm - values[f"{prefix}TREF"]
     terms = [[values[f"{prefix}X{power}_{axis}"] * d**power for power in range(4)] for axis in range(3)]
-    return warm, np.column_stack([np.sum(each, axis=0) for each in terms])
+    return warm, np.column_stack([np.sum(term, axis=0) for term in terms])
 
 
 def _ardupilot(values: Mapping[str, float], imu: int) -> tuple[Array, Array]:

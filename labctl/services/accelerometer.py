@@ -251,7 +251,7 @@ def _response(sensor: Accelerometer, rests: Rests, worth: Adequacy) -> Accelerom
         verdict=worth.verdict,
         bias_g={a: Estimate(value=float(sensor.bias_g[i]), u=float(u[i])) for i, a in enumerate(AXES)},
         scale_factor={a: errors[a + a] for a in AXES},
-        misalignment={name: each for name, each in errors.items() if name[0] != name[1]},
+        misalignment={name: error for name, error in errors.items() if name[0] != name[1]},
         covariance=sensor.covariance.tolist(), gravity_g=sensor.gravity_g,
         rests=len(rests), left_out=int((~sensor.used).sum()), poses=different_poses(sensor.up),
         before_g=worth.before_g, residual_g=sensor.residual_g, heldout_g=worth.heldout_g, expected_g=worth.expected_g,

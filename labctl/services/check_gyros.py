@@ -115,7 +115,7 @@ def _results(store: Store, serial: str, at_c: float, first: date | None) -> tupl
         if measured_at(row.info) is None:
             left_out[row.id] = f"the date of the measurement is not known; {GIVE_DATE}"
             continue
-        own = next((each for each in versions if each.recordings == (row.id,)), None)
+        own = next((version for version in versions if version.recordings == (row.id,)), None)
         if own is None:
             left_out[row.id] = f"no version is fitted to it alone: `labctl fit {serial} --recording {row.id}`"
             continue
@@ -145,7 +145,7 @@ def _charts(results: Sequence[_Found]) -> Iterator[tuple[CheckGyroChart, list[Ju
     for key in dict.fromkeys(key for each in results for key in each.values):
         those = [each for each in results if key in each.values]
         judgements = judged([ChartPoint(*each.values[key]) for each in those])
-        points = [_point(each, one) for each, one in zip(those, judgements, strict=True)]
+        points = [_point(each, judgement) for each, judgement in zip(those, judgements, strict=True)]
         axis, result = key
         yield CheckGyroChart(axis=axis, result=result, unit=UNITS[result], points=points), judgements
 
@@ -153,7 +153,7 @@ def _charts(results: Sequence[_Found]) -> Iterator[tuple[CheckGyroChart, list[Ju
 def _point(result: _Found, one: Judged) -> CheckGyroPoint:
     return CheckGyroPoint(
         recording=result.row.id, campaign=result.row.campaign, at=ordered_at(result.row.info), version=result.version,
-        value=one.point.value, u=one.point.u, state=one.state, limits=[limits_answer(each) for each in one.limits],
+        value=one.point.value, u=one.point.u, state=one.state, limits=[limits_answer(limit) for limit in one.limits],
     )  # fmt: skip
 
 

@@ -152,7 +152,7 @@ def _over_temperature(result: AccelerometerResponse, warm: AccelerometerTemperat
     """Return the nine estimates and those of temperature, by power and axis, in the order of the covariance."""
     sensor_estimates = _estimates(result)
     for terms in (warm.bias_g, warm.scale_factor):
-        powers = max((len(each) for each in terms.values()), default=0)
+        powers = max((len(term) for term in terms.values()), default=0)
         sensor_estimates += [
             dict(enumerate(terms.get(axis, []))).get(power) for power in range(powers) for axis in AXES
         ]
@@ -170,7 +170,7 @@ def _not_json(result: JsonDocument) -> str | None:
 
 def _problem(estimates: Sequence[Estimate | None], covariance: Sequence[Sequence[float]]) -> str | None:
     """Return in words why a result does not come from a fit; None: it may."""
-    sensor_estimates, size = [each for each in estimates if each is not None], len(estimates)
+    sensor_estimates, size = [estimate for estimate in estimates if estimate is not None], len(estimates)
     if len(sensor_estimates) != size:
         return f"{size - len(sensor_estimates)} of {size} parameters are missing"
     if len(covariance) != size or any(len(row) != size for row in covariance):
@@ -181,9 +181,9 @@ def _problem(estimates: Sequence[Estimate | None], covariance: Sequence[Sequence
             return "the covariance is not finite and symmetric"
     if np.diag(matrix).min() < 0:
         return "a variance is negative"
-    for each, u in zip(sensor_estimates, np.sqrt(np.diag(matrix)), strict=True):
-        if each.u is not None and not abs(each.u - u) <= ROUNDING * u:
-            return f"u = {each.u:.3g} where the covariance says {u:.3g}"
+    for sensor_estimate, u in zip(sensor_estimates, np.sqrt(np.diag(matrix)), strict=True):
+        if sensor_estimate.u is not None and not abs(sensor_estimate.u - u) <= ROUNDING * u:
+            return f"u = {sensor_estimate.u:.3g} where the covariance says {u:.3g}"
     return None
 
 

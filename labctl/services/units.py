@@ -60,8 +60,10 @@ def _answer(
         recalibration=_recalibration(store, act) if act and whole else None,
         draft=newest_draft(store, unit_row.serial) if whole else None,
         formats=[
-            ExportFormatResponse(id=name, title=each.title, suffix=each.suffix, options=dict(each.options))
-            for name, each in export_formats().items()
+            ExportFormatResponse(
+                id=name, title=export_format.title, suffix=export_format.suffix, options=dict(export_format.options)
+            )
+            for name, export_format in export_formats().items()
         ],
     )
 

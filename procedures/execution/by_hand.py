@@ -134,7 +134,7 @@ class TurnReadings:
         recorder = self._context.recorder
         for blocks in rounds:
             if part not in self._numbers:
-                self._open(part, min((float(each.t_s[0]) for each in blocks.values() if len(each)), default=None))
+                self._open(part, min((float(block.t_s[0]) for block in blocks.values() if len(block)), default=None))
             for name, readings in blocks.items():
                 self._courses[part][name].add(readings)
                 if len(readings) or readings.lost or readings.damaged:

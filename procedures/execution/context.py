@@ -119,6 +119,6 @@ class ExecutionContext:
 
 def raise_violation(violations: list[GuardViolation]) -> None:
     """Raise GuardTripped for the first limit that does more than warn; one that fails goes before one that suspends."""
-    serious = [each for each in violations if each.action != "warn"]
+    serious = [violation for violation in violations if violation.action != "warn"]
     if serious:
         raise min(serious, key=lambda each: each.action != "fail").error()

@@ -67,17 +67,19 @@ class CourseLog:
 
         Raises StepFailed for too few angles, and for angles that do not follow the course.
         """
-        t_s = np.array([one.t_s for one in self.readings])
+        t_s = np.array([reading.t_s for reading in self.readings])
         needed = ANGLES_EACH * regressors(run.course, np.zeros(1)).shape[1]
         if len(t_s) < needed:
             raise StepFailed(
                 f"{self._name}: its encoder was read {len(t_s)} times during a {run.course.text}, but {needed} angles "
                 "are needed; make it longer, or check the link"
             )
-        angle_deg = np.array([one.angle_deg for one in self.readings])
+        angle_deg = np.array([reading.angle_deg for reading in self.readings])
         since_s = t_s - run.began_s
         own_dps = np.abs(run.course.rate_dps(since_s))
-        u_deg = np.hypot([one.u_deg for one in self.readings], own_dps * [one.u_s for one in self.readings])
+        u_deg = np.hypot(
+            [reading.u_deg for reading in self.readings], own_dps * [reading.u_s for reading in self.readings]
+        )
         design = regressors(run.course, since_s)
         fitted, covariance, excess = _fitted(design, angle_deg - run.course.angle_deg(since_s), u_deg)
         if excess > MOST_EXCESS:
@@ -90,7 +92,9 @@ class CourseLog:
         ends = measured.angle_deg(np.asarray(time.of(np.array([run.began_s, run.ends_s]))))
         mean_dps = float(ends[1] - ends[0]) / run.course.duration_s
         commanded = run.course.angle_deg(np.array([run.course.duration_s]))
-        common_u_s = float(np.mean([one.common_u_s for one in self.readings]))  # as early or late in each answer
+        common_u_s = float(
+            np.mean([reading.common_u_s for reading in self.readings])
+        )  # as early or late in each answer
         by_encoder = CourseTime(_time_u_s(run, covariance), common_u_s)
         return TableAngles(
             tuple(np.asarray(time.of(t_s)).tolist()), tuple(angle_deg.tolist()), mean_dps,

@@ -58,9 +58,9 @@ class EncoderLog:
                 f"{self._table.name}: its encoder was read {len(self.readings)} times during a data set, but a "
                 f"mean rate needs {LEAST} angles; take longer data sets, or check the link"
             )
-        t_s = np.array([one.t_s for one in self.readings])
-        angle_deg = np.array([one.angle_deg for one in self.readings])
-        u_deg = np.array([math.hypot(one.u_deg, spin.rate_dps * one.u_s) for one in self.readings])
+        t_s = np.array([reading.t_s for reading in self.readings])
+        angle_deg = np.array([reading.angle_deg for reading in self.readings])
+        u_deg = np.array([math.hypot(reading.u_deg, spin.rate_dps * reading.u_s) for reading in self.readings])
         rate_dps, u_dps, from_deg = fitted_line(t_s - gate_from_s, angle_deg, u_deg)
         if spin.rate_dps == 0 and abs(rate_dps) <= COVERAGE * u_dps:
             rate_dps = 0.0  # it holds its angle

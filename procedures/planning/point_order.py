@@ -90,7 +90,7 @@ def _blocks(recipe: Recipe) -> list[MountingBlock]:
         visits = [(position, (temperature,)) for temperature in temperatures for position in recipe.positions]
     blocks: list[MountingBlock] = []
     for position, levels in visits:
-        blocks.append(MountingBlock(position, tuple(Level(each, recipe.rates_dps) for each in levels)))
+        blocks.append(MountingBlock(position, tuple(Level(level, recipe.rates_dps) for level in levels)))
         blocks += _turned(recipe, position, levels)
     return _merged(blocks)
 

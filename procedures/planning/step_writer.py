@@ -66,7 +66,7 @@ class _StepWriter:
             self.measure(block)
         self.power_cycles()
         for block in verification_blocks(self.recipe):
-            levels = tuple(Level(each.temperature_c, self.runnable(each.rates_dps)) for each in block.levels)
+            levels = tuple(Level(level.temperature_c, self.runnable(level.rates_dps)) for level in block.levels)
             self.measure(replace(block, levels=levels))
         if any(isinstance(step, Acquire) and step.rate_dps for step in self.steps[self.timed_at :]):
             self.measure_clock(LATER_RUNS)

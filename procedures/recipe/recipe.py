@@ -143,8 +143,10 @@ def parse_recipe(text: str, *, where: str = "recipe") -> Recipe:
 def _complaints(error: ValidationError) -> str:
     """Return everything that is wrong in one line; a list that is empty only because of its items is not said twice."""
     details: list[dict[str, Any]] = [dict(each) for each in error.errors()]
-    blamed = [each["loc"][:-1] for each in details]
-    return listed(_complaint(each) for each in details if not (each["type"] == "too_short" and each["loc"] in blamed))
+    blamed = [detail["loc"][:-1] for detail in details]
+    return listed(
+        _complaint(detail) for detail in details if not (detail["type"] == "too_short" and detail["loc"] in blamed)
+    )
 
 
 def _complaint(error: dict[str, Any]) -> str:
@@ -166,5 +168,7 @@ def _keys(location: list[str]) -> list[str]:
     for part in location:
         field = table.model_fields.get(part)
         options = [field.annotation, *getattr(field.annotation, "__args__", ())] if field else []
-        table = next((each for each in options if isinstance(each, type) and issubclass(each, BaseModel)), Recipe)
+        table = next(
+            (option for option in options if isinstance(option, type) and issubclass(option, BaseModel)), Recipe
+        )
     return list(table.model_fields)

@@ -136,7 +136,7 @@ class LabJackGyro:
             self._said = {"inputs": f"{self._model} {self._registers.get_int(lj.SERIAL_NUMBER)}"}
             constants = self._constants()
             scalings = [self._scaling_of(product, constants, number) for number in self._inputs]
-            self._scaling = [(each.slope_v, each.centre) for each in scalings]
+            self._scaling = [(scaling.slope_v, scaling.centre) for scaling in scalings]
         return self._scaling
 
     def _scaling_of(self, product: int, constants: list[float], number: int) -> lj.Scaling:

@@ -38,7 +38,7 @@ class CanLayout:
         database = CanDatabase(dbc)
         _require_channels(signals, axes, units, hold)
         channels = {name: database.signal(path) for name, path in signals.items()}
-        scales = {name: _scale(name, each, units.get(name)) for name, each in channels.items()}
+        scales = {name: _scale(name, channel, units.get(name)) for name, channel in channels.items()}
         checked = {path: database.signal(path) for path in status}
         counting = [database.signal(path) for path in counters]
         parts: dict[int, list[tuple[str, CanSignal]]] = {}
@@ -114,13 +114,13 @@ def _scale(name: str, signal: CanSignal, stated: str | None) -> Scale:
 def _good(signal: CanSignal, values: Sequence[int | str]) -> frozenset[int]:
     if signal.is_float:
         raise ValueError(f"status {signal.path!r} is a floating-point number; name a signal of whole numbers")
-    if unknown := next((each for each in values if isinstance(each, str) and each not in signal.choices), None):
+    if unknown := next((value for value in values if isinstance(value, str) and value not in signal.choices), None):
         known = ", ".join(map(repr, signal.choices)) or "none"
         raise ValueError(
             f"status {signal.path!r}: the DBC file has no value {unknown!r} (it has {known}); write one of them, or a "
             "raw number"
         )
-    return frozenset(signal.choices[each] if isinstance(each, str) else each for each in values)
+    return frozenset(signal.choices[value] if isinstance(value, str) else value for value in values)
 
 
 def _counter_bits(counting: Sequence[CanSignal]) -> int | None:

@@ -141,11 +141,11 @@ def configuration_frame(given: Configuration) -> bytes:
     body[3] = bit_rate << 4 | (given.stop_bits == 2) << 3 | PARITIES.index(given.parity) << 1 | given.crlf
     body[4] = sum(bit for axis, bit in (("x", 0x40), ("y", 0x20), ("z", 0x10)) if axis in given.axes)
     body[4] |= OUTPUT_UNITS.index(given.unit) | (DELAYED if given.is_delayed else 0)
-    x_hz, y_hz, z_hz = (_code(FILTERS_HZ, each) for each in given.filters_hz)
+    x_hz, y_hz, z_hz = (_code(FILTERS_HZ, filter_hz) for filter_hz in given.filters_hz)
     compensations = {name: code for code, name in G_COMPENSATIONS.items()}
     body[5], body[6] = x_hz << 4 | y_hz, z_hz << 4 | compensations[given.g_compensation]
     body[13] = 8 if given.has_pps else 0
-    x_dps, y_dps, z_dps = (_code(RANGES_DPS, each) for each in given.ranges_dps)
+    x_dps, y_dps, z_dps = (_code(RANGES_DPS, range_dps) for range_dps in given.ranges_dps)
     ranges = {value: number for number, value in ACCELERATION_RANGES_G.items()}
     reach = ranges[given.acceleration_range_g or 10]
     body[14], body[15] = x_dps << 4 | y_dps, z_dps << 4

@@ -206,5 +206,5 @@ class FrameDecoder:
             values[field.name] = numbers
             if field.hold:
                 self._held[field.name] = int(numbers[-1])
-        kept = {name: each[is_reading] for name, each in values.items()}
+        kept = {name: value[is_reading] for name, value in values.items()}
         return _Part(kept, good[is_reading], behind[is_reading])

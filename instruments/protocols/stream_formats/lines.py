@@ -42,14 +42,14 @@ class LineDecoder:
             pieces, behind = pieces[1:], behind[1:]
             self._in_line = True
         parsed_lines = [self._numbers(piece) if piece else _Not.OTHER_MESSAGE for piece in pieces]
-        rows = [each for each in parsed_lines if isinstance(each, list)]
+        rows = [parsed_line for parsed_line in parsed_lines if isinstance(parsed_line, list)]
         numbers = np.asarray(rows, dtype=np.float64).reshape(-1, len(self._columns)).T
         good = np.ones(len(rows), dtype=bool)
         values = {}
         for field, column, step in zip(self._layout.fields, numbers, self._steps, strict=True):
             values[field.name], fits = whole_numbers(column, step)
             good &= fits
-        after = behind[[isinstance(each, list) for each in parsed_lines]]
+        after = behind[[isinstance(parsed_line, list) for parsed_line in parsed_lines]]
         return Decoded(values, flags(self._format, values, good), after, parsed_lines.count(_Not.DAMAGED))
 
     def _numbers(self, line: bytes) -> list[float] | _Not:

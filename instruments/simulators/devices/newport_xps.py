@@ -95,7 +95,7 @@ class XpsController:
         if self.status != JOGGING:
             return NOT_ALLOWED, "", t_s
         try:
-            rate, acceleration = (float(each) for each in arguments)
+            rate, acceleration = (float(argument) for argument in arguments)
         except ValueError:
             return ARGUMENTS, "", t_s
         if abs(rate) > MAX_DPS or not 0 < acceleration <= MAX_DPS2:

@@ -176,7 +176,7 @@ def _of_token(uri: TokenUri, settings: SigningSettings) -> SigningKey:
         session = open_session(uri)
         key = session.get_key(object_class=ObjectClass.PRIVATE_KEY, label=uri.object)
         certificates = session.get_objects({Attribute.CLASS: ObjectClass.CERTIFICATE, Attribute.LABEL: uri.object})
-        kept = [x509.load_der_x509_certificate(each[Attribute.VALUE]) for each in certificates]
+        kept = [x509.load_der_x509_certificate(certificate[Attribute.VALUE]) for certificate in certificates]
     except (PKCS11Error, RuntimeError, KeyError, OSError, ValueError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(f"{where}: {said}; check token, object, module and PIN") from error

@@ -77,9 +77,9 @@ def _xades(root: Any, xml: bytes, roots: Sequence[x509.Certificate] | None) -> S
         results = XAdESVerifier().verify(xml, x509_cert=own, expect_config=config)
     except (SignXMLException, ValueError, TypeError, etree.LxmlError) as error:
         return replace(signature, problem=" ".join(str(error).split()) or type(error).__name__)
-    if not any(each.signed_xml is not None and each.signed_xml.tag == root.tag for each in results):
+    if not any(result.signed_xml is not None and result.signed_xml.tag == root.tag for result in results):
         return replace(signature, problem="the signature is not over the whole certificate")
-    (signed,) = [each for each in results if isinstance(each, XAdESVerifyResult)]
+    (signed,) = [result for result in results if isinstance(result, XAdESVerifyResult)]
     at = datetime.fromisoformat(signed.signed_properties.findtext(f"{{{XADES}}}SigningTime"))
     return _with_trust(replace(signature, valid=True, signed_at=at), at, own, chain, roots)
 
@@ -112,7 +112,8 @@ def _attached(reader: PdfFileReader) -> Iterator[bytes]:
 
 def _pades(signature: EmbeddedPdfSignature, roots: Sequence[x509.Certificate] | None) -> SignatureFound:
     own, *chain = [
-        x509.load_der_x509_certificate(each.dump()) for each in (signature.signer_cert, *signature.other_embedded_certs)
+        x509.load_der_x509_certificate(other_embedded_cert.dump())
+        for other_embedded_cert in (signature.signer_cert, *signature.other_embedded_certs)
     ]
     at = signature.self_reported_timestamp
     pades_signature = SignatureFound("PAdES", signatory=signatory_of(own), signed_at=at)
@@ -148,7 +149,7 @@ def _with_trust(
     if roots is None:
         what = "self-signed" if own.issuer == own.subject else f"issued by {own.issuer.rfc4514_string()}"
         return replace(signature, reason=f"{what}: trust not established; name the file of a trusted authority by --ca")
-    context = ValidationContext(trust_roots=[_asn1(each) for each in roots], allow_fetching=False, moment=at)
+    context = ValidationContext(trust_roots=[_asn1(root) for root in roots], allow_fetching=False, moment=at)
     validator = CertificateValidator(_asn1(own), [_asn1(each) for each in chain], validation_context=context)
     try:
         in_own_thread(lambda: asyncio.run(validator.async_validate_path()))

@@ -61,8 +61,10 @@ def add(
     if as_json:
         print_json(answer)
         return
-    for each in answer.readings[: len(given)]:
-        console.print(f"{each.measured_at:%Y-%m-%d %H:%M}  {each.quantity} {each.value:g} {each.unit}", markup=False)
+    for reading in answer.readings[: len(given)]:
+        console.print(
+            f"{reading.measured_at:%Y-%m-%d %H:%M}  {reading.quantity} {reading.value:g} {reading.unit}", markup=False
+        )
 
 
 @app.command("show")
@@ -89,6 +91,6 @@ def show(
         print_json(answer)
         return
     rows = table("", "quantity", "unit", "least", "largest", "readings", numbers=3)
-    for each in answer.spans:
-        rows.add_row(each.quantity, each.unit, format_number(each.low), format_number(each.high), str(each.readings))
+    for span in answer.spans:
+        rows.add_row(span.quantity, span.unit, format_number(span.low), format_number(span.high), str(span.readings))
     console.print(rows)

@@ -117,7 +117,7 @@ def _try_description(
     elif not sends:
         console.print(f"{answer.name}, a {answer.kind}: the description is valid; give --port or --host to try it")
     else:
-        failed = sum(1 for each in answer.checks if each.problem)
+        failed = sum(1 for check in answer.checks if check.problem)
         said = f"{failed} of {len(answer.checks)} failed" if failed else f"all {len(answer.checks)} passed"
         left = "" if move or answer.kind == "reference" else "; its commands were not tried (--move)"
         console.print(f"{answer.name}, a {answer.kind} at {answer.address}: {said}{left}", soft_wrap=True)
@@ -142,7 +142,7 @@ def _try_driver(name: str, bench: str | None, *, as_json: bool) -> None:
     if as_json:
         print_json(answer)
     else:
-        failed = sum(1 for each in answer.checks if each.problem)
+        failed = sum(1 for check in answer.checks if check.problem)
         said = (
             f"{failed} of {len(answer.checks)} checks failed" if failed else f"all {len(answer.checks)} checks passed"
         )

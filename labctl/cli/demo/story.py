@@ -50,8 +50,8 @@ def _certify_best(demo: DemoRunner, serial: str) -> None:
     # no second person: the demo certifies units of its own
     act = put_in_force(demo.store, serial, best.version, request, VirtualClock().utc(), None)
     demo.say(f"{serial} version {act.version} ({best.model}): verdict {act.verdict or f'none, {act.verdict_reason}'}")
-    for each in act.objections:
-        demo.say(f"  overridden: {each.text}")
+    for objection in act.objections:
+        demo.say(f"  overridden: {objection.text}")
 
 
 def _least_known(error: ErrorFiguresJson) -> float:

@@ -147,8 +147,8 @@ def _verdict(answer: CertificationResponse) -> str:
 
 
 def _print_objections(answer: CertificationResponse) -> None:
-    for each in answer.objections:
-        console.print(f"  overridden: {each.text}", style="bold red", soft_wrap=True)
+    for objection in answer.objections:
+        console.print(f"  overridden: {objection.text}", style="bold red", soft_wrap=True)
 
 
 def print_table(coefficients: Coefficients) -> None:

@@ -95,10 +95,11 @@ def print_live(answer: LiveResponse) -> None:
 
         print_fit(answer.fit)
         return
-    for each in answer.coefficients:
-        limit = "" if each.limit is None else f", limit {each.limit:g}"
+    for coefficient in answer.coefficients:
+        limit = "" if coefficient.limit is None else f", limit {coefficient.limit:g}"
         console.print(
-            f"{each.axis} {each.name}: {_with_unit(each.value, each.unit)}, U = {each.expanded:.2g} (k = 2{limit})"
+            f"{coefficient.axis} {coefficient.name}: {_with_unit(coefficient.value, coefficient.unit)}, U = "
+            f"{coefficient.expanded:.2g} (k = 2{limit})"
         )
     console.print(f"not complete: {answer.text}" if not answer.complete else f"no version: {answer.refused}")
     for text in answer.missing:

@@ -21,7 +21,7 @@ def print_sensor(answer: AccelerometerResponse | MagnetometerResponse) -> None:
 def print_kept(answer: AccelerometerVersion | MagnetometerVersion) -> None:
     """Print a version that was kept: its parameters, who and when, and its data."""
     print_sensor(answer.result)
-    files = ", ".join(f"{each.name} ({each.sha256[:12]})" for each in answer.data.files)
+    files = ", ".join(f"{file.name} ({file.sha256[:12]})" for file in answer.data.files)
     console.print(
         f"{answer.sensor} of {answer.serial}, version {answer.version}: stored {answer.at:%Y-%m-%d %H:%M} UTC by "
         f"{answer.by}; hash {answer.hash[:12]}",
@@ -33,10 +33,10 @@ def print_kept(answer: AccelerometerVersion | MagnetometerVersion) -> None:
 def print_versions(answers: Sequence[SensorVersionResponse]) -> None:
     """Print the versions of a unit's sensors."""
     rows = table("accelerometer and magnetometer", "sensor", "version", "verdict", "stored, UTC", "by", "files", "hash")
-    for each in answers:
+    for answer in answers:
         rows.add_row(
-            each.sensor, str(each.version), each.verdict, f"{each.at:%Y-%m-%d %H:%M}", each.by,
-            str(len(each.data.files)), each.hash[:12],
+            answer.sensor, str(answer.version), answer.verdict, f"{answer.at:%Y-%m-%d %H:%M}", answer.by,
+            str(len(answer.data.files)), answer.hash[:12],
         )  # fmt: skip
     console.print(rows)
 

@@ -145,7 +145,7 @@ def _table(values: object) -> str:
     if not isinstance(values, list):
         return str(values)
     between = ",\n " if isinstance(values[0], list) else ", "
-    return "{" + between.join(_table(each) for each in values) + "}"
+    return "{" + between.join(_table(value) for value in values) + "}"
 
 
 FORMAT = Format(

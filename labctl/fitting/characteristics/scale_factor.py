@@ -69,9 +69,9 @@ def slope_over(temperature_c: Array, estimates: list[Estimate]) -> Estimate | No
     if len(temperature_c) < 2 or float(np.ptp(temperature_c)) < 1.0:
         return None
     columns = np.column_stack([np.ones(len(temperature_c)), temperature_c - temperature_c.mean()])
-    values, u, _ = _solved(columns, np.array([each.value for each in estimates]))
+    values, u, _ = _solved(columns, np.array([estimate.value for estimate in estimates]))
     weights = columns[:, 1] / float(columns[:, 1] @ columns[:, 1])
-    own = [each.u for each in estimates if each.u is not None]
+    own = [estimate.u for estimate in estimates if estimate.u is not None]
     carried = float(np.sqrt(np.sum((weights * np.array(own)) ** 2))) if len(own) == len(estimates) else None
     known = [each for each in (u[1], carried) if each is not None]
     return Estimate(values[1], max(known) if known else None)

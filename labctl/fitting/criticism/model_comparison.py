@@ -261,11 +261,11 @@ def compare_models(
         number = len({(option.candidate, option.smooth) for option in design.options})
         report_stage(f"comparing {number} candidates, axis {axis}")
         axis_comparisons[axis] = compare_axis(data, design, axis)
-    axes = {axis: one.evidence for axis, one in axis_comparisons.items()}
+    axes = {axis: axis_comparison.evidence for axis, axis_comparison in axis_comparisons.items()}
     return Comparison(
         data, model, designs, axes,
-        {axis: one.white_var for axis, one in axis_comparisons.items()},
-        {axis: one.scale for axis, one in axis_comparisons.items()},
+        {axis: axis_comparison.white_var for axis, axis_comparison in axis_comparisons.items()},
+        {axis: axis_comparison.scale for axis, axis_comparison in axis_comparisons.items()},
         rank_candidates(designs, axes, data.info.technology or ""),
     )  # fmt: skip
 

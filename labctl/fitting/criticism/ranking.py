@@ -100,8 +100,8 @@ def rank_candidates(
     places = {axis: _places(design) for axis, design in designs.items()}
     priors = {axis: _size_priors(design, axes[axis], technology) for axis, design in designs.items()}
     ranked = []
-    for key in dict.fromkeys(key for each in places.values() for key in each):
-        which = {axis: each[key] for axis, each in places.items() if key in each}
+    for key in dict.fromkeys(key for place in places.values() for key in place):
+        which = {axis: place[key] for axis, place in places.items() if key in place}
         ranked.append(_physical_or_not(key, which, designs, axes, priors))
     return tuple(sorted((c for c in ranked if c is not None), key=lambda c: -c.log_bf))
 

@@ -143,7 +143,7 @@ def placed_rad(standards: Iterable[Standard]) -> float:
 
 def stated_rad(standards: Iterable[Standard], quantities: Collection[str]) -> float:
     """Return the standard deviation of angles that are stated, deg, taken together, rad; 0 where none is stated."""
-    return math.radians(math.hypot(*(each.standard_u for each in standards if each.quantity in quantities)))
+    return math.radians(math.hypot(*(standard.standard_u for standard in standards if standard.quantity in quantities)))
 
 
 def leaning_rates(channels: Channels, angles_rad: Mapping[str, Mapping[str, float]]) -> dict[str, Array]:

@@ -139,7 +139,7 @@ def _of_responses(channels: Channels, axis: str) -> NDArray[np.float64]:
         return np.zeros((len(channels), 0))
     responses = [Response(delay_s=delay) for delay in DELAYS_S] + [Response(0.0, tau) for tau in TIME_CONSTANTS_S]
     rate = channels.rate_dps(axis)
-    return np.column_stack([rate, *(channels.through(each).rate_dps(axis) - rate for each in responses)])
+    return np.column_stack([rate, *(channels.through(response).rate_dps(axis) - rate for response in responses)])
 
 
 def _of_other_axes(channels: Channels, axis: str, warm: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:

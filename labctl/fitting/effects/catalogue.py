@@ -88,7 +88,7 @@ def _own() -> dict[str, Effect]:
 
 @cache
 def _all() -> dict[str, Effect]:
-    return FAMILIES.merged(lambda kinds: ((each.id, each) for each in kinds), "effect")
+    return FAMILIES.merged(lambda kinds: ((kind.id, kind) for kind in kinds), "effect")
 
 
 CATALOGUE: Mapping[str, Effect] = Catalogue()

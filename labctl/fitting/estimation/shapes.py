@@ -30,7 +30,11 @@ TOLERANCE, EVALUATIONS = 0.005, 60
 
 def quantities(kind: Effect) -> list[Parameter]:
     """Return the parameters that are found from the data: of an effect of the bias, and of one that remembers."""
-    return [each for each in kind.parameters if each.logarithmic] if kind.shows_at_rest or kind.remembers else []
+    return (
+        [parameter for parameter in kind.parameters if parameter.logarithmic]
+        if kind.shows_at_rest or kind.remembers
+        else []
+    )
 
 
 def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> Preset:

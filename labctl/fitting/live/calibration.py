@@ -246,9 +246,10 @@ class LiveCalibration:
         absent = [each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if not has]
         missing = [text for text in (_poses_text(absent, target), why or (refused if len(rests.up) else "")) if text]
         missing += [
-            f"U of {each.name} of {each.axis} is {each.expanded:.2g}, above its limit of {each.limit:g} ({each.unit})"
-            for each in coefficients
-            if not each.is_met
+            f"U of {coefficient.name} of {coefficient.axis} is {coefficient.expanded:.2g}, above its limit of "
+            f"{coefficient.limit:g} ({coefficient.unit})"
+            for coefficient in coefficients
+            if not coefficient.is_met
         ]
         request = PoseRequest(self._pose(rests.up, covers, coefficients), target.rest_s) if missing else None
         t_s = recording.columns["t_s"]

@@ -207,7 +207,7 @@ class RunningMemory:
         if self._last is None:
             return None
         t_s, warm, places = self._last
-        at_c = (each.at_c(place, warm) for each, place in zip(self._followers, places, strict=True))
+        at_c = (follower.at_c(place, warm) for follower, place in zip(self._followers, places, strict=True))
         return MemoryState(t_s, warm, tuple(at_c))
 
     def reset(self) -> None:
@@ -224,7 +224,7 @@ class RunningMemory:
                 "and all values must be finite; hand over the `state` of a compensator of the same calibration"
             )
         warm = state.temperature_c
-        places = (each.place(at_c, warm) for each, at_c in zip(self._followers, state.at_c, strict=True))
+        places = (follower.place(at_c, warm) for follower, at_c in zip(self._followers, state.at_c, strict=True))
         self._last = state.t_s, warm, tuple(places)
 
     @property
@@ -266,12 +266,12 @@ class RunningMemory:
         steps = Steps.of(t_s, warm, last_s, last_c)
         moved: dict[tuple[str, float, float | None], Array] = {}
         rows = []
-        for each, place in zip(self._followers, places, strict=True):
-            movement = each.movement
+        for follower, place in zip(self._followers, places, strict=True):
+            movement = follower.movement
             if movement not in moved:
-                moved[movement] = each.moved(steps, place)
-            rows.append(each.state(moved[movement], warm))
-        ends = tuple(float(moved[each.movement][-1]) for each in self._followers)
+                moved[movement] = follower.moved(steps, place)
+            rows.append(follower.state(moved[movement], warm))
+        ends = tuple(float(moved[follower.movement][-1]) for follower in self._followers)
         self._last = float(t_s[-1]), float(warm[-1]), ends
         if self._sizes.shape == (1, 1):  # a product of matrices would cost as much as the state
             np.multiply(rows[0], self._sizes[0, 0], out=errors[:, 0])
@@ -319,4 +319,4 @@ def state_json(fitted: FittedModel) -> StateJson | None:
     if memory is None:
         return None
     more = SCALE_EQUATION.format(law=LAWS[fitted.model.argument]) if memory.has_scale else ""
-    return {"equation": STATE_EQUATION + more, "elements": [each.to_json() for each in memory.followers]}
+    return {"equation": STATE_EQUATION + more, "elements": [follower.to_json() for follower in memory.followers]}

@@ -33,7 +33,7 @@ class BenchConditions:
 
     def of(self, quantity: str) -> tuple[Standard, ...]:
         """Return the standards of a quantity."""
-        return tuple(each for each in self.standards if each.quantity == quantity)
+        return tuple(standard for standard in self.standards if standard.quantity == quantity)
 
     def angle_gains(self, axis: str) -> AngleGains:
         """Return how the misalignment towards a body axis follows the angles of its mountings; 1 where not stored.
@@ -53,7 +53,7 @@ class BenchConditions:
         conditions_json: BenchConditionsJson = {
             "used_on": self.used_on.isoformat(), "motion": self.motion, "thermometer": self.thermometer,
             "latitude_deg": self.latitude_deg, "turn_common_u": self.turn_common_u, "max_rate_dps": self.max_rate_dps,
-            "stated": [each.model_dump(mode="json") for each in self.standards],  # type: ignore[misc]
+            "stated": [standard.model_dump(mode="json") for standard in self.standards],  # type: ignore[misc]
         }  # fmt: skip
         if self.mountings:
             conditions_json["mountings"] = dict(self.mountings)

@@ -87,7 +87,7 @@ def _bound(places: list[tuple[float, float, RateUncertainty]], coefficients: Map
         "temperature_c": warm,
         "why": "; ".join(f"{part}: {why}" for part, why in bound.unknown.items()),
         "budget": bound.budget.to_json(),
-        "coefficients": {name: _expanded(one) for name, one in coefficients.items()},
+        "coefficients": {name: _expanded(coefficient) for name, coefficient in coefficients.items()},
     }
 
 

@@ -37,7 +37,7 @@ def slope_error(left: LocalModelError, temperature_c: float, across: str | None 
 
     known = np.isfinite(left.left_var)
     rates = [left.rate_dps, *(left.across_dps or {}).values()]
-    squares = np.stack([np.ones(len(known)), *(each**2 for each in rates)], axis=1)[known]
+    squares = np.stack([np.ones(len(known)), *(rate**2 for rate in rates)], axis=1)[known]
     weight = near_weights(left.warmth_away(temperature_c)[known])
     root, size = np.sqrt(weight / weight.sum()), np.maximum(squares.max(axis=0), np.finfo(float).tiny)
     beyond = left.left_var[known] - left.white_var[known]

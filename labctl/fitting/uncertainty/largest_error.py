@@ -33,9 +33,13 @@ def widening(uncertainties: Sequence[RateVectorUncertainty], seen: Sequence[Sequ
     """
     outputs = uncertainties[0].outputs
     counts = np.array([[output in here for output in outputs] for here in seen or [outputs] * len(uncertainties)])
-    size = max((abs(rate) for each in uncertainties for rate in each.rates_dps.values()), default=0.0) or 1.0
-    terms = np.array([[1.0, *(each.rates_dps[axis] / size for axis in BODY_AXES)] for each in uncertainties])
-    covariance = np.array([each.covariance for each in uncertainties])
+    size = (
+        max((abs(rate) for uncertainty in uncertainties for rate in uncertainty.rates_dps.values()), default=0.0) or 1.0
+    )
+    terms = np.array(
+        [[1.0, *(uncertainty.rates_dps[axis] / size for axis in BODY_AXES)] for uncertainty in uncertainties]
+    )
+    covariance = np.array([uncertainty.covariance for uncertainty in uncertainties])
     own = np.einsum("pii->pi", covariance)
     if not np.isfinite(own[counts]).all():
         return float("nan")

@@ -102,7 +102,7 @@ def standard_lines(bench: BenchConditions | None, s: Sensitivities) -> list[Sour
     n = len(s.angle_squared)
     if bench is None:
         return [_of_all(_unknown("standards", NOT_KEPT), n)]
-    stated = [_of_standard(each, bench, s) for each in bench.standards if _matters(each.quantity, bench)]
+    stated = [_of_standard(standard, bench, s) for standard in bench.standards if _matters(standard.quantity, bench)]
     return [*stated, *(_of_all(line, n) for line in _missing(bench))]
 
 
@@ -211,7 +211,9 @@ def _missing(bench: BenchConditions) -> list[BudgetLine]:
     if bench.thermometer != "unit":
         quantities += ["thermometer", "chamber_gradient"]
     quantities += ["level"] if bench.motion != "poses" else []
-    if any(Position.of(each).turned_deg for each in bench.mountings):  # then little else is left of these angles
+    if any(
+        Position.of(mounting).turned_deg for mounting in bench.mountings
+    ):  # then little else is left of these angles
         quantities.append("mounting_repeatability")
     missing = [name for name in quantities if not bench.of(name)]
     lines = [

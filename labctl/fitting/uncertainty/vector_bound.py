@@ -53,9 +53,9 @@ def vector_bounds(
 
 
 def _bound(axis: str, uncertainties: Sequence[RateVectorUncertainty], reach_dps: float) -> VectorBoundJson:
-    unknown = next((each for each in uncertainties if each.budgets[axis].expanded is None), None)
-    place = unknown or max(uncertainties, key=lambda each: each.budgets[axis].expanded or 0.0)
-    aligned = [each.aligned_budgets[axis].expanded or 0.0 for each in uncertainties]
+    unknown = next((uncertainty for uncertainty in uncertainties if uncertainty.budgets[axis].expanded is None), None)
+    place = unknown or max(uncertainties, key=lambda uncertainty: uncertainty.budgets[axis].expanded or 0.0)
+    aligned = [uncertainty.aligned_budgets[axis].expanded or 0.0 for uncertainty in uncertainties]
     return {
         "bound_dps": None if unknown else place.budgets[axis].expanded,
         "aligned_bound_dps": None if unknown else max(aligned),

@@ -64,7 +64,7 @@ def _day_first(words: Sequence[str]) -> bool:
         raise ValueError(f"{words[0][:40] if words else ''!r} is no date")
     if matches[0]["sep"] == ".":
         return True
-    first, second = (max(int(each[key]) for each in matches) for key in "ab")
+    first, second = (max(int(match[key]) for match in matches) for key in "ab")
     if (first > 12) == (second > 12):
         raise ValueError(
             f"{words[0][:40]!r} has the day first or the month first; write unit = 'date-time d/m/y' or unit = "

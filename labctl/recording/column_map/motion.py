@@ -55,7 +55,7 @@ def free_motion(columns: Columns, movement: Movement, t_s: Array, at_rest: Seque
 
 
 def _named(findings: Sequence[Finding]) -> str:
-    shown = "; ".join(f"{each.what}: {each.where}: {each.said}" for each in findings[:MOST_NAMED])
+    shown = "; ".join(f"{finding.what}: {finding.where}: {finding.said}" for finding in findings[:MOST_NAMED])
     more = f"; and {len(findings) - MOST_NAMED} more" if len(findings) > MOST_NAMED else ""
     return f". Taken to rest, its readings have this wrong: {shown}{more}" if findings else ""
 

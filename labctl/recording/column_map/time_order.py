@@ -50,8 +50,8 @@ def _twice(table: RawTable, values: NDArray[np.float64], kept: NDArray[np.bool_]
     """Return the finding about rows that repeat an earlier row with its time, (n,) times; None where others are out."""
     order = np.argsort(values, kind="stable")
     same = values[order[1:]] == values[order[:-1]]
-    for each in table.columns.values():
-        cells = each.values if each.is_number else each.words
+    for column in table.columns.values():
+        cells = column.values if column.is_number else column.words
         if cells is not None and len(cells) == len(values):
             same &= cells[order[1:]] == cells[order[:-1]]
     again = np.zeros(len(values), dtype=np.bool_)

@@ -76,9 +76,9 @@ def _without_prefix(columns: list[RawColumn]) -> list[RawColumn]:
     """Return columns of one struct, group or record by the names that they have within it."""
     parts = [column.name.split(".") for column in columns]
     shared = 0
-    while all(len(each) > shared + 1 and each[shared] == parts[0][shared] for each in parts):
+    while all(len(part) > shared + 1 and part[shared] == parts[0][shared] for part in parts):
         shared += 1
-    return [replace(column, name=".".join(each[shared:])) for column, each in zip(columns, parts, strict=True)]
+    return [replace(column, name=".".join(part[shared:])) for column, part in zip(columns, parts, strict=True)]
 
 
 def _columns(name: str, values: NDArray[Any], unit: str) -> Iterator[RawColumn]:

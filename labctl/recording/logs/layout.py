@@ -99,7 +99,10 @@ def is_number(cell: str) -> bool:
 
 def _separator(lines: list[str]) -> str:
     divisions = [_division(lines, separator) for separator in SEPARATORS.values()]
-    best = max(divisions, key=lambda each: (each.score > 0, each.width > 1, round(each.score, 1), each.width))
+    best = max(
+        divisions,
+        key=lambda division: (division.score > 0, division.width > 1, round(division.score, 1), division.width),
+    )
     return best.separator
 
 

@@ -65,7 +65,7 @@ def check_responses(summary: Summary, responses_by_axis: Mapping[str, Mapping[st
 
 def _follower(axis: str, outputs: Mapping[str, Response]) -> str | None:
     """Return the output that follows the table where the axis that should does not; None where all is well."""
-    others = {name: one for name, one in outputs.items() if name != axis and one.is_known}
+    others = {name: output for name, output in outputs.items() if name != axis and output.is_known}
     if not others:
         return None
     name, strongest = max(others.items(), key=lambda item: abs(item[1].gain))

@@ -284,16 +284,18 @@ def findings_of(
 
 def _not_said(of_readings: Sequence[Finding], findings: Sequence[Finding]) -> Iterator[Finding]:
     """Yield findings of readings but those that the data sets' figures say too, with what they leave in the means."""
-    said = {(each.what, each.channel) for each in findings if each.channel}
-    yield from (each for each in of_readings if (each.what, each.channel) not in said)
+    said = {(finding.what, finding.channel) for finding in findings if finding.channel}
+    yield from (finding for finding in of_readings if (finding.what, finding.channel) not in said)
 
 
 def _with_gross(findings: Sequence[Finding], gross: Sequence[Finding]) -> list[Finding]:
     """Return findings of rates and the gross ones: what wraps explains all else of its axis; none is said twice."""
     wrapped = {each.where.partition(",")[0] for each in gross if each.what == "wrapped"}
-    said = {each.where for each in findings} | {"of a whole axis" for each in findings if each.what in OF_AXIS}
+    said = {finding.where for finding in findings} | {
+        "of a whole axis" for finding in findings if finding.what in OF_AXIS
+    }
     added = [each for each in gross if each.what == "wrapped" or not {each.where, "of a whole axis"} & said]
-    return [*(each for each in findings if not wrapped & set(each.where.split(", "))), *added]
+    return [*(finding for finding in findings if not wrapped & set(finding.where.split(", "))), *added]
 
 
 def _order(finding: Finding) -> bool:

@@ -60,7 +60,7 @@ def check_database(
         anchor=None if result.head is None else str(result.head),
         remarks=list(result.remarks),
         kept_readings=[each.text for each in kept_beside(location)],
-        findings=[FindingResponse(part=each.part, text=each.text) for each in result.findings],
+        findings=[FindingResponse(part=finding.part, text=finding.text) for finding in result.findings],
     )
 
 

@@ -84,7 +84,7 @@ def check_description(
             checks.append(each)
             if done is not None:
                 done(each)
-        keep = any(each.problem for each in checks)
+        keep = any(check.problem for check in checks)
     except ValidationError as error:
         raise BadInput(f"description {source}: {error.errors()[0]['msg']}; correct the address or the file") from error
     finally:
@@ -93,7 +93,7 @@ def check_description(
             file = None
     return DescriptionTestResponse(
         file=source, name=description.name, kind=description.kind, address=port or host,
-        ok=not any(each.problem for each in checks), checks=checks, wire_log=None if file is None else str(file),
+        ok=not any(check.problem for check in checks), checks=checks, wire_log=None if file is None else str(file),
     )  # fmt: skip
 
 

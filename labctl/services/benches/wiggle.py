@@ -140,11 +140,11 @@ class _Test:
     def _shares(self, rates: Mapping[str, Rates]) -> dict[str, float]:
         """Return the root mean square of each unit's rates, less those at rest, as a share of its limit."""
         return {
-            name: float(np.sqrt(np.mean(np.sum((each - self._rest[name].mean_dps) ** 2, axis=1))))
+            name: float(np.sqrt(np.mean(np.sum((rate - self._rest[name].mean_dps) ** 2, axis=1))))
             / self._rest[name].limit_dps
-            if len(each)
+            if len(rate)
             else 0.0
-            for name, each in rates.items()
+            for name, rate in rates.items()
         }
 
 

@@ -109,7 +109,7 @@ def _lacks_something(criticism: CriticismResponse) -> bool:
     Of an ambiguous verdict: whether its leader takes off a share of the excess over noise, 0 where there is no excess.
     """
     if criticism.verdict == "ambiguous":
-        leader = [each for each in criticism.suspects if each["effect"] in criticism.named[:1]]
+        leader = [suspect for suspect in criticism.suspects if suspect["effect"] in criticism.named[:1]]
         return all(each["share_removed"] > 0 for each in leader)
     return criticism.verdict in {"missing", "unexplained"}
 

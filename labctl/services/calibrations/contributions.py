@@ -74,7 +74,8 @@ def write_figure(answer: UncertaintyResponse, target: Path) -> None:
             f"{target}: the contributions over rate and temperature were not computed; request them with grid = true"
         )
     over = {
-        axis: cast(ContributionsOverJson, each.model_dump(mode="json")) for axis, each in grid.contributions.items()
+        axis: cast(ContributionsOverJson, contribution.model_dump(mode="json"))
+        for axis, contribution in grid.contributions.items()
     }
     title = f"{answer.serial}, version {answer.version}: contributions to the uncertainty of a corrected rate"
     target.write_text(contributions_html(title, over, answer.not_stated), encoding="utf-8")

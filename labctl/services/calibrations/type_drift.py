@@ -93,7 +93,7 @@ def _histories(
 def _chosen(versions: Sequence[CertifiedVersion]) -> Iterator[list[CertifiedVersion]]:
     """Yield the newest versions of each unit that has several far enough apart, up to the number of units."""
     units = 0
-    for _, every in groupby(versions, key=lambda each: each.serial):
+    for _, every in groupby(versions, key=lambda version: version.serial):
         of_unit = [each for each in every if each.measured_at is not None]
         if not of_unit:
             continue
@@ -108,5 +108,5 @@ def _is_simulated(version: CertifiedVersion, calibration: Calibration, simulated
     """Return whether a version was measured on a simulated bench: by its campaigns, or by its standards."""
     standards = () if calibration.bench is None else calibration.bench.standards
     return any(simulated.get(number, False) for number in version.campaigns) or (
-        any(each.traceability == SIMULATED for each in standards)
+        any(standard.traceability == SIMULATED for standard in standards)
     )

@@ -114,8 +114,8 @@ def uncertainty_answer(
         },
         vector=None if vector is None else _vector_response(vector),
         any_axis=over_any_axis(calibration),
-        not_stated=list(dict.fromkeys(name for one in budgets.values() for name in one.not_stated)),
-        overdue=any(one.overdue for one in budgets.values()),
+        not_stated=list(dict.fromkeys(name for budget in budgets.values() for name in budget.not_stated)),
+        overdue=any(budget.overdue for budget in budgets.values()),
         grid=uncertainty_grid(calibration) if grid else None,
     )
 

@@ -82,7 +82,7 @@ def assembled(
         performed_from=first,
         performed_until=last,
         environment=(*evidence.conditions, *evidence.room),
-        standards=tuple(_standard(each) for each in facts.standards),
+        standards=tuple(_standard(standard) for standard in facts.standards),
         uncertainty=uncertainty,
         results=evidence.results.points,
         any_axis=evidence.results.any_axis,

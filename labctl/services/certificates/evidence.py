@@ -128,8 +128,10 @@ def errors_of(measured: Measurements, calibration: Calibration, about: Use) -> E
     Raises NotVerified where a verification part does not cover the use; BadInput, NotEnoughData.
     """
     recordings = list(measured.of_each.values())
-    fitted = [error for each in recordings for error in _Part.of(calibration, fitted_part(each)).largest(about)]
-    aside = [(each, part) for each in recordings if (part := verification_part(each)) is not None]
+    fitted = [
+        error for recording in recordings for error in _Part.of(calibration, fitted_part(recording)).largest(about)
+    ]
+    aside = [(recording, part) for recording in recordings if (part := verification_part(recording)) is not None]
     errors: list[VerifiedError] = []
     datasets = outside = 0
     for _, points in aside:

@@ -124,7 +124,7 @@ def _refuse_dates(facts: Facts) -> None:
             f"[item] of the order: received = {received} is after the calibration of {facts.what} began, {first}; "
             "correct the date"
         )
-    if bad := [each for each in facts.standards if _off(each, first, last)]:
+    if bad := [standard for standard in facts.standards if _off(standard, first, last)]:
         said = "; ".join(f"{each.label}: calibrated {each.calibrated or 'not stated'}, due {each.due}" for each in bad)
         raise CertificateRefused(
             f"no certificate of {facts.what}: measured from {first} to {last}, when the calibration of a "

@@ -80,7 +80,7 @@ class Results:
 
 def environment_of_room(spans: Sequence[RoomSpan], ordered: RoomConditions) -> tuple[Condition, ...]:
     """Return the environment of the room: what was recorded while the campaign ran, else what the order states."""
-    recorded = {each.quantity: (each.low, each.high) for each in spans}
+    recorded = {span.quantity: (span.low, span.high) for span in spans}
     return tuple(
         Condition(name=name, unit=unit, low=value[0], high=value[1])
         for quantity, (name, unit, stated) in ROOM.items()
@@ -120,9 +120,9 @@ def results(store: Store, row: CalibrationRecord, calibration: Calibration) -> R
                     error_dps=errors[axis][i][j], expanded_dps=expanded, k=k,
                 )  # fmt: skip
                 result_points.append((point, u.budget))
-    result_points.sort(key=lambda each: calibration.axes.index(each[0].axis))
+    result_points.sort(key=lambda result_point: calibration.axes.index(result_point[0].axis))
     points = tuple(point for point, _ in result_points)
-    largest = max(result_points, key=lambda each: each[0].expanded_dps, default=None)
+    largest = max(result_points, key=lambda result_point: result_point[0].expanded_dps, default=None)
     without = frozenset(calibration.axes) - {point.axis for point in points}
     return Results(points, None if largest is None else _largest(*largest), unknown, without, _any_axis(calibration))
 

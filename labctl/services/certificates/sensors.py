@@ -248,7 +248,7 @@ def _result(
         raise BadInput(f"[{sensor}] of the order: state performed_from")  # refused before
     return SensorResult(
         sensor=sensor, version=version.version, hash=version.hash,
-        files=tuple(f"{each.name} ({each.sha256})" for each in version.data.files),
+        files=tuple(f"{file.name} ({file.sha256})" for file in version.data.files),
         performed_from=first, performed_until=ordered.performed_until or first, included_by=included_by,
         formula=formula, reference=reference, coefficients=tuple(coefficients), verdict=version.verdict,
         found=(*version.summary, *findings), holds_for=holds_for, not_stated=not_stated,

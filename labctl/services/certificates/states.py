@@ -42,7 +42,7 @@ def list_certificates(store: Store, serial: str) -> list[CertificateResponse]:
 def certificate_by_number(store: Store, number: str) -> CertificateResponse:
     """Return a certificate with its state. Raises NotFound."""
     serial = store.certificates.get(number).serial
-    return next(each for each in list_certificates(store, serial) if each.number == number)
+    return next(certificate for certificate in list_certificates(store, serial) if certificate.number == number)
 
 
 def stated(rows: Sequence[CertificateRow], acts: Sequence[CertificationRow]) -> list[CertificateResponse]:

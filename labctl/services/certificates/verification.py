@@ -58,15 +58,15 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
         kept = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[form]
         in_register = "same" if kept == content else "differs"
     signatures = _signatures(content, form, path, ca)
-    answers = [_answer(each, wanted) for each in signatures]
+    answers = [_answer(signature, wanted) for signature in signatures]
     certificate = None if row is None else certificate_by_number(store, row.number)
     # a DCC that is attached to a PDF is signed by itself, which says nothing of the pages
-    own = [each for each in answers if each.valid and each.form == OWN.get(form)]
+    own = [answer for answer in answers if answer.valid and answer.form == OWN.get(form)]
     by = [each.signed_by for each in own]
     if form == "json" and certificate is not None and in_register == "same":
         by = [certificate.signed_by]
-    against = in_register == "differs" or not all(each.valid for each in answers)
-    against = against or any(each.trust == "not trusted" or each.expected is False for each in answers)
+    against = in_register == "differs" or not all(answer.valid for answer in answers)
+    against = against or any(answer.trust == "not trusted" or answer.expected is False for answer in answers)
     against = against or (bool(wanted) and not any(_is_one_of(each, wanted) for each in by))
     vouched = in_register == "same" or any(each.trust == "trusted" for each in own)
     state: CertificateState | Literal["unknown"] = "unknown" if certificate is None else certificate.state

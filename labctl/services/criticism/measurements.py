@@ -148,7 +148,7 @@ class Measurements:
         static_records = [(number, read.static) for number, read in self._read.items() if read.static is not None]
         if not static_records:
             return None
-        recording, longest = max(static_records, key=lambda each: each[1].duration_s)
+        recording, longest = max(static_records, key=lambda static_record: static_record[1].duration_s)
         columns = self.readings.columns
         if RECORDING not in columns:
             return longest

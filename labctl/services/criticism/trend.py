@@ -54,7 +54,7 @@ def occasions_of(store: Store, measured: Sequence[RecordingRow]) -> list[list[in
         if reached is None or begun >= reached + LEAST_APART:
             occasions.append([])
         occasions[-1].append(row.id)
-        ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
+        ends = [data_set.t_until_s for data_set in store.recordings.data_sets(row.id) if data_set.t_until_s is not None]
         until = begun + timedelta(seconds=max(ends, default=0.0))
         reached = until if reached is None else max(reached, until)
     return occasions
@@ -214,7 +214,7 @@ def _course(line: TrendLine, points: Sequence[TrendPoint], years: Array) -> Drif
     value, half = line.at(years)
     known = line.freedom > 0
     return DriftLine(
-        at=[points[0].at + each * YEAR for each in years.tolist()],
+        at=[points[0].at + year * YEAR for year in years.tolist()],
         value=value.tolist(),
         low=(value - half).tolist() if known else [None] * len(years),
         high=(value + half).tolist() if known else [None] * len(years),
@@ -254,14 +254,14 @@ def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
     if not drifts and points < 2:
         word = "recording" if points == 1 else "recordings"
         yield f"{points} {word} in time: a drift needs two recordings, and its uncertainty three."
-    for each in drifts:
-        said = f"Axis {each.axis}, {each.what}" if each.axis != "all" else "RMS error over all axes"
-        if each.u is None or each.low is None or each.high is None:
-            figure = f"{said}: {each.per_year:.2g} {each.unit}"
+    for drift in drifts:
+        said = f"Axis {drift.axis}, {drift.what}" if drift.axis != "all" else "RMS error over all axes"
+        if drift.u is None or drift.low is None or drift.high is None:
+            figure = f"{said}: {drift.per_year:.2g} {drift.unit}"
             yield f"{figure} from two recordings; its uncertainty needs {LEAST_POINTS} recordings."
         else:
-            is_drift = "drifts by" if each.significant else "no drift beyond repeatability:"
-            yield f"{said}: {is_drift} {each.per_year:.2g} {each.unit} (95 %: {each.low:.2g} to {each.high:.2g})."
+            is_drift = "drifts by" if drift.significant else "no drift beyond repeatability:"
+            yield f"{said}: {is_drift} {drift.per_year:.2g} {drift.unit} (95 %: {drift.low:.2g} to {drift.high:.2g})."
 
 
 def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[str]:

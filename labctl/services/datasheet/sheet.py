@@ -239,9 +239,9 @@ def _text(
         yield f"{serial}: {sum(decisions)} of {len(decisions)} figures with a specified value pass."
     else:
         yield f"{serial}: no measured figure has a specified value; state them in [datasheet] of the bench file."
-    for each in lines:
-        if each.passed is False:
-            axis = f", axis {each.axis}" if each.axis else ""
-            yield f"{each.title}{axis}: {each.value:.3g} {each.unit}, specified {each.specified_as} {each.specified:g}."
+    for line in lines:
+        if line.passed is False:
+            axis = f", axis {line.axis}" if line.axis else ""
+            yield f"{line.title}{axis}: {line.value:.3g} {line.unit}, specified {line.specified_as} {line.specified:g}."
     if missing:
         yield f"Not measured: {', '.join(name.replace('_', ' ') for name in missing)}."

@@ -65,7 +65,7 @@ def _result(limit: Limit, axis: str | None, value: float | None, most: float, wh
 
 def all_within(results: Sequence[LimitResult]) -> bool | None:
     """Return whether all limits are kept; None where there are none, or where none is broken but not all are known."""
-    passed = [each.passed for each in results]
+    passed = [result.passed for result in results]
     if False in passed:
         return False
     return True if passed and None not in passed else None

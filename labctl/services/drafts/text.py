@@ -36,8 +36,8 @@ def _sentences(serial: str, version: int, report: DraftReport) -> Iterator[str]:
 
 
 def _limits(report: DraftReport) -> Iterator[str]:
-    broken = [limit_text(each) for each in report.limits if each.passed is False]
-    unknown = [LIMITS[each.limit] for each in report.limits if each.passed is None]
+    broken = [limit_text(limit) for limit in report.limits if limit.passed is False]
+    unknown = [LIMITS[limit.limit] for limit in report.limits if limit.passed is None]
     if broken:
         yield f"Limits of the recipe that are exceeded: {'; '.join(broken)}."
     if unknown:

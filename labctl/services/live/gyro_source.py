@@ -37,9 +37,9 @@ class GyroSource:
 
     def __init__(self, bench: BenchFile, serial: str | None, clock: Clock, wire: Wire | None = None) -> None:
         """Choose a gyro by its serial number, default the first. Raises BadInput for an unknown one."""
-        chosen = [each for each in bench.gyros if serial in (None, each.serial)]
+        chosen = [gyro for gyro in bench.gyros if serial in (None, gyro.serial)]
         if not chosen:
-            known = ", ".join(each.serial for each in bench.gyros)
+            known = ", ".join(gyro.serial for gyro in bench.gyros)
             raise BadInput(f"{serial}: bench {bench.name} has no such unit; choose one of {known}")
         self._settings = chosen[0]
         # the simulated world and the seed of a unit do not depend on the other units of the bench

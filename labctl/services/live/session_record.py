@@ -54,14 +54,18 @@ class UncertaintyHistory:
         points = list(self._points)
         columns: dict[tuple[str, str], LiveUncertaintyColumn] = {}
         for k, point in enumerate(points):
-            for each in point.coefficients:
+            for coefficient in point.coefficients:
                 column = columns.setdefault(
-                    (each.axis, each.name),
+                    (coefficient.axis, coefficient.name),
                     LiveUncertaintyColumn(
-                        axis=each.axis, name=each.name, unit=each.unit, limit=each.limit, expanded=[None] * len(points)
+                        axis=coefficient.axis,
+                        name=coefficient.name,
+                        unit=coefficient.unit,
+                        limit=coefficient.limit,
+                        expanded=[None] * len(points),
                     ),
                 )
-                column.expanded[k] = each.expanded
+                column.expanded[k] = coefficient.expanded
         return LiveHistoryResponse(
             number=number,
             t_s=[point.t_s for point in points],

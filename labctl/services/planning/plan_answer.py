@@ -44,7 +44,7 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
     None where no unit turns about an axis across one of its outputs, or where the bench states no such standard.
     """
     shares = _shares(plan, bench)
-    stated = sorted({each.quantity for each in bench.standards} & set(ANGLE_QUANTITIES))
+    stated = sorted({standard.quantity for standard in bench.standards} & set(ANGLE_QUANTITIES))
     if not shares or not stated:
         return None
     now = _expanded(bench, shares)
@@ -63,7 +63,7 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
         )  # fmt: skip
         outlooks.append(more)
     return MisalignmentOutlook(
-        expanded=now, further=sorted(outlooks, key=lambda each: (each.expanded, each.more_s)),
+        expanded=now, further=sorted(outlooks, key=lambda outlook: (outlook.expanded, outlook.more_s)),
         not_stated=[each for each in ANGLE_QUANTITIES if each not in stated],
     )  # fmt: skip
 
@@ -80,7 +80,7 @@ def _shares(plan: Plan, bench: BenchFile) -> dict[str, float]:
 
 def _expanded(bench: BenchFile, shares: dict[str, float]) -> float:
     """Return U of the misalignment towards the axis whose mountings separate least."""
-    stated = tuple(each for each in bench.standards if each.quantity in ANGLE_QUANTITIES)
+    stated = tuple(standard for standard in bench.standards if standard.quantity in ANGLE_QUANTITIES)
     conditions = BenchConditions(ANY_DAY, standards=stated, mountings=shares)
     return max(
         K * standards_u(conditions, Sensitivities.of_one(angle=1.0, gains=angle_gains(shares, axis)))

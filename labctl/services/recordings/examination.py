@@ -57,7 +57,7 @@ def inspection_of_file(
     of_readings = [*out_of_order.findings, *part.findings]
     warnings = [warning_of(each) for each in findings_of(summarise(recording), recording.environment, of_readings)]
     examined = ReadingsExamined(
-        warnings=[warning_of(each) for each in of_readings], courses=part.courses, marks=part.marks
+        warnings=[warning_of(finding) for finding in of_readings], courses=part.courses, marks=part.marks
     )
     return _answer(str(path), None, recording.info, len(recording), warnings, examined)
 

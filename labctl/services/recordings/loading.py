@@ -134,7 +134,9 @@ def is_to_verify(store: Store, row: RecordingRow) -> bool:
     False where nothing was measured yet.
     """
     if row.kind == "samples":
-        sets = [each for each in store.recordings.data_sets(row.id) if each.state == "complete" and each.n]
+        sets = [
+            data_set for data_set in store.recordings.data_sets(row.id) if data_set.state == "complete" and data_set.n
+        ]
         return bool(sets) and all(each.verification for each in sets)
     marked = is_marked(store.recordings.points(row.id, head=row)) if row.kind == "points" else np.zeros(0)
     return bool(len(marked) and marked.all())

@@ -79,8 +79,8 @@ def _warnings(mapped: MappedFile) -> list[DataWarning]:
     """Return what is wrong with single rows and readings, as an inspection of the file says it."""
     _, of_rows = in_order_of_time(mapped.table, mapped.column_map)
     of_readings = [] if mapped.log is None else examine(mapped.log.recording)
-    findings = [*([] if of_rows is None else [of_rows]), *(each.finding for each in of_readings)]
-    return [warning_of(each) for each in findings]
+    findings = [*([] if of_rows is None else [of_rows]), *(finding.finding for finding in of_readings)]
+    return [warning_of(finding) for finding in findings]
 
 
 def _duration(mapped: MappedFile) -> float | None:
@@ -100,8 +100,10 @@ def _traces(table: RawTable, mapped: MappedFile) -> list[LogTrace]:
     starts = np.unique(np.linspace(0, n, BINS + 1).astype(np.int64)[:-1])
     middle = x[np.minimum(starts + np.diff(np.append(starts, n)) // 2, n - 1)]
     return [
-        LogTrace(name=each.name, x=middle.tolist(), low=_least(each.values, starts), high=_most(each.values, starts))
-        for each in numbers
+        LogTrace(
+            name=number.name, x=middle.tolist(), low=_least(number.values, starts), high=_most(number.values, starts)
+        )
+        for number in numbers
     ]
 
 

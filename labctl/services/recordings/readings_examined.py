@@ -36,7 +36,7 @@ def _examined(store: Store, row: RecordingRow, recording: Recording | None) -> R
         info = RecordingInfo.model_validate(row.info)
         result = joined_examinations([examination(Recording(info, columns)) for columns in _together(store, row.id)])
     return ReadingsExamined(
-        warnings=[warning_of(each) for each in result.findings], courses=result.courses, marks=result.marks
+        warnings=[warning_of(finding) for finding in result.findings], courses=result.courses, marks=result.marks
     )
 
 

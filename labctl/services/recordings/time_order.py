@@ -54,8 +54,8 @@ class OutOfOrder:
     def stated(self, recording: Recording, rows: int) -> Recording:
         """Return a recording whose head states what was left out of the log's rows."""
         left = tuple(
-            LeftOut(what=each.what, channel=each.channel, n=each.n or 0, of=rows, why=each.said)
-            for each in self.findings
+            LeftOut(what=finding.what, channel=finding.channel, n=finding.n or 0, of=rows, why=finding.said)
+            for finding in self.findings
         )
         if not left or self.also_steps:  # an inspection leaves nothing out of what is kept
             return recording

@@ -81,7 +81,7 @@ def of_unit(store: Store, serial: str, recording: int | None) -> Measured:
 
 def _longest_rest(store: Store, recording: int) -> int | None:
     """Return the number of the data set at rest with the most readings; None where there is none."""
-    sets = [each for each in store.recordings.data_sets(recording) if each.n and not each.verification]
+    sets = [data_set for data_set in store.recordings.data_sets(recording) if data_set.n and not data_set.verification]
     still = [each for each in sets if abs(each.table_rate_dps) <= AT_REST_DPS]
     return max(still, key=lambda each: each.n).number if still else None
 

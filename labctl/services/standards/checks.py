@@ -16,10 +16,10 @@ BASES = {"history": "its history", "stated u": "the stated uncertainties"}
 def charted(standard: RegisteredStandard) -> list[tuple[StandardCheck, Judged]]:
     """Return every check of a standard in order of time, judged on the chart of its nominal."""
     charted_checks: list[tuple[StandardCheck, Judged]] = []
-    for nominal in dict.fromkeys(each.nominal for each in standard.checks):
-        checks = [each for each in standard.checks if each.nominal == nominal]
-        charted_checks += zip(checks, judged([_point(standard, each) for each in checks]), strict=True)
-    return sorted(charted_checks, key=lambda each: each[0].checked_at)
+    for nominal in dict.fromkeys(check.nominal for check in standard.checks):
+        checks = [check for check in standard.checks if check.nominal == nominal]
+        charted_checks += zip(checks, judged([_point(standard, check) for check in checks]), strict=True)
+    return sorted(charted_checks, key=lambda charted_check: charted_check[0].checked_at)
 
 
 def _point(standard: RegisteredStandard, check: StandardCheck) -> ChartPoint:
@@ -44,7 +44,7 @@ def check_answer(check: StandardCheck, judgement: Judged) -> StandardCheckRespon
     """Return a judged check as an answer."""
     return StandardCheckResponse(
         checked_at=check.checked_at, nominal=check.nominal, value=check.value, u=check.u, note=check.note, by=check.by,
-        state=judgement.state, limits=[limits_answer(each) for each in judgement.limits],
+        state=judgement.state, limits=[limits_answer(limit) for limit in judgement.limits],
     )  # fmt: skip
 
 
@@ -56,8 +56,8 @@ def limits_answer(limits: Limits) -> ChartLimits:
 def out_text(value: float, unit: str, judgement: Judged) -> str:
     """Return by which limits a value is out, in words."""
     said = "; ".join(
-        f"by {BASES[each.basis]} {each.low:.6g} to {each.high:.6g}"
-        for each in judgement.limits
-        if each.state_of(value) == "out"
+        f"by {BASES[limit.basis]} {limit.low:.6g} to {limit.high:.6g}"
+        for limit in judgement.limits
+        if limit.state_of(value) == "out"
     )
     return f"{value:.6g} {unit} is out of the control limits ({said})"

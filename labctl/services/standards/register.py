@@ -59,13 +59,13 @@ def add_certificate(store: Store, label: str, asked: StandardCertificateRequest,
     standard = store.standards.get(label)
     if asked.calibrated > at.date():
         raise BadInput(f"certificate {asked.number}: calibrated {asked.calibrated} is a day to come; correct the date")
-    alike = [each for each in standard.certificates if each.number == asked.number]
+    alike = [certificate for certificate in standard.certificates if certificate.number == asked.number]
     if any(same_issuer(each.laboratory, asked.laboratory) for each in alike) and not asked.reason:
         raise Conflict(
             f"certificate {asked.number} of standard {standard.row.label} is in the register; to correct it, send it "
             "again with the reason (--reason TEXT)"
         )
-    points = tuple(_point(each) for each in asked.points)
+    points = tuple(_point(point) for point in asked.points)
     new = StandardCertificate(
         asked.number, asked.laboratory, asked.calibrated, asked.due, asked.adjusted, asked.traceability, points,
         asked.reason, asked.by, at,
@@ -139,7 +139,7 @@ def answer_of(standard: RegisteredStandard, on: date) -> StandardResponse:
     row = standard.row
     answer = dict(_states(standard, on))
     state = next((each for each in ("bad", "check it", "overdue", "no certificate") if each in answer), "valid")
-    withdrawn = {each.finding: each for each in standard.findings if each.act == "withdraw"}
+    withdrawn = {finding.finding: finding for finding in standard.findings if finding.act == "withdraw"}
     return StandardResponse(
         label=row.label, serial=row.serial, quantity=row.quantity, unit=row.unit, description=row.description,
         state=cast(StandardState, state), text=[text for texts in answer.values() for text in texts],
@@ -148,7 +148,7 @@ def answer_of(standard: RegisteredStandard, on: date) -> StandardResponse:
         predictions=[prediction_answer(nominal, each) for nominal, each in predictions_of(standard, on)],
         checks=[check_answer(check, judged) for check, judged in charted(standard)],
         findings=[
-            _finding(each, withdrawn.get(each.id)) for each in standard.findings if each.act == "bad"
+            _finding(finding, withdrawn.get(finding.id)) for finding in standard.findings if finding.act == "bad"
         ],
     )  # fmt: skip
 
@@ -186,7 +186,7 @@ def _certificate(given: StandardCertificate) -> StandardCertificateResponse:
         number=given.number, laboratory=given.laboratory, calibrated=given.calibrated, due=given.due,
         adjusted=given.adjusted, traceability=given.traceability, reason=given.reason, by=given.by, at=given.at,
         points=[
-            CertifiedPointResponse(nominal=each.nominal, value=each.value, u=each.u, k=each.k) for each in given.points
+            CertifiedPointResponse(nominal=point.nominal, value=point.value, u=point.u, k=point.k) for point in given.points
         ],
     )  # fmt: skip
 

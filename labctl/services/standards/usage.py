@@ -33,7 +33,7 @@ def performed(store: Store, row: RecordingRow) -> Days:
     at = measured_at(row.info)
     if at is None:
         return None, None
-    ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
+    ends = [data_set.t_until_s for data_set in store.recordings.data_sets(row.id) if data_set.t_until_s is not None]
     return at.date(), (at + timedelta(seconds=max(ends))).date() if ends else None
 
 
@@ -51,7 +51,7 @@ def numbered(standard: RegisteredStandard, entry: Standard) -> list[StandardCert
     """Return the certificates of a standard that have the number, and are of the quantity, of an entry."""
     if not entry.certificate or entry.quantity != standard.row.quantity:
         return []
-    return [each for each in standard.certificates if each.number == entry.certificate]
+    return [certificate for certificate in standard.certificates if certificate.number == entry.certificate]
 
 
 def same_issuer(first: str, second: str) -> bool:
@@ -103,8 +103,8 @@ def affected(store: Store, label: str, bad_from: date | None = None, bad_until: 
     starts, ends = [each[0] for each in spans], [each[1] for each in spans]
     return AffectedResponse(
         label=standard.row.label,
-        bad_from=None if None in starts else min(each for each in starts if each is not None),
-        bad_until=None if None in ends else max(each for each in ends if each is not None),
+        bad_from=None if None in starts else min(start for start in starts if start is not None),
+        bad_until=None if None in ends else max(end for end in ends if end is not None),
         calibrations=versions,
         text=list(_text(standard, versions)),
     )
@@ -145,14 +145,14 @@ def _text(standard: RegisteredStandard, calibrations: Sequence[AffectedCalibrati
     if not calibrations:
         yield f"No calibration was measured with standard {label} on these days."
         return
-    units = len({each.serial for each in calibrations})
-    issued = [number for each in calibrations for number in each.certificates]
+    units = len({calibration.serial for calibration in calibrations})
+    issued = [number for calibration in calibrations for number in calibration.certificates]
     what = "calibration" if len(calibrations) == 1 else "calibrations"
     of, was = ("unit", "was") if units == 1 == len(calibrations) else ("unit" if units == 1 else "units", "were")
     yield f"{len(calibrations)} {what} of {units} {of} {was} measured with standard {label} on these days."
     if issued:
         yield f"Certificates issued of them: {', '.join(issued)}. Inform those who hold them, and measure again."
-    if any(each.in_force for each in calibrations):
+    if any(calibration.in_force for calibration in calibrations):
         yield "Versions in force are among them: revoke them, or state why they remain usable."
 
 

@@ -102,18 +102,18 @@ class RegisteredStandard:
         A row without a reason is another certificate, also where another laboratory used the same number.
         """
         certificates: list[StandardCertificate] = []
-        for each in self.certificates:
-            alike = [one for one in certificates if one.number == each.number]
-            if each.reason and alike:
-                certificates.remove(next((one for one in alike if one.laboratory == each.laboratory), alike[-1]))
-            certificates.append(each)
-        return tuple(sorted(certificates, key=lambda each: each.calibrated))
+        for certificate in self.certificates:
+            alike = [one for one in certificates if one.number == certificate.number]
+            if certificate.reason and alike:
+                certificates.remove(next((one for one in alike if one.laboratory == certificate.laboratory), alike[-1]))
+            certificates.append(certificate)
+        return tuple(sorted(certificates, key=lambda certificate: certificate.calibrated))
 
     @property
     def bad(self) -> tuple[StandardFinding, ...]:
         """The findings that are not withdrawn."""
-        withdrawn = {each.finding for each in self.findings if each.act == "withdraw"}
-        return tuple(each for each in self.findings if each.act == "bad" and each.id not in withdrawn)
+        withdrawn = {finding.finding for finding in self.findings if finding.act == "withdraw"}
+        return tuple(finding for finding in self.findings if finding.act == "bad" and finding.id not in withdrawn)
 
 
 def _day(text: str | None) -> date | None:
@@ -123,7 +123,7 @@ def _day(text: str | None) -> date | None:
 def _certificate(row: sa.Row[Any]) -> StandardCertificate:
     return StandardCertificate(
         row.number, row.laboratory, date.fromisoformat(row.calibrated), _day(row.due), bool(row.adjusted),
-        row.traceability, tuple(CertifiedPoint(**each) for each in row.points), row.reason, row.by, row.at,
+        row.traceability, tuple(CertifiedPoint(**point) for point in row.points), row.reason, row.by, row.at,
     )  # fmt: skip
 
 
@@ -155,7 +155,7 @@ class Standards:
             standards = self._registered(
                 connection, sa.or_(s.label == label, sa.and_(s.serial == label, s.serial != ""))
             )
-        return next(iter(sorted(standards, key=lambda each: each.row.label != label)), None)
+        return next(iter(sorted(standards, key=lambda standard: standard.row.label != label)), None)
 
     def get(self, label: str) -> RegisteredStandard:
         """Return a standard by label or serial. Raises NotFound."""
@@ -222,7 +222,7 @@ class Standards:
         values: dict[str, Any] = {
             **{name: getattr(new, name) for name in ("number", "laboratory", "adjusted", "traceability", "reason")},
             "calibrated": new.calibrated.isoformat(), "due": None if new.due is None else new.due.isoformat(),
-            "points": [asdict(each) for each in new.points],
+            "points": [asdict(point) for point in new.points],
         }  # fmt: skip
         self._add(label, tables.standard_certificates, STANDARD_CERTIFICATE.name, values, "certificate", new.by, new.at)
 

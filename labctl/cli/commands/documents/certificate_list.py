@@ -102,8 +102,8 @@ def _print(file: Path, answer: VerifiedFileResponse) -> None:
         )
     if answer.signatures:
         console.print(_signer(answer), soft_wrap=True)
-    for each in answer.signatures:
-        console.print(_signature(each), soft_wrap=True)
+    for signature in answer.signatures:
+        console.print(_signature(signature), soft_wrap=True)
     if not answer.signatures:
         console.print("no signature", soft_wrap=True)
 

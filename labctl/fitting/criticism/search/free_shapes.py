@@ -82,7 +82,9 @@ def beside_terms(first: Comparison, terms: tuple[Term, ...], discrepancy: Mappin
     """Return the comparison beside terms and their discrepancy, in which nothing competes."""
     model = with_steady(first, terms)
     designs = designs_beside(first, model, discrepancy)
-    return compare_models(first.data, model, {}, {axis: replace(each, options=[]) for axis, each in designs.items()})
+    return compare_models(
+        first.data, model, {}, {axis: replace(design, options=[]) for axis, design in designs.items()}
+    )
 
 
 def _shapes(comparison: Comparison, axis: str) -> dict[tuple[str, ...], list[CandidateShape]]:

@@ -108,7 +108,7 @@ def merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
     return Verdict(
         "missing" if all(len(group) == 1 for group in axes) else "ambiguous", tuple(axes), joint.depends_on,
         terms={group[0]: terms[group[0]] for group in axes if group[0] in terms},
-        remainder=max(remainders, key=lambda each: float(each["share"]), default=None),
+        remainder=max(remainders, key=lambda remainder: float(remainder["share"]), default=None),
         axes={group[0]: where for group, where in axes.items()},
     )  # fmt: skip
 

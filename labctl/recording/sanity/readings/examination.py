@@ -235,7 +235,7 @@ def examine(recording: Recording) -> list[Marked]:
     if whole is None or series is None or not all(np.isfinite(values).all() for values in series.outputs.values()):
         return []
     at = np.flatnonzero(valid)
-    of_values = [replace(each, rows=_spread(each.rows, at, n)) for each in _of_values(recording, series, at)]
+    of_values = [replace(fault, rows=_spread(fault.rows, at, n)) for fault in _of_values(recording, series, at)]
     return [*check_clock(whole), *check_gaps(whole), *check_sampling(whole), *of_values]
 
 
@@ -252,7 +252,7 @@ def _spread(rows: Rows, at: Indices, n: int) -> Rows:
 def examination(recording: Recording) -> Examination:
     """Return what is wrong with the readings of a recording, and the course of its channels."""
     faults = examine(recording)
-    return Examination([each.finding for each in faults], courses_of(recording), marks_of(recording, faults))
+    return Examination([fault.finding for fault in faults], courses_of(recording), marks_of(recording, faults))
 
 
 def joined_examinations(parts: Sequence[Examination]) -> Examination:
@@ -280,7 +280,7 @@ def _of_values(recording: Recording, series: Series, at: Indices) -> list[Marked
     alone = series if len(once) == n else series_of(_rows(recording, at[once]))
     if alone is not None:
         faults += [replace(each, rows=_spread(each.rows, once, n)) for each in _of_each(alone)]
-    return [each for each in faults if not _is_explained(each, faults)]
+    return [fault for fault in faults if not _is_explained(fault, faults)]
 
 
 def _of_each(series: Series) -> Iterator[Marked]:

@@ -24,8 +24,10 @@ def without(recording: Recording, kinds: Sequence[str], name: str) -> Recording:
     Raises BadInput for readings that cannot be left out, and where no reading would stay.
     """
     faults = [each for each in examine(recording) if ALL in kinds or each.finding.what in kinds]
-    chosen = [each for each in faults if each.finding.may_leave_out]
-    if refused := [each.finding for each in faults if not each.finding.may_leave_out and each.finding.what in kinds]:
+    chosen = [fault for fault in faults if fault.finding.may_leave_out]
+    if refused := [
+        fault.finding for fault in faults if not fault.finding.may_leave_out and fault.finding.what in kinds
+    ]:
         raise BadInput(f"{name}: {refused[0].where}: cannot be left out: {refused[0].said}; {refused[0].do}")
     if not chosen:
         return recording
