@@ -13,14 +13,14 @@ def configuration_of(reported: Mapping[str, str]) -> dict[str, str]:
     return {name: value for name, value in reported.items() if name not in IDENTITY}
 
 
-def not_as_stated(stated: Mapping[str, str], reported: Mapping[str, str]) -> list[str]:
+def not_as_stated(stated_settings: Mapping[str, str], reported: Mapping[str, str]) -> list[str]:
     """Return where a unit is not set as it is stated to be, one phrase each; what it does not say counts."""
     configuration = configuration_of(reported)
     return [
         f"{name} is {configuration[name]} instead of {value}"
         if name in configuration
         else f"it does not report {name} ({value})"
-        for name, value in stated.items()
+        for name, value in stated_settings.items()
         if configuration.get(name) != value
     ]
 

@@ -199,9 +199,9 @@ class PluginGroup(Generic[PluginT]):
             self._logged.add(line)
             _log.warning("%s", line)
 
-    def unknown(self, name: str, known: Sequence[str] | None = None) -> str:
+    def unknown(self, name: str, known_names: Sequence[str] | None = None) -> str:
         """Return one line about a name that is not installed, with those that are (default: all of the group)."""
-        names = self.names if known is None else known
+        names = self.names if known_names is None else known_names
         near = difflib.get_close_matches(name, names, n=1)
         hint = f"did you mean {near[0]!r}? If not, " if near else ""
         listed = ", ".join(f"{each} ({self._by_name[each][0].release})" for each in names)

@@ -212,20 +212,20 @@ class Compensator:
         return Compensated(compensated.rate_dps.reshape(given.shape), compensated.outside, left_out)
 
     def _followed(
-        self, running: RunningMemory, by_force: Remembered | None, raw: Array, warm: Array,
-        known: Mapping[str, Array], correct: Correct, at_once: int,
+        self, running: RunningMemory, by_force: Remembered | None, raw: Array, temperature_c: Array,
+        of_channels: Mapping[str, Array], correct: Correct, at_once: int,
     ) -> Compensated:  # fmt: skip
         """Correct a course of outputs (n, axes), so many samples `at_once`, that they stay in the processor's cache."""
         n = len(raw)
-        channels = {name: np.asarray(values) for name, values in known.items()}
+        channels = {name: np.asarray(values) for name, values in of_channels.items()}
         t_s = channels["t_s"].astype(np.float64, copy=False)
         check_order(running, t_s)
         rate, outside = np.empty_like(raw), np.empty(n, dtype=bool)
         for first in range(0, n, at_once):
             rows = slice(first, first + at_once)
             of_rows = {name: values[rows] if values.shape[:1] == (n,) else values for name, values in channels.items()}
-            warm_rows = warm[rows] if warm.ndim else warm
-            one_c = warm_rows.mean(axis=1) if warm.ndim == 2 else np.broadcast_to(warm_rows, t_s[rows].shape)
+            warm_rows = temperature_c[rows] if temperature_c.ndim else temperature_c
+            one_c = warm_rows.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(warm_rows, t_s[rows].shape)
             beside = running.errors(t_s[rows], one_c)
             if by_force is not None:
                 beside = beside.with_bias(by_force.bias_dps[rows])
@@ -234,7 +234,8 @@ class Compensator:
         return Compensated(rate, outside)
 
     def _beside(
-        self, beside: Remembered | None, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct,
+        self, beside: Remembered | None, raw: Array, temperature_c: Array, channels: Mapping[str, Array],
+        correct: Correct,
         first: int = 0,
     ) -> Compensated:  # fmt: skip
         """Correct outputs (n, axes) of which errors of bias and scale factor, (n, axes), are known; None: none.
@@ -242,18 +243,20 @@ class Compensator:
         `first` is the number of samples before them.
         """
         if beside is None:
-            return self._held(raw, warm, known, correct, first)
+            return self._held(raw, temperature_c, channels, correct, first)
         if self._is_direct:
-            compensated = self._held(np.where(np.isnan(beside.bias_dps), np.nan, raw), warm, known, correct, first)
+            compensated = self._held(
+                np.where(np.isnan(beside.bias_dps), np.nan, raw), temperature_c, channels, correct, first
+            )
             rate = compensated.rate_dps - beside.bias_dps
             if beside.scale is not None:
                 rate = rate - beside.scale * np.clip(raw, self._slow, self._fast)
             return Compensated(rate, compensated.outside)
         less = raw - beside.bias_dps
-        compensated = self._held(less, warm, known, correct, first)
+        compensated = self._held(less, temperature_c, channels, correct, first)
         rate = compensated.rate_dps
         if beside.scale is not None:
-            held = partial(self._at_edge, warm=warm, known=known, correct=correct)
+            held = partial(self._at_edge, temperature_c=temperature_c, channels=channels, correct=correct)
             rate = with_scale(held, less, beside.scale, self._slow, self._fast)
         return Compensated(rate, compensated.outside)
 
@@ -280,22 +283,28 @@ class Compensator:
         across = {axis: np.broadcast_to(np.asarray(r, np.float64), (n,)) for axis, r in cross_rates_dps.items()}
         return partial(correct_across, self._model, self.axes, across)
 
-    def _held(self, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct, first: int) -> Compensated:
+    def _held(
+        self, raw: Array, temperature_c: Array, channels: Mapping[str, Array], correct: Correct, first: int
+    ) -> Compensated:
         """Correct outputs (n, axes) by what does not remember, at the edge of the range where they are outside."""
-        lowest, highest = (float(np.min(warm)), float(np.max(warm))) if warm.size else (self._low_c, self._high_c)
+        lowest, highest = (
+            (float(np.min(temperature_c)), float(np.max(temperature_c)))
+            if temperature_c.size
+            else (self._low_c, self._high_c)
+        )
         least, most = (float(np.min(raw)), float(np.max(raw))) if raw.size else (0.0, 0.0)
         calm = lowest >= self._low_c and highest <= self._high_c and least >= self._slow and most <= self._fast
         if calm:  # also false when there is a NaN
             flags = np.zeros(len(raw), dtype=bool)
         else:
-            flags = self._judge(raw, warm, first)
-            return Compensated(self._at_edge(raw, warm, known, correct), flags)
-        return Compensated(correct(raw, warm, known), flags)
+            flags = self._judge(raw, temperature_c, first)
+            return Compensated(self._at_edge(raw, temperature_c, channels, correct), flags)
+        return Compensated(correct(raw, temperature_c, channels), flags)
 
-    def _at_edge(self, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct) -> Array:
+    def _at_edge(self, raw: Array, temperature_c: Array, channels: Mapping[str, Array], correct: Correct) -> Array:
         """Return corrected rates, (n, axes); of what is outside the range the error at its edge is taken off."""
         held = np.clip(raw, self._slow, self._fast)
-        return correct(held, np.clip(warm, self._low_c, self._high_c), known) + (raw - held)
+        return correct(held, np.clip(temperature_c, self._low_c, self._high_c), channels) + (raw - held)
 
     @property
     def needs_temperature(self) -> bool:
@@ -312,9 +321,11 @@ class Compensator:
             )
         return STAND_IN_C
 
-    def _judge(self, raw: Array, warm: Array, first: int) -> NDArray[np.bool_]:
+    def _judge(self, raw: Array, temperature_c: Array, first: int) -> NDArray[np.bool_]:
         """Return which samples are outside the range or no numbers, (n,); raises BadInput when that is refused."""
-        spread = warm.reshape(len(raw), -1) if warm.ndim else np.full((len(raw), 1), float(warm))
+        spread = (
+            temperature_c.reshape(len(raw), -1) if temperature_c.ndim else np.full((len(raw), 1), float(temperature_c))
+        )
         within_c = (spread >= self._low_c - MARGIN_C) & (spread <= self._high_c + MARGIN_C)
         cold: NDArray[np.bool_] = ~np.all(within_c, axis=1)
         fast: NDArray[np.bool_] = ~np.all((raw >= self._slow) & (raw <= self._fast), axis=1)

@@ -75,12 +75,12 @@ def _attribute(part: str) -> tuple[str, str]:
     return name, unquote(value)
 
 
-def _pin(given: dict[str, str], use: KeyUse) -> str:
-    if "pin-value" in given:
-        return given["pin-value"]
-    if "pin-source" not in given:
+def _pin(options: dict[str, str], use: KeyUse) -> str:
+    if "pin-value" in options:
+        return options["pin-value"]
+    if "pin-source" not in options:
         return ""
-    return read_secret(Path(given["pin-source"].removeprefix("file:")), use)
+    return read_secret(Path(options["pin-source"].removeprefix("file:")), use)
 
 
 def read_secret(path: Path, use: KeyUse) -> str:

@@ -148,9 +148,13 @@ def _ask_shortcomings(device: object, report: DeviceReport, otherwise: str = "")
 
 
 def _identity(identity: GyroIdentity) -> str:
-    said = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in identity.reported.items())
+    reported = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in identity.reported.items())
     text = f"{identity.model}, serial {identity.serial}"
-    return f"{text}; the instrument reported: {said}" if said else f"{text}; the instrument reported no identification"
+    return (
+        f"{text}; the instrument reported: {reported}"
+        if reported
+        else f"{text}; the instrument reported no identification"
+    )
 
 
 def _judge_readings(gyro: Gyro, readings: Readings, report: DeviceReport) -> None:
@@ -248,7 +252,7 @@ def _address(section: DeviceSettings) -> str:
     return section.host if "://" in section.host else f"{section.host}:{section.tcp_port}"
 
 
-def _ask(opened: Bench, report: DeviceReport, stated: Mapping[str, str]) -> None:
+def _ask(opened: Bench, report: DeviceReport, stated_reply: Mapping[str, str]) -> None:
     if report.kind == "table" and opened.table is not None:
         ask_table(opened.table, report)
     elif report.kind == "chamber" and opened.chamber is not None:
@@ -257,8 +261,8 @@ def _ask(opened: Bench, report: DeviceReport, stated: Mapping[str, str]) -> None
         ask_reference(opened.references[report.device], report)
     elif report.kind == "gyro":
         ask_gyro(opened.gyros[report.device], report)
-        if (said := not_as_stated(stated, report.reported)) and report.reported:
-            report.add([Finding("configuration", f"not set as the bench file states: {'; '.join(said)}", "bad")])
+        if (differences := not_as_stated(stated_reply, report.reported)) and report.reported:
+            report.add([Finding("configuration", f"not set as the bench file states: {'; '.join(differences)}", "bad")])
 
 
 def _about_port(port: str, report: DeviceReport) -> list[Finding]:

@@ -41,9 +41,11 @@ def has_every_method(stand: Stand) -> None:
             continue
         require(hasattr(stand.driver, name), f"{driver.__name__} has no {name}; {protocol.__name__} says what it does")
         if inspect.isfunction(member):
-            wanted = list(inspect.signature(member).parameters)[1:]
+            parameters = list(inspect.signature(member).parameters)[1:]
             given = list(inspect.signature(getattr(stand.driver, name)).parameters)
-            require(given == wanted, f"{driver.__name__}.{name} takes {given}; {protocol.__name__} says {wanted}")
+            require(
+                given == parameters, f"{driver.__name__}.{name} takes {given}; {protocol.__name__} says {parameters}"
+            )
 
 
 def sends_nothing_when_it_is_made(stand: Stand) -> None:
@@ -238,8 +240,10 @@ def gives_whole_numbers_at_rising_times(stand: Stand) -> None:
     parts = [gyro.read(1.0) for _ in range(4)]
     times = np.concatenate([part.t_s for part in parts])
     require(np.all(np.diff(times) > 0), "the times of the readings do not increase")
-    wanted = 4 * gyro.sample_rate_hz
-    require(abs(len(times) - wanted) <= 3, f"{len(times)} readings arrived in 4 s; at least {wanted:g} are expected")
+    expected = 4 * gyro.sample_rate_hz
+    require(
+        abs(len(times) - expected) <= 3, f"{len(times)} readings arrived in 4 s; at least {expected:g} are expected"
+    )
     names = {channel.name for channel in gyro.channels}
     for part in parts:
         require(set(part.raw) == names, f"readings have {sorted(part.raw)}, the channels are {sorted(names)}")

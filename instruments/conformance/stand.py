@@ -78,17 +78,17 @@ def place_of(name: str) -> BenchFile:
 
 def _with_trial(name: str, kind: Kind, trial: Trial) -> BenchFile:
     record = read_bench(trial.bench).model_dump()
-    wanted: dict[str, object] = {"driver": name, **trial.section}
+    section: dict[str, object] = {"driver": name, **trial.section}
     if kind == "gyro":
         gyro = record["gyros"][0]
         kept = ("name", "serial", "axes", "max_rate_dps", "min_c", "max_c", "technology")
-        record["gyros"] = [{key: gyro[key] for key in kept} | wanted]
+        record["gyros"] = [{key: gyro[key] for key in kept} | section]
         if trial.unit:
             record["simulation"]["units"] |= {record["gyros"][0]["name"]: dict(trial.unit)}
     elif kind == "reference":
-        record["references"] = [{"name": "reference"} | wanted]
+        record["references"] = [{"name": "reference"} | section]
     else:
-        record[kind] = record[kind] | wanted
+        record[kind] = record[kind] | section
         record["simulation"]["table"] |= dict(trial.table)
     try:
         return resolve(BenchFile.model_validate(record))

@@ -120,12 +120,12 @@ class C4Link:
             text += character.decode("latin-1")
         return text
 
-    def expect(self, letter: str, what: str, timeout_s: float = REPLY_S) -> None:
-        """Read one letter; raises RequestRejected for another one, NoReply or LinkError. `what` is for the message."""
+    def expect(self, letter: str, purpose: str, timeout_s: float = REPLY_S) -> None:
+        """Read one letter; raises RequestRejected for another one (`purpose` is named), NoReply or LinkError.."""
         received = self.read_letter(timeout_s)
         if received != letter:
             raise RequestRejected(
-                self._device, f"answered {received!r} instead of {letter!r}, so it did not {what}; home the table"
+                self._device, f"answered {received!r} instead of {letter!r}, so it did not {purpose}; home the table"
             )
 
     def _port_timeout_s(self, deadline_s: float) -> float:

@@ -79,11 +79,11 @@ class Gyrostar:
                 "address of the host"
             )
             raise WrongInstrument(self.name, text)
-        for channel, wanted in self.options.range_codes.items():
+        for channel, expected in self.options.range_codes.items():
             range_code = self._get(RANGE_CODE.nth(channel, 1, first=0))
-            if range_code != wanted:
+            if range_code != expected:
                 text = (
-                    f"input {channel} has range code 0x{range_code:04X}, but the bench file says 0x{wanted:04X}; "
+                    f"input {channel} has range code 0x{range_code:04X}, but the bench file says 0x{expected:04X}; "
                     "change one of the two"
                 )
                 raise WrongInstrument(self.name, text)

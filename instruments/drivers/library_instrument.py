@@ -23,19 +23,19 @@ LONGEST_REPLY_BYTES = 4096
 USUAL_IDENTITIES = ("id", "identity", "idn", "get_identity")
 
 
-def _in_one_line(said: object) -> str:
-    if said is None:
+def _in_one_line(reply: object) -> str:
+    if reply is None:
         return ""
-    return one_line(", ".join(str(part) for part in said) if isinstance(said, list | tuple) else str(said))
+    return one_line(", ".join(str(part) for part in reply) if isinstance(reply, list | tuple) else str(reply))
 
 
-def serial_in(said: str) -> str:
+def serial_in(reply: str) -> str:
     """Return the serial number in an answer to `*IDN?`; empty where it has none.
 
     By IEEE Std 488.2, 10.14, that answer has four fields: manufacturer, model, serial number and firmware. A serial
     number that is not available is 0; some classes write NA.
     """
-    fields = [field.strip() for field in said.split(",")]
+    fields = [field.strip() for field in reply.split(",")]
     return fields[2] if len(fields) == 4 and any(each in "123456789" for each in fields[2]) else ""
 
 
@@ -56,9 +56,9 @@ class LibraryInstrument:
         instrument that does not answer that counts as one that says nothing. Raises InstrumentError for an attribute
         of the bench file that cannot be read, and where the class cannot be opened.
         """
-        wanted = self._settings.identity
-        if wanted is not None:
-            return _in_one_line(self.get(wanted)) if wanted else ""
+        identity_attributes = self._settings.identity
+        if identity_attributes is not None:
+            return _in_one_line(self.get(identity_attributes)) if identity_attributes else ""
         with self._one_line("open"):
             class_ = type(self._opened())
         usual = next((name for name in USUAL_IDENTITIES if hasattr(class_, name)), None)
@@ -113,7 +113,7 @@ class LibraryInstrument:
             self._port = None
 
     @contextlib.contextmanager
-    def _one_line(self, what: str) -> Any:
+    def _one_line(self, purpose: str) -> Any:
         """Turn every error of the library into an InstrumentError; the link is opened again after one."""
         library = self._settings.library
         try:
@@ -123,19 +123,19 @@ class LibraryInstrument:
             raise
         except AttributeError as error:
             raise RequestRejected(
-                self.device, f"cannot {what}: {one_line(error)}; correct the name in the bench file"
+                self.device, f"cannot {purpose}: {one_line(error)}; correct the name in the bench file"
             ) from error
         except (ValueError, TypeError) as error:
             raise RequestRejected(
                 self.device,
-                f"{library} refused to {what} ({one_line(error)}); check the value, and the message on the "
+                f"{library} refused to {purpose} ({one_line(error)}); check the value, and the message on the "
                 "panel of the instrument",
             ) from error
         except Exception as error:
             self._forget()
             raise LinkError(
                 self.device,
-                f"{library} cannot {what} ({type(error).__name__}: {one_line(error)}); check cable and power",
+                f"{library} cannot {purpose} ({type(error).__name__}: {one_line(error)}); check cable and power",
             ) from error
 
     def _forget(self) -> None:

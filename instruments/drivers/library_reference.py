@@ -25,17 +25,17 @@ class LibraryReference:
 
     def identify(self) -> str:
         """Get what the instrument says of itself; raises WrongInstrument for another serial number, InstrumentError."""
-        settings, said = self.settings, self._instrument.identity()
-        tells_serial = settings.identity or serial_in(said)
-        if settings.serial and tells_serial and settings.serial not in said:
+        settings, identity = self.settings, self._instrument.identity()
+        tells_serial = settings.identity or serial_in(identity)
+        if settings.serial and tells_serial and settings.serial not in identity:
             raise WrongInstrument(
                 self.name,
-                f"identifies itself as {said!r}, but the bench file gives serial number "
+                f"identifies itself as {identity!r}, but the bench file gives serial number "
                 f"{settings.serial!r}; correct the address, or serial and certificate, in the bench file",
             )
         self.read()
         certificate = f"; certificate {settings.certificate}" if settings.certificate else ""
-        return f"{settings.instrument} of {settings.library} {said}".strip() + certificate
+        return f"{settings.instrument} of {settings.library} {identity}".strip() + certificate
 
     def read(self) -> ReferenceState:
         """Get one reading of every quantity; raises InstrumentError."""

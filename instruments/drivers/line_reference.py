@@ -49,21 +49,21 @@ class LineReference:
 
         Raises WrongInstrument for another serial number than the bench file's, MalformedReply, NoReply, LinkError.
         """
-        said = ""
+        serial = ""
         if self._model.identity:
             reply = self._lines.ask(self._model.identity, r".*\S.*", "say what it is")[0]
-            said = self._checked_serial(reply)
+            serial = self._checked_serial(reply)
         self.read()
         certificate = f"; certificate {self.settings.certificate}" if self.settings.certificate else ""
-        return f"{said or self._model.title}{certificate}"
+        return f"{serial or self._model.title}{certificate}"
 
     def _checked_serial(self, reply: str) -> str:
         parts = [part.strip() for part in reply.split(",")]
-        wanted = self.settings.serial
-        if wanted and wanted not in parts:
+        expected_serial = self.settings.serial
+        if expected_serial and expected_serial not in parts:
             raise WrongInstrument(
                 self.name,
-                f"identifies itself as {reply!r}, but the bench file gives serial number {wanted!r}; correct "
+                f"identifies itself as {reply!r}, but the bench file gives serial number {expected_serial!r}; correct "
                 "the port, or serial and certificate, in the bench file",
             )
         return reply

@@ -84,8 +84,8 @@ def _driver(name: str, kind: type[Driver]) -> Driver:
         raise UnknownPlugin(DRIVERS.unknown(name, names_of(kind))) from error
     if not isinstance(driver, kind):
         drives, _ = KINDS[type(driver)]
-        known: Sequence[str] = names_of(kind)
-        choice = f"choose {', '.join(known)}" if known else f"no driver of a {what} is installed"
+        driver_names: Sequence[str] = names_of(kind)
+        choice = f"choose {', '.join(driver_names)}" if driver_names else f"no driver of a {what} is installed"
         raise PluginError(f"driver {name!r} is for a {drives}, not for a {what}; {choice}")
     return driver
 
@@ -94,7 +94,7 @@ def _settings_of(driver: Driver) -> str:
     return ", ".join(driver.settings.model_fields)
 
 
-def _detail(kind: str, text: str, place: Place, given: Any) -> InitErrorDetails:
+def _detail(kind: str, text: str, place: Place, detail: Any) -> InitErrorDetails:
     # pydantic asks for a literal, and repeats here a kind that it has given itself
     error = PydanticCustomError(kind, "{text}", {"text": text})  # pyright: ignore[reportArgumentType]
-    return {"type": error, "loc": place, "input": given}
+    return {"type": error, "loc": place, "input": detail}

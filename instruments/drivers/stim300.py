@@ -97,8 +97,12 @@ class Stim300:
     def channels(self) -> tuple[Channel, ...]:
         """What a datagram holds: rates in deg/s, temperatures in deg C where it has them, and the status byte."""
         rates = [Channel(f"gyro_{axis}", "deg/s", RATE_PER_LSB) for axis in self.axes]
-        warm = [Channel(f"temperature_{axis}_c", "deg C", TEMPERATURE_PER_LSB) for axis in self.axes]
-        return (*rates, *(warm if self.layout.temperature is not None else ()), Channel("status", "", 1.0))
+        temperature_channels = [Channel(f"temperature_{axis}_c", "deg C", TEMPERATURE_PER_LSB) for axis in self.axes]
+        return (
+            *rates,
+            *(temperature_channels if self.layout.temperature is not None else ()),
+            Channel("status", "", 1.0),
+        )
 
     def identify(self) -> GyroIdentity:
         """Get the unit's identity: the name of the bench file, and what the unit and its adapter say.
@@ -214,11 +218,11 @@ class Stim300:
     def _hear(self, special: bytes) -> None:
         """Take in what the unit says of itself; raises WrongInstrument where its bench file says otherwise."""
         if (configuration := parse_configuration(special)) is not None:
-            if said := differences(configuration, self.settings):
+            if differing := differences(configuration, self.settings):
                 raise WrongInstrument(
                     self.name,
                     f"the unit on {self.settings.port} is not configured as the bench file requires: "
-                    f"{'; '.join(said)}; configure the unit in its service mode (commands u, m, d), or correct "
+                    f"{'; '.join(differing)}; configure the unit in its service mode (commands u, m, d), or correct "
                     "the bench file",
                 )
             self._set = configuration
@@ -231,15 +235,15 @@ class Stim300:
     def _refuse_other_unit(self, serial: str) -> None:
         settings = self.settings
         if settings.own_serial not in {None, serial}:
-            wanted = settings.own_serial
+            expected_serial = settings.own_serial
         elif is_other_serial(serial, settings.serial):
-            wanted = settings.serial
+            expected_serial = settings.serial
         else:
             return
         raise WrongInstrument(
             self.name,
             f"the unit on {settings.port} has serial number {serial}, but the bench file or the "
-            f"campaign names {wanted}; connect "
+            f"campaign names {expected_serial}; connect "
             "the "
             "right unit, or correct port, serial or own_serial",
         )
@@ -282,8 +286,8 @@ class Stim300:
         valid &= np.all(np.abs(rates) < SATURATION_DPS / RATE_PER_LSB, axis=1)
         raw: dict[str, NDArray[np.int64]] = {f"gyro_{axis}": rates[:, AXES.index(axis)] for axis in self.axes}
         if layout.temperature is not None and layout.temperature_status is not None:
-            warm = int16(frames, layout.temperature).astype(np.int64)
-            raw |= {f"temperature_{axis}_c": warm[:, AXES.index(axis)] for axis in self.axes}
+            temperature_codes = int16(frames, layout.temperature).astype(np.int64)
+            raw |= {f"temperature_{axis}_c": temperature_codes[:, AXES.index(axis)] for axis in self.axes}
             valid &= (frames[:, layout.temperature_status] & BAD_STATUS) == 0
         raw["status"] = status
         counter = frames[:, layout.counter].astype(np.int64)

@@ -145,15 +145,15 @@ class StreamedReadings:
         refuse_other_rate(self._device, self._port, self._time.line)
         counts = self._counter is not None or self._law.stamps is not None
         lost = int(advance.sum()) - len(advance) + uncounted if counts else uncounted
-        told = self._law.stamps or self._law.counter
-        ticks = None if told is None else decoded.values[told.field][kept].astype(np.int64)
+        has_stamp = self._law.stamps or self._law.counter
+        ticks = None if has_stamp is None else decoded.values[has_stamp.field][kept].astype(np.int64)
         readings = Readings(times, raw, valid, lost, damaged, None, arrival_s)
         return self._undecided.pass_on(readings, self._time, self._device_time, ticks)
 
-    def _advance(self, decoded: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def _advance(self, decoded: Decoded, is_used: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return how many periods each reading, (n,), is from the one before."""
         if self._counter is not None and self._law.counter is not None:
-            return self._counter.advance(decoded.values[self._law.counter.field][kept])
+            return self._counter.advance(decoded.values[self._law.counter.field][is_used])
         if (ticks := self._law.stamps) is not None:
             return self._advance_by_time(decoded.values[ticks.field], ticks)
         advance = np.ones(len(decoded), dtype=np.int64)

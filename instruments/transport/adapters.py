@@ -28,21 +28,21 @@ def adapter_of(port: str | None) -> str:
     return ""
 
 
-def is_adapter(wanted: str, serial: str) -> bool:
+def is_adapter(wanted_serial: str, serial: str) -> bool:
     """Return whether an adapter is the wanted one, named with or without the number of its port."""
-    return wanted in (serial, serial.partition(":")[0])
+    return wanted_serial in (serial, serial.partition(":")[0])
 
 
-def require_adapter(device: str, port: str | None, wanted: str | None) -> dict[str, str]:
+def require_adapter(device: str, port: str | None, serial: str | None) -> dict[str, str]:
     """Return the adapter of a port as something that a device reports; empty where it has none.
 
     Raises WrongInstrument where the bench file names another adapter.
     """
     adapter = adapter_of(port)
-    if wanted is not None and not is_adapter(wanted, adapter):
+    if serial is not None and not is_adapter(serial, adapter):
         raise WrongInstrument(
             device,
             f"port {port} is on USB adapter {adapter or 'without a serial number'}, but the bench file or the "
-            f"campaign names {wanted}; two adapters may be exchanged: give the path of the port in /dev/serial/by-id",
+            f"campaign names {serial}; two adapters may be exchanged: give the path of the port in /dev/serial/by-id",
         )
     return {"adapter": adapter} if adapter else {}

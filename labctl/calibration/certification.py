@@ -65,14 +65,14 @@ class Certification:
         }  # fmt: skip
 
 
-def read_certification(given: Mapping[str, object]) -> Certification:
+def read_certification(document: Mapping[str, object]) -> Certification:
     """Read the value of `certification`. Raises LookupError, TypeError or ValueError for one that is not whole."""
-    state, due = given["state"], given["due"]
+    state, due = document["state"], document["due"]
     if state not in get_args(State):
         raise ValueError(f"the state is {str(state)[:80]!r}, but must be one of {', '.join(get_args(State))}")
     return Certification(
-        cast(State, state), str(given["by"]), str(given["reason"]), _instant(given["at"]),
-        None if due is None else _instant(due), str(given["calibration_hash"]),
+        cast(State, state), str(document["by"]), str(document["reason"]), _instant(document["at"]),
+        None if due is None else _instant(due), str(document["calibration_hash"]),
     )  # fmt: skip
 
 
@@ -99,7 +99,7 @@ def _said(at: datetime) -> str:
     return f"{at.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
 
 
-def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:
+def with_certification(content: bytes, certification: Certification) -> tuple[bytes, str]:
     """Return the bytes of a calibration file with its certification, and their hash, which covers it."""
-    whole, digest = with_own_hash({**json.loads(content), "certification": known.to_json()})
+    whole, digest = with_own_hash({**json.loads(content), "certification": certification.to_json()})
     return whole + b"\n", digest

@@ -40,15 +40,16 @@ def optional(parent: ET.Element, name: str, text: str) -> None:
         child(parent, name, text)
 
 
-def contact(parent: ET.Element, name: str, given: Contact, further: str = "") -> None:
+def contact(parent: ET.Element, name: str, person: Contact, further: str = "") -> None:
     """Add the address of an organisation."""
     made = child(parent, name)
-    texts(made, "name", given.name)
-    optional(made, "eMail", given.email)
-    optional(made, "phone", given.phone)
+    texts(made, "name", person.name)
+    optional(made, "eMail", person.email)
+    optional(made, "phone", person.phone)
     place = child(made, "location")
     for tag, text in (
-        ("city", given.city), ("countryCode", given.country), ("postCode", given.post_code), ("street", given.street),
+        ("city", person.city), ("countryCode", person.country), ("postCode", person.post_code),
+        ("street", person.street),
     ):  # fmt: skip
         optional(place, tag, text)
     if further:

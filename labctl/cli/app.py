@@ -107,8 +107,8 @@ for name, command in COMMANDS.items():
     app.command(name)(command)
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(is_wanted: bool) -> None:
+    if is_wanted:
         typer.echo(f"labctl {version('labctl')}")
         raise typer.Exit
 

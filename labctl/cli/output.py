@@ -36,9 +36,9 @@ def give_up_blocked_stderr() -> None:
         os.close(nothing)
 
 
-def print_heading(name: str, rest: str = "") -> None:
+def print_heading(name: str, row_text: str = "") -> None:
     """Print a line that begins with a name in bold."""
-    console.print(Text.assemble((name, "bold"), rest))
+    console.print(Text.assemble((name, "bold"), row_text))
 
 
 def print_warnings(warnings: Iterable[DataWarning]) -> None:

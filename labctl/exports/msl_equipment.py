@@ -128,10 +128,10 @@ def _report(
 
 def _rows(axes: tuple[str, ...], table: Table, index: int) -> list[str]:
     return [
-        f"{axes[by]},{output:.12g},{warm:.12g},{table.errors[index, by, i, j]:.9g}"
+        f"{axes[by]},{output:.12g},{temperature_c:.12g},{table.errors[index, by, i, j]:.9g}"
         for by in range(len(axes))
         for i, output in enumerate(table.outputs)
-        for j, warm in enumerate(table.temperatures_c)
+        for j, temperature_c in enumerate(table.temperatures_c)
     ]
 
 

@@ -38,8 +38,10 @@ def written_calibration(document: bytes, format_name: str, options: Mapping[str,
     given = dict(options or {})
     unknown = sorted(set(given) - set(chosen.options))
     if unknown:
-        known = ", ".join(chosen.options) or "none"
-        raise BadInput(f"format {format_name}: option {unknown[0]!r} is not known; options of this format: {known}")
+        option_names = ", ".join(chosen.options) or "none"
+        raise BadInput(
+            f"format {format_name}: option {unknown[0]!r} is not known; options of this format: {option_names}"
+        )
     calibration = read_calibration(document)
     try:
         file_bytes = chosen.write(calibration, given) if chosen.options else chosen.write(calibration)

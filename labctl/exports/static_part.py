@@ -116,7 +116,7 @@ def static_part(calibration: Calibration, format_name: str, *, carries: str) -> 
             f"temperature; {carries}; use the JSON file with labctl's Compensator"
         )
     law = correction(rest, calibration.axes)
-    return StaticPart(calibration, lambda raw, warm: law(raw, warm, {}), memory)
+    return StaticPart(calibration, lambda raw, temperature_c: law(raw, temperature_c, {}), memory)
 
 
 def needs_thermometer(calibration: Calibration, format_name: str, advice: str) -> None:
@@ -151,16 +151,16 @@ def differences(part: StaticPart, formula: Callable[[Array, Array], Array]) -> D
     still = part.bias_dps(dense_c)
     at_rest = np.abs(formula(still, dense_c) - part.rate(still, dense_c)).max(axis=0)
     coarse_c = part.with_kinks(part.temperatures())
-    warm = np.repeat(coarse_c, len(part.outputs()))
+    temperature_c = np.repeat(coarse_c, len(part.outputs()))
     base = np.repeat(part.bias_dps(coarse_c), len(part.outputs()), axis=0)
     apart = np.zeros((axes, axes))
     for turning in range(axes):
         raw = base.copy()
         raw[:, turning] = np.tile(part.outputs(), len(coarse_c))
-        apart[:, turning] = np.abs(formula(raw, warm) - part.rate(raw, warm)).max(axis=0)
+        apart[:, turning] = np.abs(formula(raw, temperature_c) - part.rate(raw, temperature_c)).max(axis=0)
     own = np.maximum(np.diag(apart), at_rest)
-    raw, warm = all_turning(part)
-    corners = np.abs(formula(raw, warm) - part.rate(raw, warm)).max(axis=0)
+    raw, temperature_c = all_turning(part)
+    corners = np.abs(formula(raw, temperature_c) - part.rate(raw, temperature_c)).max(axis=0)
     return Differences(at_rest, own, apart.sum(axis=1) - np.diag(apart), corners)
 
 

@@ -34,17 +34,17 @@ def _vectors(calibration: Calibration) -> dict[str, VectorBoundJson | None]:
 def bound_lines(calibration: Calibration) -> list[str]:
     """Return the lines of a comment: U of each axis, alone and turned about any axis, and standards not in it."""
     use_bounds, bounds = _of(calibration), bounds_dps(calibration)
-    known = _listed(bounds)
+    bound_list = _listed(bounds)
     lines = []
-    if known:
+    if bound_list:
         lines.append(
             "Expanded uncertainty U (95.45 %) of a corrected rate on later days, about its own axis alone, at most: "
-            f"{known}."
+            f"{bound_list}."
         )
     if unknown := [axis for axis, bound in bounds.items() if bound is None]:
         lines.append(f"Uncertainty of a corrected rate: unknown for {', '.join(unknown)}.")
     lines += _any_axis_lines(calibration)
-    if known and use_bounds is not None and use_bounds["not_stated"]:
+    if bound_list and use_bounds is not None and use_bounds["not_stated"]:
         lines.append(
             f"Uncertainties that the bench does not state, and that U does not contain: "
             f"{', '.join(use_bounds['not_stated'])}."
@@ -55,11 +55,12 @@ def bound_lines(calibration: Calibration) -> list[str]:
 def _any_axis_lines(calibration: Calibration) -> list[str]:
     vectors, bounds = _vectors(calibration), any_axis_bounds_dps(calibration)
     lines = []
-    if known := _listed(bounds):
+    if bound_list := _listed(bounds):
         reach = max(vector["reach_dps"] for vector in vectors.values() if vector is not None)
         aligned = _listed({axis: vector and vector["aligned_bound_dps"] for axis, vector in vectors.items()})
         lines.append(
-            f"U turned about any axis at up to {reach:.4g} deg/s, in the frame of the case, at most: {known}; up to a "
+            f"U turned about any axis at up to {reach:.4g} deg/s, in the frame of the case, at most: {bound_list}; up "
+            "to a "
             f"rotation of the frame: {aligned}."
         )
     if unknown := [axis for axis, bound in bounds.items() if bound is None]:

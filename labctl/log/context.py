@@ -13,9 +13,9 @@ from structlog.contextvars import bind_contextvars, bound_contextvars, clear_con
 _GIVEN = re.compile(r"[A-Za-z0-9._-]{1,64}")
 
 
-def new_request_id(given: str = "") -> str:
+def new_request_id(requested: str = "") -> str:
     """Return the number of a request: the one that it came with, else a new one."""
-    return given if _GIVEN.fullmatch(given) else secrets.token_hex(8)
+    return requested if _GIVEN.fullmatch(requested) else secrets.token_hex(8)
 
 
 def request_id() -> str:

@@ -81,10 +81,10 @@ def _since_adjustment(ordered: Sequence[CertifiedValue], before: CertifiedValue)
     return list(ordered[first:last])
 
 
-def _why(same: Sequence[CertifiedValue], valued: Sequence[CertifiedValue]) -> str:
-    if len(valued) < len(same):
+def _why(repeats: Sequence[CertifiedValue], valued: Sequence[CertifiedValue]) -> str:
+    if len(valued) < len(repeats):
         return "drift unknown: the certificates state no value, only an uncertainty"
-    since = " since the last adjustment" if same[0].after_adjustment else ""
+    since = " since the last adjustment" if repeats[0].after_adjustment else ""
     return f"drift unknown: one certificate{since}; u holds no contribution of a drift"
 
 

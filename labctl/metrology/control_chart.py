@@ -105,12 +105,12 @@ def judged(points: Sequence[ChartPoint]) -> list[Judged]:
 
 
 def _limits(point: ChartPoint, history: Sequence[ChartPoint]) -> Iterator[Limits]:
-    known = [each.u for each in history if each.u is not None]
+    u_values = [each.u for each in history if each.u is not None]
     if point.u is not None and point.expected is not None:
         yield Limits("stated u", point.expected, math.hypot(point.u, point.u_expected), 0)
-    elif point.u is not None and history and len(known) == len(history):
+    elif point.u is not None and history and len(u_values) == len(history):
         centre = float(np.mean([each.value for each in history]))
-        u_centre = math.sqrt(sum(u**2 for u in known)) / len(history)
+        u_centre = math.sqrt(sum(u**2 for u in u_values)) / len(history)
         yield Limits("stated u", centre, math.hypot(point.u, u_centre), len(history))
     values = [each.value for each in history]
     if len(history) >= LEAST_HISTORY and len(set(values)) > 1:  # equal values, as coarse steps give, say nothing of it

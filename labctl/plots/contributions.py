@@ -49,7 +49,7 @@ def contributions(over: Mapping[str, ContributionsOverJson]) -> go.Figure:
 
 
 def _draw(
-    figure: go.Figure, lines: ContributionLinesJson, names: Sequence[str], drawn: set[str], where: dict[str, int]
+    figure: go.Figure, lines: ContributionLinesJson, names: Sequence[str], drawn: set[str], placement: dict[str, int]
 ) -> None:
     sums = {"combined u": lines["combined"], "expanded U": lines["expanded"]}
     dashes = {"combined u": "solid", "expanded U": "dash"}
@@ -64,7 +64,7 @@ def _draw(
                 line={"color": colour, "dash": dashes.get(name, "solid"), "width": 2.5 if name in sums else 1.5},
                 hovertemplate=f"{escape(name)}<br>%{{x:.5g}}: %{{y:.3g}} deg/s<extra></extra>",
             ),
-            **where,
+            **placement,
         )  # fmt: skip
         drawn.add(name)
 

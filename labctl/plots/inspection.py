@@ -48,8 +48,8 @@ def inspection_html(
 ) -> str:
     """Return an HTML document of an inspection: its sentences, and the picture."""
     picture = inspection_picture(courses, marks)
-    said = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences) or "<li>nothing was found</li>"
-    parts = [f"<h1>Inspection of {escape(source)}</h1>", f"<ul>{said}</ul>"]
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences) or "<li>nothing was found</li>"
+    parts = [f"<h1>Inspection of {escape(source)}</h1>", f"<ul>{items}</ul>"]
     if picture is not None:
         parts.append(figure_part(picture))
     return whole_page(f"Inspection of {source}", parts, drawn=picture is not None)
@@ -73,15 +73,15 @@ def _bands(mark: MarkJson, colour: str, panel: int) -> list[dict[str, object]]:
 
 def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:
     drawn = "reading by reading" if course["bins"] >= course["readings"] else f"in {course['bins']} bins"
-    said = [f"{course['channel']}: all {course['readings']} readings, {drawn}"]
+    parts = [f"{course['channel']}: all {course['readings']} readings, {drawn}"]
     for mark in marks:
         if mark["whole"]:
-            said.append(f"{mark['what']} (all of it)")
+            parts.append(f"{mark['what']} (all of it)")
         elif len(mark["from_s"]) < mark["places"]:
-            said.append(f"{mark['what']} ({len(mark['from_s'])} of {mark['places']} places drawn)")
+            parts.append(f"{mark['what']} ({len(mark['from_s'])} of {mark['places']} places drawn)")
         else:
-            said.append(f"{mark['what']} ({mark['places']} places)")
-    return "; ".join(said)
+            parts.append(f"{mark['what']} ({mark['places']} places)")
+    return "; ".join(parts)
 
 
 def _envelope(course: CourseJson) -> go.Scatter:

@@ -50,12 +50,12 @@ def _apart(high: Numbers, low: Numbers) -> Numbers:
 
 
 def _figures_text(axis: str, line: AllanJson) -> str:
-    said = [
+    parts = [
         f"{letter} = {figure['value']:.3g} {figure['unit']}"
         for letter, figure in (("N", line["N"]), ("B", line["B"]), ("K", line["K"]))
         if figure["value"] is not None
     ]
-    return f"{axis}: {', '.join(said) or 'no slope shows'}"
+    return f"{axis}: {', '.join(parts) or 'no slope shows'}"
 
 
 def repeats(answer: CriticismJson) -> go.Figure | None:

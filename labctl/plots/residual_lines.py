@@ -63,7 +63,7 @@ def shown_text(sets: DataSetColumns) -> str:
 
 
 def _dots(
-    figure: go.Figure, sets: DataSetColumns, axis: str, channel: str, position: str | None, where: Mapping[str, int]
+    figure: go.Figure, sets: DataSetColumns, axis: str, channel: str, position: str | None, placement: Mapping[str, int]
 ) -> None:
     values = (sets.get("channels") or {}).get(channel)
     residual = (sets.get("residual_dps") or {}).get(axis)
@@ -73,7 +73,7 @@ def _dots(
     numbers = sets.get("dataset", [])
     dots(
         figure, [values[k] for k in rows], [residual[k] for k in rows], colour_of(axis),
-        [f"data set {numbers[k]}" for k in rows], **where,
+        [f"data set {numbers[k]}" for k in rows], **placement,
     )  # fmt: skip
 
 
@@ -122,8 +122,8 @@ def _over(values: Numbers, unit: float) -> Numbers:
 
 def _time_title(line: TimeLine) -> str:
     figures = (("lag-1", line["lag1_whitened"]), ("runs p", line["runs_p"]))
-    said = [f"{word} {figure:.2g}" for word, figure in figures if figure is not None]
-    return f"{line['axis']}: {', '.join(said)} (drift taken out)" if said else line["axis"]
+    parts = [f"{word} {figure:.2g}" for word, figure in figures if figure is not None]
+    return f"{line['axis']}: {', '.join(parts)} (drift taken out)" if parts else line["axis"]
 
 
 def previous_rate(answer: CriticismJson) -> go.Figure | None:

@@ -30,18 +30,18 @@ def _lines_text(line: AngleSpectrum) -> str:
     return f"{line['axis']}: {above or 'no line above the limit'}"
 
 
-def _stems(figure: go.Figure, x: list[int], y: Numbers, line: AngleSpectrum, where: Mapping[str, int]) -> None:
+def _stems(figure: go.Figure, x: list[int], y: Numbers, line: AngleSpectrum, placement: Mapping[str, int]) -> None:
     figure.add_trace(
         go.Bar(x=x, y=y, marker={"color": colour_of(line["axis"])}, name=line["axis"],
                hovertemplate="%{x} per turn: %{y:.2f}<extra></extra>"),
-        **where,
+        **placement,
     )  # fmt: skip
-    _limit(figure, x, line["limit"], where)
+    _limit(figure, x, line["limit"], placement)
 
 
-def _limit(figure: go.Figure, x: Sequence[float | None], y: Numbers, where: Mapping[str, int]) -> None:
+def _limit(figure: go.Figure, x: Sequence[float | None], y: Numbers, placement: Mapping[str, int]) -> None:
     figure.add_trace(
-        go.Scatter(x=x, y=y, mode="lines", line={"color": INK, "dash": "dash", "width": 1}, name="limit"), **where
+        go.Scatter(x=x, y=y, mode="lines", line={"color": INK, "dash": "dash", "width": 1}, name="limit"), **placement
     )
 
 

@@ -206,9 +206,9 @@ def _one_mark(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> No
     if not (wrong | changes).any():
         return
     row = int(np.argmax(wrong | changes))
-    said = "is not 0 or 1" if wrong[row] else f"differs from {marks[row - 1]} in the row before, of the same data set"
+    fault = "is not 0 or 1" if wrong[row] else f"differs from {marks[row - 1]} in the row before, of the same data set"
     raise BadRecording(
-        f"{path}: column {VERIFICATION!r}, row {row + 1}: {marks[row]} {said}; give every row of a data set 1 if it "
+        f"{path}: column {VERIFICATION!r}, row {row + 1}: {marks[row]} {fault}; give every row of a data set 1 if it "
         "was measured to verify a calibration, else 0"
     )
 

@@ -106,8 +106,8 @@ def check_coefficients(path: Path, info: RecordingInfo, columns: Mapping[str, ob
             f"{', '.join(info.axes)} has columns {', '.join(needed)}: add it"
         )
     coefficients = form.coefficients(info, columns)
-    known = {*needed, *form.also, *(f"u_{name}" for name in coefficients)}
-    unknown = sorted(set(columns) - known)
+    allowed = {*needed, *form.also, *(f"u_{name}" for name in coefficients)}
+    unknown = sorted(set(columns) - allowed)
     if unknown:
         raise BadRecording(
             f"{path}: column {unknown[0][:80]!r} is not known in a table of the form {form.name!r}; remove or "

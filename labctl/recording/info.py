@@ -60,13 +60,13 @@ class OutputUnit(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _default_scale(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "scale" not in given:
-            unit = given.get("unit", "deg/s")
+    def _default_scale(cls, value: Any) -> Any:
+        if isinstance(value, dict) and "scale" not in value:
+            unit = value.get("unit", "deg/s")
             if unit in RATE_UNITS:
-                return {**given, "scale": RATE_UNITS[unit]}
+                return {**value, "scale": RATE_UNITS[unit]}
             raise ValueError(f"unit {unit!r} needs a scale: the output's change, in that unit, per deg/s")
-        return given
+        return value
 
     @model_validator(mode="after")
     def _usable(self) -> OutputUnit:

@@ -25,13 +25,13 @@ def with_quantisation(recording: Recording) -> Recording:
     columns = recording.columns
     dataset = np.asarray(columns["dataset"], dtype=np.int64)
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
-    known, starts = dataset[valid], dataset_starts(dataset[valid])
+    valid_sets, starts = dataset[valid], dataset_starts(dataset[valid])
     quantised: dict[str, NDArray[np.generic]] = {}
     for name in (f"gyro_{axis}" for axis in recording.info.axes):
-        if name + QUANTISATION not in columns and len(known):
+        if name + QUANTISATION not in columns and len(valid_sets):
             sets = np.split(np.asarray(columns[name], dtype=np.float64)[valid], starts[1:])
             for column, values in steps_columns(name, sets).items():
-                quantised[column] = per_reading(dataset, known[starts], values)
+                quantised[column] = per_reading(dataset, valid_sets[starts], values)
     return replace(recording, columns={**columns, **quantised}) if quantised else recording
 
 

@@ -60,7 +60,7 @@ def read(path: Path, options: ParameterOptions) -> Recording:
         )
     try:
         values = {name: float(number) for name, number in _LINE.findall(text)}
-        warm, bias_rad_s = _px4(values, kind[1]) if kind[0] == "PX4" else _ardupilot(values, kind[1])
+        temperatures_c, bias_rad_s = _px4(values, kind[1]) if kind[0] == "PX4" else _ardupilot(values, kind[1])
     except KeyError as error:
         raise BadRecording(
             f"{path}: parameter {error.args[0]} is missing; export the complete set of parameters"
@@ -73,9 +73,9 @@ def read(path: Path, options: ParameterOptions) -> Recording:
         serial=options.serial, axes=AXES, kind="coefficients", started_at=options.started_at,
         max_rate_dps=options.max_rate_dps, notes=notes,
     )  # fmt: skip
-    gains = {f"k_{out}{turned}": np.full(len(warm), float(out == turned)) for out in AXES for turned in AXES}
+    gains = {f"k_{out}{turned}": np.full(len(temperatures_c), float(out == turned)) for out in AXES for turned in AXES}
     biases = {f"b_{axis}": np.rad2deg(bias_rad_s[:, column]) for column, axis in enumerate(AXES)}
-    columns: dict[str, Column] = {**gains, **biases, "temperature_c": warm}
+    columns: dict[str, Column] = {**gains, **biases, "temperature_c": temperatures_c}
     return Recording(info, columns)
 
 
@@ -112,10 +112,10 @@ def _temperatures(low: float, high: float) -> Array:
 def _px4(values: Mapping[str, float], gyro: int) -> tuple[Array, Array]:
     """Return temperatures (n,) deg C and offsets (n, 3) rad/s."""
     prefix = f"TC_G{gyro}_"
-    warm = _temperatures(values[f"{prefix}TMIN"], values[f"{prefix}TMAX"])
-    d = warm - values[f"{prefix}TREF"]
+    temperatures_c = _temperatures(values[f"{prefix}TMIN"], values[f"{prefix}TMAX"])
+    d = temperatures_c - values[f"{prefix}TREF"]
     terms = [[values[f"{prefix}X{power}_{axis}"] * d**power for power in range(4)] for axis in range(3)]
-    return warm, np.column_stack([np.sum(term, axis=0) for term in terms])
+    return temperatures_c, np.column_stack([np.sum(term, axis=0) for term in terms])
 
 
 def _ardupilot(values: Mapping[str, float], imu: int) -> tuple[Array, Array]:
@@ -124,15 +124,15 @@ def _ardupilot(values: Mapping[str, float], imu: int) -> tuple[Array, Array]:
     prefix = f"INS{imu}_TCAL_" if late else f"INS_TCAL{imu}_"
     offset = f"INS{imu}_GYROFFS_" if late else f"INS_GYR{'' if imu == 1 else imu}OFFS_"
     low, high = values[f"{prefix}TMIN"], values[f"{prefix}TMAX"]
-    warm = _temperatures(low, high)
+    temperatures_c = _temperatures(low, high)
     at = float(np.clip(values[f"INS{imu}_GYR_CALTEMP" if late else f"INS_GYR{imu}_CALTEMP"], low, high))
 
     def cubic(temperature_c: Array, axis: str) -> Array:
         d = temperature_c - REFERENCE_C
         return np.sum([values[f"{prefix}GYR{power}_{axis}"] * SCALE * d**power for power in (1, 2, 3)], axis=0)
 
-    bias = [cubic(warm, axis) - cubic(np.array([at]), axis) + values[f"{offset}{axis}"] for axis in "XYZ"]
-    return warm, np.column_stack(bias)
+    bias = [cubic(temperatures_c, axis) - cubic(np.array([at]), axis) + values[f"{offset}{axis}"] for axis in "XYZ"]
+    return temperatures_c, np.column_stack(bias)
 
 
 IMPORTER = Importer("parameters of PX4 or ArduPilot with a gyro's thermal calibration", probe, read, ParameterOptions)

@@ -44,11 +44,11 @@ def stop_instruments(
 def _stopped(bench: BenchFile, say: Callable[[str], None], stands: Callable[[], None]) -> InstrumentsLeft:
     at_rest = False
 
-    def note(what: str, complaint: str) -> None:
+    def note(text: str, complaint: str) -> None:
         nonlocal at_rest
         if complaint:
-            say(f"{what}: {complaint}")
-        elif what == TABLE:
+            say(f"{text}: {complaint}")
+        elif text == TABLE:
             at_rest = True
             stands()
 

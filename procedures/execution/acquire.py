@@ -118,8 +118,8 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             raise
     context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
     context.unchecked.append(number)
-    taken = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
-    return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **rates, **taken}
+    reading_counts = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
+    return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **rates, **reading_counts}
 
 
 def _demand_answer(context: ExecutionContext, step: Acquire, spin: Spin) -> None:

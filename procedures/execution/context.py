@@ -85,10 +85,10 @@ class ExecutionContext:
         """Raise WrongInstrument where a unit is set otherwise than in the campaign so far, or than it is to be."""
         before = self._set.get(gyro) or self.full_bench.configurations.get(gyro, {})
         if changes := changed(before, reported):
-            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
+            text = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
             raise WrongInstrument(
                 gyro,
-                f"the unit is set otherwise than before: {said}. What was not saved in the unit is lost when it is "
+                f"the unit is set otherwise than before: {text}. What was not saved in the unit is lost when it is "
                 "switched off: set it as it was, save that, and resume the campaign",
             )
         self._set[gyro] = {**before, **configuration_of(reported)}

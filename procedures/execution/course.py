@@ -67,9 +67,9 @@ def _follow(
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
             raise
     context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
-    taken = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
+    reading_counts = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
     figures = {"encoder_dps": angles.rate_dps, "encoder_u_dps": angles.rate_u_dps, "angles": float(len(angles.t_s))}
-    return {"gate_s": gate[1] - gate[0], **figures, **taken}
+    return {"gate_s": gate[1] - gate[0], **figures, **reading_counts}
 
 
 def _read(

@@ -60,18 +60,18 @@ def _parts(bench: Bench, clock: Clock) -> Iterator[tuple[str, Callable[[], str |
         yield f"stream of {name} closed", gyro.stop
 
 
-def _tried(what: str, part: Callable[[], str | None]) -> str:
+def _tried(action: str, part: Callable[[], str | None]) -> str:
     """Try one part; returns what is to be complained of, empty when it is confirmed."""
     for attempt in (1, 2):
         try:
             complaint = part()
         except Exception as error:  # noqa: BLE001  whatever one part does, the others are still tried
-            return f"{what}: {str(error) or type(error).__name__}"
+            return f"{action}: {str(error) or type(error).__name__}"
         except KeyboardInterrupt:
             if attempt == 2:
-                return f"{what}: interrupted twice"
+                return f"{action}: interrupted twice"
         else:
-            return f"{what}: {complaint}" if complaint else ""
+            return f"{action}: {complaint}" if complaint else ""
     return ""
 
 

@@ -110,13 +110,17 @@ def mount(context: ExecutionContext, step: Mount) -> Figures:
 
 def mounting_text(position: str) -> str:
     """Return what a person is asked for to mount the units in a position."""
-    asked = Position.of(position)
-    text = f"turn the units so that body axis {asked.end} points up along the table axis"
-    if asked.unit_deg:
-        text += f", and each unit on the same face of its fixture by {asked.unit_deg} deg from where it was first"
-    if asked.fixture_deg:
-        text += f", and the fixture with the units on the table by {asked.fixture_deg} deg from where it was first"
-    return f"{text} (counter-clockwise seen from above)" if asked.turned_deg else text
+    axis_position = Position.of(position)
+    text = f"turn the units so that body axis {axis_position.end} points up along the table axis"
+    if axis_position.unit_deg:
+        text += (
+            f", and each unit on the same face of its fixture by {axis_position.unit_deg} deg from where it was first"
+        )
+    if axis_position.fixture_deg:
+        text += (
+            f", and the fixture with the units on the table by {axis_position.fixture_deg} deg from where it was first"
+        )
+    return f"{text} (counter-clockwise seen from above)" if axis_position.turned_deg else text
 
 
 def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:

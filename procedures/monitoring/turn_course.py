@@ -41,10 +41,12 @@ def nominal_outputs(
         if not channel.name.startswith(PREFIX):
             continue
         axis = channel.name.removeprefix(PREFIX)
-        said = output.get(axis, {})
-        usual = RATE_UNITS.get(str(said.get("unit", channel.unit)), 1.0)
-        unit, scale = str(said.get("unit", channel.unit)), float(said.get("scale", usual))
-        by_axis[axis] = Nominal(channel, float(said.get("offset", 0.0)), scale, unit in RATE_UNITS or "scale" in said)
+        nominal = output.get(axis, {})
+        usual = RATE_UNITS.get(str(nominal.get("unit", channel.unit)), 1.0)
+        unit, scale = str(nominal.get("unit", channel.unit)), float(nominal.get("scale", usual))
+        by_axis[axis] = Nominal(
+            channel, float(nominal.get("offset", 0.0)), scale, unit in RATE_UNITS or "scale" in nominal
+        )
     return by_axis
 
 

@@ -27,8 +27,8 @@ def numbers(device: str, text: str, least: int) -> list[float]:
 
 def check_factory_limits(device: str, settings: Acutrol3000Settings, limits: list[float]) -> None:
     """Compare rate and acceleration of the bench file with the controller's absolute limits; raises WrongInstrument."""
-    wanted = {"max_rate_dps": settings.max_rate_dps, "acceleration_dps2": settings.acceleration_dps2}
-    for (key, value), limit in zip(wanted.items(), limits, strict=False):
+    expected = {"max_rate_dps": settings.max_rate_dps, "acceleration_dps2": settings.acceleration_dps2}
+    for (key, value), limit in zip(expected.items(), limits, strict=False):
         if value > limit * (1 + 1e-9):
             raise WrongInstrument(
                 device,

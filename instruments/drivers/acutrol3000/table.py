@@ -228,12 +228,12 @@ class Acutrol3000:
             self._link.ask(acl.limit_acceleration(mode, self._axis, acceleration))
         self._link.ask(acl.limit_rate(acl.POSITION, self._axis, self._home_dps))
         self._link.ask(acl.limit_rate(acl.RATE, self._axis, self.settings.max_rate_dps))
-        for name, wanted in (("Rate", self.settings.max_rate_dps), ("Acceleration", acceleration)):
+        for name, expected in (("Rate", self.settings.max_rate_dps), ("Acceleration", acceleration)):
             (limit,) = self._numbers(f":Limit:{name}? {acl.RATE},{self._axis}", 1)
-            if not math.isclose(limit, wanted, rel_tol=1e-4):
+            if not math.isclose(limit, expected, rel_tol=1e-4):
                 raise RequestRejected(
                     self.name,
-                    f"limits the {name.lower()} to {limit:g}, but labctl set {wanted:g}; query :Limit:Absolute? "
+                    f"limits the {name.lower()} to {limit:g}, but labctl set {expected:g}; query :Limit:Absolute? "
                     "of the controller, then correct max_rate_dps and acceleration_dps2 in the bench file",
                 )
 
@@ -256,12 +256,12 @@ class Acutrol3000:
                 raise NoReply(self.name, "the table still turns after the command Off; press its stop switch")
             self._clock.sleep(POLL_S)
 
-    def _demand_time(self, deadline_s: float, what: str) -> None:
+    def _demand_time(self, deadline_s: float, purpose: str) -> None:
         """Stop the table and say why, after the deadline or once the interlock is not closed any more."""
         cause = self._cause()
         if cause or self._clock.now_s() > deadline_s:
             self.stop()
-            raise RequestRejected(self.name, what + (cause or "; check load, limits and mode of the controller"))
+            raise RequestRejected(self.name, purpose + (cause or "; check load, limits and mode of the controller"))
 
     def _quickest_answer(self, message: str) -> tuple[str, float, float]:
         """Return the answer that came quickest to a few equal questions, where answers are quick, and its times."""

@@ -189,8 +189,8 @@ class LabJackGyro:
     def _scans_per_packet(self) -> int:
         """Scans of a packet: whole readings where they fit."""
         average, most = self.settings.options.average, lj.MOST_SAMPLES_PER_PACKET // len(self._inputs)
-        wanted = min(max(round(self.scans_per_s / PACKETS_PER_S), 1), most)
-        return wanted if average > wanted else wanted - wanted % average
+        scans = min(max(round(self.scans_per_s / PACKETS_PER_S), 1), most)
+        return scans if average > scans else scans - scans % average
 
     def _discard(self) -> None:
         self._stream.discard_input()

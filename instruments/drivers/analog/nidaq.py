@@ -148,7 +148,7 @@ class NidaqmxTask:
             return LinkError(self.name, f"the package {PACKAGE} is not installed; run `{command}`")
         return LinkError(self.name, f"{PACKAGE} needs the module {error.name}, which is not installed; run `{command}`")
 
-    def _failed(self, what: str, error: Exception) -> LinkError:
+    def _failed(self, purpose: str, error: Exception) -> LinkError:
         """Return an error of nidaqmx as one line; the scans must be started again.
 
         A buffer that ran over (error -200279) is one of them: the number of scans that are missing is not known, so the
@@ -165,14 +165,14 @@ class NidaqmxTask:
         if status in (RpcStatus.DEADLINE_EXCEEDED, RpcStatus.UNAVAILABLE):
             return NoReply(
                 self.name,
-                f"cannot {what} of {settings.address}: NI's gRPC device server does not answer ({one_line(error)}); "
+                f"cannot {purpose} of {settings.address}: NI's gRPC device server does not answer ({one_line(error)}); "
                 "check host, tcp_port, network, and that the server is running",
             )
         code = getattr(error, "error_code", None)
         text = f"error {code}: {one_line(error)}" if code is not None else one_line(error)
         software = "driver software" if settings.host is None else "the driver software of the server"
         return LinkError(
-            self.name, f"cannot {what} of {settings.address} ({text}); check device name, cable and {software}"
+            self.name, f"cannot {purpose} of {settings.address} ({text}); check device name, cable and {software}"
         )
 
     def _close_channel(self) -> None:
@@ -228,23 +228,23 @@ class NidaqGyro:
         """Get the unit's identity by the bench file, after one reading came; raises LinkError, NoReply."""
         was_open = self._task.is_open
         self.start()
-        said = {"inputs": f"{self._task.product() or 'NI-DAQ'} {self.settings.device}"}
+        reported = {"inputs": f"{self._task.product() or 'NI-DAQ'} {self.settings.device}"}
         self.read_latest()
         if not was_open:
             self.stop()
-        return analog_identity(self.settings, f"analog gyro on {said['inputs']}", said)
+        return analog_identity(self.settings, f"analog gyro on {reported['inputs']}", reported)
 
     def start(self) -> None:
         """Control the scans: begin; those that run go on. Raises LinkError, WrongInstrument for another rate."""
         if self._task.is_open:
             self._discard()
             return
-        scan_rate_hz, wanted = self._task.open(), self.settings.scans_per_s
-        if abs(scan_rate_hz / wanted - 1.0) > RATE_TOLERANCE:
+        scan_rate_hz, requested_hz = self._task.open(), self.settings.scans_per_s
+        if abs(scan_rate_hz / requested_hz - 1.0) > RATE_TOLERANCE:
             self.stop()
             raise WrongInstrument(
                 self.name,
-                f"scans {scan_rate_hz:g} times per second, but the bench file states {wanted:g}; set "
+                f"scans {scan_rate_hz:g} times per second, but the bench file states {requested_hz:g}; set "
                 f"sample_rate_hz = {scan_rate_hz:g}",
             )
         self._taken = 0

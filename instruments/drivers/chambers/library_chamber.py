@@ -22,9 +22,9 @@ class LibraryChamber(SetpointChamber):
 
     def identify(self) -> str:
         """Get what the instrument says of itself, after its air temperature was read; raises InstrumentError."""
-        said = self._instrument.identity()
+        identity = self._instrument.identity()
         self._read_air()
-        return f"{self._names.instrument} of {self._names.library} {said}".strip()
+        return f"{self._names.instrument} of {self._names.library} {identity}".strip()
 
     def make_safe(self) -> float:
         """Control the chamber to its safe set point, and off where the bench file says so; returns the value read back.

@@ -163,12 +163,12 @@ class LineChamber(TextChamber):
     def _ask_c(self, question: Question) -> float:
         return float(self._lines.ask(question.send.format(**self._names), question.reply, question.what)["c"])
 
-    def _command(self, command: str, what: str, **values: float) -> None:
+    def _command(self, command: str, purpose: str, **values: float) -> None:
         line = command.format(**self._names, **values)
         if self._acknowledges:
-            self._lines.ask(line, self._dialect.acknowledged, what)
+            self._lines.ask(line, self._dialect.acknowledged, purpose)
         else:
-            self._lines.tell(line, what)
+            self._lines.tell(line, purpose)
 
 
 class Espec(LineChamber):

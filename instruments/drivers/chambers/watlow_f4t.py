@@ -69,8 +69,8 @@ class WatlowF4T(Watlow):
         return self._known_part
 
     def _loop(self) -> f4t.ControlLoop:
-        wanted = self.settings.cascade
-        cascade = f4t.has_cascade(self._part_number()) if wanted is None else wanted
+        stated_cascade = self.settings.cascade
+        cascade = f4t.has_cascade(self._part_number()) if stated_cascade is None else stated_cascade
         return f4t.CASCADE if cascade else f4t.LOOP
 
     def _controller_limits(self) -> tuple[float, float]:

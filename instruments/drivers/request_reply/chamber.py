@@ -104,15 +104,15 @@ class DescribedChamber(TextChamber):
     def _switch_off(self) -> None:
         self._command(self._described.switch_off, "switch off")
 
-    def _command(self, lines: Sequence[str], what: str, values: Mapping[str, object] = NONE) -> None:
+    def _command(self, lines: Sequence[str], purpose: str, values: Mapping[str, object] = NONE) -> None:
         """Send commands; what prepares the chamber goes first, once for each opening of the link."""
         if self.dialogue.is_new:
             self.dialogue.command(self._described.start, "prepare")
-        self.dialogue.command(lines, what, values)
+        self.dialogue.command(lines, purpose, values)
         self.dialogue.started()
 
-    def _ask_c(self, ask: AskNumber, what: str) -> float:
-        return round(self._described.temperature.read(self.dialogue.number(ask, what)), 9)
+    def _ask_c(self, ask: AskNumber, purpose: str) -> float:
+        return round(self._described.temperature.read(self.dialogue.number(ask, purpose)), 9)
 
 
 DRIVER = ChamberDriver(

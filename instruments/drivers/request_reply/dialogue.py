@@ -41,38 +41,38 @@ class Dialogue:
 
     def identity(self, ask: AskText) -> str:
         """Return what the instrument says it is; raises WrongInstrument for a reply that does not fit."""
-        said = self.link.ask(self.request(ask.send), r".*\S.*", "say what it is")[0]
-        match = re.fullmatch(ask.pattern, said)
+        reply = self.link.ask(self.request(ask.send), r".*\S.*", "say what it is")[0]
+        match = re.fullmatch(ask.pattern, reply)
         if match is None:
             raise WrongInstrument(
                 self.link.device,
-                f"{self.link.url} answered {said[:SHOWN]!r} to {self.request(ask.send)!r}, which does not fit the "
+                f"{self.link.url} answered {reply[:SHOWN]!r} to {self.request(ask.send)!r}, which does not fit the "
                 f"pattern {ask.pattern!r} of its description; check the address, or correct [identity]",
             )
         return match["text"].strip()
 
-    def text(self, ask: Ask, what: str) -> str:
+    def text(self, ask: Ask, purpose: str) -> str:
         """Return a text."""
-        return self._answer(ask, what).strip()
+        return self._answer(ask, purpose).strip()
 
-    def number(self, ask: AskNumber, what: str) -> float:
+    def number(self, ask: AskNumber, purpose: str) -> float:
         """Return a number, in the unit of the instrument; raises MalformedReply where the answer is none."""
-        said = self._answer(ask, what)
+        reply = self._answer(ask, purpose)
         try:
-            number = float(said)
+            number = float(reply)
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            raise self._malformed(said, what, "a number")
+            raise self._malformed(reply, purpose, "a number")
         return number
 
-    def holds(self, ask: AskState, what: str) -> bool:
+    def holds(self, ask: AskState, purpose: str) -> bool:
         """Return whether a state holds; raises MalformedReply where the answer is neither yes nor no."""
-        said = self._answer(ask, what).strip()
-        is_held = ask.holds(said)
+        reply = self._answer(ask, purpose).strip()
+        is_held = ask.holds(reply)
         if is_held is None:
             rule = f"yes = {ask.yes!r} or no = {ask.no!r}" if ask.yes is not None else "a number as its rule needs"
-            raise self._malformed(said, what, rule)
+            raise self._malformed(reply, purpose, rule)
         return is_held
 
     def alarms(self, ask: AskAlarms) -> tuple[str, ...]:
@@ -80,7 +80,7 @@ class Dialogue:
         return ask.alarms(self.text(ask, "read its alarms"))
 
     def command(
-        self, lines: Sequence[str], what: str, values: Mapping[str, object] = NONE, *, tries: int = TRIES
+        self, lines: Sequence[str], purpose: str, values: Mapping[str, object] = NONE, *, tries: int = TRIES
     ) -> None:
         """Send commands in order, each with its acknowledgement and check.
 
@@ -90,18 +90,18 @@ class Dialogue:
             self._forget_old_errors()
             request = self.request(template, values)
             try:
-                self._send(template, request, what, tries)
+                self._send(template, request, purpose, tries)
             except RequestRejected:
                 if template not in self._line.may_refuse:
                     raise
 
-    def _send(self, template: str, request: str, what: str, tries: int) -> None:
+    def _send(self, template: str, request: str, purpose: str, tries: int) -> None:
         if self._line.acknowledged is not None:
             timeout_s = self._line.slow_s if template in self._line.slow else None
-            self.link.ask(request, self._line.acknowledged, f"{what} ({request})", tries=tries, timeout_s=timeout_s)
+            self.link.ask(request, self._line.acknowledged, f"{purpose} ({request})", tries=tries, timeout_s=timeout_s)
         else:
-            self.link.tell(request, what)
-        self._check(request, what)
+            self.link.tell(request, purpose)
+        self._check(request, purpose)
 
     def stop(self, lines: Sequence[str]) -> None:
         """Send the commands of a stop before anything else; raises LinkError."""
@@ -112,21 +112,22 @@ class Dialogue:
         """Return a request with its values."""
         return filled(template, {**self._names, **values})
 
-    def _answer(self, ask: Ask, what: str) -> str:
-        match = self.link.ask(self.request(ask.send), ask.pattern, what)
+    def _answer(self, ask: Ask, purpose: str) -> str:
+        match = self.link.ask(self.request(ask.send), ask.pattern, purpose)
         return str(next(value for value in match.groupdict().values() if value is not None))
 
-    def _check(self, request: str, what: str) -> None:
+    def _check(self, request: str, purpose: str) -> None:
         """Raise RequestRejected where the instrument says that a command was an error."""
         check = self._line.check
         if check is None:
             return
-        said = self.text(check, "say whether a command was an error")
-        if not re.fullmatch(check.passes, said):
-            why = self._line.reasons.get(said, said)
+        reply = self.text(check, "say whether a command was an error")
+        if not re.fullmatch(check.passes, reply):
+            why = self._line.reasons.get(reply, reply)
             raise RequestRejected(
                 self.link.device,
-                f"refused to {what}: {why!r} after {request!r}; check its mode and limits, or correct its description",
+                f"refused to {purpose}: {why!r} after {request!r}; check its mode and limits, or correct its "
+                "description",
             )
 
     def _forget_old_errors(self) -> None:
@@ -134,19 +135,20 @@ class Dialogue:
         if not self._errors_are_old or check is None:
             return
         for _ in range(MOST_OLD_ERRORS):
-            said = self.text(check, "say what errors it holds")
-            if re.fullmatch(check.passes, said):
+            reply = self.text(check, "say what errors it holds")
+            if re.fullmatch(check.passes, reply):
                 self._errors_are_old = False
                 return
         raise RequestRejected(
             self.link.device,
-            f"holds the error {said!r} however often it is asked; clear it at the instrument, or correct check in "
+            f"holds the error {reply!r} however often it is asked; clear it at the instrument, or correct check in "
             "the description",
         )
 
-    def _malformed(self, said: str, what: str, wanted: str) -> MalformedReply:
+    def _malformed(self, reply: str, purpose: str, expected: str) -> MalformedReply:
         return MalformedReply(
             self.link.device,
-            f"answered {said[:SHOWN]!r} to the request to {what}, which is not {wanted}; correct the description, or "
+            f"answered {reply[:SHOWN]!r} to the request to {purpose}, which is not {expected}; correct the "
+            "description, or "
             "check cable and line settings",
         )

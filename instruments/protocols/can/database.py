@@ -90,10 +90,10 @@ def frame_id_of(message: Message) -> int:
     return message.frame_id | (EXTENDED if message.is_extended_frame else 0)
 
 
-def _choice(where: str, what: str, wrong: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(wrong, known, n=1)
+def _choice(location: str, quantity: str, wrong: str, choices: list[str]) -> str:
+    near = difflib.get_close_matches(wrong, choices, n=1)
     hint = f"did you mean {near[0]!r}? If not, " if near else ""
-    return f"{where} has no {what} {wrong!r}; {hint}choose one of {listed(known, 20)}"
+    return f"{location} has no {quantity} {wrong!r}; {hint}choose one of {listed(choices, 20)}"
 
 
 def _signal(message: Message, signal: Signal) -> CanSignal:

@@ -37,8 +37,8 @@ def require_template(template: str, numbers: Iterable[str], names: Iterable[str]
         raise ValueError(f'{template!r} is not one line of text; list several lines as ["...", "..."]')
     for name, spec in places(template):
         if name not in (*numbers, *names):
-            known = ", ".join((*numbers, *names)) or "none"
-            raise ValueError(f"{template!r}: {{{name}}} is not known here (known: {known}); correct it")
+            allowed = ", ".join((*numbers, *names)) or "none"
+            raise ValueError(f"{template!r}: {{{name}}} is not known here (known: {allowed}); correct it")
         if name in numbers and not SPEC.fullmatch(spec):
             raise ValueError(
                 f"{template!r}: {{{name}}} does not say how the number is written; write {{{name}:.3f}} for three "

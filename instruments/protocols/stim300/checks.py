@@ -16,25 +16,25 @@ DEFAULT_RATE_HZ = 125.0
 
 def differences(configuration: Configuration, settings: Stim300Settings) -> list[str]:
     """Return the settings of a unit that differ from its bench file, one phrase each."""
-    options, said = settings.options, []
+    options, differing = settings.options, []
     if configuration.unit not in RATE_UNITS:
-        said.append(
+        differing.append(
             f"the gyro output unit is {UNIT_NAMES[configuration.unit]} in deg instead of ANGULAR RATE or AVERAGE "
             "ANGULAR RATE"
         )
     rate_hz = settings.sample_rate_hz or DEFAULT_RATE_HZ
     if configuration.sample_rate_hz not in {None, rate_hz}:  # None: external trigger; the stream shows its rate
-        said.append(f"the sample rate is {configuration.sample_rate_hz} Hz instead of {rate_hz:g} Hz")
+        differing.append(f"the sample rate is {configuration.sample_rate_hz} Hz instead of {rate_hz:g} Hz")
     if options.datagram not in configuration.datagrams:
-        said.append(f"the datagram is 0x{configuration.datagrams[0]:02X} instead of 0x{options.datagram:02X}")
+        differing.append(f"the datagram is 0x{configuration.datagrams[0]:02X} instead of 0x{options.datagram:02X}")
     if configuration.crlf != options.crlf:
-        said.append(f"CR LF {'on' if configuration.crlf else 'off'}, bench file {'on' if options.crlf else 'off'}")
+        differing.append(f"CR LF {'on' if configuration.crlf else 'off'}, bench file {'on' if options.crlf else 'off'}")
     if missing := [axis for axis in settings.axes if axis not in configuration.axes]:
-        said.append(f"the gyro axes are {' '.join(configuration.axes) or 'none'}, without {' '.join(missing)}")
-    return said
+        differing.append(f"the gyro axes are {' '.join(configuration.axes) or 'none'}, without {' '.join(missing)}")
+    return differing
 
 
-def is_other_serial(serial: str, given: str) -> bool:
+def is_other_serial(serial: str, given_serial: str) -> bool:
     """Return whether the serial number of a bench file is that of another STIM300; False for any other name."""
-    digits = SERIAL_PATTERN.fullmatch(given)
+    digits = SERIAL_PATTERN.fullmatch(given_serial)
     return digits is not None and digits[1] != serial[1:]

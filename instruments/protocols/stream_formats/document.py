@@ -52,9 +52,9 @@ class StreamField(Strict):
             return self
         if self.unit not in UNITS:
             raise ValueError(f"field {self.name}: unit {self.unit!r} is not known; choose one of {_units()}")
-        wanted = unit_of_channel(self.name)
-        if wanted is not None and UNITS[self.unit].unit != wanted:
-            fitting = [unit for unit, each in UNITS.items() if each.unit == wanted]
+        channel_unit = unit_of_channel(self.name)
+        if channel_unit is not None and UNITS[self.unit].unit != channel_unit:
+            fitting = [unit for unit, each in UNITS.items() if each.unit == channel_unit]
             raise ValueError(
                 f"field {self.name}: unit {self.unit!r} does not belong to this quantity; choose "
                 f"one of {', '.join(fitting)}"

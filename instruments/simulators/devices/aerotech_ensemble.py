@@ -47,11 +47,11 @@ class SimulatedEnsemble(TimedReplies):
             self._turn(0.0, t_s, self._abort_dps2)
         lost = self.faults.trigger(["lost_reply", "silence"], t_s) is not None
         if self.faults.trigger(["refusal"], t_s) is not None:
-            said, done_s = FAULT, t_s
+            reply, done_s = FAULT, t_s
         else:
-            said, done_s = self._execute(text, t_s)
+            reply, done_s = self._execute(text, t_s)
         if not lost:
-            self.send_in_order(done_s + self.axis.reply_s, f"{said}\n".encode())
+            self.send_in_order(done_s + self.axis.reply_s, f"{reply}\n".encode())
 
     def _execute(self, text: str, t_s: float) -> tuple[str, float]:
         """Return the reply and when the command is done."""

@@ -184,6 +184,6 @@ class SimulatedCanUnit(SampledUnit):
         return (value - conversion.offset) / conversion.factor
 
 
-def _good_value(signal: PackedSignal, given: int | str) -> float:
-    raw = signal.texts[given] if isinstance(given, str) else given
+def _good_value(signal: PackedSignal, value: int | str) -> float:
+    raw = signal.texts[value] if isinstance(value, str) else value
     return signal.offset + signal.scale * raw

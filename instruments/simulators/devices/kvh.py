@@ -39,8 +39,8 @@ class _SimulatedLines(ABC):
         self._sent = newest
         sample = self._unit.sample(index / self._rate_hz)
         lines = [
-            self.line(self.format.sign * float(rate[0]), float(warm[0]))
-            for rate, warm in zip(sample.rate_dps, sample.temperature_c, strict=True)
+            self.line(self.format.sign * float(rate[0]), float(temperature_c[0]))
+            for rate, temperature_c in zip(sample.rate_dps, sample.temperature_c, strict=True)
         ]
         if self._faults.trigger(["wrong_crc"], t_s) is not None:
             lines[0] = "?" + lines[0][1:]

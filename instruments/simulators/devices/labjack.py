@@ -186,7 +186,7 @@ class SimulatedT7Stream:
         options, sample = self.stream.settings.options, self.stream.unit.sample(t_s)
         volts = options.rest_v + options.v_per_dps * sample.rate_dps
         if options.thermometer_input is not None:
-            warm = (sample.temperature_c[:, :1] - options.thermometer_zero_c) / options.thermometer_c_per_v
-            volts = np.hstack([volts, warm])
+            above_zero_c = (sample.temperature_c[:, :1] - options.thermometer_zero_c) / options.thermometer_c_per_v
+            volts = np.hstack([volts, above_zero_c])
         slope, _, centre, _ = NOMINAL[4 * lj.gain_index(options.range_v) :][:4]
         return np.clip(np.rint(volts / slope + centre), 0, stream.DUMMY).astype(np.int64)

@@ -142,8 +142,8 @@ class SimulatedThermotron(LineDevice):
     def __init__(self, setup: InstrumentSetup) -> None:
         super().__init__(THERMOTRON.syntax, setup.faults)
         settings = part_of(setup.instrument("chamber"), ThermotronSettings)
-        said = setup.world.settings.chamber.get("acknowledges", settings.acknowledges)
-        self._channel, self._acknowledges = settings.channel, bool(said)
+        acknowledges = setup.world.settings.chamber.get("acknowledges", settings.acknowledges)
+        self._channel, self._acknowledges = settings.channel, bool(acknowledges)
         self.chamber = ChamberState(setup)
 
     def answer(self, request: str, t_s: float) -> str | None:

@@ -117,11 +117,11 @@ class Task:
         there = self.available(t_s)
         if self.started_s is None or there > self.buffer:
             raise DaqFailure(Status.OVERRUN if there else Status.NOT_YET_AVAILABLE)
-        wanted = there if count == ALL_AVAILABLE else min(count, there)
-        index = self.taken + 1 + np.arange(wanted)
-        self.taken += wanted
+        samples = there if count == ALL_AVAILABLE else min(count, there)
+        index = self.taken + 1 + np.arange(samples)
+        self.taken += samples
         volts = self.inputs.sample(self.numbers, self.range_v, self.started_s + index / self._true_hz)
-        return (Status.NOT_YET_AVAILABLE if wanted < count else None), volts
+        return (Status.NOT_YET_AVAILABLE if samples < count else None), volts
 
     @property
     def _true_hz(self) -> float:

@@ -78,8 +78,8 @@ def _settings_of(setup: InstrumentSetup) -> DeviceSettings:
 
 def _serial_of(gyro: GyroSettings) -> str:
     """Return the serial number of the bench file where it is one of a STIM300, else one that is made from it."""
-    known = SERIAL_PATTERN.fullmatch(gyro.serial)
-    return "N" + (known[1] if known else f"{zlib.crc32(gyro.serial.encode()):014d}")
+    number = SERIAL_PATTERN.fullmatch(gyro.serial)
+    return "N" + (number[1] if number else f"{zlib.crc32(gyro.serial.encode()):014d}")
 
 
 def _constant_part(layout: Layout) -> Bytes:
@@ -142,8 +142,8 @@ class SimulatedStim300:
         if command == RESET:
             index = self._silent_until = index + round(SILENT_AFTER_RESET_S * self._rate_hz)
             self._starts_until = index + round(STARTS_UP_S * self._rate_hz)
-        asked = [ASK_SERIAL_NUMBER, ASK_CONFIGURATION] if command == RESET else [command]
-        for question in asked:
+        requests = [ASK_SERIAL_NUMBER, ASK_CONFIGURATION] if command == RESET else [command]
+        for question in requests:
             if question in self._says:
                 while index in self._replies:
                     index += 1
@@ -209,7 +209,7 @@ class SimulatedStim300:
         sample = self._unit.sample(index / self._rate_hz)
         frames = np.empty((n, layout.stride), dtype=np.uint8)
         frames[:] = self._constant
-        rates, warm = self._on_three_axes(sample.rate_dps), self._on_three_axes(sample.temperature_c)
+        rates, temperature_c = self._on_three_axes(sample.rate_dps), self._on_three_axes(sample.temperature_c)
         over = np.abs(rates) > SATURATION_DPS
         words = self._words(rates).astype(">i4")
         frames[:, 1:10] = words.view(np.uint8).reshape(n, 3, 4)[:, :, 1:].reshape(n, 9)
@@ -218,7 +218,7 @@ class SimulatedStim300:
         if self._starts_until:
             frames[index < self._starts_until, layout.status] |= START_UP
         if layout.temperature is not None:
-            codes = np.rint(warm / TEMPERATURE_PER_LSB).astype(">i2")
+            codes = np.rint(temperature_c / TEMPERATURE_PER_LSB).astype(">i2")
             frames[:, layout.temperature : layout.temperature + 6] = codes.view(np.uint8).reshape(n, 6)
         skip = 0
         if (gap := self._faults.trigger(["counter_gap"], t_s)) is not None:

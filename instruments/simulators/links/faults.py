@@ -75,9 +75,9 @@ class Faults:
 
     def trigger(self, kinds: Iterable[FaultKind], t_s: float) -> Fault | None:
         """Return the first active fault of the given kinds, counted down; None when there is none."""
-        wanted = set(kinds)
+        fault_kinds = set(kinds)
         for fault in self.armed:
-            if fault.kind in wanted and fault.active(t_s):
+            if fault.kind in fault_kinds and fault.active(t_s):
                 if fault.count is not None:
                     fault.count -= 1
                 return fault

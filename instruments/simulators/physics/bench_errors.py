@@ -88,11 +88,11 @@ def _lean(two: Array) -> Lean:
     return float(two[0]), float(two[1])
 
 
-def _rotated(rates: Array, one: int, other: int, angle_rad: float) -> Array:
+def _rotated(rates: Array, axis: int, other: int, angle_rad: float) -> Array:
     """Return rates (n, 3) in axes that are turned by an angle in the plane of two of them."""
     turned = rates.copy()
-    turned[:, one] = np.cos(angle_rad) * rates[:, one] - np.sin(angle_rad) * rates[:, other]
-    turned[:, other] = np.sin(angle_rad) * rates[:, one] + np.cos(angle_rad) * rates[:, other]
+    turned[:, axis] = np.cos(angle_rad) * rates[:, axis] - np.sin(angle_rad) * rates[:, other]
+    turned[:, other] = np.sin(angle_rad) * rates[:, axis] + np.cos(angle_rad) * rates[:, other]
     return turned
 
 

@@ -113,5 +113,5 @@ class WireRecord:
         except WireLogError as error:
             raise self._error(str(error)) from error
 
-    def _error(self, why: str) -> WireLogError:
-        return WireLogError(f"{self.path} is no wire log of labctl: {why}; give a file that --wire-log wrote")
+    def _error(self, reason: str) -> WireLogError:
+        return WireLogError(f"{self.path} is no wire log of labctl: {reason}; give a file that --wire-log wrote")

@@ -112,8 +112,8 @@ class RecordedReader:
         """Return everything that has come since the last call."""
         received: Received = noted(self._note, "arrived", self._reader.take)
         arrived: Kind = "arrived"
-        known = {"now_s": received.now_s, "newest_s": received.newest_s, "width_s": received.width_s}
-        self._note(arrived, received.data, **{key: value for key, value in known.items() if value is not None})
+        times = {"now_s": received.now_s, "newest_s": received.newest_s, "width_s": received.width_s}
+        self._note(arrived, received.data, **{key: value for key, value in times.items() if value is not None})
         return received
 
     def discard(self) -> None:

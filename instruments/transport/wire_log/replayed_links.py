@@ -287,13 +287,13 @@ class ReplayedChannel:
         """Close the channel; safe to call twice."""
         self._replay.closed(self._port)
 
-    def _failure(self, said: Any) -> Exception:
+    def _failure(self, failure: Any) -> Exception:
         """Return a failure with the methods of a failed call."""
-        status = next(each for each in self._grpc.StatusCode if each.value[0] == said["status"])
-        metadata = tuple((key, value) for key, value in said.get("metadata", ()))
-        error: Exception = type("ReplayedRpcError", (self._grpc.RpcError,), {})(said["text_of_error"])
+        status = next(each for each in self._grpc.StatusCode if each.value[0] == failure["status"])
+        metadata = tuple((key, value) for key, value in failure.get("metadata", ()))
+        error: Exception = type("ReplayedRpcError", (self._grpc.RpcError,), {})(failure["text_of_error"])
         error.__dict__.update(
-            code=lambda: status, details=lambda: said["text_of_error"], trailing_metadata=lambda: metadata,
+            code=lambda: status, details=lambda: failure["text_of_error"], trailing_metadata=lambda: metadata,
             initial_metadata=tuple,
         )  # fmt: skip
         return error

@@ -128,41 +128,43 @@ def _of_file(path: Path, settings: SigningSettings) -> SigningKey:
     return SigningKey(where, certificate, chain, sign)
 
 
-def _pem(content: bytes, password: bytes | None, where: str) -> tuple[object, list[x509.Certificate]]:
+def _pem(content: bytes, password: bytes | None, location: str) -> tuple[object, list[x509.Certificate]]:
 
     try:
         key = load_pem_private_key(content, password if b"ENCRYPTED" in content else None)
     except (ValueError, TypeError) as error:
-        raise _unreadable(where, password, encrypted=b"ENCRYPTED" in content) from error
+        raise _unreadable(location, password, encrypted=b"ENCRYPTED" in content) from error
     return key, x509.load_pem_x509_certificates(content) if b"-----BEGIN CERTIFICATE" in content else []
 
 
-def _pkcs12(content: bytes, password: bytes | None, where: str) -> tuple[object, list[x509.Certificate]]:
+def _pkcs12(content: bytes, password: bytes | None, location: str) -> tuple[object, list[x509.Certificate]]:
 
     try:
         key, own, more = load_key_and_certificates(content, password)
     except ValueError as error:
         is_der = content[:1] == b"\x30"
-        raise _unreadable(where, password, encrypted=is_der) from error
+        raise _unreadable(location, password, encrypted=is_der) from error
     return key, [*([own] if own else []), *more]
 
 
-def _unreadable(where: str, password: bytes | None, *, encrypted: bool) -> BadInput:
+def _unreadable(location: str, password: bytes | None, *, encrypted: bool) -> BadInput:
     if not encrypted:
-        return BadInput(f"{where}: this is no private key in PEM form or PKCS#12; name such a file")
+        return BadInput(f"{location}: this is no private key in PEM form or PKCS#12; name such a file")
     if password is None:
         return BadInput(
-            f"{where}: it needs a password; write it into a file with mode 0600, and name that by "
+            f"{location}: it needs a password; write it into a file with mode 0600, and name that by "
             f"{SIGN_PASSWORD_VARIABLE}"
         )
     return BadInput(
-        f"{where}: the password in the file that {SIGN_PASSWORD_VARIABLE} names does not open it; correct the password"
+        f"{location}: the password in the file that {SIGN_PASSWORD_VARIABLE} names does not open it; correct the "
+        "password"
     )
 
 
-def _unused(where: str) -> BadInput:
+def _unused(location: str) -> BadInput:
     return BadInput(
-        f"{where}: this kind of key is not used; give an RSA key of {RSA_BITS} bits or more, or an ECDSA key on P-256 "
+        f"{location}: this kind of key is not used; give an RSA key of {RSA_BITS} bits or more, or an ECDSA key on "
+        "P-256 "
         "or P-384"
     )
 
@@ -218,40 +220,40 @@ def read_certificates(path: Path) -> list[x509.Certificate]:
 
 
 def _own(
-    given: Sequence[x509.Certificate], public: object, where: str
+    certificates: Sequence[x509.Certificate], public: object, location: str
 ) -> tuple[x509.Certificate, tuple[x509.Certificate, ...]]:
     """Return the certificate of a public key, and the others. Raises BadInput where none is."""
-    if not given:
-        raise BadInput(f"{where}: it holds no certificate; name a PEM file with it by {SIGN_CERTIFICATE_VARIABLE}")
-    own = next((each for each in given if each.public_key() == public), None)
+    if not certificates:
+        raise BadInput(f"{location}: it holds no certificate; name a PEM file with it by {SIGN_CERTIFICATE_VARIABLE}")
+    own = next((each for each in certificates if each.public_key() == public), None)
     if own is None:
-        raise BadInput(_mismatch(where, signatory_of(given[0])))
-    _public(own, where)
-    return own, tuple(each for each in given if each is not own)
+        raise BadInput(_mismatch(location, signatory_of(certificates[0])))
+    _public(own, location)
+    return own, tuple(each for each in certificates if each is not own)
 
 
-def _mismatch(where: str, signatory: Signatory) -> str:
+def _mismatch(location: str, signatory: Signatory) -> str:
     return (
-        f"{where}: the key is not that of the certificate ({signatory.subject}); nothing was signed; name the "
+        f"{location}: the key is not that of the certificate ({signatory.subject}); nothing was signed; name the "
         f"certificate of this key by {SIGN_CERTIFICATE_VARIABLE}, or the key of this certificate by {SIGN_KEY_VARIABLE}"
     )
 
 
-def _public(certificate: x509.Certificate, where: str) -> PublicKey:
+def _public(certificate: x509.Certificate, location: str) -> PublicKey:
     """Return the public key of a certificate that may sign documents. Raises BadInput."""
 
     public = certificate.public_key()
     is_rsa = isinstance(public, RSAPublicKey) and public.key_size >= RSA_BITS
     is_ec = isinstance(public, EllipticCurvePublicKey) and public.curve.name in ("secp256r1", "secp384r1")
     if not isinstance(public, RSAPublicKey | EllipticCurvePublicKey) or not (is_rsa or is_ec):
-        raise _unused(where)
+        raise _unused(location)
     try:
         usage = certificate.extensions.get_extension_for_class(x509.KeyUsage).value
     except x509.ExtensionNotFound:
         return public
     if not (usage.digital_signature or usage.content_commitment):
         raise BadInput(
-            f"{where}: its certificate ({certificate.subject.rfc4514_string()}) is not for signatures (key usage); "
+            f"{location}: its certificate ({certificate.subject.rfc4514_string()}) is not for signatures (key usage); "
             "name one with digitalSignature or nonRepudiation"
         )
     return public

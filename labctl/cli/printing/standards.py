@@ -38,7 +38,8 @@ def print_standard(answer: StandardResponse) -> None:
         for certificate in answer.certificates:
             for point in certificate.points:
                 rows.add_row(
-                    certificate.number, certificate.laboratory, str(certificate.calibrated), str(certificate.due or "–"),
+                    certificate.number, certificate.laboratory, str(certificate.calibrated),
+                    str(certificate.due or "–"),
                     format_number(point.nominal), format_number(point.value), format_number(point.u, 3),
                 )  # fmt: skip
         console.print(rows)
@@ -82,9 +83,10 @@ def print_affected(answer: AffectedResponse) -> None:
     if answer.calibrations:
         rows = table("", "unit", "version", "campaigns", "measured", "in force", "certificates")
         for calibration in answer.calibrations:
+            measured = f"{calibration.performed_from} to {calibration.performed_until}"
             rows.add_row(
                 calibration.serial, str(calibration.version), ", ".join(map(str, calibration.campaigns)) or "imported",
-                f"{calibration.performed_from} to {calibration.performed_until}" if calibration.performed_from else "date not known",
+                measured if calibration.performed_from else "date not known",
                 "in force" if calibration.in_force else "",
                 ", ".join(calibration.certificates) or "–",
             )  # fmt: skip

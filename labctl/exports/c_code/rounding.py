@@ -72,7 +72,7 @@ def rounding_dps(calibration: Calibration, roundoff: float) -> float:
         roundoff_dps, gain = _of_surface(surface, over, roundoff)
     else:
         law = correction(fitted, calibration.axes)
-        part = StaticPart(calibration, lambda raw, warm: law(raw, warm, {}), memory)
+        part = StaticPart(calibration, lambda raw, temperature_c: law(raw, temperature_c, {}), memory)
         sine = sine_form_of(fitted, calibration.axes)
         roundoff_dps, gain = _of_solution(part, over, roundoff, _roundings(calibration, is_sine=sine is not None))
     before = _of_memory(memory, over, roundoff) + _of_force(calibration.force_sensitivity, over, roundoff)
@@ -121,13 +121,13 @@ def _of_solution(part: StaticPart, over: Range, roundoff: float, roundings: tupl
     Rounding acts as if the output were off by as many roundoffs of its largest size as there are roundings, and the
     temperature by some roundoffs of its own.
     """
-    raw, warm = _corners(part, over)
-    rate = part.rate(raw, warm)
+    raw, temperature_c = _corners(part, over)
+    rate = part.rate(raw, temperature_c)
     gain = np.zeros(rate.shape)
     for by in range(raw.shape[1]):
         moved = raw.copy()
         moved[:, by] -= np.copysign(SLOPE_STEP_DPS, raw[:, by])
-        gain += np.abs(part.rate(moved, warm) - rate) / SLOPE_STEP_DPS
+        gain += np.abs(part.rate(moved, temperature_c) - rate) / SLOPE_STEP_DPS
     largest, size = float(gain.max()), over.output_dps + float(np.abs(raw - rate).max())
     step_k = max(float(np.ptp(over.temperature_c)) / (len(over.temperature_c) - 1), 1e-9)
     slope = len(part.axes) * float(np.abs(np.diff(_by_temperature(part, over), axis=1)).max()) / step_k

@@ -46,8 +46,8 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
 
     seen = compared(cubic, offset_rad_s)
     hold_tolerance(options, seen, NAME)
-    warm = cubic.part.temperatures()
-    moved = np.rad2deg(offset_rad_s(warm + UPDATE_K) - offset_rad_s(warm))
+    temperatures_c = cubic.part.temperatures()
+    moved = np.rad2deg(offset_rad_s(temperatures_c + UPDATE_K) - offset_rad_s(temperatures_c))
     losses = (
         *cubic.losses(seen, CONSUMER),
         Loss("a new offset is applied only when the temperature has moved by 1 K", float(np.abs(moved).max())),

@@ -11,9 +11,9 @@ from labctl.exports.format import Loss
 from labctl.exports.static_part import differences, static_part
 
 
-def correction_losses(calibration: Calibration, why: str) -> tuple[Loss, ...]:
+def correction_losses(calibration: Calibration, reason: str) -> tuple[Loss, ...]:
     """Return the whole correction as what is lost, with its size where it depends on output and temperature alone."""
-    what = f"the correction of bias, scale factor and misalignment ({why})"
+    what = f"the correction of bias, scale factor and misalignment ({reason})"
     if not np.isfinite(calibration.temperature_c).all():
         return (Loss(what), *force_losses(calibration))
     try:

@@ -50,10 +50,12 @@ SENSOR_FORMATS: Mapping[str, Mapping[str, SensorFormat]] = {
 
 def format_of(parameters: Parameters, name: str) -> SensorFormat:
     """Return a format of a sensor. Raises BadInput for one that it has not."""
-    known = SENSOR_FORMATS[parameters.sensor]
-    if name not in known:
-        raise BadInput(f"--export {name}: this {parameters.sensor} is exported to {', '.join(known)}; name one of them")
-    return known[name]
+    formats = SENSOR_FORMATS[parameters.sensor]
+    if name not in formats:
+        raise BadInput(
+            f"--export {name}: this {parameters.sensor} is exported to {', '.join(formats)}; name one of them"
+        )
+    return formats[name]
 
 
 def written(parameters: Parameters, head: Sequence[str], name: str, instance: int | None, device_id: int | None) -> str:

@@ -19,17 +19,18 @@ FORMULA = "corrected = matrix (reading - offset), along x, y, z of the sensor"
 
 def json_text(parameters: Parameters, head: Sequence[str]) -> str:
     """Return offset and matrix, with the parameters' covariance, as a JSON document."""
-    warm = parameters.temperature if isinstance(parameters, AccelerometerParameters) else None
+    response = parameters.temperature if isinstance(parameters, AccelerometerParameters) else None
     document: dict[str, object] = {
         "schema": SCHEMA, "sensor": parameters.sensor, "formula": FORMULA, "unit": parameters.unit,
         "offset": parameters.offset.tolist(), "matrix": parameters.matrix.tolist(),
         "covariance": {"of": list(parameters.labels), "values": parameters.covariance.tolist()}, "text": list(head),
     }  # fmt: skip
-    if warm is not None:
+    if response is not None:
         document["temperature"] = {
             "formula": "offset and scale factors (diagonal of the inverse of matrix) as polynomials of T - reference_c",
-            "reference_c": warm.reference_c, "range_c": list(warm.range_c),
-            "offset_per_k": (warm.bias_g * STANDARD_GRAVITY).tolist(), "scale_factor_per_k": warm.scale_factor.tolist(),
+            "reference_c": response.reference_c, "range_c": list(response.range_c),
+            "offset_per_k": (response.bias_g * STANDARD_GRAVITY).tolist(),
+            "scale_factor_per_k": response.scale_factor.tolist(),
         }  # fmt: skip
     turn = _alignment(parameters)
     if turn is not None:

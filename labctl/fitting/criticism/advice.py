@@ -154,12 +154,14 @@ def _pooled(parts: Sequence[dict[str, Array]]) -> float | None:
     return rms({axis: np.concatenate([part[axis] for part in parts]) for axis in parts[0]}) if parts else None
 
 
-def _left(seen: FitData, left_out: FitData, preset: Preset, whole: Mapping[str, Solution]) -> dict[str, Array]:
+def _left(
+    data_used: FitData, left_out: FitData, preset: Preset, axis_solutions: Mapping[str, Solution]
+) -> dict[str, Array]:
     """Return axis -> errors of data sets left out, corrected by what would be exported of a fit to the others."""
-    model, rows = preset.build(seen)
-    used = seen.take(rows)
+    model, rows = preset.build(data_used)
+    used = data_used.take(rows)
     require_enough_data(used, model)
-    solutions = solve_axes(used, model, whole)
+    solutions = solve_axes(used, model, axis_solutions)
     fitted = FittedModel(model, solutions.fits)
     for term in model.terms:
         fitted = fitted if is_carried(term) else without(fitted, term.effect)

@@ -86,14 +86,14 @@ def base_rows(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDA
         if not np.any(column.values):
             continue
         over = np.ones((len(basis), 1)) if effect_id in model.steady else basis
-        known = forward.held.of(axis, effect_id, column.name)
-        if known is not None:
-            if not known.has_u or not min(known.u) > 0:
+        held = forward.held.of(axis, effect_id, column.name)
+        if held is not None:
+            if not held.has_u or not min(held.u) > 0:
                 continue
-            over = basis @ known.spread(model.temperature)
+            over = basis @ held.spread(model.temperature)
         rows.append(_over_temperature(data, column, over))
         names += [f"{column.name}@{k}" for k in range(over.shape[1])]
-        precision.append(np.zeros(over.shape[1]) if known is None else np.array(known.u) ** -2.0)
+        precision.append(np.zeros(over.shape[1]) if held is None else np.array(held.u) ** -2.0)
     turning = _turning(data, axis)
     if turning:
         rows.append(np.stack([data.rows(column) for column in turning], axis=2))
@@ -110,9 +110,9 @@ def beside_held(data: ReducedRecording, model: ErrorModel) -> ReducedRecording:
     for axis in forward.held.axes:
         basis = forward.temperature.basis(data.nodes.temperature_c(axis))
         for effect_id, column in forward.carried(data.nodes, axis):
-            if (known := forward.held.of(axis, effect_id, column.name)) is not None:
-                over = basis @ known.spread(forward.temperature)
-                output[axis] = output[axis] - _over_temperature(data, column, over) @ np.array(known.value)
+            if (held := forward.held.of(axis, effect_id, column.name)) is not None:
+                over = basis @ held.spread(forward.temperature)
+                output[axis] = output[axis] - _over_temperature(data, column, over) @ np.array(held.value)
     return data if not forward.held.axes else replace(data, output=output)
 
 

@@ -52,14 +52,14 @@ NO_CORRECTION = Advice(
 )  # fmt: skip
 
 
-def with_quantization(verdict: Verdict, data: ReducedRecording, left: Mapping[str, Residuals]) -> Verdict:
+def with_quantization(verdict: Verdict, data: ReducedRecording, axis_residuals: Mapping[str, Residuals]) -> Verdict:
     """Return the verdict, or quantization in place of another cause where no axis leaves more than its steps do.
 
     The catalogue's effect of that name is a law of raw codes, and competes where these are logged.
     """
-    if verdict.form not in {"unexplained", "missing", "ambiguous"} or not data.steps or not left:
+    if verdict.form not in {"unexplained", "missing", "ambiguous"} or not data.steps or not axis_residuals:
         return verdict
-    for axis, residuals in left.items():
+    for axis, residuals in axis_residuals.items():
         step = data.steps.get(axis)
         most = STEPS_LEAVE * (step["left_dps"] if step else float(np.sqrt(np.mean(residuals.floor_dps**2))))
         if float(np.sqrt(np.mean(residuals.means**2))) > most:
@@ -249,11 +249,11 @@ def _reduced(recording: Recording, static: StaticRecord | None, *, is_decimated:
 
 def _to_check(comparison: Comparison, verdict: Verdict, group: tuple[str, ...]) -> Term | None:
     """Return the effect of a group that could be added: the first that a calibration carries, else the leader."""
-    known = {c.id: c for c in comparison.candidates if not c.smooth and c.term is not None}
+    candidate_by_id = {c.id: c for c in comparison.candidates if not c.smooth and c.term is not None}
     leader = verdict.terms.get(group[0])
     if leader is None or is_carried(leader):
         return leader
-    others = (refined_term(comparison, known[name]) for name in group[1:] if name in known)
+    others = (refined_term(comparison, candidate_by_id[name]) for name in group[1:] if name in candidate_by_id)
     return next((term for term in others if is_carried(term)), leader)
 
 

@@ -68,8 +68,8 @@ def _explained(design: Design, axis_evidence: AxisEvidence, option: int) -> NDAr
 def _noise_of(data: ReducedRecording, design: Design, y: NDArray[np.float64], axis: str) -> tuple[Array, list[Noise]]:
     """Return the white variance of each mean, (m,) (deg/s)^2, and the drifts to average over."""
     stability = data.info.stability_dps
-    known = data.white_var
-    white = known[axis] if known is not None else np.full(len(data), max(_floor_squared(design, y), LEAST_VAR))
+    white_var = data.white_var
+    white = white_var[axis] if white_var is not None else np.full(len(data), max(_floor_squared(design, y), LEAST_VAR))
     level = float(np.sqrt(np.median(white)))
     return white, noise_grid(data.info.technology or "", stability, level, data.instability_dps(axis))
 
@@ -91,8 +91,8 @@ def _base_residual(design: Design, y: NDArray[np.float64], white: Array) -> NDAr
     prior = np.diag(np.sqrt(design.precision))[design.precision > 0]
     columns = np.vstack([design.base[0] * weight[:, None], prior])
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    wanted = np.concatenate([y[0] * weight, np.zeros(len(prior))])
-    solution, *_ = np.linalg.lstsq(columns / size, wanted, rcond=1e-9)
+    weighted_target = np.concatenate([y[0] * weight, np.zeros(len(prior))])
+    solution, *_ = np.linalg.lstsq(columns / size, weighted_target, rcond=1e-9)
     return np.asarray(y - design.base @ (solution / size))
 
 
@@ -213,8 +213,8 @@ def designs_beside(
 def constant_coordinates(base: NDArray[np.float64], data: ReducedRecording) -> NDArray[np.float64] | None:
     """Return the coordinates of a constant, (R, m), where it lies in the span of the base; None where not."""
     constant = data.rows_of(np.ones((len(data.nodes), 1)))[:, :, 0]
-    taken, *_ = np.linalg.lstsq(base[0], constant[0], rcond=1e-9)
-    return constant if np.max(np.abs(base[0] @ taken - constant[0]), initial=0.0) < 1e-6 else None
+    coordinates, *_ = np.linalg.lstsq(base[0], constant[0], rcond=1e-9)
+    return constant if np.max(np.abs(base[0] @ coordinates - constant[0]), initial=0.0) < 1e-6 else None
 
 
 def centred(option: CandidateShape, level: NDArray[np.float64] | None) -> CandidateShape:
@@ -238,8 +238,8 @@ def orthogonalised(option: CandidateShape, base: NDArray[np.float64]) -> Candida
     meant = option.beside_base or (option.term is not None and option.term.formula)
     if not meant or base.shape[2] == 0:
         return option
-    taken, *_ = np.linalg.lstsq(base[0], option.rows[0], rcond=1e-9)
-    rows = option.rows - base @ taken
+    coordinates, *_ = np.linalg.lstsq(base[0], option.rows[0], rcond=1e-9)
+    rows = option.rows - base @ coordinates
     return (
         replace(option, rows=rows)
         if np.linalg.norm(rows) > LEAST_ORTHOGONAL_SHARE * np.linalg.norm(option.rows)

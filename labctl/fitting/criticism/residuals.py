@@ -89,10 +89,10 @@ def _axis(comparison: Comparison, axis: str, floor_dps: Array) -> Residuals:
     )
 
 
-def where_it_fails(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[FailingRange]:
+def where_it_fails(data: ReducedRecording, axis_residuals: Mapping[str, Residuals]) -> list[FailingRange]:
     """Return the ranges of channels in which the mean residual is far from 0, worst first."""
     failing_ranges: list[FailingRange] = []
-    for axis, residuals in left.items():
+    for axis, residuals in axis_residuals.items():
         for name, nodes in smooth_channels(data, axis).items():
             values = data.at_sets(nodes)
             for low, high, rows in _bins(values):
@@ -121,17 +121,19 @@ def has_one_rising_leg(data: ReducedRecording) -> bool:
     """Return whether a recording's temperatures went one way only: then temperature and time are one variable."""
     if "t_s" not in data.nodes:
         return False
-    warm = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
+    temperature_c = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
     order = np.argsort(data.at_sets(np.asarray(data.nodes["t_s"], dtype=np.float64)), kind="stable")
-    steps, span = np.diff(warm[order]), float(np.ptp(warm))
+    steps, span = np.diff(temperature_c[order]), float(np.ptp(temperature_c))
     back = min(float(-steps[steps < 0].sum()), float(steps[steps > 0].sum()))
     return span > ONE_LEVEL_SPAN_C and back < BACK_SHARE * span
 
 
-def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most: int = 10) -> list[WorstDataSet]:
+def worst_data_sets(
+    data: ReducedRecording, axis_residuals: Mapping[str, Residuals], most: int = 10
+) -> list[WorstDataSet]:
     """Return the data sets with the largest mean residual over its floor, at most `most`, worst first."""
     worst: list[WorstDataSet] = []
-    for axis, residuals in left.items():
+    for axis, residuals in axis_residuals.items():
         order = np.argsort(-np.abs(residuals.score))[:most]
         worst.extend(
             WorstDataSet(

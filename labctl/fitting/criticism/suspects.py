@@ -54,7 +54,7 @@ class Suspect:
 
 def suspects_of(
     comparison: Comparison,
-    seen: Comparison,
+    fuller: Comparison,
     data: FitData,
     model: ErrorModel,
     shape_of: Callable[[Comparison, Candidate], Term],
@@ -63,8 +63,9 @@ def suspects_of(
     """Return what may be missing, best first; last what is of a size that the unit's technology cannot have.
 
     The ranking is that of `comparison`. Coefficients are those of a fit with the effect in its best shape (`shape_of`),
-    the one that adding the effect makes; without that fit they are those of `seen`, with the noise that remains
-    beside a fuller model. An effect whose fit leaves more than `before`, the fit of the model, is not listed.
+    the one that adding the effect makes; without that fit they are those of `fuller`, with the noise
+    that remains beside a fuller model. An effect whose fit leaves more than `before`, the fit of the model, is not
+    listed.
     """
     probability = probabilities(comparison.candidates)
     effects = [c for c in comparison.candidates if not c.smooth]
@@ -75,11 +76,11 @@ def suspects_of(
         after = _fit_with(comparison, candidate, data, model, shape_of)
         if after is not None and _is_worse(before, after):
             continue  # another shape of an effect that the model has: what it would replace fits better
-        share = _share(before, after, share_removed(seen, candidate))
+        share = _share(before, after, share_removed(fuller, candidate))
         fitted = _fitted_coefficients(after, candidate) if after and candidate.id not in model.effect_ids else {}
         suspect = Suspect(
-            candidate, probability[candidate.id], _p_value(comparison, seen, candidate),
-            fitted or coefficients_of(seen, candidate), bool(fitted), share, after,
+            candidate, probability[candidate.id], _p_value(comparison, fuller, candidate),
+            fitted or coefficients_of(fuller, candidate), bool(fitted), share, after,
             alias_group(comparison, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,),
         )  # fmt: skip
         suspects.append(suspect)
@@ -108,10 +109,10 @@ def _share(before: FitResult | None, after: FitResult | None, compared: float) -
     return float(np.clip(1.0 - left / excess, 0.0, 1.0))
 
 
-def _p_value(comparison: Comparison, seen: Comparison, candidate: Candidate) -> float:
+def _p_value(comparison: Comparison, fuller: Comparison, candidate: Candidate) -> float:
     """Return the probability of such a gain in chi2 by chance, corrected for the mean number of options per axis."""
-    dimensions = sum(int(seen.axes[a].dimensions[o]) for a, o in candidate.option.items())
-    gain = sum(float(seen.axes[a].gain[o]) for a, o in candidate.option.items())
+    dimensions = sum(int(fuller.axes[a].dimensions[o]) for a, o in candidate.option.items())
+    gain = sum(float(fuller.axes[a].gain[o]) for a, o in candidate.option.items())
     tried = sum(len(d.options) for d in comparison.designs.values()) / max(len(comparison.designs), 1)
     single = float(chdtrc(max(dimensions, 1), gain))
     return float(-np.expm1(tried * np.log1p(-min(single, 1 - 1e-16))))

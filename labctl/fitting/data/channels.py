@@ -131,10 +131,10 @@ class Channels:
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Return which of the names are not logged."""
-        known = {*self.columns, "table_rate_dps", "temperature_c"}
+        available = {*self.columns, "table_rate_dps", "temperature_c"}
         if not self.history.thermometer:
-            known.remove("temperature_c")
-        return [name for name in names if name not in known]
+            available.remove("temperature_c")
+        return [name for name in names if name not in available]
 
 
 def body_rates(table_rate_dps: Array, position: NDArray[np.generic]) -> dict[str, Array]:

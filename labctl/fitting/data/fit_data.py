@@ -194,8 +194,8 @@ def profile_of(recording: Recording) -> RateProfile | None:
     if recording.info.motion != "profile" or "t_s" not in columns:
         return None
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
-    known = {name: np.asarray(columns[name])[valid] for name in ("t_s", "dataset", "table_rate_dps")}
-    return rate_profile(known, windows=recording.info.kind == "samples")
+    rows = {name: np.asarray(columns[name])[valid] for name in ("t_s", "dataset", "table_rate_dps")}
+    return rate_profile(rows, windows=recording.info.kind == "samples")
 
 
 def _white(points: Recording) -> dict[str, Array] | None:

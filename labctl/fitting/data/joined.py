@@ -107,17 +107,17 @@ def recordings_in(columns: Mapping[str, NDArray[np.generic]]) -> list[int]:
 
 def joined_coverage(parts: Sequence[Covered | None]) -> Covered | None:
     """Return what several recordings cover together; None where that is not known of one of them."""
-    known = [part for part in parts if part is not None]
-    if len(known) < len(parts):
+    stated = [part for part in parts if part is not None]
+    if len(stated) < len(parts):
         return None
-    axes = known[0].rate_dps
+    axes = stated[0].rate_dps
     low, high = (
-        [end for end in ends if end is not None] for ends in zip(*(p.temperature_c for p in known), strict=True)
+        [end for end in ends if end is not None] for ends in zip(*(p.temperature_c for p in stated), strict=True)
     )
-    is_known = len(low) == len(high) == len(known)  # a recording at rest may be without a thermometer
+    is_known = len(low) == len(high) == len(stated)  # a recording at rest may be without a thermometer
     return Covered(
         (min(low), max(high)) if is_known else (None, None),
-        {a: (min(part.rate_dps[a][0] for part in known), max(part.rate_dps[a][1] for part in known)) for a in axes},
+        {a: (min(part.rate_dps[a][0] for part in stated), max(part.rate_dps[a][1] for part in stated)) for a in axes},
     )
 
 
@@ -128,8 +128,8 @@ def _least_known(infos: Sequence[RecordingInfo]) -> tuple[Standard, ...]:
     """
     least_known: dict[tuple[str, str], Standard] = {}
     for each in (standard for info in infos for standard in info.standards):
-        known = least_known.get((each.quantity, each.name))
-        if known is None or known.standard_u <= each.standard_u:
+        current = least_known.get((each.quantity, each.name))
+        if current is None or current.standard_u <= each.standard_u:
             least_known[each.quantity, each.name] = each
     return tuple(least_known.values())
 

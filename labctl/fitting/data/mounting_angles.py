@@ -79,11 +79,11 @@ class _Scheme:
         """Return the gains of a fit to so much of each position: the weighted least squares of the mountings."""
         root = np.sqrt([shares[str(position)] for position in self.positions])
         design = root[:, None] * np.column_stack([self.sign, self.angles @ self.separated])
-        taken = np.linalg.pinv(design, rcond=UNSEEN)[0] * root
-        of = taken @ self.angles
+        pseudo_inverse = np.linalg.pinv(design, rcond=UNSEEN)[0] * root
+        of = pseudo_inverse @ self.angles
         of[np.abs(of) < UNSEEN] = 0.0
         size = {part: float(np.linalg.norm(of[[part in name for name in self.names]])) for part in PARTS}
-        return AngleGains(size["fixture"], size["table"], float(np.linalg.norm(taken)))
+        return AngleGains(size["fixture"], size["table"], float(np.linalg.norm(pseudo_inverse)))
 
 
 @dataclass(frozen=True)
@@ -204,16 +204,16 @@ def angle_gains(shares: Mapping[str, float], axis: str, *, separates: bool = Tru
 
 @lru_cache(maxsize=256)
 def _angle_gains(shares: tuple[tuple[str, float], ...], axis: str, separates: bool) -> AngleGains:
-    known: dict[str, float] = {}
+    gains: dict[str, float] = {}
     for text, share in shares:
-        known[str(Position.of(text))] = known.get(str(Position.of(text)), 0.0) + share
-    scheme = _scheme(tuple(sorted(known)), axis)
+        gains[str(Position.of(text))] = gains.get(str(Position.of(text)), 0.0) + share
+    scheme = _scheme(tuple(sorted(gains)), axis)
     if scheme is None:
         return AngleGains()
     if not separates:
         none = np.zeros((len(scheme.names), 0))
         scheme = _Scheme(scheme.positions, scheme.names, scheme.sign, scheme.angles, none)
-    return scheme.gains(known)
+    return scheme.gains(gains)
 
 
 def separates_any(positions: Iterable[str], axis: str) -> bool:

@@ -53,8 +53,13 @@ def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
     Of turns no law can be found that is not linear in the rate; what is linear is taken in whole, whatever m is.
     """
     if "turn_deg" in channels:
-        warm, rate = _chebyshev(channels.temperature_c(axis), max(DEGREES)), channels.rate_dps(axis)[:, None]
-        return _orthonormal(iter([warm[:, 1:4], warm[:, 1:3] * rate]), _linear(channels), MOST_SHARE)
+        temperature_basis, rate = (
+            _chebyshev(channels.temperature_c(axis), max(DEGREES)),
+            channels.rate_dps(axis)[:, None],
+        )
+        return _orthonormal(
+            iter([temperature_basis[:, 1:4], temperature_basis[:, 1:3] * rate]), _linear(channels), MOST_SHARE
+        )
     responses = _orthonormal(
         iter([_of_responses(channels, axis)]), np.zeros((len(channels), 0)), MOST_SHARE, LEAST_NEW_OF_RESPONSE
     )
@@ -113,24 +118,26 @@ def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
     m = len(channels)
     rate = _scaled(channels.rate_dps(axis), about_zero=True)
     powers = np.column_stack([np.ones(m), rate, rate**2, rate**3])
-    warm = _chebyshev(channels.temperature_c(axis), max(DEGREES))
+    temperature_basis = _chebyshev(channels.temperature_c(axis), max(DEGREES))
     places = np.column_stack([rows.astype(np.float64) for _, rows in channels.positions()])
     yield places
     yield powers[:, 1:]
     yield shift_columns(channels, axis)
-    yield from _of_other_axes(channels, axis, warm)
+    yield from _of_other_axes(channels, axis, temperature_basis)
     for degree in range(1, max(DEGREES) + 1):
-        yield np.column_stack([warm[:, degree] * powers[:, n] for n, most in enumerate(DEGREES) if degree <= most])
+        yield np.column_stack(
+            [temperature_basis[:, degree] * powers[:, n] for n, most in enumerate(DEGREES) if degree <= most]
+        )
     if channels.profile is None:
         yield _levels_of_rate(channels)
-    yield from _history(channels, warm, rate)
+    yield from _history(channels, temperature_basis, rate)
     for name in sorted(set(channels.columns) - NO_SURROUNDINGS):
         values = channels[name]
         if not name.startswith("gyro_") and np.issubdtype(values.dtype, np.number) and np.all(np.isfinite(values)):
             around = _scaled(np.asarray(values, dtype=np.float64))
             yield np.column_stack([around, around * rate])
     yield np.column_stack([(place * powers[:, 1:].T).T for place in places.T])
-    yield np.column_stack([(place * warm[:, 1:4].T).T for place in places.T])
+    yield np.column_stack([(place * temperature_basis[:, 1:4].T).T for place in places.T])
 
 
 def _of_responses(channels: Channels, axis: str) -> NDArray[np.float64]:
@@ -142,11 +149,11 @@ def _of_responses(channels: Channels, axis: str) -> NDArray[np.float64]:
     return np.column_stack([rate, *(channels.through(response).rate_dps(axis) - rate for response in responses)])
 
 
-def _of_other_axes(channels: Channels, axis: str, warm: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+def _of_other_axes(channels: Channels, axis: str, temperature_c: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
     """Yield the rate about each other axis, alone, and times linear and quadratic functions of temperature."""
     for other in channels.rates:
         if other != axis:
-            yield _scaled(channels.rate_dps(other), about_zero=True)[:, None] * warm[:, :3]
+            yield _scaled(channels.rate_dps(other), about_zero=True)[:, None] * temperature_c[:, :3]
 
 
 def _levels_of_temperature(temperature_c: Array, rate: Array) -> NDArray[np.float64]:
@@ -171,20 +178,22 @@ def _levels_of_rate(channels: Channels) -> NDArray[np.float64]:
     return np.asarray(np.eye(int(cell.max()) + 1)[cell])
 
 
-def _history(channels: Channels, warm: NDArray[np.float64], rate: Array) -> Iterator[NDArray[np.float64]]:
+def _history(channels: Channels, temperature_c: NDArray[np.float64], rate: Array) -> Iterator[NDArray[np.float64]]:
     """Yield columns that distinguish rising from falling temperatures, and functions of the time since power-on."""
     if "t_s" not in channels:
         return
     t_s = np.asarray(channels["t_s"], dtype=np.float64)
     order = np.argsort(t_s, kind="stable")
-    steps = np.diff(warm[order, 1], prepend=warm[order[0], 1])
+    steps = np.diff(temperature_c[order, 1], prepend=temperature_c[order[0], 1])
     rising = np.empty(len(t_s))
     rising[order] = np.sign(np.where(np.abs(steps) > 1e-3, steps, 0.0))
     leg = _carried(rising[order])
     direction = np.empty(len(t_s))
     direction[order] = leg
     if np.ptp(direction) > 0:
-        yield np.column_stack([direction, direction * warm[:, 1], direction * warm[:, 2], direction * rate])
+        yield np.column_stack(
+            [direction, direction * temperature_c[:, 1], direction * temperature_c[:, 2], direction * rate]
+        )
     if channels.history.courses and (not np.any(rate) or _is_on_ramps(channels)):
         lags = np.column_stack([channels.history.lag_k(channels.columns, tau) for tau in LAGS_S])
         states = [channels.history.hysteresis_state(channels.columns, width) for width in WIDTHS_K]

@@ -58,8 +58,8 @@ def axis_design(
     unknowns = 0
     for owner, column in _exercised(data, model, channels, axis):
         values = column.values
-        if (known := model.held.of(axis, owner, column.name)) is not None:
-            held.add(known, known.spread(model.temperature), values)
+        if (held_value := model.held.of(axis, owner, column.name)) is not None:
+            held.add(held_value, held_value.spread(model.temperature), values)
             spread.append(np.zeros((nodes, 0)))
             names.append((owner, column.name, column.unit))
             continue

@@ -176,10 +176,10 @@ def _solve_axis(
             f"{model.name} ({', '.join(model.effect_ids)}); record rates about the other axes of the unit too"
         )
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
-    known, random = data.scatter(axis), None
+    axis_scatter, random = data.scatter(axis), None
     if design.shifts or len(design.angles):
-        known = _with_white_noise(design, y, known)
-    columns, y, scatter = with_known_size(design.columns, design.turning, y, known, turning_size_dps(data.info))
+        axis_scatter = _with_white_noise(design, y, axis_scatter)
+    columns, y, scatter = with_known_size(design.columns, design.turning, y, axis_scatter, turning_size_dps(data.info))
     columns, y, scatter = with_prior(columns, design.angles.values, y, scatter, design.angles.size**2)
     if design.shifts:
         wide = np.array([KINDS[shift.kind].largest for shift in design.shifts])
@@ -208,8 +208,8 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
             f"mountings) and to estimate the error of the fit: at least {rank + 1} are needed; measure more data sets, "
             "or leave effects out"
         )
-    taken, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
-    left = y - columns @ taken
+    coordinates, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
+    left = y - columns @ coordinates
     return replace(scatter, white_var=np.full(len(y), max(float(left @ left) / (len(y) - rank), 1e-20)))
 
 

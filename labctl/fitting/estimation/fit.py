@@ -105,8 +105,8 @@ def _tested(
     return _answer(names, rms({axis: np.concatenate(parts) for axis, parts in errors.items()}), tested, "")
 
 
-def _answer(names: tuple[str, str], rms_dps: float | None, datasets: int, why: str) -> LegErrorJson:
-    return {"fitted": names[0], "tested": names[1], "rms_dps": rms_dps, "datasets": datasets, "why": why}
+def _answer(names: tuple[str, str], rms_dps: float | None, datasets: int, reason: str) -> LegErrorJson:
+    return {"fitted": names[0], "tested": names[1], "rms_dps": rms_dps, "datasets": datasets, "why": reason}
 
 
 #: Data sets at which regressors are compared, and rates, as shares of the fastest measured one.

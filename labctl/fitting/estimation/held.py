@@ -59,11 +59,11 @@ class HeldColumns:
         self._spread: list[NDArray[np.float64]] = []
         self._held: list[HeldCoefficient] = []
 
-    def add(self, known: HeldCoefficient, spread: NDArray[np.float64], values: Array) -> None:
+    def add(self, coefficient: HeldCoefficient, spread: NDArray[np.float64], values: Array) -> None:
         """Add a held coefficient with its regressor (m,) and its `spread` (nodes, p)."""
         self._columns.append(values[:, None] * (self._basis @ spread))
         self._spread.append(spread)
-        self._held.append(known)
+        self._held.append(coefficient)
 
     def add_none(self) -> None:
         """Add a coefficient that is estimated."""
@@ -231,24 +231,30 @@ def _of_axis(
     return held
 
 
-def _check(what: str, one: HeldCoefficient, unit: str, model: ErrorModel) -> None:
-    if one.unit and one.unit != unit:
-        raise BadInput(f"{what}: the unit of this coefficient is {unit!r}, not {one.unit!r}; write value and u in it")
-    term = next(term for term in model.terms if term.effect == one.effect)
+def _check(quantity: str, coefficient: HeldCoefficient, unit: str, model: ErrorModel) -> None:
+    if coefficient.unit and coefficient.unit != unit:
+        raise BadInput(
+            f"{quantity}: the unit of this coefficient is {unit!r}, not {coefficient.unit!r}; write value and u in it"
+        )
+    term = next(term for term in model.terms if term.effect == coefficient.effect)
     if kind_of(term).parameters:
         shape = ", ".join(parameter.name for parameter in kind_of(term).parameters)
         raise BadInput(
-            f"{what}: the shape of effect {one.effect} is fitted ({shape}), so a coefficient of it cannot be held; "
+            f"{quantity}: the shape of effect {coefficient.effect} is fitted ({shape}), so a coefficient of it cannot "
+            "be held; "
             "leave the coefficient out"
         )
-    if not one.temperature_c:
+    if not coefficient.temperature_c:
         return
     nodes = model.temperature.nodes_c if isinstance(model.temperature, LagrangeTable) and not term.steady else ()
-    given = ", ".join(f"{t:.4g}" for t in one.temperature_c)
-    if len(nodes) != len(one.temperature_c) or np.abs(np.subtract(nodes, one.temperature_c)).max() > SAME_LEVEL_K:
+    given = ", ".join(f"{t:.4g}" for t in coefficient.temperature_c)
+    if (
+        len(nodes) != len(coefficient.temperature_c)
+        or np.abs(np.subtract(nodes, coefficient.temperature_c)).max() > SAME_LEVEL_K
+    ):
         has = f"the temperatures {', '.join(f'{t:.4g}' for t in nodes)} deg C" if nodes else "one value for all"
         raise BadInput(
-            f"{what}: a table at {given} deg C, but here the model has {has}; a table is held only at the same "
+            f"{quantity}: a table at {given} deg C, but here the model has {has}; a table is held only at the same "
             f"temperatures, to {SAME_LEVEL_K:g} K: give a single value, or fit a model with these temperatures"
         )
 
@@ -280,7 +286,9 @@ def _require_reference(channels: Channels, model: ErrorModel, axis: str, fixed: 
         )
 
 
-def _shown(one: HeldCoefficient) -> str:
-    values = ", ".join(f"{value:g}" for value in one.value[:3]) + (", ..." if len(one.value) > 3 else "")
-    text = f"[{values}]" if one.temperature_c else values
-    return f"{text} {one.unit}".strip()
+def _shown(coefficient: HeldCoefficient) -> str:
+    values = ", ".join(f"{value:g}" for value in coefficient.value[:3]) + (
+        ", ..." if len(coefficient.value) > 3 else ""
+    )
+    text = f"[{values}]" if coefficient.temperature_c else values
+    return f"{text} {coefficient.unit}".strip()

@@ -71,8 +71,8 @@ def agreement_of(
             fits[number] = {axis: _estimated(fit, tuple(model.held.axes.get(axis, ()))) for axis, fit in solved.items()}
         except LabctlError as error:
             return [], f"recording {number} alone does not determine the model: {error}"
-    known = model.held.effects - {effect for one in fits.values() for fit in one.values() for effect in fit.effects}
-    ours = [term.effect for term in model.terms if is_exported(term) and term.effect not in known]
+    held_only = model.held.effects - {effect for one in fits.values() for fit in one.values() for effect in fit.effects}
+    ours = [term.effect for term in model.terms if is_exported(term) and term.effect not in held_only]
     return [_agreement(effect, data.outputs, list(fits.values()), len(ours)) for effect in ours], ""
 
 
@@ -141,13 +141,13 @@ def _scatter(parts: list[tuple[Array, NDArray[np.float64]]], shift: NDArray[np.f
     if keep.shape[1] == 0:
         return _Scatter()
     variances, vectors = np.linalg.eigh(sum(covariance for _, covariance in scaled))
-    known = vectors[:, variances > LEAST_VARIANCE * max(float(variances.max()), 1e-300)]
-    scaled = [(known.T @ v, known.T @ c @ known) for v, c in scaled]
+    seen_vectors = vectors[:, variances > LEAST_VARIANCE * max(float(variances.max()), 1e-300)]
+    scaled = [(seen_vectors.T @ v, seen_vectors.T @ c @ seen_vectors) for v, c in scaled]
     inverses = [np.linalg.pinv(covariance) for _, covariance in scaled]
     weight = sum(inverses)
     mean = np.linalg.solve(weight, sum(i @ v for i, (v, _) in zip(inverses, scaled, strict=True)))
     chi2 = sum(float((v - mean) @ i @ (v - mean)) for i, (v, _) in zip(inverses, scaled, strict=True))
-    return _Scatter(chi2, known.shape[1] * (len(parts) - 1))
+    return _Scatter(chi2, seen_vectors.shape[1] * (len(parts) - 1))
 
 
 def _beside(columns: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -28,12 +28,12 @@ class TimeErrors:
     common_u_s: float
     own_u_s: float  #: root mean square over the data sets
 
-    def beside(self, known: Considered | None, rows: int) -> Considered:
+    def beside(self, considered: Considered | None, rows: int) -> Considered:
         """Return these as considered columns behind those that are; a design has `rows`, priors below the data."""
         more = np.vstack([self.columns, np.zeros((rows - len(self.columns), self.columns.shape[1]))])
-        if known is None:
+        if considered is None:
             return Considered(more, np.zeros((rows, 0)))
-        return replace(known, columns=np.column_stack([known.columns, more]))
+        return replace(considered, columns=np.column_stack([considered.columns, more]))
 
     def parts(self, along: NDArray[np.float64]) -> tuple[ErrorPart, ...]:
         """Return the parts of a covariance; `along` (k, 1 + j) is the change of the coefficients by each."""

@@ -71,7 +71,7 @@ def _slope_dps(data: FitData, fitted: FittedModel, axis: str, moved: _Moved) -> 
     for sign in (1.0, -1.0):
         value = moved.term.parameters[moved.name] * float(np.exp(sign * STEP))
         term = replace(moved.term, parameters={**moved.term.parameters, moved.name: value})
-        terms = tuple(term if known is moved.term else known for known in fitted.model.terms)
+        terms = tuple(term if own_term is moved.term else own_term for own_term in fitted.model.terms)
         model = FittedModel(fitted.model.with_terms(terms), fitted.axes)
         ends.append(model.error_dps(data.seen_by(fitted.model.argument), axis))
     return np.asarray((ends[0] - ends[1]) / (2 * STEP))
@@ -87,8 +87,8 @@ def _beside_base(
     rows = whitened(scatter, [solution.drift], white, np.column_stack([base, slopes]))[0][0]
     own, moved = rows[:, : base.shape[1]], rows[:, base.shape[1] :]
     size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
-    taken, *_ = np.linalg.lstsq(own / size, moved, rcond=1e-9)
-    left = moved - own / size @ taken
+    coordinates, *_ = np.linalg.lstsq(own / size, moved, rcond=1e-9)
+    left = moved - own / size @ coordinates
     noise = float(np.sqrt(solution.scale)) if np.isfinite(solution.scale) else np.inf
     return np.asarray(left / max(noise, 1e-300))
 

@@ -133,6 +133,6 @@ class _Search:
             drift = self.data.noise_floor.axes[axis].drift
             rows = whitened(scatter, [drift], white, np.column_stack([design.columns, y]))[0][0]
             size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
-            taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
-            total += float(np.sum((rows[:, -1] - rows[:, :-1] / size @ taken) ** 2))
+            coordinates, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
+            total += float(np.sum((rows[:, -1] - rows[:, :-1] / size @ coordinates) ** 2))
         return total

@@ -114,13 +114,13 @@ class LeftOut:
 class Axis:
     """One axis: the columns of the other effects, those of every time constant, and what is to be explained."""
 
-    def __init__(self, data: FitData, rest: ErrorModel, name: str, kind: Lag | None = None) -> None:
+    def __init__(self, data: FitData, base_model: ErrorModel, name: str, kind: Lag | None = None) -> None:
         self.data, self.name = data, name
         self.factor = (kind or ThermalLag()).factor(data.channels, name)
-        design = axis_design(data, rest, name)
+        design = axis_design(data, base_model, name)
         self.base = design.columns
         self.y = data.outputs[name] - data.true_rate_dps(name) - design.offset_dps
-        self.above_k = data.channels.temperature_c(name) - rest.reference.temperature_c
+        self.above_k = data.channels.temperature_c(name) - base_model.reference.temperature_c
         self._folds: dict[bytes, Projected] = {}
 
     @cached_property
@@ -143,40 +143,40 @@ class Axis:
         )
         return np.column_stack([np.zeros((len(self.y), 0)), *made]) * self.factor[:, None]
 
-    def projected(self, seen: NDArray[np.bool_]) -> Projected:
+    def projected(self, in_fit: NDArray[np.bool_]) -> Projected:
         """Return the time constants' columns beside the base, over the noise, of the data sets of a mask."""
-        key = seen.tobytes()
+        key = in_fit.tobytes()
         if key not in self._folds:
-            self._folds[key] = Projected(self, seen)
+            self._folds[key] = Projected(self, in_fit)
         return self._folds[key]
 
-    def over_noise(self, values: NDArray[np.float64], seen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def over_noise(self, values: NDArray[np.float64], in_fit: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return columns (m, k) of the data sets of a mask, whitened at the drift of the noise floor."""
-        scatter = self.data.take(seen).scatter(self.name)
-        white = scatter.white_var if scatter.white_var is not None else np.ones(int(seen.sum()))
-        return whitened(scatter, [self.data.noise_floor.axes[self.name].drift], white, values[seen])[0][0]
+        scatter = self.data.take(in_fit).scatter(self.name)
+        white = scatter.white_var if scatter.white_var is not None else np.ones(int(in_fit.sum()))
+        return whitened(scatter, [self.data.noise_floor.axes[self.name].drift], white, values[in_fit])[0][0]
 
-    def left_over_noise(self, added: NDArray[np.float64], seen: NDArray[np.bool_]) -> Array:
+    def left_over_noise(self, added: NDArray[np.float64], in_fit: NDArray[np.bool_]) -> Array:
         """Return what a fit of base and added columns (m, k) leaves of the data sets of a mask, whitened."""
-        rows = self.over_noise(np.column_stack([self.base, added, self.y]), seen)
+        rows = self.over_noise(np.column_stack([self.base, added, self.y]), in_fit)
         size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
-        return np.asarray(rows[:, -1] - rows[:, :-1] / size @ taken)
+        coordinates, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
+        return np.asarray(rows[:, -1] - rows[:, :-1] / size @ coordinates)
 
-    def errors(self, added: NDArray[np.float64], seen: NDArray[np.bool_], tested: NDArray[np.bool_]) -> Array:
+    def errors(self, added: NDArray[np.float64], in_fit: NDArray[np.bool_], tested: NDArray[np.bool_]) -> Array:
         """Return what a fit of base and added columns (m, k) to some data sets leaves of others, deg/s."""
         whole = np.concatenate([self.base, added], axis=1)
-        rows = self.over_noise(np.column_stack([whole, self.y]), seen)
+        rows = self.over_noise(np.column_stack([whole, self.y]), in_fit)
         size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
-        return np.asarray(self.y[tested] - whole[tested] @ (taken / size))
+        coordinates, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
+        return np.asarray(self.y[tested] - whole[tested] @ (coordinates / size))
 
 
 class Projected:
     """Normal equations of the time constants' columns of one axis, beside its base."""
 
-    def __init__(self, axis: Axis, seen: NDArray[np.bool_]) -> None:
-        rows = axis.over_noise(np.column_stack([axis.base, axis.lags, axis.y]), seen)
+    def __init__(self, axis: Axis, in_fit: NDArray[np.bool_]) -> None:
+        rows = axis.over_noise(np.column_stack([axis.base, axis.lags, axis.y]), in_fit)
         base, rest = rows[:, : axis.base.shape[1]], rows[:, axis.base.shape[1] :]
         whole = (rest**2).sum(axis=0)
         if base.shape[1]:
@@ -222,25 +222,25 @@ def _choices(structure: Structure) -> tuple[NDArray[np.int64], NDArray[np.int64]
     return at + offsets, places
 
 
-def best_taus(axes: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_], steps: int = FEW_STEPS) -> Taus:
+def best_taus(axes: Sequence[Axis], structure: Structure, in_fit: NDArray[np.bool_], steps: int = FEW_STEPS) -> Taus:
     """Return axis -> name -> time constant, s, for the data sets of a mask: the grid's best, and steps from there."""
     if not structure.columns:
         return {axis.name: {} for axis in axes}
     columns, places = _choices(structure)
-    gains = [axis.projected(seen).gains(columns) for axis in axes]
+    gains = [axis.projected(in_fit).gains(columns) for axis in axes]
     groups = [([axis], gain) for axis, gain in zip(axes, gains, strict=True)]
     if not structure.per_axis:
         groups = [(list(axes), np.sum(gains, axis=0))]
     tau_by_axis: dict[str, Mapping[str, float]] = {}
     for group, gain in groups:
         begin = np.log(GRID_S[places[int(np.argmax(gain))]])
-        logarithms = refined(partial(moved_around, group, structure, seen), begin, LOG_BOUNDS, steps)
+        logarithms = refined(partial(moved_around, group, structure, in_fit), begin, LOG_BOUNDS, steps)
         tau_by_axis |= {axis.name: structure.taus_s(logarithms) for axis in group}
     return tau_by_axis
 
 
 def moved_around(
-    group: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_], logarithms: Array
+    group: Sequence[Axis], structure: Structure, in_fit: NDArray[np.bool_], logarithms: Array
 ) -> list[Local]:
     """Return what is left of each axis at logarithms of time constants, and what each of them moves."""
     taus_s = structure.taus_s(logarithms)
@@ -251,7 +251,7 @@ def moved_around(
             (axis.columns(structure, {**taus_s, name: taus_s[name] * np.exp(STEP)}) - own) / STEP
             for name in structure.constants
         ]
-        rows = axis.over_noise(np.column_stack([axis.base, own, *moved, axis.y]), seen)
+        rows = axis.over_noise(np.column_stack([axis.base, own, *moved, axis.y]), in_fit)
         neighbours.append(Local(rows, axis.base.shape[1], own.shape[1]))
     return neighbours
 

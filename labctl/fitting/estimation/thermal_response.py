@@ -96,7 +96,7 @@ class _OfAxis:
 
 
 def _of_axis(
-    axis: Axis, errors: Mapping[str, Errors], stretches: Sequence[Stretch], every: NDArray[np.bool_]
+    axis: Axis, errors: Mapping[str, Errors], stretches: Sequence[Stretch], all_rows: NDArray[np.bool_]
 ) -> _OfAxis:
     """Return the structure of one axis by what was left out of it; of what each axis has by itself that is known."""
     tried, own = [], {}
@@ -104,50 +104,50 @@ def _of_axis(
         if structure is STRUCTURES[0]:  # on one axis the same as a time constant on each
             continue
         of_axis = structure.of_axis()
-        known = [each for each in errors.get(structure.id, ()) if each[0] is axis]
+        axis_errors = [each for each in errors.get(structure.id, ()) if each[0] is axis]
         tried.append(of_axis)
-        own[of_axis.id] = known if structure.per_axis else errors_of([axis], of_axis, stretches)
+        own[of_axis.id] = axis_errors if structure.per_axis else errors_of([axis], of_axis, stretches)
     held_out = {name: pooled(left) for name, left in own.items()}
     while True:
-        structure, structure_errors = _told_apart([axis], tried, held_out, every)
+        structure, structure_errors = _told_apart([axis], tried, held_out, all_rows)
         taus_s = structure_errors[axis.name]
-        if structure is tried[0] or _is_seen(axis, structure, taus_s, tried[0], every):
+        if structure is tried[0] or _is_seen(axis, structure, taus_s, tried[0], all_rows):
             return _OfAxis(axis.name, structure, taus_s, own[structure.id])
         tried.remove(structure)
 
 
 def _is_seen(
-    axis: Axis, structure: Structure, taus_s: Mapping[str, float], simplest: Structure, every: NDArray[np.bool_]
+    axis: Axis, structure: Structure, taus_s: Mapping[str, float], simplest: Structure, all_rows: NDArray[np.bool_]
 ) -> bool:
     """Return whether a structure also leaves clearly less of all data of one axis than the simplest.
 
     Few stretches are left out of one axis, and the errors within one are those of one extrapolation: chance.
     """
-    simple_s = best_taus([axis], simplest, every, MOST_STEPS)[axis.name]
+    simple_s = best_taus([axis], simplest, all_rows, MOST_STEPS)[axis.name]
     left, simple = (
-        float(np.sum(axis.left_over_noise(axis.columns(each, taus), every) ** 2))
+        float(np.sum(axis.left_over_noise(axis.columns(each, taus), all_rows) ** 2))
         for each, taus in ((structure, taus_s), (simplest, simple_s))
     )
     more = structure.coefficients(1) - simplest.coefficients(1)
-    return simple - left > SEEN * max(more, 1) * max(left / len(every), 1.0)
+    return simple - left > SEEN * max(more, 1) * max(left / len(all_rows), 1.0)
 
 
 def _by_axis(structures: Mapping[str, Structure]) -> Structure:
     """Return what stands for structures that differ from axis to axis, in words and in what was not looked for."""
-    said = "; ".join(f"on {axis} {structure.sentence}" for axis, structure in structures.items())
+    sentence = "; ".join(f"on {axis} {structure.sentence}" for axis, structure in structures.items())
     fixed = {f"{name}_{axis}": tau_s for axis, each in structures.items() for name, tau_s in each.fixed.items()}
-    return Structure(BY_AXIS, said, fixed=fixed)
+    return Structure(BY_AXIS, sentence, fixed=fixed)
 
 
 def _told_apart(
-    axes: Sequence[Axis], structures: Sequence[Structure], held_out: Mapping[str, LeftOut], every: NDArray[np.bool_]
+    axes: Sequence[Axis], structures: Sequence[Structure], held_out: Mapping[str, LeftOut], all_rows: NDArray[np.bool_]
 ) -> tuple[Structure, Taus]:
     """Return the structure chosen, and its time constants, among those whose time constants are not the same."""
     tried = list(structures)
     while True:
         chosen = _chosen(tried, held_out)
-        taus = best_taus(axes, chosen, every, MOST_STEPS)
-        if are_told_apart(axes, chosen, taus, every):
+        taus = best_taus(axes, chosen, all_rows, MOST_STEPS)
+        if are_told_apart(axes, chosen, taus, all_rows):
             return chosen, taus
         tried.remove(chosen)
 
@@ -161,23 +161,23 @@ def _chosen(tried: Sequence[Structure], held_out: Mapping[str, LeftOut]) -> Stru
     return chosen
 
 
-def are_told_apart(axes: Sequence[Axis], structure: Structure, taus: Taus, seen: NDArray[np.bool_]) -> bool:
+def are_told_apart(axes: Sequence[Axis], structure: Structure, taus: Taus, in_fit: NDArray[np.bool_]) -> bool:
     """Return whether the two time constants of a structure are not one and the same.
 
     Those of two flows on each axis: nearer ones are one flow. Those of warming and cooling on one axis at least, beyond
     `TOLD_APART` standard uncertainties of their ratio.
     """
     if structure.two_ways:
-        return any(_ways_differ(axis, structure, taus[axis.name], seen) for axis in axes)
+        return any(_ways_differ(axis, structure, taus[axis.name], in_fit) for axis in axes)
     least = GRID_S[APART] / GRID_S[0]
     both = [(taus_s["tau"], taus_s["second_tau"]) for taus_s in taus.values() if "second_tau" in taus_s]
     return all(max(pair) >= least * min(pair) for pair in both)
 
 
-def _ways_differ(axis: Axis, structure: Structure, taus_s: Mapping[str, float], seen: NDArray[np.bool_]) -> bool:
+def _ways_differ(axis: Axis, structure: Structure, taus_s: Mapping[str, float], in_fit: NDArray[np.bool_]) -> bool:
     """Return whether warming and cooling have different time constants, by the curvature of what is left."""
     logarithms = np.log([taus_s[name] for name in structure.constants])
-    (part,) = moved_around([axis], structure, seen, logarithms)
+    (part,) = moved_around([axis], structure, in_fit, logarithms)
     freedom = max(len(part.residual) - axis.base.shape[1] - len(structure.columns) - len(logarithms), 1)
     information = part.slopes.T @ part.slopes / (part.chi2 / freedom)
     if np.linalg.cond(information) > MOST_CONDITION:
@@ -209,9 +209,9 @@ def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool
         parts += [np.isin(np.arange(len(data)), piece) for piece in pieces]
     stretches = []
     for part in parts:
-        seen, warm = ~part, data.temperature_c
-        low, high = float(warm[seen].min()) - BEYOND_K, float(warm[seen].max()) + BEYOND_K
-        tested = part & (warm >= low) & (warm <= high)
+        seen, temperature_c = ~part, data.temperature_c
+        low, high = float(temperature_c[seen].min()) - BEYOND_K, float(temperature_c[seen].max()) + BEYOND_K
+        tested = part & (temperature_c >= low) & (temperature_c <= high)
         if tested.sum() >= LEAST_SETS:
             stretches.append((seen, tested))
     return stretches if len(stretches) > 1 else []

@@ -106,22 +106,22 @@ GOOD_TURN_DEG = (60.0, 150.0)
 OTHER_TURN = 0.3
 
 
-def next_pose(covered: tuple[bool, ...], wanted: int, here: Array | None, needs: Array) -> Direction:
+def next_pose(covered: tuple[bool, ...], poses: int, direction: Array | None, needs: Array) -> Direction:
     """Return the pose to ask for; `covered` says of each of DIRECTIONS whether a rest covers it.
 
-    `here` (3,) is gravity's direction in the last rest, None before the first; `needs` (3,) how much a turn about each
-    body axis would add. While some of the first `wanted` poses are missing it is one of them, else any.
+    `direction` (3,) is gravity's direction in the last rest, None before the first; `needs` (3,) how much a turn about
+    each body axis would add. While some of the first `poses` poses are missing it is one of them, else any.
     """
-    missing = [place for place in range(wanted) if not covered[place]]
+    missing = [place for place in range(poses) if not covered[place]]
     places = missing or list(range(len(DIRECTIONS)))
-    if here is None:
+    if direction is None:
         return DIRECTIONS[places[0]]
-    worth = [_worth(here, np.array(DIRECTIONS[place].up), needs) for place in places]
+    worth = [_worth(direction, np.array(DIRECTIONS[place].up), needs) for place in places]
     return DIRECTIONS[places[int(np.argmax(worth))]]
 
 
-def _worth(here: Array, there: Array, needs: Array) -> float:
-    axis, angle_deg = turn_between(here, there)
+def _worth(direction: Array, candidate: Array, needs: Array) -> float:
+    axis, angle_deg = turn_between(direction, candidate)
     shared = float(np.sum(axis**2 * needs))
     low, high = GOOD_TURN_DEG
     return shared * (1.0 if low <= angle_deg <= high else OTHER_TURN) * min(angle_deg, 90.0)
@@ -238,13 +238,15 @@ class LiveCalibration:
     def _plain(self, error: Exception) -> str:
         return str(error).removeprefix(f"{self.info.serial}: ")
 
-    def _state(self, recording: Recording, rests: _Rests, why: str, up: tuple[float, float, float] | None) -> LiveState:
+    def _state(
+        self, recording: Recording, rests: _Rests, reason: str, up: tuple[float, float, float] | None
+    ) -> LiveState:
         target, (_, result, refused) = self.target, self._fitted
         covers = covered(rests.up)
         coefficients = () if result is None else tuple(coefficients_of(result, target))
         turns = 0 if result is None or result.poses is None else result.poses["moves"]["used"]
         absent = [each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if not has]
-        missing = [text for text in (_poses_text(absent, target), why or (refused if len(rests.up) else "")) if text]
+        missing = [text for text in (_poses_text(absent, target), reason or (refused if len(rests.up) else "")) if text]
         missing += [
             f"U of {coefficient.name} of {coefficient.axis} is {coefficient.expanded:.2g}, above its limit of "
             f"{coefficient.limit:g} ({coefficient.unit})"

@@ -79,12 +79,12 @@ def align_field(
     dip = float(np.mean(np.sum(solved.accelerometer.up * (seen.direction @ turn.T), axis=1)))
     change, place, extra = np.inf, 0.0, 0.0
     for _ in range(STEPS):
-        residual, jacobian, known, by_place = _equations(seen, turn, dip)
+        residual, jacobian, noise, by_place = _equations(seen, turn, dip)
         if change > SETTLED:
             place, extra = components(
-                jacobian, residual, known, by_place, lambda _: 0.0, float(np.mean(np.diag(known)))
+                jacobian, residual, noise, by_place, lambda _: 0.0, float(np.mean(np.diag(noise)))
             )
-        total = known + place * by_place + extra * np.eye(len(known))
+        total = noise + place * by_place + extra * np.eye(len(noise))
         step, covariance = gls(jacobian, residual, total)
         turn, dip = _rotation(-step[:3]) @ turn, dip - float(step[3])
         change = float(np.abs(step).max())
@@ -130,11 +130,11 @@ def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64],
     )  # fmt: skip
 
 
-def _start(seen: _Seen) -> NDArray[np.float64]:
+def _start(parts: _Seen) -> NDArray[np.float64]:
     """Return the rotation (3, 3) from the magnetometer's to the body axes by the turns: linear in its elements."""
-    gyro, moves = seen.solved.gyro, seen.solved.moves
+    gyro, moves = parts.solved.gyro, parts.solved.moves
     rows = [
-        np.kron(seen.direction[k], turned.T) - np.kron(seen.direction[k + 1], np.eye(3))
+        np.kron(parts.direction[k], turned.T) - np.kron(parts.direction[k + 1], np.eye(3))
         for k, turned, used in zip(moves.before, gyro.equations.rotations.matrix, gyro.used, strict=True)
         if used
     ]
@@ -145,15 +145,15 @@ def _start(seen: _Seen) -> NDArray[np.float64]:
 
 
 def _equations(
-    seen: _Seen, turn: NDArray[np.float64], dip: float
+    field_seen: _Seen, turn: NDArray[np.float64], dip: float
 ) -> tuple[Array, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return residuals (r,), derivatives (r, 4) by turn and dip, known noise (r, r), and that by 1 rad^2 per rest.
 
     One residual of each used rest, two of each used move.
     """
-    solved, k = seen.solved, len(seen.direction)
+    solved, k = field_seen.solved, len(field_seen.direction)
     accelerometer, gyro, moves = solved.accelerometer, solved.gyro, solved.moves
-    body = seen.direction @ turn.T
+    body = field_seen.direction @ turn.T
     rest = np.flatnonzero(accelerometer.used)
     up = accelerometer.up
     size = len(rest) + 2 * int(np.count_nonzero(gyro.used))
@@ -181,19 +181,19 @@ def _equations(
     by_bias[pairs, before[:, None]] = turned @ parts.by_bias_before
     by_bias[pairs, before[:, None] + 1] = turned @ parts.by_bias_after
     by_gyro[pairs] = turned @ parts.by_error
-    each = of_each_move(moves.take(gyro.used), parts.white, turned, seen.readings_u)
+    each = of_each_move(moves.take(gyro.used), parts.white, turned, field_seen.readings_u)
     own[len(rest) :, len(rest) :] = block_diag(*each)
 
     flat = by_seen.reshape(size, -1)
     tilt = (by_tilt * accelerometer.u_rest_g[:, None]).reshape(size, -1)
     drift = (by_bias * np.radians(solved.bias.u_rest_dps)).reshape(size, -1)
-    iron = np.einsum("rka,kab->rb", by_seen, seen.by_parameters)
-    known = (
-        own + flat @ block_diag(*seen.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
-        + iron @ seen.parameters @ iron.T + by_gyro @ gyro.covariance @ by_gyro.T
+    iron = np.einsum("rka,kab->rb", by_seen, field_seen.by_parameters)
+    noise = (
+        own + flat @ block_diag(*field_seen.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
+        + iron @ field_seen.parameters @ iron.T + by_gyro @ gyro.covariance @ by_gyro.T
         + by_force @ accelerometer.covariance @ by_force.T
     )  # fmt: skip
-    return residual, jacobian, known, flat @ block_diag(*seen.across) @ flat.T
+    return residual, jacobian, noise, flat @ block_diag(*field_seen.across) @ flat.T
 
 
 def _rotation(vector: Array) -> NDArray[np.float64]:

@@ -73,17 +73,20 @@ class Magnetometer:
         return "unexplained" if more or self.left_out_share > MOST_LEFT_OUT else "adequate"
 
 
-def calibrate_magnetometer(what: str, readings_ut: NDArray[np.float64], field_ut: float | None = None) -> Magnetometer:
+def calibrate_magnetometer(
+    subject: str, readings_ut: NDArray[np.float64], field_ut: float | None = None
+) -> Magnetometer:
     """Fit hard and soft iron to readings (n, 3), uT, in order of time, of turns in a constant field.
 
     `field_ut` is its size; without it the matrix has the determinant 1. Raises NotEnoughData, naming what to do.
     """
     if len(readings_ut) < LEAST_READINGS:
         raise NotEnoughData(
-            f"{what}: {len(readings_ut)} readings of a magnetometer; nine parameters need {LEAST_READINGS} and more: "
+            f"{subject}: {len(readings_ut)} readings of a magnetometer; nine parameters need {LEAST_READINGS} and "
+            "more: "
             "turn it slowly through all directions"
         )
-    ellipsoid, used = _robust(what, readings_ut)
+    ellipsoid, used = _robust(subject, readings_ut)
     n, repetition = len(ellipsoid.distance), _repetition(ellipsoid.distance)
     # as few independent readings as there are have given nine of them to the parameters, and so look quieter
     fewer = max(n - PARAMETERS, 1) / max(n - PARAMETERS * repetition, n / 10)
@@ -102,11 +105,11 @@ def calibrate_magnetometer(what: str, readings_ut: NDArray[np.float64], field_ut
         float(np.sqrt(np.mean(np.diff(ellipsoid.distance) ** 2) / 2)), float(np.sqrt(np.mean(ellipsoid.distance**2))),
         _held_out(readings_ut[used], ellipsoid), float(size.std()), repetition, angle, gap,
     )  # fmt: skip
-    _require_determined(what, result)
+    _require_determined(subject, result)
     return result
 
 
-def _robust(what: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDArray[np.bool_]]:
+def _robust(subject: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDArray[np.bool_]]:
     used = np.ones(len(readings), dtype=np.bool_)
     ellipsoid: Ellipsoid | None = None
     for _ in range(ROUNDS):
@@ -114,7 +117,7 @@ def _robust(what: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDArra
         ellipsoid = None if start is None else nearest_ellipsoid(readings[used], *start)
         if ellipsoid is None:
             raise NotEnoughData(
-                f"{what}: the readings lie on no ellipsoid that they determine; turn the unit slowly through all "
+                f"{subject}: the readings lie on no ellipsoid that they determine; turn the unit slowly through all "
                 "directions (each axis up and down, and turned in each), away from iron and currents"
             )
         every = at(readings, ellipsoid.centre, ellipsoid.matrix, ellipsoid.noise).distance
@@ -147,11 +150,11 @@ def _repetition(distance: Array) -> float:
 def _values(parameters: Array, field_ut: float | None) -> tuple[Array, NDArray[np.float64]]:
     """Return hard iron, soft iron and field, (10,), of centre and matrix, and their derivative (10, 9)."""
 
-    def of(given: Array) -> Array:
-        a, b, c, d, e, f = given[3:]
+    def of(values: Array) -> Array:
+        a, b, c, d, e, f = values[3:]
         determinant = a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)
         field = float(np.cbrt(1 / determinant)) if field_ut is None else field_ut
-        return np.concatenate([given[:3], given[3:] * field, [field]])
+        return np.concatenate([values[:3], values[3:] * field, [field]])
 
     return of(parameters), _derivative(of, parameters)
 
@@ -198,7 +201,7 @@ def in_words(direction: Array) -> str:
     return " ".join(named)
 
 
-def _require_determined(what: str, result: Magnetometer) -> None:
+def _require_determined(subject: str, result: Magnetometer) -> None:
     # by the noise alone: what a disturbed field makes uncertain is no want of directions
     alone = min(result.noise_ut / max(result.residual_ut, 1e-300), 1.0) / np.sqrt(result.repetition)
     u = alone * np.concatenate([result.u[:3] / result.field_ut, result.u[3:9]])
@@ -208,7 +211,7 @@ def _require_determined(what: str, result: Magnetometer) -> None:
     names = [f"hard iron {axis} (over the field)" for axis in AXES]
     names += [f"soft iron {AXES[i]}{AXES[j]}" for i, j in PLACES]
     raise NotEnoughData(
-        f"{what}: the readings do not determine {names[worst]} (u = {u[worst]:.2g}, limit {LARGEST_U:g}); the field "
+        f"{subject}: the readings do not determine {names[worst]} (u = {u[worst]:.2g}, limit {LARGEST_U:g}); the field "
         f"was never nearer than {result.largest_gap_deg:.0f} deg to {in_words(result.gap)} of the sensor: turn that "
         "side "
         "into the field too"

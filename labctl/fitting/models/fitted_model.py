@@ -88,10 +88,10 @@ class FittedModel:
         if self.model.argument == "output":
             seen = channels.with_rates({**across, **outputs})
             return {axis: outputs[axis] - self.error_dps(seen, axis) for axis in outputs}
-        known = {axis: self._coefficients(channels, axis) for axis in outputs}
+        coefficients = {axis: self._coefficients(channels, axis) for axis in outputs}
         return invert(
             outputs,
-            lambda rates, axis: self._error_with(known[axis], channels.with_rates({**across, **rates}), axis),
+            lambda rates, axis: self._error_with(coefficients[axis], channels.with_rates({**across, **rates}), axis),
             self.model.name,
         )
 

@@ -67,14 +67,14 @@ class ForceSensitivity:
 
     def error_dps(self, specific_force_g: Array) -> Array:
         """Return the error, (n, axes) deg/s, of forces (n, 3) g; no number where a force is not finite."""
-        known = np.isfinite(specific_force_g).all(axis=1, keepdims=True)
-        force = np.where(known, specific_force_g, np.nan)
+        is_known = np.isfinite(specific_force_g).all(axis=1, keepdims=True)
+        force = np.where(is_known, specific_force_g, np.nan)
         own = force[:, [BODY_AXES.index(axis) for axis in self.axes]]
         return np.asarray(force @ self.known_per_g.T + self.known_per_g2 * own * own)
 
-    def forces(self, given: object, n: int) -> Array:
+    def forces(self, value: object, n: int) -> Array:
         """Return forces as (n, 3) g from (3,) or (n, 3); raises BadInput for another shape."""
-        force_g = np.asarray(given, dtype=np.float64)
+        force_g = np.asarray(value, dtype=np.float64)
         if force_g.shape not in {(3,), (n, 3)}:
             raise BadInput(
                 f"{INPUT} of shape {force_g.shape} given; give the specific force in g along body axes x, y and z: "
@@ -91,13 +91,13 @@ class ForceSensitivity:
         return f"g-sensitivity is not corrected without {INPUT}; at 1 g at most: {sizes}"
 
     @staticmethod
-    def from_json(given: SpecificForceJson, axes: tuple[str, ...]) -> ForceSensitivity:
+    def from_json(document: SpecificForceJson, axes: tuple[str, ...]) -> ForceSensitivity:
         """Read the part of a calibration document; raises LookupError, TypeError or ValueError where it is not one."""
-        if given["input"] != INPUT:
-            raise ValueError(f"input {str(given['input'])[:80]!r} instead of {INPUT!r}")
+        if document["input"] != INPUT:
+            raise ValueError(f"input {str(document['input'])[:80]!r} instead of {INPUT!r}")
         per_g, per_g2 = np.full((len(axes), 3), np.nan), np.full(len(axes), np.nan)
         for row, axis in enumerate(axes):
-            for name, coefficients in given["coefficients"][axis].items():
+            for name, coefficients in document["coefficients"][axis].items():
                 if name == SQUARED:
                     per_g2[row] = float(coefficients["value"])
                 else:

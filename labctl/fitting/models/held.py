@@ -90,14 +90,14 @@ class Held:
         return Held(axes, record["source"])
 
 
-def _json(one: HeldCoefficient) -> HeldCoefficientJson:
-    us = [None if math.isnan(u) else u for u in one.u]
-    if one.temperature_c:
+def _json(coefficient: HeldCoefficient) -> HeldCoefficientJson:
+    us = [None if math.isnan(u) else u for u in coefficient.u]
+    if coefficient.temperature_c:
         return {
-            "effect": one.effect, "value": list(one.value), "u": us, "unit": one.unit,
-            "temperature_c": list(one.temperature_c),
+            "effect": coefficient.effect, "value": list(coefficient.value), "u": us, "unit": coefficient.unit,
+            "temperature_c": list(coefficient.temperature_c),
         }  # fmt: skip
-    return {"effect": one.effect, "value": one.value[0], "u": us[0], "unit": one.unit}
+    return {"effect": coefficient.effect, "value": coefficient.value[0], "u": us[0], "unit": coefficient.unit}
 
 
 def _read(record: HeldCoefficientJson) -> HeldCoefficient:

@@ -41,11 +41,11 @@ class Linear:
 
     def correct(self, raw: Array, temperature_c: Array) -> Array:
         """Return the true rates, (n, axes), of outputs (n, axes)."""
-        warm = np.broadcast_to(temperature_c, (len(raw),)) if temperature_c.ndim < 2 else temperature_c
+        row_c = np.broadcast_to(temperature_c, (len(raw),)) if temperature_c.ndim < 2 else temperature_c
         out = np.empty_like(raw)
         for start in range(0, len(raw), PIECE):
             piece = slice(start, start + PIECE)
-            k, b = self.k_and_b(warm[piece])
+            k, b = self.k_and_b(row_c[piece])
             out[piece] = np.linalg.solve(k, (raw[piece] - b)[:, :, None])[:, :, 0]
         return out
 

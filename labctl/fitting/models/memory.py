@@ -206,9 +206,9 @@ class RunningMemory:
         """Where the followers are; None before the first sample."""
         if self._last is None:
             return None
-        t_s, warm, places = self._last
-        at_c = (follower.at_c(place, warm) for follower, place in zip(self._followers, places, strict=True))
-        return MemoryState(t_s, warm, tuple(at_c))
+        t_s, temperature_c, places = self._last
+        at_c = (follower.at_c(place, temperature_c) for follower, place in zip(self._followers, places, strict=True))
+        return MemoryState(t_s, temperature_c, tuple(at_c))
 
     def reset(self) -> None:
         """Forget all, as after the unit was switched off for long."""
@@ -223,9 +223,11 @@ class RunningMemory:
                 f"temperature {state.temperature_c:g} deg C: this calibration has {len(self._followers)} followers, "
                 "and all values must be finite; hand over the `state` of a compensator of the same calibration"
             )
-        warm = state.temperature_c
-        places = (follower.place(at_c, warm) for follower, at_c in zip(self._followers, state.at_c, strict=True))
-        self._last = state.t_s, warm, tuple(places)
+        temperature_c = state.temperature_c
+        places = (
+            follower.place(at_c, temperature_c) for follower, at_c in zip(self._followers, state.at_c, strict=True)
+        )
+        self._last = state.t_s, temperature_c, tuple(places)
 
     @property
     def last_s(self) -> float | None:
@@ -245,34 +247,36 @@ class RunningMemory:
             return Remembered(errors_dps)
         return Remembered(errors_dps[:, : self._axes], errors_dps[:, self._axes :])
 
-    def _block(self, t_s: Array, warm: Array, errors: Array) -> None:
+    def _block(self, t_s: Array, temperature_c: Array, errors: Array) -> None:
         """Write the errors of some samples into `errors`."""
-        known = np.isfinite(t_s)
-        known &= np.isfinite(warm)
-        if known.all():
-            self._known_block(t_s, warm, errors)
+        is_finite = np.isfinite(t_s)
+        is_finite &= np.isfinite(temperature_c)
+        if is_finite.all():
+            self._known_block(t_s, temperature_c, errors)
             return
         errors[:] = np.nan
-        if known.any():
-            of_known = np.empty((int(known.sum()), errors.shape[1]))
-            self._known_block(t_s[known], warm[known], of_known)
-            errors[known] = of_known
+        if is_finite.any():
+            of_known = np.empty((int(is_finite.sum()), errors.shape[1]))
+            self._known_block(t_s[is_finite], temperature_c[is_finite], of_known)
+            errors[is_finite] = of_known
 
-    def _known_block(self, t_s: Array, warm: Array, errors: Array) -> None:
+    def _known_block(self, t_s: Array, temperature_c: Array, errors: Array) -> None:
         if self._last is None:
-            self.start(MemoryState(float(t_s[0]), float(warm[0]), (float(warm[0]),) * len(self._followers)))
+            self.start(
+                MemoryState(float(t_s[0]), float(temperature_c[0]), (float(temperature_c[0]),) * len(self._followers))
+            )
         assert self._last is not None
         last_s, last_c, places = self._last
-        steps = Steps.of(t_s, warm, last_s, last_c)
+        steps = Steps.of(t_s, temperature_c, last_s, last_c)
         moved: dict[tuple[str, float, float | None], Array] = {}
         rows = []
         for follower, place in zip(self._followers, places, strict=True):
             movement = follower.movement
             if movement not in moved:
                 moved[movement] = follower.moved(steps, place)
-            rows.append(follower.state(moved[movement], warm))
+            rows.append(follower.state(moved[movement], temperature_c))
         ends = tuple(float(moved[follower.movement][-1]) for follower in self._followers)
-        self._last = float(t_s[-1]), float(warm[-1]), ends
+        self._last = float(t_s[-1]), float(temperature_c[-1]), ends
         if self._sizes.shape == (1, 1):  # a product of matrices would cost as much as the state
             np.multiply(rows[0], self._sizes[0, 0], out=errors[:, 0])
         else:
@@ -286,12 +290,13 @@ def check_order(running: RunningMemory, t_s: Array) -> None:
     if goes_on and np.all(t_s[1:] >= t_s[:-1]):
         return
     rows = np.flatnonzero(np.isfinite(t_s))  # one that is no number is left out
-    known = t_s[rows]
-    before = np.concatenate([known[:1] if last is None else [last], known[:-1]])
-    if np.any(back := known < before):
+    row_times_s = t_s[rows]
+    before = np.concatenate([row_times_s[:1] if last is None else [last], row_times_s[:-1]])
+    if np.any(back := row_times_s < before):
         k = int(np.argmax(back))
         raise BadInput(
-            f"sample {rows[k] + 1}: t_s = {known[k]:.9g} s is before {before[k]:.9g} s; give them in order of time"
+            f"sample {rows[k] + 1}: t_s = {row_times_s[k]:.9g} s is before {before[k]:.9g} s; give them in order of "
+            "time"
         )
 
 

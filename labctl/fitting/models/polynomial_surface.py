@@ -25,14 +25,14 @@ class Surface:
     def correct(self, raw: Array, temperature_c: Array) -> Array:
         """Return corrected rates, (n, axes), from outputs (n, axes) and temperatures (n,), (n, axes) or one for all."""
         out = np.empty_like(raw)
-        warm = np.asarray(temperature_c, dtype=np.float64)
+        row_c = np.asarray(temperature_c, dtype=np.float64)
         buffers = np.empty(PIECE), np.empty(PIECE), np.empty(PIECE)
         for start in range(0, len(raw), PIECE):  # all axes of a piece, as they lie between each other in memory
             piece = slice(start, start + PIECE)
             u, row, total = (buffer[: len(raw[piece])] for buffer in buffers)
             for axis, c in enumerate(self.coefficients):
-                if axis == 0 or warm.ndim == 2:
-                    of_axis = warm[piece, axis] if warm.ndim == 2 else warm[piece] if warm.ndim else warm
+                if axis == 0 or row_c.ndim == 2:
+                    of_axis = row_c[piece, axis] if row_c.ndim == 2 else row_c[piece] if row_c.ndim else row_c
                     np.subtract(of_axis, self.reference_c, out=u)
                 _sum(c, raw[piece, axis], u, row, total)
                 np.subtract(raw[piece, axis], total, out=out[piece, axis])

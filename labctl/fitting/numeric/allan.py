@@ -256,12 +256,12 @@ class _Fitted:
         """Return whether the record cannot be explained without a term."""
         return bool(self.shows[self.columns(j)].any())
 
-    def is_followed(self, shown: NDArray[np.bool_]) -> bool:
+    def is_followed(self, is_shown: NDArray[np.bool_]) -> bool:
         """Return whether the fitted curve lies within the data's intervals at the octaves where a term shows."""
         tail = (1 - FAMILY_CONFIDENCE) / 2 / len(self.tau)
         ratio = self.freedom * self.variance / self.model
         inside = (ratio > chdtri(self.freedom, 1 - tail)) & (ratio < chdtri(self.freedom, tail))
-        return bool(np.all(inside[shown]))
+        return bool(np.all(inside[is_shown]))
 
 
 @dataclass(frozen=True)

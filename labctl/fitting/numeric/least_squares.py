@@ -177,7 +177,7 @@ def _at(
     design: NDArray[np.float64], y: Array, scatter: Scatter, drifts: Sequence[Drift], reduce: _Reduce = _by_qr
 ) -> _Fits:
     """Return the weighted fit and its restricted log likelihood at each drift."""
-    known = scatter.white_var is not None
+    has_white = scatter.white_var is not None
     white = scatter.white_var if scatter.white_var is not None else np.ones(len(y))
     m, k = design.shape
     rows, log_dets = drift_noise.whitened(scatter, drifts, white, np.column_stack([design, y]))
@@ -185,8 +185,8 @@ def _at(
     log_dets = log_dets + 2 * np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))).sum(axis=1)
     freedom = max(m - k, 1)
     # a chi2 above that of the noise is due to the model, and makes its coefficients as much less certain
-    scale = np.maximum(chi2 / freedom, 1.0) if known else np.maximum(chi2, 1e-300) / freedom
-    fit_terms = chi2 if known else freedom * np.log(np.maximum(chi2, 1e-300))
+    scale = np.maximum(chi2 / freedom, 1.0) if has_white else np.maximum(chi2, 1e-300) / freedom
+    fit_terms = chi2 if has_white else freedom * np.log(np.maximum(chi2, 1e-300))
     priors = np.array([drift_noise.log_prior(scatter, drift) for drift in drifts])
     return _Fits(drifts, r, projected, -0.5 * (log_dets + fit_terms) + priors, scale)
 
@@ -279,6 +279,6 @@ def _along(
         rows = drift_noise.whitened(scatter, [fits.drifts[point]], white, np.column_stack([design, columns]))[0][0]
         rows = np.vstack([rows, below])
         size = np.maximum(np.linalg.norm(rows[:, :k], axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(rows[:, :k] / size, rows[:, k:], rcond=1e-12)
-        projected -= share * taken / size[:, None]
+        coordinates, *_ = np.linalg.lstsq(rows[:, :k] / size, rows[:, k:], rcond=1e-12)
+        projected -= share * coordinates / size[:, None]
     return projected

@@ -25,15 +25,15 @@ def nonnegative_least_squares(columns: NDArray[np.float64], y: Array) -> Array:
     return solution
 
 
-def _feasible(gram: NDArray[np.float64], inner: Array, solution: Array, kept: NDArray[np.bool_]) -> Array:
-    """Return the solution of the columns that are kept, after leaving out of `kept` those it makes negative."""
+def _feasible(gram: NDArray[np.float64], inner: Array, solution: Array, is_free: NDArray[np.bool_]) -> Array:
+    """Return the solution of the columns that are kept, after leaving out of `is_free` those it makes negative."""
     while True:
-        wanted = np.zeros(len(solution))
-        wanted[kept] = np.linalg.solve(gram[kept][:, kept], inner[kept])
-        negative = kept & (wanted <= 0)
+        step = np.zeros(len(solution))
+        step[is_free] = np.linalg.solve(gram[is_free][:, is_free], inner[is_free])
+        negative = is_free & (step <= 0)
         if not negative.any():
-            return wanted
-        share = solution[negative] / (solution[negative] - wanted[negative])
-        solution = solution + share.min() * (wanted - solution)
-        kept[np.flatnonzero(negative)[share <= share.min()]] = False
-        solution = np.where(kept, solution, 0.0)
+            return step
+        share = solution[negative] / (solution[negative] - step[negative])
+        solution = solution + share.min() * (step - solution)
+        is_free[np.flatnonzero(negative)[share <= share.min()]] = False
+        solution = np.where(is_free, solution, 0.0)

@@ -193,16 +193,16 @@ def _component(
     return Component(float(value), float(upper - lower) / 2, float(low), float(high), groups, p_value)
 
 
-def _scatter(information: _Information, here: NDArray[np.bool_], random: RandomEffects) -> tuple[float, int]:
+def _scatter(information: _Information, rows: NDArray[np.bool_], random: RandomEffects) -> tuple[float, int]:
     """Return chi2 of the effects of one kind with the others free, and its degrees of freedom."""
-    rest = ~here
-    matrix, product = information.matrix[np.ix_(here, here)], information.product[here]
+    rest = ~rows
+    matrix, product = information.matrix[np.ix_(rows, rows)], information.product[rows]
     if rest.any():
-        crossed = information.matrix[np.ix_(here, rest)]
+        crossed = information.matrix[np.ix_(rows, rest)]
         others = information.matrix[np.ix_(rest, rest)] + np.diag(np.asarray(random.wide)[rest] ** -2.0)
         matrix = matrix - crossed @ np.linalg.solve(others, crossed.T)
         product = product - crossed @ np.linalg.solve(others, information.product[rest])
     sizes, vectors = np.linalg.eigh(matrix)
-    known = sizes > 1e-6 * max(float(sizes.max()), 1e-300)
-    along = vectors[:, known].T @ product
-    return float(np.sum(along**2 / sizes[known])), int(known.sum())
+    is_seen = sizes > 1e-6 * max(float(sizes.max()), 1e-300)
+    along = vectors[:, is_seen].T @ product
+    return float(np.sum(along**2 / sizes[is_seen])), int(is_seen.sum())

@@ -56,14 +56,14 @@ def require_determined(serial: str, moves: Moves, equations: Equations, noise: N
     column = int(np.argmin(turned)) if turned.min() < LEAST_TURN_DEG else int(np.argmax(u.max(axis=0)))
     row = int(np.argmax(u[:, column]))
     what = f"scale_factor of {AXES[row]}" if row == column else f"misalignment_{AXES[column]} of {AXES[row]}"
-    known = (
+    reason = (
         f"in all moves together the unit turned about {AXES[column]} by only {turned[column]:.0f} deg"
         if turned[column] < LEAST_TURN_DEG
         else f"gravity changed too little in the turns about {AXES[column]}"
     )
     raise NotEnoughData(
         f"{serial}: the recording does not determine {what} (u = {u[row, column]:.2g}, limit {LARGEST_U:g}), "
-        f"because {known}; turn about the {AXES[column]} axis too, by 90 deg or more with {AXES[column]} level "
+        f"because {reason}; turn about the {AXES[column]} axis too, by 90 deg or more with {AXES[column]} level "
         "(a turn about the vertical does not change gravity and gives no information)"
     )
 

@@ -88,8 +88,8 @@ def angle_between_deg(first: NDArray[np.float64], second: NDArray[np.float64]) -
     return np.asarray(np.degrees(2 * np.arctan2(apart, along)))
 
 
-def _square_to(there: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.einsum("mca,ma->mc", tangents(there), error))
+def _square_to(direction: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.einsum("mca,ma->mc", tangents(direction), error))
 
 
 def per_second(angle: NDArray[np.float64], seconds: Array) -> NDArray[np.float64]:

@@ -102,16 +102,16 @@ def _result(readings: PoseReadings, solved: Solved) -> PosesFit:
     raw = uncorrected_errors(moves_between(readings, rests).take(every.usable), accelerometer)
     exported = corrected(readings.gyro_dps, gyro.errors, bias.mean_dps)
     applied = uncorrected_errors(moves_between(readings, rests, exported).take(every.usable), accelerometer)
-    warm = readings.temperature_c
-    span = (None, None) if warm is None else (float(warm.min()), float(warm.max()))
-    reference = Reference(NO_THERMOMETER_C if warm is None else float(np.round(warm.mean())))
-    known = np.diag(gyro.noise).reshape(-1, 2)[used]
+    temperature_c = readings.temperature_c
+    span = (None, None) if temperature_c is None else (float(temperature_c.min()), float(temperature_c.max()))
+    reference = Reference(NO_THERMOMETER_C if temperature_c is None else float(np.round(temperature_c.mean())))
+    variances = np.diag(gyro.noise).reshape(-1, 2)[used]
     return PosesFit(
         FittedModel(ErrorModel("poses", TERMS, "rate", reference=reference), _axes(bias, gyro)),
         rms_dps(raw[used], seconds),
         rms_dps(gyro.equations.residual.reshape(-1, 2)[used], seconds),
         rms_dps(gyro.held_out.error[used], seconds),
-        float(np.sqrt(np.mean(per_second(np.sqrt(known), seconds) ** 2))),
+        float(np.sqrt(np.mean(per_second(np.sqrt(variances), seconds) ** 2))),
         span,
         _rates(moves.take(used), bias, gyro.errors),
         dict(zip(AXES, bias.solutions, strict=True)),
@@ -147,5 +147,5 @@ def _axes(bias: Bias, gyro: Gyroscope) -> dict[str, AxisFit]:
     return axis_fits
 
 
-def _between(rest: Array, row: Array) -> Array:
-    return np.concatenate([rest[:1], row, rest[1:]])
+def _between(residual: Array, row: Array) -> Array:
+    return np.concatenate([residual[:1], row, residual[1:]])

@@ -117,11 +117,11 @@ class _Noises:
             variance = white + pose_g2
             return (freedom * np.log(variance) + scatter / variance) / 2
 
-        known = self.total(equations, 0.0)
-        by_pose = (self.total(equations, typical) - known) / typical
+        total = self.total(equations, 0.0)
+        by_pose = (self.total(equations, typical) - total) / typical
         both = np.ix_(rows, rows)
         start = max(scatter / max(freedom, 1) - white, white)
-        return components(equations.jacobian[rows], equations.residual[rows], known[both], by_pose[both], sizes, start)
+        return components(equations.jacobian[rows], equations.residual[rows], total[both], by_pose[both], sizes, start)
 
 
 def _solved(
@@ -156,8 +156,8 @@ def _solved(
 def _robust_variance(equations: Equations, noise: NDArray[np.float64]) -> float:
     """Return the variance of a component beyond its known noise, by the median of the moves."""
     size = np.sum(equations.residual.reshape(-1, 2) ** 2, axis=1)
-    known = np.diag(noise).reshape(-1, 2).mean(axis=1)
-    return float(max(np.median(size) / MEDIAN - np.median(known), 0.0))
+    variances = np.diag(noise).reshape(-1, 2).mean(axis=1)
+    return float(max(np.median(size) / MEDIAN - np.median(variances), 0.0))
 
 
 def _robust_start(moves: Moves, accelerometer: Accelerometer, bias: Bias) -> NDArray[np.float64]:

@@ -81,14 +81,14 @@ def budget_of(result: str, unit: str, lines: Sequence[BudgetLine], value: float 
     Each line is one source at this place; what its inputs have in common is included in it. A line of type A that is
     unknown leaves the result unknown; one that is not stated, as a standard, is listed and not in U.
     """
-    known = [line for line in lines if line.contribution is not None]
+    stated = [line for line in lines if line.contribution is not None]
     if any(line.contribution is None and line.kind == "A" and line.is_stated for line in lines):
         return Budget(result, unit, value, tuple(lines), None, None, None, None)
-    sizes = [line.contribution or 0.0 for line in known]
+    sizes = [line.contribution or 0.0 for line in stated]
     combined = combined_u(np.array(sizes))
-    freedom = effective_freedom(sizes, [line.freedom for line in known])
-    k = coverage_factor(sizes, [line.distribution for line in known], freedom)
-    expanded = half_width(k * combined, sum(line.uncorrected for line in known))
+    freedom = effective_freedom(sizes, [line.freedom for line in stated])
+    k = coverage_factor(sizes, [line.distribution for line in stated], freedom)
+    expanded = half_width(k * combined, sum(line.uncorrected for line in stated))
     return Budget(result, unit, value, tuple(lines), combined, freedom, k, expanded)
 
 

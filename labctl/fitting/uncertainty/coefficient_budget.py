@@ -39,14 +39,14 @@ def coefficient_budgets(
 def _of_axis(
     fitted: FittedModel, axis: str, temperature_c: float, evidence: AxisEvidence | None, bench: BenchConditions | None
 ) -> dict[str, Budget]:
-    known = {
+    laws = {
         name: (unit, law)
         for name, (unit, law) in coefficients_of(axis).items()
         if np.any(law.gradient(fitted, temperature_c))
     }
-    values = {name: law.value(fitted, temperature_c) for name, (_, law) in known.items()}
+    values = {name: law.value(fitted, temperature_c) for name, (_, law) in laws.items()}
     budgets = {}
-    for name, (unit, law) in known.items():
+    for name, (unit, law) in laws.items():
         lines: list[BudgetLine] = [coefficient_line(fitted, law, temperature_c, evidence, unit)]
         if name == "bias":
             lines += [model_line(fitted, axis, evidence, {}, temperature_c), repeatability_line(fitted, evidence)]
@@ -70,11 +70,11 @@ def response_budgets(
     by_axis: dict[str, dict[str, Budget]] = {}
     for axis, fit in fitted.axes.items():
         for name in (name for name, owner in zip(fit.names, fit.effects, strict=True) if owner in response.IDS):
-            own, known = OwnCoefficient(axis, name), evidence.get(axis)
+            own, axis_evidence = OwnCoefficient(axis, name), evidence.get(axis)
             if not np.isfinite(fit.u_of(name)):
                 continue
             at_c = fitted.model.reference.temperature_c  # it is the same at all temperatures
-            lines = [coefficient_line(fitted, own, at_c, known, "s")]
+            lines = [coefficient_line(fitted, own, at_c, axis_evidence, "s")]
             lines += [source.lines[0] for source in time_lines(fitted, [own], at_c, bench)]
             by_axis.setdefault(axis, {})[name] = budget_of(name, "s", lines, fit.value_of(name))
     return by_axis

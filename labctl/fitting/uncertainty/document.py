@@ -48,17 +48,17 @@ def uncertainty_json(
     fitted: FittedModel, covered: Covered, evidence: Mapping[str, AxisEvidence], bench: BenchConditions
 ) -> UncertaintyJson | None:
     """Return what the document says; None where no uncertainty at a rate and a temperature alone is defined."""
-    name, warm = "calibration", covered.temperatures()
+    name, temperatures_c = "calibration", covered.temperatures()
     try:
         places = [
             (rate, each, rate_uncertainty(fitted, rate, each, evidence=evidence, name=name, bench=bench))
-            for each in warm
+            for each in temperatures_c
             for rate in covered.rates(evidence)
         ]
-        at_c = warm[len(warm) // 2]
+        at_c = temperatures_c[len(temperatures_c) // 2]
         coefficients = coefficient_budgets(fitted, at_c, evidence=evidence, name=name, bench=bench)
         reach = covered.reach_dps(evidence)
-        vectors = vector_bounds(fitted, reach, warm, evidence=evidence, name=name, bench=bench)
+        vectors = vector_bounds(fitted, reach, temperatures_c, evidence=evidence, name=name, bench=bench)
     except (BadInput, NotEnoughData):
         return None
     axes = {
@@ -80,11 +80,11 @@ def uncertainty_json(
 def _bound(places: list[tuple[float, float, RateUncertainty]], coefficients: Mapping[str, Budget]) -> AxisBoundJson:
     """Return the place with the largest U; where it is unknown somewhere, the first such place and why."""
     unknown = next((place for place in places if place[2].expanded_dps is None), None)
-    rate, warm, bound = unknown or max(places, key=lambda place: place[2].expanded_dps or 0.0)
+    rate, temperature_c, bound = unknown or max(places, key=lambda place: place[2].expanded_dps or 0.0)
     return {
         "bound_dps": bound.expanded_dps,
         "rate_dps": rate,
-        "temperature_c": warm,
+        "temperature_c": temperature_c,
         "why": "; ".join(f"{part}: {why}" for part, why in bound.unknown.items()),
         "budget": bound.budget.to_json(),
         "coefficients": {name: _expanded(coefficient) for name, coefficient in coefficients.items()},

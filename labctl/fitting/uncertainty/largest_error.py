@@ -25,14 +25,18 @@ NORMAL_K = 2.0
 DRAWS, SEED = 20_000, 106
 
 
-def widening(uncertainties: Sequence[RateVectorUncertainty], seen: Sequence[Sequence[str]] | None = None) -> float:
+def widening(
+    uncertainties: Sequence[RateVectorUncertainty], outputs_by_place: Sequence[Sequence[str]] | None = None
+) -> float:
     """Return by which factor U at the worst place has to be widened to cover the largest error of all outputs.
 
-    `uncertainties` are those at several rate vectors of one temperature; `seen` are the outputs that count at each
-    of them (default: all). At least 1; NaN where a covariance is unknown.
+    `uncertainties` are those at several rate vectors of one temperature; `outputs_by_place` are the outputs that count
+    at each of them (default: all). At least 1; NaN where a covariance is unknown.
     """
     outputs = uncertainties[0].outputs
-    counts = np.array([[output in here for output in outputs] for here in seen or [outputs] * len(uncertainties)])
+    counts = np.array(
+        [[output in here for output in outputs] for here in outputs_by_place or [outputs] * len(uncertainties)]
+    )
     size = (
         max((abs(rate) for uncertainty in uncertainties for rate in uncertainty.rates_dps.values()), default=0.0) or 1.0
     )

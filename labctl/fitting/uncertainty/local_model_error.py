@@ -65,13 +65,13 @@ class LocalModelError:
         beyond = (self._variance(self._away_across(axis, rate, temperature_c)) - rest for axis, rate in turned.items())
         return float(np.sqrt(own + sum(max(each, 0.0) for each in beyond)))
 
-    def _variance(self, away: Array) -> float:
+    def _variance(self, distance: Array) -> float:
         """Return the variance left, (deg/s)^2, where the data sets with a known one are so far away, in widths."""
-        known, weight = np.isfinite(self.left_var), near_weights(away)
+        is_finite, weight = np.isfinite(self.left_var), near_weights(distance)
         near = effective_number(weight)
         weight /= weight.sum()
-        left = float(weight @ self.left_var[known])
-        noise = float(weight @ self.white_var[known])
+        left = float(weight @ self.left_var[is_finite])
+        noise = float(weight @ self.white_var[is_finite])
         unseen = LEAST_SHARE * np.sqrt(2 / near) * max(left, noise)
         return float(max(left - noise, unseen))
 
@@ -81,8 +81,8 @@ class LocalModelError:
         A group has neighbouring rates about one body axis at neighbouring temperatures; each of its members says as
         much as any other.
         """
-        known = np.flatnonzero(np.isfinite(self.left_var))
-        if len(self.left_var) <= MOST_KEPT or len(known) == 0:
+        finite_rows = np.flatnonzero(np.isfinite(self.left_var))
+        if len(self.left_var) <= MOST_KEPT or len(finite_rows) == 0:
             return self
         across = self.across_dps or {}
         rates = np.stack([self.rate_dps, *across.values()])
@@ -90,7 +90,9 @@ class LocalModelError:
         groups = [
             group
             for axis in range(len(rates))
-            for level in np.array_split(_sorted(known[about[known] == axis], self.temperature_c), TEMPERATURES)
+            for level in np.array_split(
+                _sorted(finite_rows[about[finite_rows] == axis], self.temperature_c), TEMPERATURES
+            )
             for group in np.array_split(_sorted(level, rates[axis]), MOST_KEPT // (10 * TEMPERATURES))
             if len(group)
         ]
@@ -148,11 +150,11 @@ class LocalModelError:
         return np.asarray(away[np.isfinite(self.left_var)])
 
 
-def _unknown(away: Array) -> str | None:
+def _unknown(distance: Array) -> str | None:
     """Return why nothing is known so far, in widths, from the data sets; None where something is."""
-    if away.min() > FARTHEST:
+    if distance.min() > FARTHEST:
         return NONE_NEAR
-    if effective_number(near_weights(away)) < LEAST_NEAR:
+    if effective_number(near_weights(distance)) < LEAST_NEAR:
         return f"fewer than {LEAST_NEAR:g} data sets were measured near there"
     return None
 
@@ -161,10 +163,10 @@ def _sorted(rows: NDArray[np.int64], by: Array) -> NDArray[np.int64]:
     return rows[np.argsort(by[rows], kind="stable")]
 
 
-def near_weights(away: Array) -> Array:
+def near_weights(distance: Array) -> Array:
     """Return the weights of data sets so far away, in widths: of the narrowest neighbourhood with enough of them."""
     for factor in WIDENED:
-        weight = np.exp(-0.5 * (away / factor) ** 2)
+        weight = np.exp(-0.5 * (distance / factor) ** 2)
         if effective_number(weight) >= LEAST_NEAR:
             break
     return np.asarray(weight)

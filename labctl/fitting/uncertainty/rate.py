@@ -61,13 +61,13 @@ def of_budget(budget: Budget, evidence: AxisEvidence | None) -> RateUncertainty:
     """Return the parts of one output's budget of a corrected rate."""
     evaluated = {line.source: line for line in budget.lines if line.source in EVALUATED}
     standards = [line for line in budget.lines if line.source not in {*EVALUATED, CROSS_RATES}]
-    known = [line.contribution for line in standards if line.contribution is not None]
+    contributions = [line.contribution for line in standards if line.contribution is not None]
     return RateUncertainty(
         evaluated["coefficients"].contribution,
         evaluated["model"].contribution,
         evaluated["repeatability"].contribution,
         evidence.repeatability.source if evidence and evidence.repeatability else "none",
-        combined_u(np.array(known)) if known else None,
+        combined_u(np.array(contributions)) if contributions else None,
         without_repeatability(budget.lines),
         None if budget.expanded is None else budget.expanded / COVERAGE,
         budget.expanded,

@@ -153,13 +153,13 @@ class _Place:
 
     def evaluated(self, evidence: Mapping[str, AxisEvidence]) -> list[SourceLines]:
         """Return the lines that come from the recording, and that of rates which the user does not know."""
-        fitted, warm, alone = self.fitted, self.temperature_c, np.eye(len(self.outputs))
+        fitted, temperature_c, alone = self.fitted, self.temperature_c, np.eye(len(self.outputs))
         related = _correlation(self.outputs, evidence)
         coefficients = [
-            coefficient_line(fitted, error_at(axis, self.rates_dps), warm, evidence.get(axis), "deg/s")
+            coefficient_line(fitted, error_at(axis, self.rates_dps), temperature_c, evidence.get(axis), "deg/s")
             for axis in self.outputs
         ]
-        model = [model_line(fitted, axis, evidence.get(axis), self.rates_dps, warm) for axis in self.outputs]
+        model = [model_line(fitted, axis, evidence.get(axis), self.rates_dps, temperature_c) for axis in self.outputs]
         later = [repeatability_line(fitted, evidence.get(axis)) for axis in self.outputs]
         evaluations = [
             _propagated(coefficients, related, self.gain),
@@ -261,8 +261,8 @@ def _correlation(outputs: Sequence[str], evidence: Mapping[str, AxisEvidence]) -
 def _propagated(lines: Sequence[BudgetLine], correlation: Array, gain: Array) -> SourceLines:
     """Return lines of the outputs' errors as they are in the corrected rates (GUM eq. 16)."""
     u = np.array([np.nan if line.u is None else line.u for line in lines])
-    known = np.nan_to_num(u)
-    covariance = gain @ (np.outer(known, known) * correlation) @ gain.T
+    finite_u = np.nan_to_num(u)
+    covariance = gain @ (np.outer(finite_u, finite_u) * correlation) @ gain.T
     propagated = tuple(
         line if line.u is None else replace(line, u=float(s), contribution=float(s))
         for line, s in zip(lines, np.sqrt(np.maximum(np.diag(covariance), 0.0)), strict=True)

@@ -48,8 +48,8 @@ class LawFunction:
 
     def temperature_slope(self, fitted: FittedModel, temperature_c: float) -> float:
         """Return its derivative over temperature, per K."""
-        warm, cold = (self.value(fitted, temperature_c + sign * STEP_K) for sign in (1, -1))
-        return (warm - cold) / (2 * STEP_K)
+        above, below = (self.value(fitted, temperature_c + sign * STEP_K) for sign in (1, -1))
+        return (above - below) / (2 * STEP_K)
 
     def gradient(self, fitted: FittedModel, temperature_c: float) -> Array:
         """Return its derivative along the coefficients of the axis, (k*m,), temperature functions running fastest."""

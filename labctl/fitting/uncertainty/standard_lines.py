@@ -174,7 +174,7 @@ def _size(sensitivity: Array) -> float:
 
 
 def _line(
-    standard: Standard, bench: BenchConditions, sensitivity: float | None, contribution: float | None, why: str
+    standard: Standard, bench: BenchConditions, sensitivity: float | None, contribution: float | None, reason: str
 ) -> BudgetLine:
     return BudgetLine(
         source=standard.quantity,
@@ -190,7 +190,7 @@ def _line(
         is_common=standard.quantity in COMMON,
         is_overdue=standard.is_overdue(bench.used_on),
         due=None if standard.due is None else standard.due.isoformat(),
-        why=why,
+        why=reason,
     )
 
 
@@ -227,8 +227,8 @@ def _missing(bench: BenchConditions) -> list[BudgetLine]:
 _UNITS = {"standards": "", "clock": "ppm", "thermometer": "deg C", "chamber_gradient": "deg C", "earth_rate": "deg/s"}
 
 
-def _unknown(source: str, why: str) -> BudgetLine:
+def _unknown(source: str, reason: str) -> BudgetLine:
     return BudgetLine(
         source, source, "B", "", None, _UNITS.get(source, "deg"), None, None, is_common=source in COMMON,
-        is_stated=False, why=why,
+        is_stated=False, why=reason,
     )  # fmt: skip

@@ -55,9 +55,9 @@ def left_variance(data: FitData, preset: Preset) -> dict[str, Array]:
     for axis, values in inside.items():
         within = within_runs(data, values)
         products = np.stack([within * within_runs(data, without[axis]) for without in outside])
-        known = np.isfinite(products)
-        total = np.where(known, products, 0.0).sum(axis=0)
-        left[axis] = np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
+        is_finite = np.isfinite(products)
+        total = np.where(is_finite, products, 0.0).sum(axis=0)
+        left[axis] = np.where(is_finite.any(axis=0), total / np.maximum(is_finite.sum(axis=0), 1), np.nan)
     return left
 
 
@@ -142,18 +142,18 @@ class AxisEvidence:
     def from_json(record: AxisEvidenceJson) -> AxisEvidence:
         """Return what `to_json` described."""
         columns = (record["rate_dps"], record["temperature_c"], record["left_var"], record["white_var"])
-        rate, warm, left, white = (np.asarray(column, dtype=np.float64) for column in columns)
+        rate, temperature_c, left, white = (np.asarray(column, dtype=np.float64) for column in columns)
         kept = record.get("across_dps")
         across = None if kept is None else {axis: np.asarray(each, dtype=np.float64) for axis, each in kept.items()}
-        local = LocalModelError(rate, warm, left, white, across)
+        local = LocalModelError(rate, temperature_c, left, white, across)
         u_dps, correlation = record["repeatability_dps"], record.get("correlation", {})
         if u_dps is None:
             return AxisEvidence(local, None, correlation)
         source = record["repeatability_source"]
         text = record.get("repeatability_text", HALVED if source == "data sheet" else "")
         convention = record.get("repeatability_convention")
-        known = Repeatability(u_dps, source, record["repeatability_freedom"], text, convention)
-        return AxisEvidence(local, known, correlation)
+        repeatability = Repeatability(u_dps, source, record["repeatability_freedom"], text, convention)
+        return AxisEvidence(local, repeatability, correlation)
 
 
 @single_threaded
@@ -197,8 +197,8 @@ def _correlation(residual_dps: Mapping[str, Array]) -> dict[str, dict[str, float
     """Return axis -> other axis -> correlation coefficient of their residuals, where both scatter."""
     by_pair: dict[str, dict[str, float]] = {axis: {} for axis in residual_dps}
     for one, other in permutations(residual_dps, 2):
-        known = np.isfinite(residual_dps[one]) & np.isfinite(residual_dps[other])
-        pair = np.array([residual_dps[one][known], residual_dps[other][known]])
+        in_both = np.isfinite(residual_dps[one]) & np.isfinite(residual_dps[other])
+        pair = np.array([residual_dps[one][in_both], residual_dps[other][in_both]])
         if np.all(np.ptp(pair, axis=1) > 0):
             by_pair[one][other] = float(np.atleast_2d(np.corrcoef(pair))[0, 1])
     return by_pair

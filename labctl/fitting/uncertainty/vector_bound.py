@@ -45,8 +45,8 @@ def vector_bounds(
         for place in (PLACES if reach_dps else PLACES[:1])
     ]
     bounds = [
-        rate_vector_uncertainty(fitted, rates, warm, evidence=evidence, name=name, bench=bench)
-        for warm in temperatures_c
+        rate_vector_uncertainty(fitted, rates, temperature_c, evidence=evidence, name=name, bench=bench)
+        for temperature_c in temperatures_c
         for rates in vectors
     ]
     return {axis: _bound(axis, bounds, reach_dps) for axis in fitted.axes}
@@ -75,13 +75,15 @@ def cross_rates(fitted: FittedModel, coefficients: Mapping[str, Budget]) -> Cros
     unread = [other for other in BODY_AXES if other not in fitted.axes]
     if not unread:
         return None
-    known = {other: coefficients.get(f"misalignment_{other}") for other in unread}
-    expanded = {other: budget.expanded for other, budget in known.items() if budget is not None and budget.expanded}
+    misalignments = {other: coefficients.get(f"misalignment_{other}") for other in unread}
+    expanded = {
+        other: budget.expanded for other, budget in misalignments.items() if budget is not None and budget.expanded
+    }
     if missing := [other for other in unread if other not in expanded]:
         why = (
             f"the misalignment towards {' and '.join(missing)} is not known: measure the unit with this axis up too, "
             "and fit misalignment"
         )
         return {"about": unread, "per_dps": None, "why": why}
-    size = math.hypot(*(budget.value or 0.0 for budget in known.values() if budget is not None))
+    size = math.hypot(*(budget.value or 0.0 for budget in misalignments.values() if budget is not None))
     return {"about": unread, "per_dps": half_width(max(expanded.values()), size), "why": ""}

@@ -76,11 +76,13 @@ def output_of(mapped: MappedColumn, column: RawColumn) -> tuple[Array, OutputUni
     return mapped.sign * (unit.factor if unit is not None else 1.0) * values, None
 
 
-def _unknown_unit(target: str, column: RawColumn, quantity: str, why: str) -> str:
+def _unknown_unit(target: str, column: RawColumn, quantity: str, reason: str) -> str:
     finite = column.values[np.isfinite(column.values)]
     span = f" ({finite.min():.4g} to {finite.max():.4g})" if len(finite) else ""
     where = f"[units] or [columns.{target}]"
-    return f"column {column.name!r}{span} for {target}: {why}; write its unit in {where}: one of {names_of(quantity)}"
+    return (
+        f"column {column.name!r}{span} for {target}: {reason}; write its unit in {where}: one of {names_of(quantity)}"
+    )
 
 
 def _refuse_impossible(target: str, column: RawColumn, values: Array, quantity: str, problems: Problems) -> None:

@@ -61,8 +61,8 @@ def _column(target: str, mapped: MappedColumn) -> Iterator[str]:
 
 
 def _own_unit(target: str) -> str:
-    known = BY_NAME.get(target)
-    return known.unit if known is not None else target.rpartition("_")[2]
+    column_spec = BY_NAME.get(target)
+    return column_spec.unit if column_spec is not None else target.rpartition("_")[2]
 
 
 def _data_sets(column_map: ColumnMap) -> Iterator[str]:

@@ -64,10 +64,10 @@ def movement(rates_dps: Array, t_s: Array) -> Movement:
     return Movement(still, float(np.average(moves, weights=counts)), float((high - low).max()))
 
 
-def stretches(same: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
+def stretches(is_same: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
     """Return runs of equal values as (first row, row after the last, value), rows from 0."""
-    edges = np.flatnonzero(np.concatenate([[True], same[1:] != same[:-1], [True]]))
-    return [(int(a), int(b), bool(same[a])) for a, b in pairwise(edges)]
+    edges = np.flatnonzero(np.concatenate([[True], is_same[1:] != is_same[:-1], [True]]))
+    return [(int(a), int(b), bool(is_same[a])) for a, b in pairwise(edges)]
 
 
 def rests(log_movement: Movement, t_s: Array) -> list[tuple[int, int]]:

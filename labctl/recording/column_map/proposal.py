@@ -46,17 +46,17 @@ class Proposal:
     guesses: list[str] = field(default_factory=list)
 
 
-def propose(table: RawTable, serial: str | None = None, stated: Units | None = None) -> Proposal:
+def propose(table: RawTable, serial: str | None = None, units_given: Units | None = None) -> Proposal:
     """Return a map of a log, as far as the file shows it; what it cannot show stays open and is a problem later.
 
-    What `stated` says of the units of a quantity is not guessed.
+    What `units_given` says of the units of a quantity is not guessed.
     """
     guesses: list[str] = []
-    stated = stated or {}
+    units_given = units_given or {}
     columns = {target: MappedColumn.of(name) for name, target in table.targets.items() if name in table.columns}
     if not columns:
-        columns = _by_names(table, guesses, stated)
-    columns = {target: _in_stated(target, mapped, stated) for target, mapped in columns.items()}
+        columns = _by_names(table, guesses, units_given)
+    columns = {target: _in_stated(target, mapped, units_given) for target, mapped in columns.items()}
     sources_by_target = {target: table.columns[str(mapped.source)] for target, mapped in columns.items()}
     kind = "samples" if "t_s" in columns or "table_rate_dps" not in columns else "points"
     _guess_force(columns, sources_by_target, guesses)
@@ -70,21 +70,21 @@ def propose(table: RawTable, serial: str | None = None, stated: Units | None = N
     return Proposal(proposed, guesses)
 
 
-def completed(table: RawTable, given: ColumnMap) -> Proposal:
+def completed(table: RawTable, column_map: ColumnMap) -> Proposal:
     """Return a map that was given, with what it leaves to the file: columns where it names none, units by [units]."""
-    if given.columns:
+    if column_map.columns:
         columns = {
-            target: mapped if mapped.unit else _in_stated(target, mapped, given.units)
-            for target, mapped in given.columns.items()
+            target: mapped if mapped.unit else _in_stated(target, mapped, column_map.units)
+            for target, mapped in column_map.columns.items()
         }
-        return Proposal(given.model_copy(update={"columns": columns}))
-    proposal = propose(table, given.serial, given.units)
+        return Proposal(column_map.model_copy(update={"columns": columns}))
+    proposal = propose(table, column_map.serial, column_map.units)
     kept = {"kind": proposal.column_map.kind, "datasets": proposal.column_map.datasets}
-    changes: dict[str, Any] = {key: value for key, value in kept.items() if key not in given.model_fields_set}
+    changes: dict[str, Any] = {key: value for key, value in kept.items() if key not in column_map.model_fields_set}
     columns = proposal.column_map.columns
-    if given.sample_rate_hz is not None and "t_s" in columns and _is_open(table, columns["t_s"]):
+    if column_map.sample_rate_hz is not None and "t_s" in columns and _is_open(table, columns["t_s"]):
         columns = {target: mapped for target, mapped in columns.items() if target != "t_s"}
-    return Proposal(given.model_copy(update={**changes, "columns": columns}), proposal.guesses)
+    return Proposal(column_map.model_copy(update={**changes, "columns": columns}), proposal.guesses)
 
 
 def _is_open(table: RawTable, mapped: MappedColumn) -> bool:
@@ -92,24 +92,26 @@ def _is_open(table: RawTable, mapped: MappedColumn) -> bool:
     return not (mapped.unit or table.columns[str(mapped.source)].unit)
 
 
-def stated_units(target: str, stated: Units) -> UnitKeys | None:
+def stated_units(target: str, units_given: Units) -> UnitKeys | None:
     """Return what [units] of a map says of a column of a recording; None for nothing."""
-    return next((keys for name, keys in stated.items() if target.startswith(QUANTITY_COLUMNS[name])), None)
+    return next((keys for name, keys in units_given.items() if target.startswith(QUANTITY_COLUMNS[name])), None)
 
 
-def _in_stated(target: str, mapped: MappedColumn, stated: Units) -> MappedColumn:
-    keys = stated_units(target, stated)
+def _in_stated(target: str, mapped: MappedColumn, units_given: Units) -> MappedColumn:
+    keys = stated_units(target, units_given)
     return mapped if keys is None else mapped.model_copy(update=keys.model_dump(exclude_unset=True))
 
 
-def _by_names(table: RawTable, guesses: list[str], stated: Units) -> dict[str, MappedColumn]:
+def _by_names(table: RawTable, guesses: list[str], units_given: Units) -> dict[str, MappedColumn]:
     columns: dict[str, MappedColumn] = {}
-    said = {name: _name_says(table, name) for name in table.columns}
-    for name in sorted(said, key=lambda each: said[each].target == "t_s"):  # a thermometer tests the unit of time
-        column, says = table.columns[name], said[name]
+    guesses_by_name = {name: _name_says(table, name) for name in table.columns}
+    for name in sorted(
+        guesses_by_name, key=lambda each: guesses_by_name[each].target == "t_s"
+    ):  # a thermometer tests the unit of time
+        column, says = table.columns[name], guesses_by_name[name]
         if not says.target or says.target == "dataset" or _is_counter(says.target, column):
             continue
-        keys = stated_units(says.target, stated)
+        keys = stated_units(says.target, units_given)
         unit = keys.unit if keys is not None else column.unit or says.unit
         held = columns.get(says.target)
         if held is not None and (_has_unit(says.target, held) or not unit):
@@ -117,8 +119,8 @@ def _by_names(table: RawTable, guesses: list[str], stated: Units) -> dict[str, M
         if keys is not None and column.is_number:
             columns[says.target] = MappedColumn.of(name)  # what was stated is filled in later
             continue
-        warm = columns.get("temperature_c")
-        mapped = _with_unit(name, says.target, unit, column, guesses, _celsius(table, warm))
+        temperature_column = columns.get("temperature_c")
+        mapped = _with_unit(name, says.target, unit, column, guesses, _celsius(table, temperature_column))
         if mapped is not None:
             columns[says.target] = mapped
     order = list(table.columns)

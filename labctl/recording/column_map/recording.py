@@ -44,25 +44,25 @@ def fill_between(columns: dict[str, NDArray[np.generic]], t_s: Array, problems: 
     Before the first and after the last reading the nearest one stands. A problem where readings are too few or too far
     apart: what the temperature did between them is then not known.
     """
-    said = []
+    filled = []
     for name in filter(is_thermometer, columns):
         values = np.asarray(columns[name], dtype=np.float64)
-        known = np.isfinite(values)
-        n = int((~known).sum())
+        is_finite = np.isfinite(values)
+        n = int((~is_finite).sum())
         if n == 0:
             continue
-        if known.sum() < LEAST_KNOWN:
+        if is_finite.sum() < LEAST_KNOWN:
             problems.add(
                 f"{name}: {n} of {len(values)} cells are empty; leave the column out of the map, or fill it in"
             )
             continue
-        order = np.argsort(t_s[known], kind="stable")
-        at, read = t_s[known][order], values[known][order]
+        order = np.argsort(t_s[is_finite], kind="stable")
+        at, read = t_s[is_finite][order], values[is_finite][order]
         after = np.searchsorted(at, t_s)
         before_s = t_s - at[np.maximum(after - 1, 0)]
         after_s = at[np.minimum(after, len(at) - 1)] - t_s
         apart_s = np.where((after > 0) & (after < len(at)), before_s + after_s, np.abs(np.maximum(before_s, after_s)))
-        far = ~known & (apart_s > LONGEST_S)
+        far = ~is_finite & (apart_s > LONGEST_S)
         if far.any():
             problems.add(
                 f"{name}, {rows_text(far)}: empty, and the thermometer was not read for "
@@ -70,13 +70,13 @@ def fill_between(columns: dict[str, NDArray[np.generic]], t_s: Array, problems: 
                 "these rows"
             )
             continue
-        columns[name] = np.where(known, values, np.interp(t_s, at, read))
-        longest_s = float(apart_s[~known].max())
-        said.append(
+        columns[name] = np.where(is_finite, values, np.interp(t_s, at, read))
+        longest_s = float(apart_s[~is_finite].max())
+        filled.append(
             f"{name}: {n} of {len(values)} cells are empty and were filled in by straight lines between the "
             f"thermometer's readings, at most {longest_s:.3g} s apart"
         )
-    return "; ".join(said)
+    return "; ".join(filled)
 
 
 Array = NDArray[np.float64]
@@ -262,10 +262,11 @@ def _info(
     table: RawTable, column_map: ColumnMap, motion: Motion, output: dict[str, OutputUnit], times: TimeAxis,
     problems: Problems,
 ) -> RecordingInfo | None:  # fmt: skip
-    taken = sorted(_TAKEN & set(column_map.info))
-    if taken:
+    reserved = sorted(_TAKEN & set(column_map.info))
+    if reserved:
         problems.add(
-            f"[info] {taken[0]}: this key belongs at the top level of a map, or comes from the file; leave it out here"
+            f"[info] {reserved[0]}: this key belongs at the top level of a map, or comes from the file; leave it out "
+            "here"
         )
         return None
     started = column_map.started_at or _dated(times.started_at) or _dated(table.started_at)

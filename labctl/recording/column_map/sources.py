@@ -13,16 +13,16 @@ from labctl.recording.columns import holds_flags
 from labctl.recording.raw_table import RawColumn, RawTable
 
 
-def source(table: RawTable, named: str | int) -> RawColumn | None:
+def source(table: RawTable, column_name: str | int) -> RawColumn | None:
     """Return the column of a file by its name or its number from 1; None where there is none."""
-    if isinstance(named, int):
+    if isinstance(column_name, int):
         by_number = list(table.columns.values())
-        exact = table.columns.get(f"column {named}")
-        return exact or (by_number[named - 1] if 1 <= named <= len(by_number) else None)
-    raw_column = table.columns.get(named)
+        exact = table.columns.get(f"column {column_name}")
+        return exact or (by_number[column_name - 1] if 1 <= column_name <= len(by_number) else None)
+    raw_column = table.columns.get(column_name)
     if raw_column is not None:
         return raw_column
-    loose = [column for name, column in table.columns.items() if name.strip().lower() == named.strip().lower()]
+    loose = [column for name, column in table.columns.items() if name.strip().lower() == column_name.strip().lower()]
     return loose[0] if len(loose) == 1 else None
 
 
@@ -80,10 +80,10 @@ def refuse_wrong_cells(column: RawColumn, target: str, problems: Problems, *, em
         )
 
 
-def _not_there(table: RawTable, named: str | int, target: str) -> str:
+def _not_there(table: RawTable, column_name: str | int, target: str) -> str:
     names = list(table.columns)
-    near = difflib.get_close_matches(str(named), names, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(str(column_name), names, n=1, cutoff=0.6)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     listed = ", ".join(repr(name[:40]) for name in names[:20]) + (" ..." if len(names) > 20 else "")
-    what = f"number {named}" if isinstance(named, int) else repr(named[:60])
+    what = f"number {column_name}" if isinstance(column_name, int) else repr(column_name[:60])
     return f"column {what} (for {target}) is not in the file{hint} (it has {listed})"

@@ -92,8 +92,8 @@ def _finer(column: RawColumn, axis_read: TimeAxis, problems: Problems) -> TimeAx
         return axis_read
     zero_s = float(between.t_s[0] - axis_read.t_s[0]) if axis_read.started_at is not None else 0.0
     started = None if axis_read.started_at is None else axis_read.started_at + timedelta(seconds=zero_s)
-    said = f"column {column.name!r}: {between.said}"
-    return TimeAxis(between.t_s - (between.t_s[0] if started is not None else 0.0), started, said)
+    reason = f"column {column.name!r}: {between.said}"
+    return TimeAxis(between.t_s - (between.t_s[0] if started is not None else 0.0), started, reason)
 
 
 def _instant(column: RawColumn, epoch_s: float, problems: Problems) -> datetime | None:
@@ -159,10 +159,10 @@ def _refuse_impossible(
                 f"{rate_hz:g}; correct the unit of the column, or leave sample_rate_hz or the column out of the map"
             )
     elif not SHORTEST_STEP_S < usual <= LONGEST_STEP_S:
-        said = "" if unit is None else f" in {unit.name}"
+        unit_text = "" if unit is None else f" in {unit.name}"
         fits = "" if unit is None else time_unit(column.values).unit
         hint = f"; {fits!r} would fit" if fits and unit is not None and fits != unit.name else ""
         problems.add(
-            f"column {column.name!r} (time): the usual step would be {usual:g} s{said} ({SHORTEST_STEP_S:g} to "
+            f"column {column.name!r} (time): the usual step would be {usual:g} s{unit_text} ({SHORTEST_STEP_S:g} to "
             f"{LONGEST_STEP_S:g} s are possible); check the column's unit{hint}"
         )

@@ -46,7 +46,7 @@ def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, 
     return replace(table, columns=columns, rows=int(kept.sum()), first_rows=()), problem
 
 
-def _twice(table: RawTable, values: NDArray[np.float64], kept: NDArray[np.bool_]) -> Finding | None:
+def _twice(table: RawTable, values: NDArray[np.float64], is_used: NDArray[np.bool_]) -> Finding | None:
     """Return the finding about rows that repeat an earlier row with its time, (n,) times; None where others are out."""
     order = np.argsort(values, kind="stable")
     same = values[order[1:]] == values[order[:-1]]
@@ -57,7 +57,7 @@ def _twice(table: RawTable, values: NDArray[np.float64], kept: NDArray[np.bool_]
     again = np.zeros(len(values), dtype=np.bool_)
     again[order[1:][same]] = True
     n = int(again.sum())
-    if not n or n != int((~kept).sum()):
+    if not n or n != int((~is_used).sum()):
         return None
     return Finding(
         "time_back", "certain", f"t_s, {rows_in_words(again)}",

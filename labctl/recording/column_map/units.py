@@ -90,8 +90,8 @@ def unit_of_target(target: str) -> str:
     """Return the unit of a recording's column; empty where it has none. A gyro's output counts as deg/s."""
     if target.startswith("gyro_"):
         return "deg/s"
-    known = BY_NAME.get(target)
-    return known.unit if known else ""
+    column_spec = BY_NAME.get(target)
+    return column_spec.unit if column_spec else ""
 
 
 def find_unit(quantity: str, text: str) -> Unit | None:

@@ -33,8 +33,8 @@ def cut_last_line(path: Path, encoding: str, separator: str) -> Unread | None:
     shortest = min(len(other[-1]) for other in others)
     if len(fields) == len(others[-1]) and (len(fields[-1]) >= shortest or not all(map(_is_number, [fields, *others]))):
         return None
-    said = f"the last line has no line break and ends after {last[-20:]!r} (byte {size})"
-    return Unread(len(last) / max(size, 1), (said,), is_cut=True)
+    reason = f"the last line has no line break and ends after {last[-20:]!r} (byte {size})"
+    return Unread(len(last) / max(size, 1), (reason,), is_cut=True)
 
 
 def _is_number(fields: list[str]) -> bool:

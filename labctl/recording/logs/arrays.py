@@ -195,8 +195,8 @@ def _hdf5(path: Path) -> _Arrays:
 
 def _is_table(name: str, each: Any) -> bool:
     """Whether a data set of an HDF5 file is of numbers; MATLAB keeps words and references as numbers too."""
-    said = each.attrs.get("MATLAB_class", b"")
-    is_word = said in {b"char", b"cell", "char", "cell"} or name.startswith("#")
+    class_name = each.attrs.get("MATLAB_class", b"")
+    is_word = class_name in {b"char", b"cell", "char", "cell"} or name.startswith("#")
     return not is_word and each.shape is not None and (each.dtype.kind in "iufb" or bool(each.dtype.names))
 
 

@@ -22,7 +22,7 @@ MOST_STEPS = 5.0
 _NAMELESS = "column "
 
 
-def joined(table: RawTable, others: Sequence[RawTable], column_map: ColumnMap | None) -> RawTable:
+def joined(table: RawTable, tables: Sequence[RawTable], column_map: ColumnMap | None) -> RawTable:
     """Return a log with the columns of other files at its times, interpolated where their times are others.
 
     A column keeps its name; one without, or with a name that is taken, is called "STEM: NAME" by its file. The time
@@ -31,24 +31,24 @@ def joined(table: RawTable, others: Sequence[RawTable], column_map: ColumnMap | 
     """
     columns = dict(table.columns)
     problems = list(table.problems)
-    for other in others:
+    for other in tables:
         problems += [f"{other.path.name}: {line}" for line in other.problems]
         time = _time(table, column_map, None)
         theirs = _time(other, column_map, time)
         for name, column in _at(table, time, other, theirs).items():
             if theirs is not None and name == theirs.name:
                 continue
-            taken = name in columns or name.startswith(_NAMELESS)
-            called = f"{other.path.stem}: {name}" if taken else name
+            is_taken = name in columns or name.startswith(_NAMELESS)
+            called = f"{other.path.stem}: {name}" if is_taken else name
             if called in columns:
                 raise _refused(
                     other,
                     f"another file has the same name and gives column {called!r} too; give the files different names",
                 )
             columns[called] = replace(column, name=called)
-    unread = of_several([table.unread, *(other.unread for other in others)])
+    unread = of_several([table.unread, *(other.unread for other in tables)])
     made = replace(table, columns=columns, problems=tuple(problems), first_rows=(), unread=unread)
-    return made if others else table
+    return made if tables else table
 
 
 def _time(table: RawTable, column_map: ColumnMap | None, main: RawColumn | None) -> RawColumn | None:

@@ -52,18 +52,18 @@ class Header:
     units: list[str]
 
 
-def layout_of(path: Path, head: bytes, given: FileKeys) -> tuple[FileLayout, Header]:
-    """Return how a file is divided and what its header says; what `given` says is not looked for."""
-    encoding = given.encoding or encoding_of(path, head)
+def layout_of(path: Path, head: bytes, file_keys: FileKeys) -> tuple[FileLayout, Header]:
+    """Return how a file is divided and what its header says; what `file_keys` says is not looked for."""
+    encoding = file_keys.encoding or encoding_of(path, head)
     lines = lines_of(path, head, encoding)
     if not any(line.strip() for line in lines):
         raise BadRecording(f"{path}: only empty lines; expected a header and readings")
-    separator = SEPARATORS[given.separator] if given.separator else _separator(lines)
+    separator = SEPARATORS[file_keys.separator] if file_keys.separator else _separator(lines)
     cells = [split(line, separator) for line in lines]
-    data = given.data or _first_data(path, lines, cells)
-    header = _header(lines, cells, data) if given.header is None else given.header
+    data = file_keys.data or _first_data(path, lines, cells)
+    header = _header(lines, cells, data) if file_keys.header is None else file_keys.header
     stated = _units_row(cells, header, data)
-    if given.header is None and stated == header:
+    if file_keys.header is None and stated == header:
         header = _header(lines, cells, stated) or header
     below = [row for line, row in zip(lines[data - 1 :], cells[data - 1 :], strict=True) if line.strip()]
     width = Counter(len(row) for row in below).most_common(1)[0][0] if below else 0
@@ -71,7 +71,7 @@ def layout_of(path: Path, head: bytes, given: FileKeys) -> tuple[FileLayout, Hea
         raise BadRecording(
             f"{path}: no row of readings below the header; check that the file is complete, or give another file"
         )
-    decimal = given.decimal or _decimal(below, separator)
+    decimal = file_keys.decimal or _decimal(below, separator)
     if header > len(lines):
         raise BadRecording(
             f"{path}: header = {header} is beyond the {len(lines)} lines at the beginning of the "

@@ -82,9 +82,9 @@ def with_damaged_times(
     return is_wrong
 
 
-def unread_messages(damaged: NDArray[np.bool_], arrived_ns: NDArray[np.int64], stated: int) -> Unread | None:
-    """Return what of the `stated` messages of a topic was not found or is damaged; None where nothing is."""
-    lost = max(stated - len(damaged), 0)
+def unread_messages(damaged: NDArray[np.bool_], arrived_ns: NDArray[np.int64], n_stated: int) -> Unread | None:
+    """Return what of the `n_stated` messages of a topic was not found or is damaged; None where nothing is."""
+    lost = max(n_stated - len(damaged), 0)
     if not lost and not damaged.any():
         return None
     t_s = (arrived_ns - arrived_ns[0]) / NS if len(arrived_ns) else np.zeros(0)
@@ -94,13 +94,13 @@ def unread_messages(damaged: NDArray[np.bool_], arrived_ns: NDArray[np.int64], s
         for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     ]
     if lost:
-        place = f"{lost} of the {stated} messages that its index states are not there"
+        place = f"{lost} of the {n_stated} messages that its index states are not there"
         if len(t_s) > 1:
             gap = int(np.argmax(np.diff(t_s)))
             place += f"; the longest gap is from {t_s[gap]:.3f} s to {t_s[gap + 1]:.3f} s"
             place += f", the last message at {t_s[-1]:.3f} s"
         places.append(place)
-    return Unread((lost + int(damaged.sum())) / max(stated, len(damaged), 1), tuple(places))
+    return Unread((lost + int(damaged.sum())) / max(n_stated, len(damaged), 1), tuple(places))
 
 
 ROS1 = b"#ROSBAG V2.0"
@@ -165,15 +165,15 @@ def _opened(path: Path) -> Iterator[Any]:
         yield bag
 
 
-def _topic(path: Path, bag: Any, asked: str | None, kind: str, option: str) -> str | None:
+def _topic(path: Path, bag: Any, topic: str | None, kind: str, option: str) -> str | None:
     """Return the topic of a kind of message; None where the bag has no temperature."""
     there = sorted(name for name, info in bag.topics.items() if info.msgtype == kind)
-    if asked is not None:
-        if asked not in there:
+    if topic is not None:
+        if topic not in there:
             raise BadInput(
-                f"{path}: the bag has no topic {asked!r} of {kind}; choose one of {', '.join(there) or 'none'}"
+                f"{path}: the bag has no topic {topic!r} of {kind}; choose one of {', '.join(there) or 'none'}"
             )
-        return asked
+        return topic
     if len(there) == 1:
         return str(there[0])
     if kind == TEMPERATURE:

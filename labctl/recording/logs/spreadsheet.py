@@ -69,14 +69,14 @@ def read(path: Path, options: SheetOptions) -> RawTable:
     return replace(table, path=path, layout=None)
 
 
-def _chosen(path: Path, sheets: dict[str, Any], wanted: str | None) -> str:
-    if wanted is not None and wanted not in sheets:
-        raise BadRecording(f"{path}: there is no sheet {wanted!r}; choose one of {', '.join(map(repr, sheets))}")
+def _chosen(path: Path, sheets: dict[str, Any], sheet_name: str | None) -> str:
+    if sheet_name is not None and sheet_name not in sheets:
+        raise BadRecording(f"{path}: there is no sheet {sheet_name!r}; choose one of {', '.join(map(repr, sheets))}")
     filled = [name for name, sheet in sheets.items() if sheet.total_height > 1]
-    if wanted is None and len(filled) > 1:
+    if sheet_name is None and len(filled) > 1:
         listed = ", ".join(map(repr, filled[:10]))
         raise BadRecording(f"{path}: the sheets {listed} hold rows; choose one with --option sheet=NAME")
-    return wanted or (filled or list(sheets))[0]
+    return sheet_name or (filled or list(sheets))[0]
 
 
 def _text(cell: Any) -> str:

@@ -323,13 +323,13 @@ _TARGETS = {
 
 
 def _table(
-    path: Path, log: Any, taken: str, columns: dict[str, Array], started: datetime | None, unread: Unread | None
+    path: Path, log: Any, message_name: str, columns: dict[str, Array], started: datetime | None, unread: Unread | None
 ) -> RawTable:
     damaged = "; damaged in places, which are left out" if log.file_corruption or unread else ""
-    facts: dict[str, object] = {"notes": f"PX4 ULog, {taken}{damaged}"}
+    facts: dict[str, object] = {"notes": f"PX4 ULog, {message_name}{damaged}"}
     uid = log.msg_info_dict.get("sys_uuid", "")
     if isinstance(uid, str) and uid.isalnum() and uid.isascii():
-        facts["serial"] = f"{uid[-16:]}-{taken.split(' ')[1]}"
+        facts["serial"] = f"{uid[-16:]}-{message_name.split(' ')[1]}"
     raw = {name: RawColumn(name, values, unit=_TARGETS[name][1]) for name, values in columns.items()}
     targets = {name: _TARGETS[name][0] for name in raw}
     return RawTable(
@@ -344,9 +344,9 @@ def _booted(data: Mapping[tuple[str, int], Any]) -> datetime | None:
         if source is None or "time_utc_usec" not in source:
             continue
         utc_us = np.asarray(source["time_utc_usec"], dtype=np.float64)
-        known = np.flatnonzero(utc_us > EARLIEST_US)
-        if len(known):
-            boot_us = float(utc_us[known[0]]) - float(source["timestamp"][known[0]])
+        synchronised = np.flatnonzero(utc_us > EARLIEST_US)
+        if len(synchronised):
+            boot_us = float(utc_us[synchronised[0]]) - float(source["timestamp"][synchronised[0]])
             with suppress(OverflowError, ValueError):
                 return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=boot_us)
     return None

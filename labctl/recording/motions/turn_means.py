@@ -32,11 +32,11 @@ def turned_points(
     t_s = np.asarray(rows["t_s"], dtype=np.float64)
     sets = [slice(int(begin), int(begin + n)) for begin, n in zip(starts, counts, strict=True)]
     length = np.array([t_s[here][-1] - t_s[here][0] for here in sets])
-    known = np.maximum(length, 1e-12)
+    lasting_s = np.maximum(length, 1e-12)
     turn = np.asarray(points["turn_deg"], dtype=np.float64)
     point_recording: dict[str, NDArray[np.generic]] = {
         "duration_s": length,
-        "table_rate_dps": np.where(turn != 0, turn / known, 0.0),
+        "table_rate_dps": np.where(turn != 0, turn / lasting_s, 0.0),
     }
     for name, values in rows.items():
         if not name.startswith("gyro_"):

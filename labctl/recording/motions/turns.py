@@ -81,9 +81,9 @@ def mean_rate_dps(info: RecordingInfo, columns: Columns) -> NDArray[np.float64]:
     t_s, valid = np.asarray(columns["t_s"], dtype=np.float64), _valid(columns)
     rates_dps = np.zeros(len(turn))
     for begin, end in zip(starts, ends, strict=True):
-        known = t_s[begin:end][valid[begin:end]]
-        if len(known) >= LEAST:
-            rates_dps[begin:end] = turn[begin:end] / (known[-1] - known[0])
+        times_s = t_s[begin:end][valid[begin:end]]
+        if len(times_s) >= LEAST:
+            rates_dps[begin:end] = turn[begin:end] / (times_s[-1] - times_s[0])
     return rates_dps
 
 

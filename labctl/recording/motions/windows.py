@@ -78,10 +78,10 @@ def white_std_of_profile(columns: Columns, output: NDArray[np.float64]) -> NDArr
             here = slice(first, min(first + PIECE, begin + size))
             if here.stop - here.start >= LEAST_FOR_SPECTRUM + 6 * LAGS:
                 white_std_dps[here] = white_std(_not_followed(rate[here], output[here]))
-    known = np.isfinite(white_std_dps)
-    if not known.any():
+    is_finite = np.isfinite(white_std_dps)
+    if not is_finite.any():
         return None
-    return np.where(known, white_std_dps, np.sqrt(np.mean(white_std_dps[known] ** 2)))
+    return np.where(is_finite, white_std_dps, np.sqrt(np.mean(white_std_dps[is_finite] ** 2)))
 
 
 def _not_followed(rate: NDArray[np.float64], output: NDArray[np.float64]) -> NDArray[np.float64]:

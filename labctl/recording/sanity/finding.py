@@ -52,7 +52,7 @@ def certain(findings: Iterable[Finding]) -> list[Finding]:
 
 def numbers_in_words(numbers: Iterable[int], most: int = 6) -> str:
     """Return "data set 7" or "data sets 1, 2, 3 and 40 more" for the numbers of data sets."""
-    known = [int(number) for number in numbers]
-    shown = ", ".join(str(number) for number in known[:most])
-    more = f" and {len(known) - most} more" if len(known) > most else ""
-    return f"data set{'s' if len(known) > 1 else ''} {shown}{more}"
+    whole_numbers = [int(number) for number in numbers]
+    shown = ", ".join(str(number) for number in whole_numbers[:most])
+    more = f" and {len(whole_numbers) - most} more" if len(whole_numbers) > most else ""
+    return f"data set{'s' if len(whole_numbers) > 1 else ''} {shown}{more}"

@@ -59,8 +59,8 @@ def check_responses(summary: Summary, responses_by_axis: Mapping[str, Mapping[st
         else:
             own.setdefault(axis, []).append((position, outputs[axis]))
     yield from _crossed(crossed, responses_by_axis)
-    for axis, known in own.items():
-        yield from _of_axis(summary, axis, known)
+    for axis, own_response in own.items():
+        yield from _of_axis(summary, axis, own_response)
 
 
 def _follower(axis: str, outputs: Mapping[str, Response]) -> str | None:
@@ -103,9 +103,9 @@ def _crossed(crossed: Mapping[str, str], responses_by_axis: Mapping[str, Mapping
         )  # fmt: skip
 
 
-def _of_axis(summary: Summary, axis: str, known: list[tuple[str, Response]]) -> Iterator[Finding]:
-    signed = [(position, -one.gain if Position.of(position).sign < 0 else one.gain, one) for position, one in known]
-    for position, one in known:
+def _of_axis(summary: Summary, axis: str, responses: list[tuple[str, Response]]) -> Iterator[Finding]:
+    signed = [(position, -one.gain if Position.of(position).sign < 0 else one.gain, one) for position, one in responses]
+    for position, one in responses:
         if (finding := _unsigned(summary, position, one)) is not None:
             yield finding
             return
@@ -125,8 +125,8 @@ def _of_axis(summary: Summary, axis: str, known: list[tuple[str, Response]]) -> 
 
 
 def _sign(where: str, gain: float, do: str) -> Finding:
-    said = f"the output decreases when the table turns faster: gain {gain:.3g} (output rate divided by table rate)"
-    return Finding("sign", "certain", where, said, gain, "1", "a gain near 1", do)
+    text = f"the output decreases when the table turns faster: gain {gain:.3g} (output rate divided by table rate)"
+    return Finding("sign", "certain", where, text, gain, "1", "a gain near 1", do)
 
 
 def _output_unit(summary: Summary, axis: str) -> OutputUnit:
@@ -145,32 +145,32 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
         return
     where = f"axis {axis}" if len(signed) == 1 else f"axis {axis}, position {position}"
     if size < max(SIGNIFICANT * one.u, 1e-9):
-        said = (
+        text = (
             f"the output does not follow the table: gain {gain:.3g} (output rate divided by table rate), u = "
             f"{one.u:.2g}"
         )
         do = "check that the table turned, that this axis is along it, and which column is the output"
-        yield Finding("no_response", "certain", where, said, gain, "1", EXPECTED, do)
+        yield Finding("no_response", "certain", where, text, gain, "1", EXPECTED, do)
         return
     output = _output_unit(summary, axis)
     right = f"with [output.{axis}] scale = {output.scale * gain:.6g} the gain is 1"
     cause = next((f.cause for f in FACTORS if abs(size / f.gain - 1) < NEAR_FACTOR), None)
     if cause is not None:
-        said = f"the gain (output rate divided by table rate) is {gain:.4g}, near {cause}"
+        text = f"the gain (output rate divided by table rate) is {gain:.4g}, near {cause}"
         yield Finding(
-            "unit", "certain", where, said, gain, "1", EXPECTED, f"correct the unit in recording.toml; {right}"
+            "unit", "certain", where, text, gain, "1", EXPECTED, f"correct the unit in recording.toml; {right}"
         )
         return
     odd = POSSIBLE[0] <= size <= POSSIBLE[1]
-    said = f"gain {gain:.4g}" + ("" if odd else ": the output is not in the unit that recording.toml gives")
+    text = f"gain {gain:.4g}" + ("" if odd else ": the output is not in the unit that recording.toml gives")
     do = f"give unit and scale of the output (raw counts, mV?); {right}"
-    yield Finding("scale", "likely" if odd else "certain", where, said, gain, "1", EXPECTED, do)
+    yield Finding("scale", "likely" if odd else "certain", where, text, gain, "1", EXPECTED, do)
 
 
-def _unsigned(summary: Summary, position: str, one: Response) -> Finding | None:
+def _unsigned(summary: Summary, position: str, response: Response) -> Finding | None:
     """Return a finding where the table's rates have lost their sign: the outputs have two, the rates one."""
-    rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)[one.rows]
-    output = summary.of_axis("mean", one.output)[one.rows]
+    rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)[response.rows]
+    output = summary.of_axis("mean", response.output)[response.rows]
     fast = np.abs(rate) > 0.1 * np.abs(rate).max()
     if not (np.all(rate >= 0) or np.all(rate <= 0)) or fast.sum() < 4:
         return None
@@ -183,7 +183,7 @@ def _unsigned(summary: Summary, position: str, one: Response) -> Finding | None:
     opposite = int(min(np.sum(signs > 0), np.sum(signs < 0)))
     return Finding(
         "sign", "certain", f"column table_rate_dps, position {position}",
-        f"all rates have the same sign, but output {one.output} has the opposite sign in {opposite} of "
+        f"all rates have the same sign, but output {response.output} has the opposite sign in {opposite} of "
         f"{int(fast.sum())} data sets",
         float(opposite), "data sets", "signed rates", "give the table's rates with their sign",
     )  # fmt: skip

@@ -60,9 +60,9 @@ def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
     ):
         unit = next((name for name, per_s in UNITS.items() if abs(np.log(max(ratio, 1e-12) / per_s)) < NEAR_UNIT), None)
         if unit is not None:
-            said = f"the time stamps are in {unit}: {evidence}"
+            text = f"the time stamps are in {unit}: {evidence}"
             do = f"divide column t_s by {UNITS[unit]:g}"
-            yield Finding("time_unit", "certain", "column t_s", said, ratio, "per s", "seconds", do)
+            yield Finding("time_unit", "certain", "column t_s", text, ratio, "per s", "seconds", do)
             return
     span = float(summary["t_end_s"][-1] - summary["t_begin_s"][0])
     slow = (
@@ -70,12 +70,12 @@ def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
         and float(np.median(np.asarray(summary["n"], dtype=np.float64))) >= LEAST_READINGS
     )  # fmt: skip
     if slow or span > LONG_S:
-        said = (
+        text = (
             f"a reading every {usual:.4g} s" if slow else f"the recording lasts {span:.3g} s ({span / 86400:.0f} days)"
         )
         do = "if the time stamps are in ms or us, divide column t_s by 1e3 or 1e6; if not, give sample_rate_hz"
         value = usual if slow else span
-        yield Finding("time_unit", "likely", "column t_s", said, value, "s", "seconds", do)
+        yield Finding("time_unit", "likely", "column t_s", text, value, "s", "seconds", do)
 
 
 def _whole(summary: Summary) -> bool:
@@ -109,14 +109,14 @@ def _by_environment(summary: Summary, environment: Columns | None) -> float:
 def _origin(summary: Summary, first_s: float) -> Iterator[Finding]:
     if abs(first_s) <= LATE_S:
         return
-    said = (
+    text = (
         f"the first reading is at {first_s:.6g} s: the time stamps count from another instant, such as 1970, not "
         "from started_at"
     )
     begun = summary.info.measured_at
     instant = f"the instant of started_at ({begun:%Y-%m-%d %H:%M} UTC)" if begun else "the time of the first reading"
     do = f"subtract {instant} from column t_s"
-    yield Finding("time_origin", "likely", "column t_s", said, first_s, "s", "seconds since started_at", do)
+    yield Finding("time_origin", "likely", "column t_s", text, first_s, "s", "seconds since started_at", do)
 
 
 # Gross faults of the rates of data sets, where few sets tell: an output that wraps round, a rate ten times too small.
@@ -242,8 +242,8 @@ def _deviation(rate: NDArray[np.float64], turning: NDArray[np.float64], u: NDArr
     off = float(np.sum(rate * (turning - rate)) / np.sum(weight))
     left = turning - (1 + off) * rate
     scatter = float(np.sqrt(left @ left / (len(rate) - 1) / weight.sum())) if len(rate) >= LEAST_SETS else 0.0
-    known = float(np.sqrt(np.sum((rate * np.nan_to_num(u)) ** 2)) / np.sum(weight))
-    return off, max(scatter, known)
+    u_mean = float(np.sqrt(np.sum((rate * np.nan_to_num(u)) ** 2)) / np.sum(weight))
+    return off, max(scatter, u_mean)
 
 
 def check_damage(info: RecordingInfo) -> Iterator[Finding]:
@@ -284,17 +284,17 @@ def findings_of(
 
 def _not_said(of_readings: Sequence[Finding], findings: Sequence[Finding]) -> Iterator[Finding]:
     """Yield findings of readings but those that the data sets' figures say too, with what they leave in the means."""
-    said = {(finding.what, finding.channel) for finding in findings if finding.channel}
-    yield from (finding for finding in of_readings if (finding.what, finding.channel) not in said)
+    stated = {(finding.what, finding.channel) for finding in findings if finding.channel}
+    yield from (finding for finding in of_readings if (finding.what, finding.channel) not in stated)
 
 
 def _with_gross(findings: Sequence[Finding], gross: Sequence[Finding]) -> list[Finding]:
     """Return findings of rates and the gross ones: what wraps explains all else of its axis; none is said twice."""
     wrapped = {each.where.partition(",")[0] for each in gross if each.what == "wrapped"}
-    said = {finding.where for finding in findings} | {
+    places = {finding.where for finding in findings} | {
         "of a whole axis" for finding in findings if finding.what in OF_AXIS
     }
-    added = [each for each in gross if each.what == "wrapped" or not {each.where, "of a whole axis"} & said]
+    added = [each for each in gross if each.what == "wrapped" or not {each.where, "of a whole axis"} & places]
     return [*(finding for finding in findings if not wrapped & set(finding.where.split(", "))), *added]
 
 

@@ -56,15 +56,15 @@ def responses(summary: Summary) -> dict[str, dict[str, Response]]:
     return by_axis
 
 
-def _design(share: NDArray[np.float64], warm: NDArray[np.float64]) -> NDArray[np.float64]:
+def _design(share: NDArray[np.float64], temperature_c: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the columns of a mean, (n, k), for rates as shares of the fastest (n,) and temperatures (n,).
 
     The rate comes first, then a constant, and temperature where there are data for it.
     """
     columns = [share, np.ones_like(share)]
-    span = float(np.ptp(warm)) if np.isfinite(warm).all() else 0.0
+    span = float(np.ptp(temperature_c)) if np.isfinite(temperature_c).all() else 0.0
     if span > LEAST_WARMTH_K:
-        u = 2.0 * (warm - warm.mean()) / span
+        u = 2.0 * (temperature_c - temperature_c.mean()) / span
         more = [u, u * share, u**2, u**3]
         columns += more[: max(len(share) // SETS_PER_COLUMN - len(columns), 0)]
     return np.column_stack(columns)

@@ -99,10 +99,10 @@ def wander(values: NDArray[np.float64], temperature_c: NDArray[np.float64] | Non
     at = np.linspace(-1.0, 1.0, blocks)
     columns = [at**power for power in range(4)] + [np.exp(-np.arange(blocks) / decay) for decay in DECAYS]
     if temperature_c is not None:
-        warm = block_means(temperature_c, blocks)
-        span = float(np.ptp(warm))
+        block_c = block_means(temperature_c, blocks)
+        span = float(np.ptp(block_c))
         if span > 0.1:
-            columns += [((warm - warm.mean()) / span) ** power for power in (1, 2, 3)]
+            columns += [((block_c - block_c.mean()) / span) ** power for power in (1, 2, 3)]
     design = np.column_stack(columns)
     q, _ = np.linalg.qr(design)
     left = means - q @ (q.T @ means)
@@ -181,10 +181,10 @@ def summarise(recording: Recording) -> Summary:
 
 def joined(info: RecordingInfo, parts: Sequence[Summary]) -> Summary:
     """Return the summaries of parts of a recording, in order, as one."""
-    known = [part for part in parts if len(part)]
-    if not known:
+    not_empty = [part for part in parts if len(part)]
+    if not not_empty:
         return Summary(info, {"dataset": np.zeros(0, dtype=np.int64)})
-    return Summary(info, {name: np.concatenate([part[name] for part in known]) for name in known[0].columns})
+    return Summary(info, {name: np.concatenate([part[name] for part in not_empty]) for name in not_empty[0].columns})
 
 
 def _of_readings(recording: Recording) -> Summary:
@@ -209,50 +209,54 @@ def _of_readings(recording: Recording) -> Summary:
 
 
 def _one_set(
-    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], here: slice
+    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], set_rows: slice
 ) -> dict[str, Any]:
-    t_s = np.asarray(rows["t_s"], dtype=np.float64)[here]
+    t_s = np.asarray(rows["t_s"], dtype=np.float64)[set_rows]
     rate = (
-        np.asarray(rows["table_rate_dps"], dtype=np.float64)[here] if "table_rate_dps" in rows else np.zeros(len(t_s))
+        np.asarray(rows["table_rate_dps"], dtype=np.float64)[set_rows]
+        if "table_rate_dps" in rows
+        else np.zeros(len(t_s))
     )
-    warm = temperature_of(rows)
+    temperature_c = temperature_of(rows)
     summary_row: dict[str, Any] = {
-        **_place(info, rows, here.start),
+        **_place(info, rows, set_rows.start),
         "n": len(rate),
         "table_rate_dps": float(rate.mean()),
         "rate_low_dps": float(rate.min()),
         "rate_high_dps": float(rate.max()),
-        **_temperatures(_NONE if warm is None else warm[here]),
+        **_temperatures(_NONE if temperature_c is None else temperature_c[set_rows]),
         **_times(t_s),
-        "turning_dps": _turning(rows, here, t_s),
-        "turning_u_dps": float(rows["encoder_rate_u_dps"][here.start]) if "encoder_rate_u_dps" in rows else np.nan,
+        "turning_dps": _turning(rows, set_rows, t_s),
+        "turning_u_dps": float(rows["encoder_rate_u_dps"][set_rows.start]) if "encoder_rate_u_dps" in rows else np.nan,
     }
     if info.motion == "turns":
-        as_turned = np.asarray(rows["rate_as_turned_dps"], dtype=np.float64)[here]
-        summary_row |= {**_turn(rows, here.start), "duration_s": float(t_s[-1] - t_s[0])}
+        as_turned = np.asarray(rows["rate_as_turned_dps"], dtype=np.float64)[set_rows]
+        summary_row |= {**_turn(rows, set_rows.start), "duration_s": float(t_s[-1] - t_s[0])}
         summary_row |= {"rate_low_dps": float(as_turned.min()), "rate_high_dps": float(as_turned.max())}
     for axis, values in outputs.items():
-        figures = _output(values[here], None if warm is None else warm[here], at_rest=not rate.any())
+        figures = _output(
+            values[set_rows], None if temperature_c is None else temperature_c[set_rows], at_rest=not rate.any()
+        )
         summary_row |= {f"{name}_{axis}": value for name, value in figures.items()}
     return summary_row
 
 
 def _stretches(
-    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], whole: slice
+    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], all_rows: slice
 ) -> list[dict[str, Any]]:
     """Return stretches of a data set whose rate changes, with the output as if it were not late."""
-    rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)[whole]
-    here = {name: values[whole] for name, values in rows.items()}
+    rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)[all_rows]
+    here = {name: values[all_rows] for name, values in rows.items()}
     place = _place(info, here, 0)
     axis = Position.of(place["position"]).axis
     steps = np.diff(np.asarray(here["t_s"], dtype=np.float64))
     lag = lag_of(
-        rate, outputs.get(axis, next(iter(outputs.values())))[whole], float(np.median(steps)) if len(steps) else 1.0
+        rate, outputs.get(axis, next(iter(outputs.values())))[all_rows], float(np.median(steps)) if len(steps) else 1.0
     )
     n = len(rate) - abs(lag)
     early, late = max(-lag, 0), max(lag, 0)
     here = {name: values[early : early + n] for name, values in here.items()}
-    moved = {name: values[whole][late : late + n] for name, values in outputs.items()}
+    moved = {name: values[all_rows][late : late + n] for name, values in outputs.items()}
     ends = {"rate_low_dps": float(rate.min()), "rate_high_dps": float(rate.max())}
     return [{**_one_set(info, here, moved, part), **ends} for part in stretches(n)]
 
@@ -268,18 +272,18 @@ def _place(info: RecordingInfo, rows: Columns, row: int) -> dict[str, Any]:
 
 def _turn(columns: Columns, row: int) -> dict[str, Any]:
     """Return what is said of the turn of the data set that begins at a row."""
-    turn, known = float(columns["turn_deg"][row]), "turn_u_deg" in columns
-    u_deg = float(columns["turn_u_deg"][row]) if known else USUAL_U_DEG
-    return {"turn_deg": turn, "turn_u_deg": u_deg if turn else 0.0, "turn_u_known": known}
+    turn, has_u = float(columns["turn_deg"][row]), "turn_u_deg" in columns
+    u_deg = float(columns["turn_u_deg"][row]) if has_u else USUAL_U_DEG
+    return {"turn_deg": turn, "turn_u_deg": u_deg if turn else 0.0, "turn_u_known": has_u}
 
 
-def _temperatures(warm: NDArray[np.float64]) -> dict[str, float]:
-    if len(warm) == 0:
+def _temperatures(temperature_c: NDArray[np.float64]) -> dict[str, float]:
+    if len(temperature_c) == 0:
         return dict.fromkeys(("temperature_c", "temperature_low_c", "temperature_high_c"), np.nan)
     return {
-        "temperature_c": float(warm.mean()),
-        "temperature_low_c": float(warm.min()),
-        "temperature_high_c": float(warm.max()),
+        "temperature_c": float(temperature_c.mean()),
+        "temperature_low_c": float(temperature_c.min()),
+        "temperature_high_c": float(temperature_c.max()),
     }
 
 
@@ -293,11 +297,11 @@ def _times(t_s: NDArray[np.float64]) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _turning(rows: Columns, here: slice, t_s: NDArray[np.float64]) -> float:
+def _turning(rows: Columns, set_rows: slice, t_s: NDArray[np.float64]) -> float:
     """Return the rate at which the logged table angle turns over the data set, degrees per unit of `t_s`."""
     if "table_angle_deg" not in rows or len(t_s) < 2 or t_s[-1] <= t_s[0]:
         return np.nan
-    angle = np.asarray(rows["table_angle_deg"], dtype=np.float64)[here]
+    angle = np.asarray(rows["table_angle_deg"], dtype=np.float64)[set_rows]
     return float((angle[-1] - angle[0]) / (t_s[-1] - t_s[0]))
 
 
@@ -307,14 +311,16 @@ def _encoder(rows: Columns, m: int) -> dict[str, NDArray[np.generic]]:
     return {name: np.asarray(rows.get(column, np.full(m, np.nan)), dtype=np.float64) for name, column in names.items()}
 
 
-def _output(values: NDArray[np.float64], warm: NDArray[np.float64] | None, *, at_rest: bool) -> dict[str, float]:
+def _output(
+    values: NDArray[np.float64], temperature_c: NDArray[np.float64] | None, *, at_rest: bool
+) -> dict[str, float]:
     codes = codes_of(values)
     noise = min(noise_of_reading(values), codes.std)
     change = level_change(values, noise)
     return {
         "mean": float(values.mean()), "std": codes.std, "noise": noise,
         "code": codes.code, "code_step": codes.step, "white_std": codes.white_std,
-        "wander": wander(values, warm, noise) if at_rest else np.nan,
+        "wander": wander(values, temperature_c, noise) if at_rest else np.nan,
         "change": change.size, "change_row": change.row,
     }  # fmt: skip
 
@@ -322,8 +328,8 @@ def _output(values: NDArray[np.float64], warm: NDArray[np.float64] | None, *, at
 def _of_means(recording: Recording) -> Summary:
     rows, m, info = recording.columns, len(recording), recording.info
     rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)
-    warm = temperature_of(rows)
-    warm = np.full(m, np.nan) if warm is None else warm
+    temperature_c = temperature_of(rows)
+    temperature_c = np.full(m, np.nan) if temperature_c is None else temperature_c
     t_s = np.asarray(rows["t_s"], dtype=np.float64) if "t_s" in rows else np.full(m, np.nan)
     unknown = np.full(m, np.nan)
     columns: dict[str, NDArray[np.generic]] = {
@@ -333,7 +339,7 @@ def _of_means(recording: Recording) -> Summary:
         "n": np.asarray(rows["n"]) if "n" in rows else np.ones(m, dtype=np.int64),
         VERIFICATION: is_marked(recording),
         "table_rate_dps": rate, "rate_low_dps": rate, "rate_high_dps": rate,
-        "temperature_c": warm, "temperature_low_c": warm, "temperature_high_c": warm,
+        "temperature_c": temperature_c, "temperature_low_c": temperature_c, "temperature_high_c": temperature_c,
         "t_begin_s": t_s, "t_end_s": t_s, **_encoder(rows, m),
         **dict.fromkeys(("step_s", "gap_s", "lost_s"), unknown),
     }  # fmt: skip

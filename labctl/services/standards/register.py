@@ -186,7 +186,8 @@ def _certificate(given: StandardCertificate) -> StandardCertificateResponse:
         number=given.number, laboratory=given.laboratory, calibrated=given.calibrated, due=given.due,
         adjusted=given.adjusted, traceability=given.traceability, reason=given.reason, by=given.by, at=given.at,
         points=[
-            CertifiedPointResponse(nominal=point.nominal, value=point.value, u=point.u, k=point.k) for point in given.points
+            CertifiedPointResponse(nominal=point.nominal, value=point.value, u=point.u, k=point.k)
+            for point in given.points
         ],
     )  # fmt: skip
 

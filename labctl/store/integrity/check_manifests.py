@@ -117,7 +117,7 @@ class ManifestCheck:
         elif key is not None or not self._keys:
             self.chain.signed = int(row.sequence)
 
-    def _check_end(self, wanted: Mapping[tuple[int, str], str], hashes: Mapping[int, str]) -> None:
+    def _check_end(self, expected: Mapping[tuple[int, str], str], hashes: Mapping[int, str]) -> None:
         computed, said = self.chain.head, chain.head_of(self._connection)
         if said is None:
             self._find("manifests", "the head of the chain, which counts the manifests, is missing")
@@ -125,7 +125,7 @@ class ManifestCheck:
             self._find("manifests", f"the last {said.length - computed.length} manifests are missing")
         elif said != computed:
             self._find("manifests", "the last manifest is not the one that the head of the chain names")
-        for (length, digest), where in wanted.items():
+        for (length, digest), where in expected.items():
             if length > computed.length:
                 self._find(
                     "manifests",

@@ -99,7 +99,7 @@ class KeptMeans:
         return damages
 
 
-def _same(kept: float | None, now: float | None) -> bool:
-    if kept is None or now is None:
-        return kept is now
-    return bool(np.isclose(kept, now, rtol=ROUNDING, atol=ROUNDING))
+def _same(stored: float | None, now: float | None) -> bool:
+    if stored is None or now is None:
+        return stored is now
+    return bool(np.isclose(stored, now, rtol=ROUNDING, atol=ROUNDING))

@@ -282,9 +282,9 @@ def last_finding(connection: sa.Connection) -> int:
     return int(connection.scalar(sa.select(sa.func.max(tables.standard_findings.c.id))) or 0)
 
 
-def _taken(there: StandardRow, new: StandardRow) -> str:
-    named = new.label if new.label in (there.label, there.serial) else new.serial
+def _taken(row: StandardRow, new: StandardRow) -> str:
+    named = new.label if new.label in (row.label, row.serial) else new.serial
     return (
-        f"{named!r} is already standard {there.label} of the register (serial number "
-        f"{there.serial or 'not stated'}); give another label, or add certificates to that one"
+        f"{named!r} is already standard {row.label} of the register (serial number "
+        f"{row.serial or 'not stated'}); give another label, or add certificates to that one"
     )

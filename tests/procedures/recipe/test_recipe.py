@@ -98,7 +98,7 @@ def test_a_file_is_read_by_path(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_is_said_in_one_line(text: str, words: list[str]) -> None:
     with pytest.raises(RecipeError) as caught:
-        parse_recipe(text, where="mine.toml")
+        parse_recipe(text, source="mine.toml")
     message = str(caught.value)
     assert message.startswith("mine.toml: ")
     assert "\n" not in message

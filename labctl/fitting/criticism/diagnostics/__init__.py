@@ -28,10 +28,13 @@ __all__ = ["VIEWS", "draws_of", "residual_maps", "views_of"]
 
 
 def views_of(
-    comparison: Comparison, left: Mapping[str, Residuals], recording: Recording, catalogue: Mapping[str, Effect]
+    comparison: Comparison,
+    axis_residuals: Mapping[str, Residuals],
+    recording: Recording,
+    catalogue: Mapping[str, Effect],
 ) -> Views:
     """Return all views of a criticism: lists of records, one or more for each axis, of plain numbers without NaN."""
-    axes = [axis_view(comparison, axis, residuals) for axis, residuals in left.items()]
+    axes = [axis_view(comparison, axis, residuals) for axis, residuals in axis_residuals.items()]
     channels = [line for view in axes for line in channel_lines(view)]
     angle, frequency, start = _within(axes, recording)
     return {

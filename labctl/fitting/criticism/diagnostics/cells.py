@@ -12,7 +12,7 @@ from labctl.fitting.data.levels import level_centres, rate_levels, temperature_r
 from labctl.json_types.criticism import ResidualMap
 
 
-def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[ResidualMap]:
+def residual_maps(data: ReducedRecording, axis_residuals: Mapping[str, Residuals]) -> list[ResidualMap]:
     """Return residual over floor in rate x temperature, one map per axis and position: lists of equal length.
 
     `rate_level_dps` and `temperature_level_c` are the centre of the cell that a data set is drawn in, the same in all
@@ -23,10 +23,10 @@ def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list
     column = rate_levels(rate)
     rate_level = level_centres(rate, column)
     maps: list[ResidualMap] = []
-    for axis, residuals in left.items():
-        warm = data.at_sets(data.nodes.temperature_c(axis))
-        row = temperature_rows(warm, position, column)
-        temperature_level, width = level_centres(warm, row), widest(warm, row)
+    for axis, residuals in axis_residuals.items():
+        temperature_c = data.at_sets(data.nodes.temperature_c(axis))
+        row = temperature_rows(temperature_c, position, column)
+        temperature_level, width = level_centres(temperature_c, row), widest(temperature_c, row)
         for there in np.unique(position):
             rows = np.flatnonzero(position == there)
             maps.append(
@@ -35,7 +35,7 @@ def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list
                     "position": str(there),
                     "dataset": data.dataset[rows].tolist(),
                     "table_rate_dps": rate[rows].tolist(),
-                    "temperature_c": warm[rows].tolist(),
+                    "temperature_c": temperature_c[rows].tolist(),
                     "rate_level_dps": rate_level[rows].tolist(),
                     "temperature_level_c": temperature_level[rows].tolist(),
                     "level_width_c": width,

@@ -140,12 +140,12 @@ def _channel_line(view: AxisView, channel: str, mean: MeanLine) -> ChannelLine:
     }  # fmt: skip
 
 
-def running_mean(view: AxisView, values: Array, here: NDArray[np.bool_]) -> MeanLine:
-    """Return the mean residual along a channel (m,), where `here`, with a 95 % band that includes the drift.
+def running_mean(view: AxisView, values: Array, inside: NDArray[np.bool_]) -> MeanLine:
+    """Return the mean residual along a channel (m,), where `inside`, with a 95 % band that includes the drift.
 
     A channel of few levels has a point for each; another a running mean.
     """
-    rows = np.flatnonzero(here)
+    rows = np.flatnonzero(inside)
     groups = [rows[group] for group in groups_of(values[rows])]
     weights = np.zeros((len(groups), len(view)))
     for k, group in enumerate(groups):

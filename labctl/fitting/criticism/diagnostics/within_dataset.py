@@ -125,14 +125,14 @@ def within_of(recording: Recording) -> Within | None:
 
 
 def _basis(
-    there: NDArray[np.float64], since: NDArray[np.float64], angle: NDArray[np.float64] | None
+    presence: NDArray[np.float64], since: NDArray[np.float64], angle: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
     turn = 2 * np.pi * angle if angle is not None else np.zeros_like(since)
     lines = [wave(k * turn) for k in STEP_LINES for wave in (np.cos, np.sin)]
-    functions = [there, *lines, since]
-    basis = np.zeros((len(functions), *there.shape))
+    functions = [presence, *lines, since]
+    basis = np.zeros((len(functions), *presence.shape))
     for k, function in enumerate(functions):
-        values = function * there
+        values = function * presence
         size = np.sqrt(np.einsum("mn,mn->m", values, values))
         for _ in range(2):
             inner = np.einsum("rmn,mn->rm", basis[:k], values)

@@ -71,16 +71,16 @@ def _of_signal(
 def drivers(kind: Effect | None, channels: frozenset[str]) -> list[str]:
     """Return the channels on which an effect's shape may depend otherwise than its law says."""
     needs, draws = (kind.needs, kind.draws) if kind is not None else ((), ())
-    wanted = dict.fromkeys((*DRIVERS, *needs, *draws))
-    return [name for name in wanted if name in channels]
+    names = dict.fromkeys((*DRIVERS, *needs, *draws))
+    return [name for name in names if name in channels]
 
 
 def _beside_base(comparison: Comparison, axis: str, means: Array) -> Array:
     """Return what the base leaves of a signal's means (m,)."""
     base = comparison.designs[axis].base[0]
     size = np.maximum(np.linalg.norm(base, axis=0), 1e-300)
-    taken, *_ = np.linalg.lstsq(base / size, means, rcond=1e-9)
-    return np.asarray(means - base / size @ taken)
+    coordinates, *_ = np.linalg.lstsq(base / size, means, rcond=1e-9)
+    return np.asarray(means - base / size @ coordinates)
 
 
 def _moved(comparison: Comparison, axis: str, kind: Effect, term: Term, values: Array) -> list[NDArray[np.float64]]:

@@ -60,14 +60,14 @@ def with_exact_terms(comparison: Comparison, terms: tuple[Term, ...]) -> tuple[T
 
 
 def _steps(
-    comparison: Comparison, data: ReducedRecording, rest: ErrorModel, axis: str, terms: tuple[Term, ...]
+    comparison: Comparison, data: ReducedRecording, base_model: ErrorModel, axis: str, terms: tuple[Term, ...]
 ) -> Array:
     """Return by how much each parameter should change on one axis, by weighted least squares beside the rest."""
-    made = [option_of(data, axis, rest.reference, kind_of(term), term) for term in terms]
+    made = [option_of(data, axis, base_model.reference, kind_of(term), term) for term in terms]
     tangents = [option.rows for option in made if option is not None]
     if len(tangents) < len(terms):
         return np.zeros(len(terms))
-    base, _ = base_of(data, rest, axis)
+    base, _ = base_of(data, base_model, axis)
     scale = comparison.scales[axis].copy()
     scale[0] = np.sqrt(comparison.white_var[axis] + comparison.axes[axis].best.noise.size_dps ** 2)
     kept = comparison.designs[axis].present

@@ -99,8 +99,10 @@ def _shapes(comparison: Comparison, axis: str) -> dict[tuple[str, ...], list[Can
         (RATE,): [_shape(comparison, RATE, of_rate[:, 1 : degree + 1]) for degree in OF_RATE]
     }
     if TEMPERATURE in channels:
-        warm = channels[TEMPERATURE]
-        of_warm = legvander(2 * (warm - warm.min()) / np.ptp(warm) - 1, max(OF_BOTH)).astype(np.float64)
+        temperature_c = channels[TEMPERATURE]
+        of_warm = legvander(2 * (temperature_c - temperature_c.min()) / np.ptp(temperature_c) - 1, max(OF_BOTH)).astype(
+            np.float64
+        )
         shapes[RATE, TEMPERATURE] = [_shape(comparison, RATE, _products(of_rate, of_warm, d)) for d in OF_BOTH]
     return shapes
 

@@ -45,8 +45,8 @@ def held_out_rises(comparison: Comparison, terms: tuple[Term, ...], catalogue: M
 
 def _by_temperature(comparison: Comparison) -> list[NDArray[np.bool_]]:
     data = comparison.data
-    warm = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
-    masks = folds(warm, thermometer=data.nodes.history.thermometer)
+    temperature_c = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
+    masks = folds(temperature_c, thermometer=data.nodes.history.thermometer)
     inner = masks[1:-1] if isinstance(comparison.model.temperature, LagrangeTable) else masks
     return [mask for mask in inner if not mask.all()]
 
@@ -92,9 +92,13 @@ class _Axis:
         data, model = comparison.data, comparison.model
         table = model.temperature
         if isinstance(table, LagrangeTable):
-            warm = data.at_sets(data.nodes.temperature_c(self.name))[mask]
-            kept = tuple(node for node in table.nodes_c if not warm.min() - EDGE_K <= node <= warm.max() + EDGE_K)
-            if len(kept) >= table.points and np.ptp(warm) < NARROW_K:
+            temperature_c = data.at_sets(data.nodes.temperature_c(self.name))[mask]
+            kept = tuple(
+                node
+                for node in table.nodes_c
+                if not temperature_c.min() - EDGE_K <= node <= temperature_c.max() + EDGE_K
+            )
+            if len(kept) >= table.points and np.ptp(temperature_c) < NARROW_K:
                 model = replace(model, temperature=LagrangeTable(kept, table.points))
         base, _, precision = base_rows(data, model, self.name)
         base = base / self.scale[:, :, None]

@@ -49,29 +49,33 @@ NEXT_SHARE_AMBIGUOUS = 0.08
 LEAST_PART = 0.05
 
 
-def is_shape_error(before: Comparison, named: Step, after: Comparison, step: Step) -> bool:
+def is_shape_error(before: Comparison, named_step: Step, after: Comparison, step: Step) -> bool:
     """Return whether the new leader may be the residue of a wrong shape of the effect that was just added.
 
     The two are compared where the new leader is largest, within data sets or between them: the wrong shape of a wave
     within data sets leaves waves, and hardly anything between them. Beside an effect of the temperature, another one
     of which the shortest time constant fits best is the delay of the first.
     """
-    if step.leader is None or named.leader is None or are_exact(step.leader, named.leader):
+    if step.leader is None or named_step.leader is None or are_exact(step.leader, named_step.leader):
         return False
-    both = all(leader.id in CATALOGUE and CATALOGUE[leader.id].by_temperature for leader in (named.leader, step.leader))
+    both = all(
+        leader.id in CATALOGUE and CATALOGUE[leader.id].by_temperature for leader in (named_step.leader, step.leader)
+    )
     if both and is_at_end(after, step.leader, shortest=True):
         return True
-    least = NEXT_SHARE if _are_one(before, named) else NEXT_SHARE_AMBIGUOUS
-    of_new, of_old = _within_and_between(after, step.leader), _within_and_between(before, named.leader)
+    least = NEXT_SHARE if _are_one(before, named_step) else NEXT_SHARE_AMBIGUOUS
+    of_new, of_old = _within_and_between(after, step.leader), _within_and_between(before, named_step.leader)
     there = int(np.argmax(of_new))
-    could = max(float(of_old[there]), LEAST_PART) * named.leader.log_bf
+    could = max(float(of_old[there]), LEAST_PART) * named_step.leader.log_bf
     return bool(of_new[there] * step.leader.log_bf < least * could)
 
 
-def _are_one(comparison: Comparison, named: Step) -> bool:
+def _are_one(comparison: Comparison, named_step: Step) -> bool:
     """Return whether a group is one effect, or several that each reproduce the leader's signal."""
-    others = [c for c in comparison.candidates if not c.smooth and c.id in named.group[1:]]
-    return all(overlap(comparison, named.leader, other) > ALIKE for other in others) if named.leader else False
+    others = [c for c in comparison.candidates if not c.smooth and c.id in named_step.group[1:]]
+    return (
+        all(overlap(comparison, named_step.leader, other) > ALIKE for other in others) if named_step.leader else False
+    )
 
 
 def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray[np.float64]:
@@ -85,9 +89,9 @@ def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray
         kept = design.present
         base, signal = (rows[kept] / scale[kept][:, None] for rows in (design.base, design.options[index].rows))
         size = np.maximum(np.linalg.norm(base, axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(base / size, signal @ values, rcond=1e-9)
+        coordinates, *_ = np.linalg.lstsq(base / size, signal @ values, rcond=1e-9)
         left = np.zeros(kept.shape)
-        left[kept] = signal @ values - base / size @ taken
+        left[kept] = signal @ values - base / size @ coordinates
         total += (np.sum(left[1:] ** 2), np.sum(left[0] ** 2))
     return np.asarray(total / max(float(total.sum()), 1e-300))
 
@@ -99,7 +103,7 @@ def merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
     axes: dict[tuple[str, ...], tuple[str, ...]] = {}
     for axis, verdict in apart.items():
         for group in verdict.groups:
-            same = next((known for known in axes if known[0] == group[0]), group)
+            same = next((same_axis for same_axis in axes if same_axis[0] == group[0]), group)
             axes[same] = (*axes.get(same, ()), axis)
     if not axes:
         return joint
@@ -238,8 +242,8 @@ def _one_by_one(
         findings.append(finding)
         before = (comparison, step)
         comparison, step = _compared_beside(first, findings, catalogue)
-        known = {name for finding in findings for name in finding.group}
-        if known & set(step.group) or is_shape_error(*before, comparison, step):
+        names = {name for finding in findings for name in finding.group}
+        if names & set(step.group) or is_shape_error(*before, comparison, step):
             break
     return findings, comparison
 
@@ -252,15 +256,15 @@ def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]
     """
     if step.form not in {"missing", "ambiguous"} or step.leader is None:
         return None
-    known = {c.id: c for c in comparison.candidates if not c.smooth}
+    candidate_by_id = {c.id: c for c in comparison.candidates if not c.smooth}
     left: list[str] = []
     for name in step.group:
         if left:
             left.append(name)
             continue
-        term = refined_term(comparison, known[name])
+        term = refined_term(comparison, candidate_by_id[name])
         if not held_out_rises(comparison, (term,), catalogue):
-            left, chosen = [name], known[name]
+            left, chosen = [name], candidate_by_id[name]
             missing_term = term
     if not left or (len(left) == 1 and chosen.log_bf < step.leader.log_bf - LEAD):
         return None

@@ -107,14 +107,14 @@ class TemperatureHistory:
             return np.zeros(len(next(iter(columns.values()), ())))
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
-        known = self._known.setdefault((function, parameters), {})
+        cache = self._known.setdefault((function, parameters), {})
         evaluated = np.zeros(len(t_s))
         for number, course in self.courses.items():
             here = run == number
             if here.any():
-                if number not in known:
-                    known[number] = function(course.temperature_c, *parameters)
-                evaluated[here] = course.at(known[number], t_s[here])
+                if number not in cache:
+                    cache[number] = function(course.temperature_c, *parameters)
+                evaluated[here] = course.at(cache[number], t_s[here])
         return evaluated
 
 
@@ -201,8 +201,8 @@ def history_of(recording: Recording) -> TemperatureHistory:
     rate = float(np.max(np.abs(np.asarray(columns["table_rate_dps"], dtype=np.float64)), initial=0.0)) or 1.0
     if "temperature_c" not in columns:
         return TemperatureHistory({}, counted, rate, thermometer=False, middle_s=_middle_s(columns))
-    warm = np.asarray(columns["temperature_c"], dtype=np.float64)
-    span = (float(warm.min()), float(warm.max())) if len(warm) else (0.0, 1.0)
+    temperature_c = np.asarray(columns["temperature_c"], dtype=np.float64)
+    span = (float(temperature_c.min()), float(temperature_c.max())) if len(temperature_c) else (0.0, 1.0)
     if "t_s" not in columns:
         return TemperatureHistory({}, counted, rate, span)
     return TemperatureHistory(_courses(source, columns), counted, rate, span, middle_s=_middle_s(columns))
@@ -217,18 +217,18 @@ def _middle_s(columns: LoggedColumns) -> float:
 
 def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int, TemperatureCourse]:
     t_s = np.asarray(source["t_s"], dtype=np.float64)
-    warm = np.asarray(source["temperature_c"], dtype=np.float64)
+    temperature_c = np.asarray(source["temperature_c"], dtype=np.float64)
     there = np.asarray(source["run"]) if "run" in source else np.ones(len(t_s), dtype=np.int64)
     runs = np.unique(np.asarray(columns["run"])) if "run" in columns else np.array([1])
     courses = {}
     for run in runs:
-        here = (there == run) & np.isfinite(warm)
+        here = (there == run) & np.isfinite(temperature_c)
         if "run" not in source:
-            here = np.isfinite(warm)
+            here = np.isfinite(temperature_c)
         if here.sum() < 2:
             continue
         order = np.argsort(t_s[here], kind="stable")
-        times, values = t_s[here][order], warm[here][order]
+        times, values = t_s[here][order], temperature_c[here][order]
         if source is columns and "duration_s" in columns:
             times, values = _to_the_ends(
                 times, values, np.asarray(columns["duration_s"], dtype=np.float64)[here][order]

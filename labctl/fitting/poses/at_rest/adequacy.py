@@ -30,11 +30,11 @@ class Adequacy:
         return "unexplained" if self.heldout_g > UNEXPLAINED * self.expected_g else "adequate"
 
 
-def adequacy_of(accelerometer: Accelerometer, rests: Rests, known: NDArray[np.float64] | None = None) -> Adequacy:
+def adequacy_of(accelerometer: Accelerometer, rests: Rests, covariance: NDArray[np.float64] | None = None) -> Adequacy:
     """Return what is left of each rest by a fit to the others.
 
-    The fit without a rest is that to all with one unknown more, which absorbs its residual: none is made again. `known`
-    are the rows (m, 9), of variance 1, of what was known of the parameters before.
+    The fit without a rest is that to all with one unknown more, which absorbs its residual: none is made again.
+    `covariance` are the rows (m, 9), of variance 1, of what was known of the parameters before.
     """
     accel_g, sigma = rests.accel_g[accelerometer.used], accelerometer.u_rest_g[accelerometer.used]
     forces = np.linalg.solve(np.eye(3) + accelerometer.errors, (accel_g - accelerometer.bias_g).T).T
@@ -42,7 +42,7 @@ def adequacy_of(accelerometer: Accelerometer, rests: Rests, known: NDArray[np.fl
     white = rests.accel_white_var.mean(axis=1)[accelerometer.used]
     jacobian = size_jacobian(accelerometer.errors, accelerometer.bias_g, accel_g) / sigma[:, None]
     before = np.linalg.norm(accel_g, axis=1) - accelerometer.gravity_g
-    return left_out_adequacy(residual, jacobian, accelerometer.covariance, sigma, white, before, known)
+    return left_out_adequacy(residual, jacobian, accelerometer.covariance, sigma, white, before, covariance)
 
 
 def left_out_adequacy(

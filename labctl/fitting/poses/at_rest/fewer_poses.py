@@ -64,7 +64,7 @@ class ByFewer:
         return self.p_value >= DISAGREE
 
 
-def by_fewer_poses(readings: PoseReadings, rests: Rests, known: Known) -> ByFewer:
+def by_fewer_poses(readings: PoseReadings, rests: Rests, prior: Known) -> ByFewer:
     """Fit the nine parameters to rests and an earlier calibration; no rest is left out.
 
     Raises NotEnoughData where the poses do not determine the bias, with what to do.
@@ -77,12 +77,12 @@ def by_fewer_poses(readings: PoseReadings, rests: Rests, known: Known) -> ByFewe
         )
     gravity, white = local_gravity_g(readings.info), rests.accel_white_var.mean(axis=1)
     freedom = len(rests) - FREE
-    _, first = _fitted(rests.accel_g, gravity, white + known.between_var, known)
-    extra = known.between_var
+    _, first = _fitted(rests.accel_g, gravity, white + prior.between_var, prior)
+    extra = prior.between_var
     if first > freedom:
-        extra = max(extra, _between(rests.accel_g, gravity, white, known, freedom))
-    theta, _ = _fitted(rests.accel_g, gravity, white + extra, known)
-    jacobian = _jacobian(theta, rests.accel_g, np.sqrt(white + extra), known)
+        extra = max(extra, _between(rests.accel_g, gravity, white, prior, freedom))
+    theta, _ = _fitted(rests.accel_g, gravity, white + extra, prior)
+    jacobian = _jacobian(theta, rests.accel_g, np.sqrt(white + extra), prior)
     covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
     u_bias = float(np.sqrt(np.diag(covariance)[:FREE]).max())
     rank = np.linalg.matrix_rank(jacobian / np.linalg.norm(jacobian, axis=0), tol=1e-6)
@@ -102,37 +102,37 @@ def by_fewer_poses(readings: PoseReadings, rests: Rests, known: Known) -> ByFewe
 
 
 def _residual(
-    theta: Array, accel_g: NDArray[np.float64], gravity: float, sigma: Array, known: Known
+    theta: Array, accel_g: NDArray[np.float64], gravity: float, sigma: Array, prior: Known
 ) -> NDArray[np.float64]:
     sizes = np.linalg.norm(corrected(accel_g, *matrices(theta)), axis=1)
-    change = known.whitened @ (theta - np.concatenate([np.zeros(FREE), known.errors]))
+    change = prior.whitened @ (theta - np.concatenate([np.zeros(FREE), prior.errors]))
     return np.concatenate([(sizes - gravity) / sigma, change])
 
 
-def _jacobian(theta: Array, accel_g: NDArray[np.float64], sigma: Array, known: Known) -> NDArray[np.float64]:
-    return np.vstack([size_jacobian(*matrices(theta), accel_g) / sigma[:, None], known.whitened])
+def _jacobian(theta: Array, accel_g: NDArray[np.float64], sigma: Array, prior: Known) -> NDArray[np.float64]:
+    return np.vstack([size_jacobian(*matrices(theta), accel_g) / sigma[:, None], prior.whitened])
 
 
-def _fitted(accel_g: NDArray[np.float64], gravity: float, variance: Array, known: Known) -> tuple[Array, float]:
+def _fitted(accel_g: NDArray[np.float64], gravity: float, variance: Array, prior: Known) -> tuple[Array, float]:
     """Return the nine parameters and the chi2 that they leave of rests and earlier calibration."""
     from scipy.optimize import least_squares
 
     sigma = np.sqrt(variance)
     optimum = least_squares(
-        lambda theta: _residual(theta, accel_g, gravity, sigma, known),
-        np.concatenate([known.bias_g, known.errors]),
-        lambda theta: _jacobian(theta, accel_g, sigma, known),
+        lambda theta: _residual(theta, accel_g, gravity, sigma, prior),
+        np.concatenate([prior.bias_g, prior.errors]),
+        lambda theta: _jacobian(theta, accel_g, sigma, prior),
         x_scale="jac",
     )
     return np.asarray(optimum.x, dtype=np.float64), 2 * float(optimum.cost)
 
 
-def _between(accel_g: NDArray[np.float64], gravity: float, white: Array, known: Known, freedom: int) -> float:
+def _between(accel_g: NDArray[np.float64], gravity: float, white: Array, prior: Known, freedom: int) -> float:
     """Return the variance to add to each rest so that chi2 is what the freedom lets expect (Mandel and Paule 1970)."""
     from scipy.optimize import brentq
 
     def excess(variance: float) -> float:
-        return _fitted(accel_g, gravity, white + variance, known)[1] - freedom
+        return _fitted(accel_g, gravity, white + variance, prior)[1] - freedom
 
     most = float(white.max())
     while excess(most) > 0:

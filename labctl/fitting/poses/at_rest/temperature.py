@@ -104,13 +104,13 @@ class TemperatureLaw:
 
 def rest_temperatures(readings: PoseReadings, rests: Rests) -> Array:
     """Return the mean temperature of each rest, (k,) deg C. Raises NotEnoughData without a thermometer."""
-    warm = readings.temperature_c
-    if warm is None:
+    temperature_c = readings.temperature_c
+    if temperature_c is None:
         raise NotEnoughData(
             f"{readings.info.serial}: no temperature was recorded, so its coefficients cannot be fitted; name the "
             "column of the temperature, or calibrate without one"
         )
-    sums = np.concatenate([[0.0], np.cumsum(warm)])
+    sums = np.concatenate([[0.0], np.cumsum(temperature_c)])
     return np.asarray((sums[rests.end] - sums[rests.begin]) / rests.n)
 
 
@@ -122,9 +122,9 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
     """
     serial = readings.info.serial
     require_poses(serial, rests)
-    warm = rest_temperatures(readings, rests)
-    low, high = float(warm.min()), float(warm.max())
-    levels = different_temperatures(warm)
+    temperature_c = rest_temperatures(readings, rests)
+    low, high = float(temperature_c.min()), float(temperature_c.max())
+    levels = different_temperatures(temperature_c)
     if levels < 2 or high - low < LEAST_SPAN_K:
         raise NotEnoughData(
             f"{serial}: the rests are at {low:.1f} to {high:.1f} deg C; coefficients of temperature need poses at two "
@@ -133,7 +133,7 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
         )
     orders = (min(BIAS_ORDER, levels - 1), SCALE_ORDER)
     reference, half = round((low + high) / 2, 1), (high - low) / 2
-    law = TemperatureLaw(rests.accel_g, (warm - reference) / half, orders)
+    law = TemperatureLaw(rests.accel_g, (temperature_c - reference) / half, orders)
     if len(rests) < law.parameters + LEAST_FREEDOM:
         raise NotEnoughData(
             f"{serial}: {len(rests)} rests at {levels} temperatures; {law.parameters} coefficients need at least "
@@ -165,10 +165,10 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
     )  # fmt: skip
 
 
-def different_temperatures(warm: Array) -> int:
+def different_temperatures(temperature_c: Array) -> int:
     """Return how many temperatures (k,) are further than SAME_TEMPERATURE_K from the next lower one that counts."""
     count, last = 0, -np.inf
-    for each in np.sort(warm):
+    for each in np.sort(temperature_c):
         if each - last > SAME_TEMPERATURE_K:
             count, last = count + 1, each
     return count

@@ -104,14 +104,15 @@ def joined_courses(parts: Sequence[list[CourseJson]]) -> list[CourseJson]:
     """Return the courses of parts of a recording as one for each channel."""
     joined: dict[str, CourseJson] = {}
     for course in (course for part in parts for course in part):
-        known = joined.get(course["channel"])
-        if known is None:
+        joined_course = joined.get(course["channel"])
+        if joined_course is None:
             joined[course["channel"]] = course
             continue
         joined[course["channel"]] = {
-            "channel": course["channel"], "unit": course["unit"], "t_s": [*known["t_s"], None, *course["t_s"]],
-            "low": [*known["low"], None, *course["low"]], "high": [*known["high"], None, *course["high"]],
-            "readings": known["readings"] + course["readings"], "bins": known["bins"] + course["bins"],
+            "channel": course["channel"], "unit": course["unit"], "t_s": [*joined_course["t_s"], None, *course["t_s"]],
+            "low": [*joined_course["low"], None, *course["low"]],
+            "high": [*joined_course["high"], None, *course["high"]],
+            "readings": joined_course["readings"] + course["readings"], "bins": joined_course["bins"] + course["bins"],
         }  # fmt: skip
     return list(joined.values())
 
@@ -239,8 +240,8 @@ def examine(recording: Recording) -> list[Marked]:
     return [*check_clock(whole), *check_gaps(whole), *check_sampling(whole), *of_values]
 
 
-def _rows(recording: Recording, kept: Rows | Indices) -> Recording:
-    return replace(recording, columns={name: np.asarray(values)[kept] for name, values in recording.columns.items()})
+def _rows(recording: Recording, rows: Rows | Indices) -> Recording:
+    return replace(recording, columns={name: np.asarray(values)[rows] for name, values in recording.columns.items()})
 
 
 def _spread(rows: Rows, at: Indices, n: int) -> Rows:
@@ -260,9 +261,9 @@ def joined_examinations(parts: Sequence[Examination]) -> Examination:
     findings: dict[tuple[str, str], Finding] = {}
     for finding in (finding for part in parts for finding in part.findings):
         key = finding.what, finding.channel
-        known = findings.get(key)
-        more = None if known is None else (known.n or 0) + (finding.n or 0)
-        findings[key] = finding if known is None else replace(known, n=more)
+        joined_finding = findings.get(key)
+        more = None if joined_finding is None else (joined_finding.n or 0) + (finding.n or 0)
+        findings[key] = finding if joined_finding is None else replace(joined_finding, n=more)
     marks = [mark for part in parts for mark in part.marks]
     return Examination(list(findings.values()), joined_courses([part.courses for part in parts]), marks)
 
@@ -296,10 +297,10 @@ def _all(marked: list[Marked], n: int) -> Rows:
     return np.any([each.rows for each in marked], axis=0) if marked else np.zeros(n, dtype=bool)
 
 
-def _is_explained(one: Marked, marked: list[Marked]) -> bool:
+def _is_explained(fault: Marked, marked: list[Marked]) -> bool:
     for other in marked:
-        if one.finding.what not in EXPLAINS.get(other.finding.what, frozenset()):
+        if fault.finding.what not in EXPLAINS.get(other.finding.what, frozenset()):
             continue
-        if other.finding.what not in OF_CHANNEL or other.finding.channel == one.finding.channel:
+        if other.finding.what not in OF_CHANNEL or other.finding.channel == fault.finding.channel:
             return True
     return False

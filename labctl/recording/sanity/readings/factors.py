@@ -97,8 +97,8 @@ def _by_factors(values: Array, row: int, factors: Sequence[float]) -> Iterator[C
         if abs(ratio - math.log(abs(factor))) > AGREES * u_noise or abs(levels[1] - expected) > AGREES * u_level:
             continue
         if factor == -1.0:
-            known = min(abs(level) for level in levels) > LEVEL_NOISES * max(noises)
-            agrees = known and _is_at_once(values, row, levels[1] - levels[0])
+            above_noise = min(abs(level) for level in levels) > LEVEL_NOISES * max(noises)
+            agrees = above_noise and _is_at_once(values, row, levels[1] - levels[0])
         else:
             agrees = abs(ratio) >= NOISE_CHANGES * u_noise and _lasts(values, row, factor)
         if agrees:

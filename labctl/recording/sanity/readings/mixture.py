@@ -55,16 +55,16 @@ def _units_of(series: Series, names: list[str]) -> Iterator[Marked]:
     if len(blocks) < 4:
         return
     noises = np.array([[noise_of(series.outputs[name][block]) for name in names] for block in blocks])
-    known = (noises > 0).all(axis=1)
-    if known.sum() < 4:
+    has_noise = (noises > 0).all(axis=1)
+    if has_noise.sum() < 4:
         return
     size = np.full(len(blocks), np.nan)
-    size[known] = np.mean(np.log(noises[known] / np.median(noises[known], axis=0)), axis=1)
-    split = _two_levels(size[known])
+    size[has_noise] = np.mean(np.log(noises[has_noise] / np.median(noises[has_noise], axis=0)), axis=1)
+    split = _two_levels(size[has_noise])
     if split is None:
         return
-    each = np.log(noises[known])
-    low = size[known] < split
+    each = np.log(noises[has_noise])
+    low = size[has_noise] < split
     apart = np.median(each[~low], axis=0) - np.median(each[low], axis=0)
     if np.any(np.abs(apart - np.log(DEG_PER_RAD)) > NEAR):
         return

@@ -101,11 +101,11 @@ def series_of(recording: Recording) -> Series | None:
         return None
     numbers = {name: np.asarray(columns[name], dtype=np.float64) for name in measured_names(columns)}
     n = len(recording)
-    known = {"rates", "profile", "rest"}
+    kinds = {"rates", "profile", "rest"}
     rate = None
     if info.motion == "rest":
         rate = np.zeros(n)
-    elif info.motion in known and "table_rate_dps" in columns:
+    elif info.motion in kinds and "table_rate_dps" in columns:
         rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
     if info.motion == "turns" and "turn_deg" in columns:
         still = np.asarray(columns["turn_deg"], dtype=np.float64) == 0
@@ -206,9 +206,9 @@ def gain_of(values: Array, rate: Array | None) -> float:
     return float(centred @ (values - values.mean()) / (centred @ centred))
 
 
-def runs(same: Rows) -> Iterator[tuple[int, int]]:
+def runs(is_same: Rows) -> Iterator[tuple[int, int]]:
     """Yield the stretches of rows that hold, as (first row, row after the last)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], is_same.astype(np.int8), [0]])))
     for begin, end in edges.reshape(-1, 2):
         yield int(begin), int(end)
 
