@@ -124,8 +124,8 @@ def ask_itself(name: str, values: Mapping[str, object], clock: Clock) -> dict[st
         if isinstance(driver, ChamberDriver):
             return _limits(driver.make(driver.settings.model_validate(values), Ports(clock), clock))
         if isinstance(driver, GyroDriver):
-            given = {**values, "name": name, "serial": UNKNOWN}
-            return _own_serial(driver.make(driver.settings.model_validate(given), Ports(clock), clock))
+            section = {**values, "name": name, "serial": UNKNOWN}
+            return _own_serial(driver.make(driver.settings.model_validate(section), Ports(clock), clock))
     except InstrumentError:
         return {}
     return {}
@@ -157,8 +157,8 @@ def _all() -> dict[str, Driver]:
 
 
 def _kind(name: str) -> str:
-    what, _ = KINDS[type(_all()[name])]
-    return what
+    kind_name, _ = KINDS[type(_all()[name])]
+    return kind_name
 
 
 def _probes(*, asking: bool) -> list[tuple[str, Probe]]:

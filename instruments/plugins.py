@@ -182,16 +182,18 @@ class PluginGroup(Generic[PluginT]):
         for name, plugins in self._by_name.items():
             try:
                 self.get(name)
-                why = ""
+                reason = ""
             except PluginError as error:
-                why = str(error)
+                reason = str(error)
             doubled = self._doubled(plugins) if len(plugins) > 1 else ""
-            statuses += [(plugin, doubled or why) if plugin is not plugins[0] else (plugin, why) for plugin in plugins]
+            statuses += [
+                (plugin, doubled or reason) if plugin is not plugins[0] else (plugin, reason) for plugin in plugins
+            ]
         return statuses
 
     def problems(self) -> list[str]:
         """Return one line for each plug-in that cannot be used; everything is imported."""
-        return list(dict.fromkeys(why for _, why in self.status() if why))
+        return list(dict.fromkeys(reason for _, reason in self.status() if reason))
 
     def report(self, line: str) -> None:
         """Log a line about a plug-in that is left out, once."""
@@ -216,9 +218,10 @@ class PluginGroup(Generic[PluginT]):
 
     def _doubled(self, plugins: Sequence[Plugin]) -> str:
         each = " and ".join(f"{plugin.release} ({plugin.target})" for plugin in plugins)
-        kept = f"{OWN}'s own is used" if plugins[0].is_own else "none of them is used"
+        effect_text = f"{OWN}'s own is used" if plugins[0].is_own else "none of them is used"
         return (
-            f"entry point {plugins[0].name!r} in group {self.group} is of {each}; {kept}: uninstall all but one, "
+            f"entry point {plugins[0].name!r} in group {self.group} is of {each}; {effect_text}: uninstall all but "
+            "one, "
             "or ask for another name"
         )
 

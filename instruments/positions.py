@@ -56,8 +56,8 @@ class Position:
     def in_words(self) -> str:
         """The position in words: which axis points up, and what is turned by how much."""
         turned = [
-            f"the {what} turned by {angle} deg"
-            for what, angle in (("unit", self.unit_deg), ("fixture", self.fixture_deg))
+            f"the {role} turned by {angle} deg"
+            for role, angle in (("unit", self.unit_deg), ("fixture", self.fixture_deg))
             if angle
         ]
         return ", ".join([f"{self.end} up", *turned])

@@ -46,11 +46,11 @@ def requests_of(description: Described) -> list[tuple[str, str]]:
     """Return the key and the text of every request that a description can send."""
     requests: list[tuple[str, str]] = []
     for key in type(description).model_fields:
-        given = getattr(description, key)
-        if isinstance(given, Ask):
-            requests.append((key, given.send))
-        elif isinstance(given, tuple):
-            requests += [(key, each) for each in given]
+        ask = getattr(description, key)
+        if isinstance(ask, Ask):
+            requests.append((key, ask.send))
+        elif isinstance(ask, tuple):
+            requests += [(key, each) for each in ask]
     if isinstance(description, ReferenceDescription):
         requests += [("identity", description.identity)] if description.identity else []
         requests += [(f"quantities.{name}", quantity.ask) for name, quantity in description.quantities.items()]
@@ -71,11 +71,11 @@ def try_description(
     section: dict[str, object] = {"driver": "described", "format": description, **address}
     steps, close = _steps(description, section, clock, Ports(clock, wire=wire), move=move)
     try:
-        for what, act in steps:
+        for step_name, act in steps:
             try:
-                yield Tried(what, act(), "")
+                yield Tried(step_name, act(), "")
             except InstrumentError as error:
-                yield Tried(what, "", str(error))
+                yield Tried(step_name, "", str(error))
     finally:
         close()
 
@@ -126,16 +126,16 @@ def _questions(description: Described, dialogue: Dialogue) -> list[Step]:
 
 
 def _answer(dialogue: Dialogue, key: str, ask: Ask) -> Callable[[], str]:
-    what = f"answer [{key}]"
+    answer_name = f"answer [{key}]"
     if isinstance(ask, AskState):
-        return lambda: "yes" if dialogue.holds(ask, what) else "no"
+        return lambda: "yes" if dialogue.holds(ask, answer_name) else "no"
     if isinstance(ask, AskNumber):
-        return lambda: f"{dialogue.number(ask, what):g}"
+        return lambda: f"{dialogue.number(ask, answer_name):g}"
     if isinstance(ask, AskAlarms):
         return lambda: ", ".join(dialogue.alarms(ask)) or "none"
     if isinstance(ask, AskText) and key == "identity":
         return lambda: dialogue.identity(ask)
-    return lambda: dialogue.text(ask, what)
+    return lambda: dialogue.text(ask, answer_name)
 
 
 def _turns(table: DescribedTable, clock: Clock) -> list[Step]:

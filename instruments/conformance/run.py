@@ -42,9 +42,10 @@ def has_every_method(stand: Stand) -> None:
         require(hasattr(stand.driver, name), f"{driver.__name__} has no {name}; {protocol.__name__} says what it does")
         if inspect.isfunction(member):
             parameters = list(inspect.signature(member).parameters)[1:]
-            given = list(inspect.signature(getattr(stand.driver, name)).parameters)
+            own_parameters = list(inspect.signature(getattr(stand.driver, name)).parameters)
             require(
-                given == parameters, f"{driver.__name__}.{name} takes {given}; {protocol.__name__} says {parameters}"
+                own_parameters == parameters,
+                f"{driver.__name__}.{name} takes {own_parameters}; {protocol.__name__} says {parameters}",
             )
 
 
@@ -57,10 +58,10 @@ def says_who_it_is(stand: Stand) -> None:
     """Check the identity."""
     identity = stand.driver.identify()
     if stand.kind == "gyro":
-        given = next(gyro.serial for gyro in stand.file.gyros if gyro.name == stand.driver.name)
+        stated_serial = next(gyro.serial for gyro in stand.file.gyros if gyro.name == stand.driver.name)
         require(
-            identity.serial == given,
-            f"identify() returns the serial number {identity.serial!r}, but the bench file gives {given!r}",
+            identity.serial == stated_serial,
+            f"identify() returns the serial number {identity.serial!r}, but the bench file gives {stated_serial!r}",
         )
         require(identity.technology in ("fog", "mems", "piezo"), f"technology {identity.technology!r} is not known")
     else:

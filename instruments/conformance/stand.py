@@ -81,8 +81,8 @@ def _with_trial(name: str, kind: Kind, trial: Trial) -> BenchFile:
     section: dict[str, object] = {"driver": name, **trial.section}
     if kind == "gyro":
         gyro = record["gyros"][0]
-        kept = ("name", "serial", "axes", "max_rate_dps", "min_c", "max_c", "technology")
-        record["gyros"] = [{key: gyro[key] for key in kept} | section]
+        general_keys = ("name", "serial", "axes", "max_rate_dps", "min_c", "max_c", "technology")
+        record["gyros"] = [{key: gyro[key] for key in general_keys} | section]
         if trial.unit:
             record["simulation"]["units"] |= {record["gyros"][0]["name"]: dict(trial.unit)}
     elif kind == "reference":

@@ -41,8 +41,8 @@ def _stim300(data: bytes, baudrate: int) -> Recognised | None:
     rate_hz = COUNTS_PER_S / step
     settings: dict[str, object] = {"technology": "mems", "axes": ["x", "y", "z"], "max_rate_dps": 400.0}
     settings["sample_rate_hz"] = rate_hz
-    if given := options.model_dump(exclude_defaults=True):
-        settings["options"] = given
+    if options_stated := options.model_dump(exclude_defaults=True):
+        settings["options"] = options_stated
     text = f"Sensonor STIM300, datagram 0x{options.datagram:02X} at {rate_hz:g} readings/s (usual {DEFAULT_RATE_HZ:g})"
     return Recognised(text, settings, {"serial": SERIAL})
 

@@ -77,7 +77,7 @@ def _section(
 
 def _driver(name: str, kind: type[Driver]) -> Driver:
     """Return an installed driver of one kind; raises PluginError saying what is installed and what to do."""
-    what, _ = KINDS[kind]
+    kind_name, _ = KINDS[kind]
     try:
         driver = DRIVERS.get(name)
     except UnknownPlugin as error:
@@ -85,8 +85,8 @@ def _driver(name: str, kind: type[Driver]) -> Driver:
     if not isinstance(driver, kind):
         drives, _ = KINDS[type(driver)]
         driver_names: Sequence[str] = names_of(kind)
-        choice = f"choose {', '.join(driver_names)}" if driver_names else f"no driver of a {what} is installed"
-        raise PluginError(f"driver {name!r} is for a {drives}, not for a {what}; {choice}")
+        choice = f"choose {', '.join(driver_names)}" if driver_names else f"no driver of a {kind_name} is installed"
+        raise PluginError(f"driver {name!r} is for a {drives}, not for a {kind_name}; {choice}")
     return driver
 
 

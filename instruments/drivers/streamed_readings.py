@@ -102,15 +102,19 @@ class StreamedReadings:
         return max(SILENCE_S, 5 / self._law.rate_hz)
 
     def _new_counter(self) -> SampleCounter | None:
-        given = self._law.counter
-        return None if given is None else SampleCounter(self._device, self._port, step=given.step, wrap=given.wrap)
+        counter_law = self._law.counter
+        return (
+            None
+            if counter_law is None
+            else SampleCounter(self._device, self._port, step=counter_law.step, wrap=counter_law.wrap)
+        )
 
     def _new_device_time(self) -> DeviceTime | None:
         """Return the unit's own time: by its time stamps, or by its counter; None without either."""
         if (ticks := self._law.stamps) is not None:
             return DeviceTime(ticks.tick_s, ticks.wrap)
-        if (given := self._law.counter) is not None:
-            return DeviceTime(1.0 / (self._law.rate_hz * given.step), given.wrap)
+        if (counter_law := self._law.counter) is not None:
+            return DeviceTime(1.0 / (self._law.rate_hz * counter_law.step), counter_law.wrap)
         return None
 
     def _discard(self) -> None:
@@ -127,26 +131,26 @@ class StreamedReadings:
 
     def _decode(self, data: bytes) -> Readings:
         decoded = self._decoder.feed(data)
-        damaged, kept = decoded.damaged, np.ones(len(decoded), dtype=bool)
+        damaged, is_used = decoded.damaged, np.ones(len(decoded), dtype=bool)
         if self._counter is not None and self._law.counter is not None and len(decoded):
             content = np.stack(list(decoded.values.values()), axis=1)
-            kept = self._counter.is_new(decoded.values[self._law.counter.field], content)
-            damaged += len(kept) - int(kept.sum())
-        raw = {name: decoded.values[name][kept] for name in self._law.channels}
-        valid = decoded.valid[kept]
+            is_used = self._counter.is_new(decoded.values[self._law.counter.field], content)
+            damaged += len(is_used) - int(is_used.sum())
+        raw = {name: decoded.values[name][is_used] for name in self._law.channels}
+        valid = decoded.valid[is_used]
         if not len(valid):
             device_s = None if self._device_time is None else np.zeros(0)
             return Readings(np.zeros(0), raw, valid, 0, damaged, device_s, np.zeros(0))
         self._last_s, self._stream.unused = self._clock.now_s(), 0
-        advance = self._advance(decoded, kept)
-        came, arrival_s = self._stream.last, self._stream.arrival_s(decoded.behind[kept])
+        advance = self._advance(decoded, is_used)
+        came, arrival_s = self._stream.last, self._stream.arrival_s(decoded.behind[is_used])
         turn = 0 if self._counter is None else self._counter.readings_per_turn
         times, uncounted = self._time.times(advance, came.now_s, turn, width_s=came.width_s, arrival_s=arrival_s)
         refuse_other_rate(self._device, self._port, self._time.line)
         counts = self._counter is not None or self._law.stamps is not None
         lost = int(advance.sum()) - len(advance) + uncounted if counts else uncounted
         has_stamp = self._law.stamps or self._law.counter
-        ticks = None if has_stamp is None else decoded.values[has_stamp.field][kept].astype(np.int64)
+        ticks = None if has_stamp is None else decoded.values[has_stamp.field][is_used].astype(np.int64)
         readings = Readings(times, raw, valid, lost, damaged, None, arrival_s)
         return self._undecided.pass_on(readings, self._time, self._device_time, ticks)
 

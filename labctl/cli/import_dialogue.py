@@ -131,10 +131,10 @@ def show(mapped_file: MappedFile) -> None:
     if log is not None:
         info = log.recording.info
         sets = len(set(log.recording.columns["dataset"].tolist()))
-        known = info.measured_at
+        measured_at = info.measured_at
         console.print(
             f"serial {info.serial}; motion {log.motion}; data sets by {mapped_file.column_map.datasets.by}: {sets}; "
-            + (f"began {known:%Y-%m-%d %H:%M:%S} UTC" if known else "date of the measurement not known")
+            + (f"began {measured_at:%Y-%m-%d %H:%M:%S} UTC" if measured_at else "date of the measurement not known")
         )  # fmt: skip
         if log.unused:
             console.print(f"not used: {', '.join(log.unused)}")

@@ -39,11 +39,11 @@ class TerminalOperator:
             threading.Thread(target=here.run, args=(self._serve, operator, note), daemon=True).start()
 
     def _serve(self, operator: HumanOperator, note: Callable[[str], None]) -> None:
-        asked = ""
+        asked_prompt = ""
         while not self._closed.wait(LOOK_S):
             prompt = operator.pending
-            if prompt is not None and prompt.id != asked:
-                asked = prompt.id
+            if prompt is not None and prompt.id != asked_prompt:
+                asked_prompt = prompt.id
                 self._put(operator, prompt, note)
 
     def close(self) -> None:
@@ -72,8 +72,8 @@ class TerminalOperator:
                 operator.decline(prompt.id, os_user(), why)
             else:
                 operator.confirm(prompt.id, os_user())
-            said = "to be asked again" if again else f"cannot be done; {why}" if why else "done"
-            note(f"{prompt.id}: {said}; {prompt.text}")
+            outcome = "to be asked again" if again else f"cannot be done; {why}" if why else "done"
+            note(f"{prompt.id}: {outcome}; {prompt.text}")
         except (StalePrompt, StoreError) as error:
             stderr.print(f"labctl: {error}")
 

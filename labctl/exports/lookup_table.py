@@ -67,8 +67,8 @@ def largest_difference(part: StaticPart, table: Table) -> float:
     axes = len(part.axes)
     apart = np.zeros((axes, axes))
     for axis, by in np.ndindex(axes, axes):
-        seen = _bilinear(table.errors[axis, by], table.outputs, table.temperatures_c, raw, temperature_c)
-        apart[axis, by] = np.abs(seen - exact.errors[axis, by].ravel()).max()
+        interpolated = _bilinear(table.errors[axis, by], table.outputs, table.temperatures_c, raw, temperature_c)
+        apart[axis, by] = np.abs(interpolated - exact.errors[axis, by].ravel()).max()
     difference = apart.sum(axis=1)
     raw_all, warm_all = all_turning(part)
     together = np.abs(raw_all - table.error_dps(raw_all, warm_all) - part.rate(raw_all, warm_all)).max(axis=0)

@@ -35,8 +35,8 @@ def export_calibration(document: bytes, format_name: str) -> tuple[bytes, str]:
 def written_calibration(document: bytes, format_name: str, options: Mapping[str, str] | None = None) -> Written:
     """Return a calibration in a format with what was lost; raises BadInput for a format or option that is not known."""
     chosen = format_named(format_name)
-    given = dict(options or {})
-    unknown = sorted(set(given) - set(chosen.options))
+    stated_options = dict(options or {})
+    unknown = sorted(set(stated_options) - set(chosen.options))
     if unknown:
         option_names = ", ".join(chosen.options) or "none"
         raise BadInput(
@@ -44,7 +44,7 @@ def written_calibration(document: bytes, format_name: str, options: Mapping[str,
         )
     calibration = read_calibration(document)
     try:
-        file_bytes = chosen.write(calibration, given) if chosen.options else chosen.write(calibration)
+        file_bytes = chosen.write(calibration, stated_options) if chosen.options else chosen.write(calibration)
     except LabctlError:
         raise
     except Exception as error:

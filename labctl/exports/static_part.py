@@ -63,13 +63,13 @@ class StaticPart:
         n, axes = len(temperature_c), len(self.axes)
         bias = np.zeros((n, axes))
         for _ in range(NEWTON_STEPS):
-            left = self.rate(bias, temperature_c)
+            residual_rate = self.rate(bias, temperature_c)
             slope = np.empty((n, axes, axes))
             for column in range(axes):
                 moved = bias.copy()
                 moved[:, column] += SLOPE_STEP_DPS
-                slope[:, :, column] = (self.rate(moved, temperature_c) - left) / SLOPE_STEP_DPS
-            bias = bias - np.linalg.solve(slope, left[:, :, None])[:, :, 0]
+                slope[:, :, column] = (self.rate(moved, temperature_c) - residual_rate) / SLOPE_STEP_DPS
+            bias = bias - np.linalg.solve(slope, residual_rate[:, :, None])[:, :, 0]
         return bias
 
     def memory_losses(self) -> tuple[Loss, ...]:
@@ -92,16 +92,16 @@ def follower_losses(memory: Memory | None, fastest_dps: float) -> tuple[Loss, ..
         if each.scale is not None:
             of, size = f"scale factor at {fastest_dps:g} deg/s", float(np.abs(each.scale).max()) * fastest_dps
         if each.kind == "play":
-            what = "hysteresis of the bias"
+            subject = "hysteresis of the bias"
         elif each.part == "curved":
             about = f"for each K from {each.reference_c:g} deg C"
-            what = f"curved thermal lag of the {of}, at {WARMING_K_MIN:g} K/min, {about}"
+            subject = f"curved thermal lag of the {of}, at {WARMING_K_MIN:g} K/min, {about}"
             size *= 2 * max(each.parameter, each.cooling_s or 0.0) / 60 * WARMING_K_MIN
         else:
-            what = f"thermal lag of the {of}, at {WARMING_K_MIN:g} K/min"
+            subject = f"thermal lag of the {of}, at {WARMING_K_MIN:g} K/min"
             size *= max(each.parameter, each.cooling_s or 0.0) / 60 * WARMING_K_MIN
-        losses[what] = losses.get(what, 0.0) + size
-    return tuple(Loss(what, size) for what, size in losses.items())
+        losses[subject] = losses.get(subject, 0.0) + size
+    return tuple(Loss(subject, size) for subject, size in losses.items())
 
 
 def static_part(calibration: Calibration, format_name: str, *, carries: str) -> StaticPart:
@@ -109,13 +109,14 @@ def static_part(calibration: Calibration, format_name: str, *, carries: str) -> 
 
     `carries` is what the format has, and ends the message.
     """
-    rest, memory = split_memory(calibration.fitted, calibration.axes)
-    if rest.model.needs:
+    static_fit, memory = split_memory(calibration.fitted, calibration.axes)
+    if static_fit.model.needs:
         raise BadInput(
-            f"format {format_name}: model {rest.model.name} needs {', '.join(rest.model.needs)} beside output and "
+            f"format {format_name}: model {static_fit.model.name} needs {', '.join(static_fit.model.needs)} beside "
+            "output and "
             f"temperature; {carries}; use the JSON file with labctl's Compensator"
         )
-    law = correction(rest, calibration.axes)
+    law = correction(static_fit, calibration.axes)
     return StaticPart(calibration, lambda raw, temperature_c: law(raw, temperature_c, {}), memory)
 
 

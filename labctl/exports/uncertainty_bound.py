@@ -83,10 +83,11 @@ def bound_constant(name: str, calibration: Calibration) -> str:
 
     `<name>_u_dps` is that of a rotation about the axis itself, `<name>_u_any_axis_dps` about any axis.
     """
-    given = {"u": bounds_dps(calibration), "u_any_axis": any_axis_bounds_dps(calibration)}
+    bounds_by_name = {"u": bounds_dps(calibration), "u_any_axis": any_axis_bounds_dps(calibration)}
     return "".join(
-        f"static const double {name}_{what}_dps[{len(bounds)}] = {{{', '.join(map(_c_number, bounds.values()))}}};\n"
-        for what, bounds in given.items()
+        f"static const double {name}_{bound_name}_dps[{len(bounds)}] = "
+        f"{{{', '.join(map(_c_number, bounds.values()))}}};\n"
+        for bound_name, bounds in bounds_by_name.items()
     )
 
 

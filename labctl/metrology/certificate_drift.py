@@ -96,9 +96,9 @@ def _on_line(valued: Sequence[CertifiedValue], before: CertifiedValue, on: date)
     columns = np.column_stack([root, root * time])
     covariance = np.linalg.inv(columns.T @ columns)
     coefficients = covariance @ (columns.T @ (root * values))
-    left = root * values - columns @ coefficients
+    residual = root * values - columns @ coefficients
     freedom = len(valued) - 2
-    birge = max(1.0, math.sqrt(float(left @ left) / freedom)) if freedom > 0 else 1.0
+    birge = max(1.0, math.sqrt(float(residual @ residual) / freedom)) if freedom > 0 else 1.0
     u_value, u_slope = birge * np.sqrt(np.diag(covariance))
     drift = Drift(float(coefficients[1]), float(u_slope), len(valued), birge)
     return Prediction(on, float(coefficients[0]), max(float(u_value), before.u), drift)

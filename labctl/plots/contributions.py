@@ -72,8 +72,8 @@ def _draw(
 def contributions_html(title: str, over: Mapping[str, ContributionsOverJson], not_stated: Sequence[str]) -> str:
     """Return a page that needs no server: the figure, and which standards are not in it."""
     figure = contributions(over).to_html(full_html=False, include_plotlyjs=True, config={"displaylogo": False})
-    left = f"<p>Not stated, and in no line: {escape(', '.join(not_stated))}.</p>" if not_stated else ""
+    note = f"<p>Not stated, and in no line: {escape(', '.join(not_stated))}.</p>" if not_stated else ""
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{escape(title)}</title>\n'
-        f"<style>{STYLE}</style></head>\n<body>\n<h1>{escape(title)}</h1>\n{left}\n{figure}\n</body>\n</html>\n"
+        f"<style>{STYLE}</style></head>\n<body>\n<h1>{escape(title)}</h1>\n{note}\n{figure}\n</body>\n</html>\n"
     )

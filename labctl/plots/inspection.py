@@ -28,15 +28,15 @@ def inspection_picture(courses: Sequence[CourseJson], marks: Sequence[MarkJson])
     if not courses:
         return None
     kinds = list(dict.fromkeys(mark["what"] for mark in marks))
-    colours = {what: COLOURS[k % len(COLOURS)] for k, what in enumerate(kinds)}
+    colours = {kind: COLOURS[k % len(COLOURS)] for k, kind in enumerate(kinds)}
     figure = grid_of([_heading(course, _marks_of(course, marks)) for course in courses], 1, shared_xaxes=True)
     height = ROW_PX * len(courses) + GAP_PX
     figure.update_layout(template=TEMPLATE, height=height)
     bands: list[dict[str, object]] = []
     for panel, course in enumerate(courses):
-        where = place(panel, 1)
-        figure.add_trace(_envelope(course), **where)
-        figure.update_yaxes(title=course["unit"], **where)
+        placement = place(panel, 1)
+        figure.add_trace(_envelope(course), **placement)
+        figure.update_yaxes(title=course["unit"], **placement)
         bands += [band for mark in _marks_of(course, marks) for band in _bands(mark, colours[mark["what"]], panel)]
     figure.update_layout(shapes=bands)  # all at once: plotly copies its figure for each that is added by itself
     figure.update_xaxes(title="t_s, s", row=len(courses), col=1)

@@ -30,11 +30,11 @@ def error_over_rate(comparison: ComparisonJson) -> go.Figure | None:
     pairs = list(zip(columns["axis"], columns["position"], strict=True))
     lines = {(line["axis"], line["position"]): line for line in comparison["over_rate"]}
     for panel, (axis, there) in enumerate(panels):
-        where, line = place(panel, len(positions)), lines[axis, there]
+        placement, line = place(panel, len(positions)), lines[axis, there]
         for level, error in zip(line["level"], line["error_dps"], strict=True):
             shade = {"color": temperature_colour(level, low, high), "width": 1.5}
             figure.add_trace(
-                go.Scatter(x=line["at"], y=error, mode="lines", line=shade, name=f"{level:.3g} deg C"), **where
+                go.Scatter(x=line["at"], y=error, mode="lines", line=shade, name=f"{level:.3g} deg C"), **placement
             )
         rows = [k for k, pair in enumerate(pairs) if pair == (axis, there)]
         figure.add_trace(
@@ -44,7 +44,7 @@ def error_over_rate(comparison: ComparisonJson) -> go.Figure | None:
                 marker=temperature_marker(_of(columns["temperature_c"], rows), low, high, size=4),
                 hovertemplate="data set %{customdata}<br>%{x:.5g} deg/s: %{y:.4g} deg/s<extra></extra>",
             ),
-            **where,
+            **placement,
         )  # fmt: skip
     figure.update_xaxes(title="table rate, deg/s", row=len(axes))
     figure.update_yaxes(title="error, deg/s", col=1)

@@ -63,8 +63,8 @@ def read_head(path: Path) -> RecordingInfo:
         # a misspelt key is both unknown and missing: the unknown one is what a person looks for
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
-        given = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
-        raise BadRecording(f"{path}: {place}: {first['msg']}{given}") from error
+        value_text = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
+        raise BadRecording(f"{path}: {place}: {first['msg']}{value_text}") from error
 
 
 def _data_file(folder: Path, kind: str) -> Path:
@@ -89,8 +89,8 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BadRecording(f"{folder}: exists already and is not empty; name a new folder")
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
-        whole = Path(made) / "recording"
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as new_folder:
+        whole = Path(new_folder) / "recording"
         whole.mkdir()
         (whole / HEAD).write_bytes(head_of(recording.info))
         write_table(recording.columns, whole / f"{recording.info.kind}.{file_format}")

@@ -246,12 +246,12 @@ class LineDecoder:
     def _time(self, layout: LineLayout, values: Mapping[str, float]) -> float:
         if not layout.time:
             return self._count / (self._rate_hz or 1.0)
-        given = {name: values.get(name, math.nan) for name in layout.time}
-        if not all(map(math.isfinite, given.values())):
+        stamps = {name: values.get(name, math.nan) for name in layout.time}
+        if not all(map(math.isfinite, stamps.values())):
             raise _Damaged("the time is missing")
         if not self._first:
-            self._first = given
-        t_s = sum((value - self._first[name]) * layout.time[name] for name, value in given.items())
+            self._first = stamps
+        t_s = sum((value - self._first[name]) * layout.time[name] for name, value in stamps.items())
         if t_s > self._last_s:
             self._backwards = 0
             return t_s

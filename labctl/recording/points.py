@@ -109,17 +109,19 @@ def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Rec
         return points
     rows: list[dict[str, NDArray[np.generic]]] = []
     for row in range(len(points)):
-        kept = {name: values[row : row + 1] for name, values in columns.items()}
-        if kept["duration_s"][0] > longest_s:
+        set_columns = {name: values[row : row + 1] for name, values in columns.items()}
+        if set_columns["duration_s"][0] > longest_s:
             info = points.info.model_copy(update={"kind": "samples"})
-            as_points = to_points(Recording(info, readings_of(int(kept["dataset"][0]))))
+            as_points = to_points(Recording(info, readings_of(int(set_columns["dataset"][0]))))
             if len(as_points) > 1:
-                kept = {
+                set_columns = {
                     n: as_points.columns[n] if n in as_points.columns else v.repeat(len(as_points))
-                    for n, v in kept.items()
+                    for n, v in set_columns.items()
                 }
-        rows.append(kept)
-    joined = {name: np.concatenate([kept[name] for kept in rows]) for name in columns} if rows else columns
+        rows.append(set_columns)
+    joined = (
+        {name: np.concatenate([set_columns[name] for set_columns in rows]) for name in columns} if rows else columns
+    )
     return Recording(points.info, joined, points.environment)
 
 
@@ -186,8 +188,8 @@ def in_windows(recording: Recording, rows: Columns) -> Recording:
             points[f"gyro_{axis}_white_std"] = white[starts]
     points["duration_s"] = counts * usual_step_s(rows)
     points["n"] = counts.astype(np.int64)
-    kept = kept_windows(rows, labels)
-    points = {name: values[kept] for name, values in points.items()}
+    in_window = kept_windows(rows, labels)
+    points = {name: values[in_window] for name, values in points.items()}
     return Recording(recording.info.model_copy(update={"kind": "points"}), points, recording.environment)
 
 

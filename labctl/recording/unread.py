@@ -26,10 +26,10 @@ class Unread:
     @property
     def text(self) -> str:
         """In words."""
-        shown = ", ".join(self.places[:SHOWN_PLACES])
+        places_text = ", ".join(self.places[:SHOWN_PLACES])
         more = f" and {len(self.places) - SHOWN_PLACES} more places" if len(self.places) > SHOWN_PLACES else ""
         cut = "; its end is cut off, and what followed is lost" if self.is_cut else ""
-        return f"{share_text(self.share)} of the file could not be read: {shown}{more}{cut}"
+        return f"{share_text(self.share)} of the file could not be read: {places_text}{more}{cut}"
 
 
 def share_text(share: float) -> str:

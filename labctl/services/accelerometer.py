@@ -51,8 +51,8 @@ class Source:
     def text(self) -> str:
         """What was read, in one line."""
         local = "" if self.latitude_deg is None else f", gravity at latitude {self.latitude_deg:g} deg"
-        warm = "" if self.temperature is None else f", temperature {self.temperature} in deg C"
-        return f"columns {', '.join(self.columns)} in {self.unit}{local}{warm}"
+        temperature_text = "" if self.temperature is None else f", temperature {self.temperature} in deg C"
+        return f"columns {', '.join(self.columns)} in {self.unit}{local}{temperature_text}"
 
 
 @dataclass(frozen=True)
@@ -132,9 +132,9 @@ def accelerometer_of_files(
     if earlier is None:
         result = calibrate_accelerometer(readings, rests)
         return with_alignment(_response(result, rests, adequacy_of(result, rests)), readings)
-    known = earlier.known()
-    fewer = by_fewer_poses(readings, rests, known)
-    worth = adequacy_of(fewer.found, rests, known.whitened)
+    earlier_known = earlier.known()
+    fewer = by_fewer_poses(readings, rests, earlier_known)
+    worth = adequacy_of(fewer.found, rests, earlier_known.whitened)
     return _response(fewer.found, rests, worth).model_copy(update={
         "verdict": "adequate" if fewer.agrees else "unexplained", "earlier": earlier.answer(fewer.p_value),
         "text": [*_size_text(fewer.found, worth), earlier.text(fewer)],
@@ -147,8 +147,13 @@ def _readings(path: Path, source: Source) -> PoseReadings:
     if not path.is_file():
         raise BadRecording(f"{path}: not found; name a CSV or Parquet file of readings, or the folder of a recording")
     table = read_table(path)
-    warm = [] if source.temperature is None else [source.temperature]
-    rows = numbers_of(path, table, [*source.columns, *warm], "time, x, y and z" + ", and temperature" * len(warm))
+    temperature_names = [] if source.temperature is None else [source.temperature]
+    rows = numbers_of(
+        path,
+        table,
+        [*source.columns, *temperature_names],
+        "time, x, y and z" + ", and temperature" * len(temperature_names),
+    )
     if len(rows) < LEAST_READINGS:
         raise BadRecording(f"{path}: {len(rows)} rows; rests in poses need at least {LEAST_READINGS}; record longer")
     steps = np.diff(rows[:, 0])
@@ -163,7 +168,7 @@ def _readings(path: Path, source: Source) -> PoseReadings:
     # without a gyro nothing tells a turn about the vertical, which leaves the specific force as it is
     return PoseReadings(
         info, rows[:, 0], UNITS_G[source.unit] * rows[:, 1:4], np.zeros((len(rows), 3)),
-        rows[:, 4] if warm else None, breaks,
+        rows[:, 4] if temperature_names else None, breaks,
     )  # fmt: skip
 
 
@@ -224,7 +229,7 @@ def temperature_response(fitted: OverTemperature, rests: Rests) -> Accelerometer
 
     low, high = fitted.range_c
     answer = _response(fitted.reference, rests, fitted.adequacy)
-    said = (
+    text = (
         f"Over {low:.1f} to {high:.1f} deg C ({fitted.temperatures} temperatures), about "
         f"{fitted.reference_c:g} deg C: "
         f"bias to the power {len(fitted.bias_g)}, scale factors to the power "
@@ -232,7 +237,7 @@ def temperature_response(fitted: OverTemperature, rests: Rests) -> Accelerometer
         f"leave {fitted.constant_g:.2g} g."
     )
     return answer.model_copy(update={
-        "text": [*answer.text, said],
+        "text": [*answer.text, text],
         "temperature": AccelerometerTemperature(
             reference_c=fitted.reference_c, range_c=fitted.range_c, temperatures=fitted.temperatures,
             bias_g=terms(fitted.bias_g, begin), scale_factor=terms(fitted.scale_factor, begin + fitted.bias_g.size),

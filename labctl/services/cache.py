@@ -75,8 +75,8 @@ class FileCache:
 
     def file(self, question: Mapping[str, object]) -> Path:
         """Return the file of the result of a question (JSON values), as the present code answers it."""
-        asked = json.dumps({"by": code_digest(), **question}, sort_keys=True)
-        name = hashlib.sha256(asked.encode()).hexdigest()
+        question_json = json.dumps({"by": code_digest(), **question}, sort_keys=True)
+        name = hashlib.sha256(question_json.encode()).hexdigest()
         return user_cache_path("labctl") / self._folder / f"{name}{self._suffix}"
 
     def load(self, file: Path, decode: Callable[[bytes], ResultT]) -> ResultT | None:
@@ -137,9 +137,9 @@ def cached_group(
 
     if (response := RESPONSES.load(file(kind), kind.model_validate_json)) is not None:
         return response
-    asked = json.dumps(question, sort_keys=True)
-    compute(asked)
-    with single_flight(asked):
+    question_json = json.dumps(question, sort_keys=True)
+    compute(question_json)
+    with single_flight(question_json):
         if (response := RESPONSES.load(file(kind), kind.model_validate_json)) is not None:
             return response
         # A fresh response takes the same way through JSON as a cached one, so both are equal.

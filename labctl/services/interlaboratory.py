@@ -80,8 +80,11 @@ def _side(store: Store, serial: str, version: int) -> _Side:
 
 def _temperature(sides: tuple[_Side, _Side], given: float | None) -> float:
     ranges = [side.calibration.temperature_c for side in sides]
-    known = [each for each in ranges if all(math.isfinite(end) for end in each)]
-    low, high = max((each[0] for each in known), default=-math.inf), min((each[1] for each in known), default=math.inf)
+    ranges_known = [each for each in ranges if all(math.isfinite(end) for end in each)]
+    low, high = (
+        max((each[0] for each in ranges_known), default=-math.inf),
+        min((each[1] for each in ranges_known), default=math.inf),
+    )
     if low > high:
         raise BadInput(
             f"the versions have no temperature in common: {ranges[0][0]:g} to {ranges[0][1]:g} and {ranges[1][0]:g} to "

@@ -103,18 +103,18 @@ def _with_alignment(
     try:
         aligned = align_field(readings, solve(readings), field, magnetometer)
     except NotEnoughData as error:
-        said = f"Alignment of the magnetometer: unknown: {error}"
-        return answer.model_copy(update={"text": [said, *answer.text]})
+        text = f"Alignment of the magnetometer: unknown: {error}"
+        return answer.model_copy(update={"text": [text, *answer.text]})
     angles = ", ".join(
         f"{value:.2f} +- {2 * u:.2f}"
         for value, u in zip(np.degrees(aligned.angles_rad), np.degrees(aligned.u_rad[:3]), strict=True)
     )
-    said = (
+    text = (
         f"Magnetometer turned from the accelerometer's axes about x, y, z by {angles} deg (U, k = 2); the field dips "
         f"by {np.degrees(aligned.dip_rad):.1f} deg."
     )
     # the last sentence is that of the verdict, which a refusal of an export cites
-    return answer.model_copy(update={"alignment": _alignment(aligned), "text": [said, *answer.text]})
+    return answer.model_copy(update={"alignment": _alignment(aligned), "text": [text, *answer.text]})
 
 
 def _alignment(field: FieldAlignment) -> FieldAlignmentJson:

@@ -208,11 +208,12 @@ class LabJackGyro:
     def _decode(self, data: bytes) -> Readings:
         packets, self._unfinished, damaged = stream.split(self._unfinished + data)
         for packet in packets:
-            if (why := stream.FATAL.get(packet.status)) is not None:
+            if (reason := stream.FATAL.get(packet.status)) is not None:
                 self.stop()
                 raise LinkError(
                     self.name,
-                    f"the stream ended (status {packet.status}): {why}; check the device, then start the stream again",
+                    f"the stream ended (status {packet.status}): {reason}; check the device, then start the stream "
+                    "again",
                 )
         numbers, codes = self._packets.add(packets)
         good = np.all((codes > LOWEST_CODE) & (codes < HIGHEST_CODE), axis=1)

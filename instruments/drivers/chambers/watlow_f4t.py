@@ -99,8 +99,8 @@ class WatlowF4T(Watlow):
     def _stopped(self) -> str:
         loop = self._loop()
         if (mode := self._registers.get_int(loop.mode)) != f4t.MODE_AUTO:
-            what = "cascade loop 1" if loop is f4t.CASCADE else "control loop 1"
-            return f"{what} is in mode {f4t.MODES.get(mode, mode)}, not auto"
+            loop_name = "cascade loop 1" if loop is f4t.CASCADE else "control loop 1"
+            return f"{loop_name} is in mode {f4t.MODES.get(mode, mode)}, not auto"
         if self.settings.run_output is None:
             return ""
         module, output = self.settings.run_output

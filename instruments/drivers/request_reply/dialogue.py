@@ -123,10 +123,10 @@ class Dialogue:
             return
         reply = self.text(check, "say whether a command was an error")
         if not re.fullmatch(check.passes, reply):
-            why = self._line.reasons.get(reply, reply)
+            reason = self._line.reasons.get(reply, reply)
             raise RequestRejected(
                 self.link.device,
-                f"refused to {purpose}: {why!r} after {request!r}; check its mode and limits, or correct its "
+                f"refused to {purpose}: {reason!r} after {request!r}; check its mode and limits, or correct its "
                 "description",
             )
 

@@ -225,11 +225,11 @@ def _own(
     """Return the certificate of a public key, and the others. Raises BadInput where none is."""
     if not certificates:
         raise BadInput(f"{location}: it holds no certificate; name a PEM file with it by {SIGN_CERTIFICATE_VARIABLE}")
-    own = next((each for each in certificates if each.public_key() == public), None)
+    own = next((certificate for certificate in certificates if certificate.public_key() == public), None)
     if own is None:
         raise BadInput(_mismatch(location, signatory_of(certificates[0])))
     _public(own, location)
-    return own, tuple(each for each in certificates if each is not own)
+    return own, tuple(certificate for certificate in certificates if certificate is not own)
 
 
 def _mismatch(location: str, signatory: Signatory) -> str:

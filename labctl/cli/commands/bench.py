@@ -61,8 +61,8 @@ def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: AR
         return
     for port in port_listing:
         adapter = f"USB adapter {port.adapter or 'without a serial number'} ({port.product})" if port.product else ""
-        said = [f"now {port.device}" if port.device != port.path else "", adapter, port.trouble]
-        console.print(f"{port.path}  {'; '.join(filter(None, said))}", soft_wrap=True)
+        text = [f"now {port.device}" if port.device != port.path else "", adapter, port.trouble]
+        console.print(f"{port.path}  {'; '.join(filter(None, text))}", soft_wrap=True)
     if not port_listing:
         console.print("this computer has no serial port: plug in the USB adapters")
 
@@ -161,21 +161,21 @@ def status(as_json: Json = False, database: Database = None) -> None:
         print_json(benches)
     else:
         for bench in benches:
-            said = [
+            remarks = [
                 bench.unconfirmed,
-                *(f"not in its safe state; campaigns that did not end: {left}" for left in bench.left),
+                *(f"not in its safe state; campaigns that did not end: {campaign}" for campaign in bench.left),
             ]
             if bench.attempts:
-                said.insert(
+                remarks.insert(
                     1, f"labctl tried {bench.attempts} more times to set the safe state, last at {bench.attempted_at}"
                 )
             if bench.confirmed_at:
-                said.insert(
+                remarks.insert(
                     2,
                     f"labctl confirmed the safe state at {bench.confirmed_at}; a person must still inspect the "
                     "bench, then run `labctl bench clear`",
                 )
-            for line in filter(None, said if any(said) else ["the safe state is confirmed"]):
+            for line in filter(None, remarks if any(remarks) else ["the safe state is confirmed"]):
                 console.print(f"{bench.name:18} {line}", soft_wrap=True)
     if any(bench.unconfirmed or bench.left for bench in benches):
         raise typer.Exit(1)

@@ -118,9 +118,9 @@ def _try_description(
         console.print(f"{answer.name}, a {answer.kind}: the description is valid; give --port or --host to try it")
     else:
         failed = sum(1 for check in answer.checks if check.problem)
-        said = f"{failed} of {len(answer.checks)} failed" if failed else f"all {len(answer.checks)} passed"
-        left = "" if move or answer.kind == "reference" else "; its commands were not tried (--move)"
-        console.print(f"{answer.name}, a {answer.kind} at {answer.address}: {said}{left}", soft_wrap=True)
+        result_text = f"{failed} of {len(answer.checks)} failed" if failed else f"all {len(answer.checks)} passed"
+        move_text = "" if move or answer.kind == "reference" else "; its commands were not tried (--move)"
+        console.print(f"{answer.name}, a {answer.kind} at {answer.address}: {result_text}{move_text}", soft_wrap=True)
         if failed and answer.wire_log is not None:
             text = f"every byte is in {answer.wire_log}: add this file to a report of a fault (zcat shows it)"
             console.print(text, soft_wrap=True, markup=False, highlight=False)
@@ -143,10 +143,10 @@ def _try_driver(name: str, bench: str | None, *, as_json: bool) -> None:
         print_json(answer)
     else:
         failed = sum(1 for check in answer.checks if check.problem)
-        said = (
+        result_text = (
             f"{failed} of {len(answer.checks)} checks failed" if failed else f"all {len(answer.checks)} checks passed"
         )
-        console.print(f"{name} of {answer.distribution} {answer.version}: {said}")
+        console.print(f"{name} of {answer.distribution} {answer.version}: {result_text}")
         if failed:
             console.print(
                 "this was its simulator; `labctl bench check FILE --wire-log FILE` records every byte of an instrument",

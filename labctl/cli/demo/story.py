@@ -55,8 +55,8 @@ def _certify_best(demo: DemoRunner, serial: str) -> None:
 
 
 def _least_known(error: ErrorFiguresJson) -> float:
-    known = (error["heldout_rms_dps"], error["rms_dps"])
-    return next((value for value in known if value is not None), math.inf)
+    errors = (error["heldout_rms_dps"], error["rms_dps"])
+    return next((value for value in errors if value is not None), math.inf)
 
 
 def _fresh(folder: Path) -> Path:

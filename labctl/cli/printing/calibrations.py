@@ -30,8 +30,10 @@ def print_fit(answer: FitResponse) -> None:
     low, high = answer.validity.temperature_c
     slow, fast = answer.validity.rate_dps
     rates = "any rate" if slow is None or fast is None else f"{slow:.4g} to {fast:.4g} deg/s"
-    warm = "any temperature (none was measured)" if low is None or high is None else f"{low:.1f} to {high:.1f} deg C"
-    console.print(f"  valid              {warm}, {rates}")
+    temperature_text = (
+        "any temperature (none was measured)" if low is None or high is None else f"{low:.1f} to {high:.1f} deg C"
+    )
+    console.print(f"  valid              {temperature_text}, {rates}")
     if answer.model.held is not None:
         _print_held(answer.model.held)
     print_joint(answer.joint)
@@ -84,9 +86,9 @@ def print_poses(poses: PosesJson) -> None:
         f"{moves['applied_rms_dps']:.2g} deg/s RMS",
         soft_wrap=True,
     )
-    for left in moves["left_out"]:
-        where = f"{left['from_s']:.1f} to {left['until_s']:.1f} s"
-        console.print(f"  turn left out, from {where}: {left['why']}", style="yellow", soft_wrap=True)
+    for left_move in moves["left_out"]:
+        where = f"{left_move['from_s']:.1f} to {left_move['until_s']:.1f} s"
+        console.print(f"  turn left out, from {where}: {left_move['why']}", style="yellow", soft_wrap=True)
     console.print(f"frame: {poses['accelerometer']['frame']}", style="dim", soft_wrap=True)
     console.print(f"not determined: {poses['not_determined']}", style="dim", soft_wrap=True)
 
@@ -131,8 +133,8 @@ def print_certifications(rows: Sequence[CertificationResponse], waiting: Sequenc
     if not rows:
         console.print("nothing has been certified yet")
     for row in rows:
-        said = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {_persons(row)}: {row.reason}"
-        console.print(said, soft_wrap=True)
+        text = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {_persons(row)}: {row.reason}"
+        console.print(text, soft_wrap=True)
         if row.act == "certify":
             console.print(f"  verdict: {_verdict(row)}", soft_wrap=True)
         _print_objections(row)

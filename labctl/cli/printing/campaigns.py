@@ -111,9 +111,9 @@ def print_campaign(answer: CampaignResponse) -> None:
     for serial, recording in answer.recordings.items():
         console.print(f"  recording {recording}: {serial}")
     print_drafts(answer.drafts)
-    for device, said in answer.reported.items():
-        known = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in said.items())
-        console.print(f"  {device} says: {known}", soft_wrap=True)
+    for device, identity in answer.reported.items():
+        identity_text = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in identity.items())
+        console.print(f"  {device} says: {identity_text}", soft_wrap=True)
 
 
 def _print_troubles(answer: CampaignResponse) -> None:

@@ -7,10 +7,10 @@ from labctl.services.schemas.documents.certificates import CertificateResponse
 
 def list_line(row: CertificateResponse) -> str:
     """Return the line of a certificate in the list of a unit."""
-    said = f"{row.number}  version {row.version}, issued {row.issued_at:%Y-%m-%d} by {row.by}"
-    said += f", signed by {row.signed_by.subject}" if row.signed_by else ""
-    said += f", replaces {row.replaces}: {row.reason}" if row.replaces else ""
-    return "; ".join([said, state_text(row), *row.notices])
+    text = f"{row.number}  version {row.version}, issued {row.issued_at:%Y-%m-%d} by {row.by}"
+    text += f", signed by {row.signed_by.subject}" if row.signed_by else ""
+    text += f", replaces {row.replaces}: {row.reason}" if row.replaces else ""
+    return "; ".join([text, state_text(row), *row.notices])
 
 
 def state_text(answer: CertificateResponse) -> str:

@@ -28,14 +28,14 @@ class LivePrinter:
 
     def show(self, state: LiveState) -> None:
         """Show a state; nothing is printed where nothing has changed."""
-        asked = state.request.text if state.request is not None else ""
-        now = (state.covered, asked)
+        question = state.request.text if state.request is not None else ""
+        now = (state.covered, question)
         if now != self._printed:
             self._clear()
             self._printed = now
             stderr.print(_progress(state))
-            if asked:
-                stderr.print(f"next: {asked}")
+            if question:
+                stderr.print(f"next: {question}")
         for text in state.left_out:
             if text not in self._said:
                 self._said.add(text)

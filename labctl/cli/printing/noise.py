@@ -29,8 +29,8 @@ def print_allan(answers: Sequence[AllanResponse]) -> None:
     console.print(rows)
     for name, noise in lines:
         figures = (("N", noise["N"]), ("B", noise["B"]), ("K", noise["K"]))
-        said = ", ".join(f"{letter} {_shown(figure)}" for letter, figure in figures)
-        console.print(f"{name}: {said}", soft_wrap=True)
+        text = ", ".join(f"{letter} {_shown(figure)}" for letter, figure in figures)
+        console.print(f"{name}: {text}", soft_wrap=True)
         for remark in _remarks(noise):
             console.print(f"  {remark}", soft_wrap=True, style="dim")
     for answer in answers:

@@ -63,8 +63,8 @@ def print_standard(answer: StandardResponse) -> None:
     for finding in answer.findings:
         until = finding.bad_until or "now"
         withdrawn = f"; withdrawn: {finding.withdrawn}" if finding.withdrawn else ""
-        said = f"finding {finding.number}: bad from {finding.bad_from} until {until}: {finding.reason}{withdrawn}"
-        console.print(said, markup=False, soft_wrap=True)
+        text = f"finding {finding.number}: bad from {finding.bad_from} until {until}: {finding.reason}{withdrawn}"
+        console.print(text, markup=False, soft_wrap=True)
     _print_text(answer.text)
 
 
@@ -119,8 +119,8 @@ def print_comparison(answer: LaboratoryComparison) -> None:
     for name, side in (("first", answer.first), ("second", answer.second)):
         where = ", ".join(filter(None, (side.laboratory, side.bench))) or "imported"
         day = side.measured_on or "a date that is not known"
-        said = f"{name}: {side.serial} version {side.version}, {where}, measured on {day}"
-        console.print(said, markup=False)
+        text = f"{name}: {side.serial} version {side.version}, {where}, measured on {day}"
+        console.print(text, markup=False)
     title = f"at {answer.temperature_c:g} deg C"
     rows = table(title, "axis", "result", "unit", "first", "U", "second", "U", "En", "zeta", numbers=6)
     for result in answer.results:

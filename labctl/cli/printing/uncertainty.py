@@ -110,8 +110,8 @@ def _print_coefficients(answer: UncertaintyResponse) -> None:
     for axis, named in answer.coefficients.items():
         for name, one in named.items():
             parts = [line.contribution for line in one.lines if line.source not in EVALUATED]
-            known = [part for part in parts if part is not None]
-            standards = sum(part**2 for part in known) ** 0.5 if known else None
+            parts_stated = [part for part in parts if part is not None]
+            standards = sum(part**2 for part in parts_stated) ** 0.5 if parts_stated else None
             rows.add_row(
                 f"{axis} {name}", one.unit, format_number(one.value), format_number(one.combined, 2),
                 format_number(one.k, 3), format_number(one.expanded, 2), format_number(standards, 2),

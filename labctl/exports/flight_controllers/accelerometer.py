@@ -42,8 +42,8 @@ LARGEST_OFFSET_M_S2, SCALES = 3.5, (0.8, 1.2)
 def misalignment_loss_g(parameters: ForceParameters) -> float:
     """Return the largest error, over all directions, of gravity's size that is left without the misalignments, g."""
     inverse = np.linalg.inv(np.eye(3) + parameters.errors)
-    left = inverse @ np.diag(1 + np.diag(parameters.errors)) - np.eye(3)
-    return parameters.gravity_g * float(np.abs(np.linalg.eigvalsh((left + left.T) / 2)).max())
+    residual = inverse @ np.diag(1 + np.diag(parameters.errors)) - np.eye(3)
+    return parameters.gravity_g * float(np.abs(np.linalg.eigvalsh((residual + residual.T) / 2)).max())
 
 
 def px4(parameters: ForceParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:

@@ -44,12 +44,12 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
         squared = d * d
         return np.asarray(values[0] + values[1] * d + values[2] * squared + values[3] * squared * d, dtype=np.float64)
 
-    seen = compared(cubic, offset_rad_s)
-    hold_tolerance(options, seen, NAME)
+    differences_seen = compared(cubic, offset_rad_s)
+    hold_tolerance(options, differences_seen, NAME)
     temperatures_c = cubic.part.temperatures()
     moved = np.rad2deg(offset_rad_s(temperatures_c + UPDATE_K) - offset_rad_s(temperatures_c))
     losses = (
-        *cubic.losses(seen, CONSUMER),
+        *cubic.losses(differences_seen, CONSUMER),
         Loss("a new offset is applied only when the temperature has moved by 1 K", float(np.abs(moved).max())),
     )
     prefix = f"TC_G{instance}_"
@@ -65,11 +65,12 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
         for column in range(len(AXES))
     ]
     head = head_lines(
-        calibration, "the bias over temperature, as a cubic in rad/s about TC_G*_TREF", float(seen.at_rest.max()),
+        calibration, "the bias over temperature, as a cubic in rad/s about TC_G*_TREF",
+        float(differences_seen.at_rest.max()),
         losses, _notes(prefix, has_id="device_id" in options),
     )  # fmt: skip
     body = "".join(f"1\t1\t{name}\t{value}\t{kind}\n" for name, value, kind in rows)
-    return Written((commented(head) + body).encode("ascii"), losses, float(seen.at_rest.max()))
+    return Written((commented(head) + body).encode("ascii"), losses, float(differences_seen.at_rest.max()))
 
 
 def _notes(prefix: str, *, has_id: bool) -> list[str]:

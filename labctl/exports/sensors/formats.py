@@ -63,7 +63,7 @@ def written(parameters: Parameters, head: Sequence[str], name: str, instance: in
     chosen = format_of(parameters, name)
     if chosen.first is not None:
         return chosen.write(parameters, head, chosen.first if instance is None else instance, device_id)
-    given: dict[str, Any] = {"--instance": instance, "--device-id": device_id}
-    if wrong := [option for option, value in given.items() if value is not None]:
+    stated_options: dict[str, Any] = {"--instance": instance, "--device-id": device_id}
+    if wrong := [option for option, value in stated_options.items() if value is not None]:
         raise BadInput(f"--export {name} takes no {wrong[0]}: it is for the parameters of an autopilot; leave it out")
     return chosen.write(parameters, head)

@@ -46,9 +46,9 @@ def g_sensitivity(position: NDArray[np.str_], error_dps: Array) -> tuple[Estimat
         return None
     columns = np.column_stack([np.ones(len(position)), up])
     coefficients, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
-    left = error_dps - columns @ coefficients
+    residual = error_dps - columns @ coefficients
     freedom = len(error_dps) - 4
-    variance = float(left @ left) / freedom
+    variance = float(residual @ residual) / freedom
     u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
     x, y, z = (Estimate(float(value), float(one)) for value, one in zip(coefficients[1:], u[1:], strict=True))
     return x, y, z

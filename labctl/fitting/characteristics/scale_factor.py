@@ -33,8 +33,8 @@ def straight_line(rate_dps: Array, output_dps: Array) -> StraightLine | None:
     if different_rates(rate_dps) < 2:
         return None
     columns = np.column_stack([np.ones(len(rate_dps)), rate_dps])
-    values, u, left = _solved(columns, output_dps)
-    return StraightLine(Estimate(values[1], u[1]), Estimate(values[0], u[0]), left)
+    values, u, residual = _solved(columns, output_dps)
+    return StraightLine(Estimate(values[1], u[1]), Estimate(values[0], u[0]), residual)
 
 
 def nonlinearity_ppm(line: StraightLine, full_scale_dps: float, u_mean_dps: Array | None) -> Estimate:
@@ -88,10 +88,10 @@ def different_rates(rate_dps: Array) -> int:
 def _solved(columns: Array, values: Array) -> tuple[list[float], list[float | None], Array]:
     """Return coefficients, their standard uncertainties by the scatter about the fit, and what is left."""
     solution, *_ = np.linalg.lstsq(columns, values, rcond=None)
-    left = values - columns @ solution
+    residual = values - columns @ solution
     freedom = len(values) - columns.shape[1]
     if freedom < 1:
-        return solution.tolist(), [None] * columns.shape[1], left
-    variance = float(left @ left) / freedom
+        return solution.tolist(), [None] * columns.shape[1], residual
+    variance = float(residual @ residual) / freedom
     u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
-    return solution.tolist(), u.tolist(), left
+    return solution.tolist(), u.tolist(), residual

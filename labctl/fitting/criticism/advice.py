@@ -71,11 +71,17 @@ def advice_for(
     for term in terms:
         report_stage(f"checking what a calibration with {term.effect} would do")
         checked = exported_errors(data, model, tuple(beside), term)
-        why = _why_not_carried(term) or _why_not_better(checked)
+        reason = _why_not_carried(term) or _why_not_better(checked)
         advice.append(
-            Advice(effect=term.effect, add=not why, why=why, before_dps=checked.before_dps, after_dps=checked.after_dps)
+            Advice(
+                effect=term.effect,
+                add=not reason,
+                why=reason,
+                before_dps=checked.before_dps,
+                after_dps=checked.after_dps,
+            )
         )
-        beside += [] if why else [term]
+        beside += [] if reason else [term]
     return tuple(advice)
 
 
@@ -118,9 +124,9 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
     except LabctlError:
         return Exported(None, None)
     errors: tuple[list[dict[str, Array]], list[dict[str, Array]]] = ([], [])
-    for seen, left_out in parts_of(data, inner_only=presets[0].inner_only):
+    for data_used, left_out in parts_of(data, inner_only=presets[0].inner_only):
         try:
-            both = [_left(seen, left_out, p, axis_errors) for p, axis_errors in zip(presets, whole, strict=True)]
+            both = [_left(data_used, left_out, p, axis_errors) for p, axis_errors in zip(presets, whole, strict=True)]
         except LabctlError:  # a part that the others do not determine says nothing
             continue
         for parts, values in zip(errors, both, strict=True):
@@ -181,10 +187,10 @@ def parts_of(data: FitData, *, inner_only: bool) -> Iterator[tuple[FitData, FitD
         yield from pairs[1:-1] if inner_only else pairs
         return
     for mask in masks:
-        seen = data.take(~mask)
-        if len(seen) == 0:
+        data_used = data.take(~mask)
+        if len(data_used) == 0:
             continue
-        low, high = float(seen.temperature_c.min()) - BEYOND_K, float(seen.temperature_c.max()) + BEYOND_K
+        low, high = float(data_used.temperature_c.min()) - BEYOND_K, float(data_used.temperature_c.max()) + BEYOND_K
         left_out = data.take(mask & (data.temperature_c >= low) & (data.temperature_c <= high))
         if len(left_out):
-            yield seen, left_out
+            yield data_used, left_out

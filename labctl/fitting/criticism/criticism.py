@@ -171,8 +171,8 @@ def criticise(
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)
     data = _leaning(data, fit_data, forward)
-    seen = data.through(response_of_terms(forward.terms))
-    comparison = compare_models(beside_held(seen, forward), forward, catalogue)
+    delayed = data.through(response_of_terms(forward.terms))
+    comparison = compare_models(beside_held(delayed, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
     verdict = _without_large_residual(_beyond_noise(verdict, initial), base)
     family, hint = family_or_hint(fit_data, forward, verdict)
@@ -191,7 +191,7 @@ def criticise(
         direct_rms_dps=_direct_rms_dps(fit_data, model),
         suspects=suspects,
         not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),
-        explained=_explained(initial, seen),
+        explained=_explained(initial, delayed),
         views=views_of(criticism.beside_missing, criticism.residuals, recording, catalogue),
     )
 
@@ -215,8 +215,8 @@ def best_shapes(
     data = replace(reduce_recording(recording), static=static if is_decimated else static_record(recording))
     fit_data = fit_data_of(points)
     forward = _forward(fit_data, model, None)
-    seen = _leaning(data, fit_data, forward).through(response_of_terms(forward.terms))
-    comparison = compare_models(beside_held(seen, forward), forward, catalogue)
+    delayed = _leaning(data, fit_data, forward).through(response_of_terms(forward.terms))
+    comparison = compare_models(beside_held(delayed, forward), forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
 
 
@@ -235,8 +235,10 @@ def _checked(criticism: Criticism, forward: ErrorModel, *, full: bool) -> Critic
     advice = advice if family is None else (family.advice, *advice)
     verdict = with_hypothesis(without_harm(verdict, advice, slow, comparison), comparison, slow)
     advice = (*advice, NO_CORRECTION) if verdict.named == (QUANTIZATION,) else advice
-    kept = tuple(each for each in advice if each["effect"] in verdict.named)
-    return replace(criticism, verdict=verdict, advice=kept, slow=slow, family=family if LAG in verdict.named else None)
+    relevant = tuple(each for each in advice if each["effect"] in verdict.named)
+    return replace(
+        criticism, verdict=verdict, advice=relevant, slow=slow, family=family if LAG in verdict.named else None
+    )
 
 
 def _reduced(recording: Recording, static: StaticRecord | None, *, is_decimated: bool, full: bool) -> ReducedRecording:
@@ -285,8 +287,8 @@ def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict
     """Return the verdict, or "unexplained" in place of an adequate model whose residual is far above the floor."""
     if verdict.form != "adequate" or base is None:
         return verdict
-    left, floor = base.error.rms_dps, base.error.noise_floor_dps
-    if left is None or not floor or left <= MOST_OVER_FLOOR * floor:
+    rms_dps, floor = base.error.rms_dps, base.error.noise_floor_dps
+    if rms_dps is None or not floor or rms_dps <= MOST_OVER_FLOOR * floor:
         return verdict
     return replace(verdict, form="unexplained", further=())
 

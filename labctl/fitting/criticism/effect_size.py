@@ -54,9 +54,9 @@ def size_in_noise_units(reference: SizeReference, recording: Recording) -> tuple
     best = (0.0, 0.0)
     for axis, design in reference.designs.items():
         difference = other.output[axis] - reference.data.output[axis]
-        left = _chi2(reference, axis, design.base, design.precision, difference)
+        chi2_left = _chi2(reference, axis, design.base, design.precision, difference)
         whole = _chi2(reference, axis, design.base[:, :, :0], design.precision[:0], difference)
-        best = max(best, (float(np.sqrt(left)), float(np.sqrt(left / whole)) if whole > 0 else 0.0))
+        best = max(best, (float(np.sqrt(chi2_left)), float(np.sqrt(chi2_left / whole)) if whole > 0 else 0.0))
     return best
 
 

@@ -81,8 +81,8 @@ def _floor_squared(design: Design, y: NDArray[np.float64]) -> float:
     columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
     u, s, _ = np.linalg.svd(columns, full_matrices=False)
     u = u[:, s > 1e-6 * s[0]]
-    left = y[0] - u @ (u.T @ y[0])
-    return float((ROBUST * np.median(np.abs(left))) ** 2 * len(left) / max(len(left) - u.shape[1], 1))
+    residual = y[0] - u @ (u.T @ y[0])
+    return float((ROBUST * np.median(np.abs(residual))) ** 2 * len(residual) / max(len(residual) - u.shape[1], 1))
 
 
 def _base_residual(design: Design, y: NDArray[np.float64], white: Array) -> NDArray[np.float64]:
@@ -225,8 +225,8 @@ def centred(option: CandidateShape, level: NDArray[np.float64] | None) -> Candid
     if level is None:
         return option
     rows = option.rows - level[:, :, None] * option.rows[0].mean(axis=0)
-    size, left = (np.linalg.norm(each, axis=(0, 1)) for each in (option.rows, rows))
-    return replace(option, rows=np.where(left > ROUNDING * size, rows, 0.0))
+    size, size_left = (np.linalg.norm(each, axis=(0, 1)) for each in (option.rows, rows))
+    return replace(option, rows=np.where(size_left > ROUNDING * size, rows, 0.0))
 
 
 def orthogonalised(option: CandidateShape, base: NDArray[np.float64]) -> CandidateShape:
@@ -289,9 +289,14 @@ def with_noise_of(comparison: Comparison, fuller: Comparison) -> Comparison:
     for axis, design in comparison.designs.items():
         axis_comparison, other = comparison.axes[axis], fuller.axes[axis]
         y = comparison.data.error_dps(axis)
-        (left,) = eliminate_base(design, y, fuller.white_var[axis], fuller.scales[axis], [other.best.noise])
-        gain, dimensions = gains_of(left, axis_comparison.slices)
+        (eliminated,) = eliminate_base(design, y, fuller.white_var[axis], fuller.scales[axis], [other.best.noise])
+        gain, dimensions = gains_of(eliminated, axis_comparison.slices)
         axes[axis] = replace(
-            axis_comparison, best=left, gain=gain, dimensions=dimensions, weights=other.weights, noises=other.noises
+            axis_comparison,
+            best=eliminated,
+            gain=gain,
+            dimensions=dimensions,
+            weights=other.weights,
+            noises=other.noises,
         )
     return replace(comparison, axes=axes, white_var=fuller.white_var, scales=fuller.scales)

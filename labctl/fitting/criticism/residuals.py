@@ -63,7 +63,7 @@ def residuals_of(
     axis_residuals = {axis: _axis(comparison, axis, floors[axis]) for axis in comparison.axes}
     if fitted is None or any(len(values) != m for values in fitted.values()):
         return axis_residuals
-    return {axis: replace(left, means=fitted[axis]) for axis, left in axis_residuals.items()}
+    return {axis: replace(residuals, means=fitted[axis]) for axis, residuals in axis_residuals.items()}
 
 
 def _axis(comparison: Comparison, axis: str, floor_dps: Array) -> Residuals:

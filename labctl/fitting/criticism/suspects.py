@@ -69,10 +69,10 @@ def suspects_of(
     """
     probability = probabilities(comparison.candidates)
     effects = [c for c in comparison.candidates if not c.smooth]
-    shown = [c for c in effects if c.physical][:SHOWN]
-    shown += [c for c in effects if not c.physical and c.log_bf >= ENOUGH][:UNPHYSICAL_SHOWN]
+    shown_candidates = [c for c in effects if c.physical][:SHOWN]
+    shown_candidates += [c for c in effects if not c.physical and c.log_bf >= ENOUGH][:UNPHYSICAL_SHOWN]
     suspects = []
-    for candidate in shown:
+    for candidate in shown_candidates:
         after = _fit_with(comparison, candidate, data, model, shape_of)
         if after is not None and _is_worse(before, after):
             continue  # another shape of an effect that the model has: what it would replace fits better
@@ -103,10 +103,10 @@ def _share(before: FitResult | None, after: FitResult | None, compared: float) -
     if before is None or after is None or before.error.rms_dps is None or after.error.rms_dps is None:
         return compared
     floor = before.error.noise_floor_dps or 0.0
-    excess, left = (max(fit.error.rms_dps or 0.0, floor) ** 2 - floor**2 for fit in (before, after))
+    excess, after_squared = (max(fit.error.rms_dps or 0.0, floor) ** 2 - floor**2 for fit in (before, after))
     if excess <= 0.0:  # nothing between data sets
         return compared
-    return float(np.clip(1.0 - left / excess, 0.0, 1.0))
+    return float(np.clip(1.0 - after_squared / excess, 0.0, 1.0))
 
 
 def _p_value(comparison: Comparison, fuller: Comparison, candidate: Candidate) -> float:

@@ -207,12 +207,12 @@ def _rival(data: FitData, model: ErrorModel, effect: str) -> LeftOut:
         for axis in axes
     ]  # fmt: skip
     rivals: list[tuple[Axis, NDArray[np.bool_], NDArray[np.float64]]] = []
-    for seen, tested in stretches_of(data):
-        left = np.zeros(len(terms))
+    for in_fit, tested in stretches_of(data):
+        residual = np.zeros(len(terms))
         for axis, own in zip(axes, options, strict=True):
-            left += [float(np.sum(axis.left_over_noise(columns, seen) ** 2)) for columns in own]
-        best = int(np.argmin(left))
+            residual += [float(np.sum(axis.left_over_noise(columns, in_fit) ** 2)) for columns in own]
+        best = int(np.argmin(residual))
         rivals += [
-            (axis, tested, axis.errors(own[best], seen, tested)) for axis, own in zip(axes, options, strict=True)
+            (axis, tested, axis.errors(own[best], in_fit, tested)) for axis, own in zip(axes, options, strict=True)
         ]
     return pooled(rivals)

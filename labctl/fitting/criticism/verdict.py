@@ -202,8 +202,8 @@ def _alike(comparison: Comparison, leader: Candidate, *, physical: bool) -> list
 
 def axes_of(comparison: Comparison, candidate: Candidate) -> tuple[str, ...]:
     """Return the axes on which there is evidence for a candidate; all of its axes where no single one has enough."""
-    shown = [axis for axis, i in candidate.option.items() if comparison.axes[axis].log_bf[i] >= LEAD]
-    return tuple(shown or candidate.option)
+    shown_axes = [axis for axis, i in candidate.option.items() if comparison.axes[axis].log_bf[i] >= LEAD]
+    return tuple(shown_axes or candidate.option)
 
 
 def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
@@ -244,11 +244,11 @@ def overlap(comparison: Comparison, leader: Candidate, rival: Candidate) -> floa
     """Return which share of the leader's fitted signal the rival's best shape on each axis reproduces, 0 to 1."""
     part = whole = 0.0
     for axis, option in leader.option.items():
-        left, slices = comparison.axes[axis].best, comparison.axes[axis].slices
+        eliminated, slices = comparison.axes[axis].best, comparison.axes[axis].slices
         shared, size = (
-            reproduced_and_size(left, slices[option], slices[rival.option[axis]])
+            reproduced_and_size(eliminated, slices[option], slices[rival.option[axis]])
             if axis in rival.option
-            else (0.0, reproduced_and_size(left, slices[option], slices[option])[1])
+            else (0.0, reproduced_and_size(eliminated, slices[option], slices[option])[1])
         )
         part, whole = part + shared, whole + size
     return part / whole if whole > 0 else 0.0

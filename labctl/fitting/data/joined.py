@@ -211,5 +211,5 @@ def _below_one_another(tables: Sequence[Rows]) -> Rows:
 
 def without_recordings(recording: Recording, numbers: Sequence[int]) -> Recording:
     """Return a joined recording without some of its recordings; its environment stays whole."""
-    kept = ~np.isin(np.asarray(recording.columns[RECORDING]), numbers)
-    return replace(recording, columns={name: np.asarray(values)[kept] for name, values in recording.columns.items()})
+    is_used = ~np.isin(np.asarray(recording.columns[RECORDING]), numbers)
+    return replace(recording, columns={name: np.asarray(values)[is_used] for name, values in recording.columns.items()})

@@ -117,10 +117,10 @@ def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> Ang
         if not scheme.separates:
             continue
         placed = [f"{position}{PLACED}" for position in scheme.positions] if placed_rad else []
-        shown = np.column_stack([angle_regressor(channels, name) for name in (*scheme.names, *placed)])
+        regressors = np.column_stack([angle_regressor(channels, name) for name in (*scheme.names, *placed)])
         names += [*scheme.names, *placed]
         blocks.append(_block_diagonal([scheme.separated, np.eye(len(placed)) * placed_rad / PLACED_SIZE]))
-        values.append(shown @ blocks[-1])
+        values.append(regressors @ blocks[-1])
         sizes += [np.full(scheme.separated.shape[1], WIDE_RAD), np.full(len(placed), PLACED_SIZE)]
     combined = _block_diagonal(blocks)
     return AngleColumns(tuple(names), combined, np.concatenate(values, axis=1), np.concatenate(sizes))
@@ -245,12 +245,12 @@ def _names(position: Position) -> tuple[str, ...]:
 
 def _shown(position: Position, names: Iterable[str]) -> list[float]:
     """Return what a mounting shows of angles, by their names."""
-    shown = {}
+    regressors = {}
     for part, turned_deg in zip(PARTS, (position.unit_deg, position.turned_deg), strict=True):
         turned = np.deg2rad(turned_deg)
         for wave, value in zip(WAVES, (np.cos(turned), np.sin(turned)), strict=True):
-            shown[f"{position.end} {part} {wave}"] = float(value)
-    return [shown.get(name, 0.0) for name in names]
+            regressors[f"{position.end} {part} {wave}"] = float(value)
+    return [regressors.get(name, 0.0) for name in names]
 
 
 def _separated(sign: Array, angles: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -265,8 +265,8 @@ def _separated(sign: Array, angles: NDArray[np.float64]) -> NDArray[np.float64]:
     if np.linalg.norm(alike) > UNSEEN:
         free = _null_space(alike[None, 1:])
     _, sizes, rows = np.linalg.svd(angles @ free)
-    seen = sizes > UNSEEN * max(float(sizes.max(initial=0.0)), 1.0)
-    return np.asarray(free @ rows[: len(seen)][seen].T)
+    is_seen = sizes > UNSEEN * max(float(sizes.max(initial=0.0)), 1.0)
+    return np.asarray(free @ rows[: len(is_seen)][is_seen].T)
 
 
 def _null_space(matrix: NDArray[np.float64]) -> NDArray[np.float64]:

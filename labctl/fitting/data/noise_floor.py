@@ -63,12 +63,12 @@ def noise_floor_of(channels: Channels, errors_dps: Mapping[str, Array], scatter:
     white = {axis: noise.white_var for axis, noise in scatter.items()}
     if all(values is not None for values in white.values()):
         return _with_known_white(channels, surfaces, errors_dps, scatter)
-    left = {axis: values - surfaces[axis] @ (surfaces[axis].T @ values) for axis, values in errors_dps.items()}
+    residuals_dps = {axis: values - surfaces[axis] @ (surfaces[axis].T @ values) for axis, values in errors_dps.items()}
     m = len(channels)
-    repeats = repeats_dps(channels, left)
+    repeats = repeats_dps(channels, residuals_dps)
     if repeats is not None:
         return _of_scatter(m, dict.fromkeys(errors_dps, repeats), "repeats")
-    about = {axis: _scatter_dps(left[axis], surfaces[axis]) for axis in left}
+    about = {axis: _scatter_dps(residuals_dps[axis], surfaces[axis]) for axis in residuals_dps}
     noise = {axis: value for axis, value in about.items() if value is not None}
     if len(noise) < len(about):
         return _of_scatter(m, dict.fromkeys(errors_dps, np.nan), "none")
@@ -105,8 +105,8 @@ def _drift_of_many(surface: NDArray[np.float64], error_dps: Array, scatter: Scat
 
     The k directions that are then missing from it are a share k / m of all.
     """
-    left = error_dps - surface @ (surface.T @ error_dps)
-    return drift_beside(np.full((len(left), 1), 1.0 / np.sqrt(len(left))), left, scatter)
+    residual = error_dps - surface @ (surface.T @ error_dps)
+    return drift_beside(np.full((len(residual), 1), 1.0 / np.sqrt(len(residual))), residual, scatter)
 
 
 def _drift(surface: NDArray[np.float64], fuller: NDArray[np.float64], error_dps: Array, scatter: Scatter) -> Drift:
@@ -120,8 +120,8 @@ def _drift(surface: NDArray[np.float64], fuller: NDArray[np.float64], error_dps:
     # the last column of the triangle: what the surface takes of the data, what the levels take, and what is left
     triangle: NDArray[np.float64] = np.asarray(np.linalg.qr(rows, mode="r"))
     reduced = triangle[:, -1] ** 2
-    explained, left = float(np.sum(reduced[k:k_fuller])), float(np.sum(reduced[k_fuller:]))
-    if fdtrc(more, free, explained / more / max(left / free, 1e-300)) > FALSE_ALARM:
+    explained, unexplained = float(np.sum(reduced[k:k_fuller])), float(np.sum(reduced[k_fuller:]))
+    if fdtrc(more, free, explained / more / max(unexplained / free, 1e-300)) > FALSE_ALARM:
         return first
     return drift_beside(fuller, error_dps, scatter)
 

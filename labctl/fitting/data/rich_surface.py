@@ -106,11 +106,11 @@ def _new_part(column: Array, basis: NDArray[np.float64], least_new: float) -> Ar
     size = float(np.linalg.norm(column))
     if size == 0:
         return None
-    left = column / size
+    residual = column / size
     for _ in range(2):  # the second time takes out what rounding left
-        left = left - basis @ (basis.T @ left)
-    new = float(np.linalg.norm(left))
-    return np.asarray(left / new) if new > least_new else None
+        residual = residual - basis @ (basis.T @ residual)
+    new = float(np.linalg.norm(residual))
+    return np.asarray(residual / new) if new > least_new else None
 
 
 def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
@@ -221,11 +221,11 @@ def since_first(channels: Channels) -> Array:
 
 def _carried(signs: Array) -> Array:
     """Return signs (m,) in order of time with each 0 replaced by the last sign before it, at the start by the first."""
-    where = np.flatnonzero(signs)
-    if not len(where):
+    rows = np.flatnonzero(signs)
+    if not len(rows):
         return signs
-    last = np.searchsorted(where, np.arange(len(signs)), side="right") - 1
-    return np.asarray(signs[where[np.maximum(last, 0)]])
+    last = np.searchsorted(rows, np.arange(len(signs)), side="right") - 1
+    return np.asarray(signs[rows[np.maximum(last, 0)]])
 
 
 def _scaled(values: Array, *, about_zero: bool = False) -> Array:

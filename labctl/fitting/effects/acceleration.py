@@ -29,9 +29,10 @@ class _Acceleration(Effect):
         changes = {body: change_g(channels, body) for body in self.felt_along(axis)}
         if not changes or max(changes.values()) >= LEAST_CHANGE_G:
             return ""
-        seen = ", ".join(f"{body} by {change:.2g} g" for body, change in changes.items())
+        changes_text = ", ".join(f"{body} by {change:.2g} g" for body, change in changes.items())
         return (
-            f"no change of pose: the specific force changes less than {LEAST_CHANGE_G} g ({seen}), as a support tilts "
+            f"no change of pose: the specific force changes less than {LEAST_CHANGE_G} g ({changes_text}), as a "
+            "support tilts "
             "or an accelerometer drifts; measure each axis up and down"
         )
 

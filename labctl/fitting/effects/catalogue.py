@@ -48,7 +48,7 @@ Kinds = tuple[Effect, ...]
 
 def _checked(declared: Any) -> Kinds:
     kinds = (declared,) if isinstance(declared, type) else tuple(declared)
-    made = []
+    effects = []
     for kind in kinds:
         if not (isinstance(kind, type) and issubclass(kind, Effect)):
             raise TypeError(f"{kind!r} is not a subclass of labctl.fitting.effects.Effect; derive it from that class")
@@ -58,8 +58,8 @@ def _checked(declared: Any) -> Kinds:
                 f"effect id {effect.id!r} is not valid; use small letters, digits and _ only, beginning with a letter"
             )
         refuse_useless(effect)
-        made.append(effect)
-    return tuple(made)
+        effects.append(effect)
+    return tuple(effects)
 
 
 FAMILIES: PluginGroup[Kinds] = PluginGroup("labctl.effects", "family of effects", _checked)

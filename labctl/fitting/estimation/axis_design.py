@@ -121,8 +121,8 @@ def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) 
     at_rest = model.columns(stopped, axis)
     return [
         (owner, column)
-        for (owner, column), (_, left) in zip(named_columns, at_rest, strict=True)
-        if np.any(left.values) or model.held.of(axis, owner, column.name) is not None
+        for (owner, column), (_, column_at_rest) in zip(named_columns, at_rest, strict=True)
+        if np.any(column_at_rest.values) or model.held.of(axis, owner, column.name) is not None
     ]
 
 

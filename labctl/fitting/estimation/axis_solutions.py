@@ -209,8 +209,8 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
             "or leave effects out"
         )
     coordinates, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
-    left = y - columns @ coordinates
-    return replace(scatter, white_var=np.full(len(y), max(float(left @ left) / (len(y) - rank), 1e-20)))
+    residual = y - columns @ coordinates
+    return replace(scatter, white_var=np.full(len(y), max(float(residual @ residual) / (len(y) - rank), 1e-20)))
 
 
 def _axis_fit(design: AxisDesign, solution: Solution, late: TimeErrors | None = None) -> AxisFit:
@@ -240,10 +240,10 @@ def residuals(fitted: FittedModel, data: FitData, nuisance: Mapping[str, Nuisanc
     if nuisance and not data.angles_known:
         data = leaning(data, nuisance)
     outputs = {a: v - nuisance[a].error_dps(data, a) if nuisance else v for a, v in data.outputs.items()}
-    seen = {axis: data.through(response_of(fitted.axes[axis])) for axis in outputs}
-    across_dps = next(iter(seen.values())).across_dps
+    delayed = {axis: data.through(response_of(fitted.axes[axis])) for axis in outputs}
+    across_dps = next(iter(delayed.values())).across_dps
     corrected = without_response(fitted).compensate(outputs, data.channels, across_dps)
-    return {axis: corrected[axis] - seen[axis].true_rate_dps(axis) for axis in outputs}
+    return {axis: corrected[axis] - delayed[axis].true_rate_dps(axis) for axis in outputs}
 
 
 def fit_turning(fitted: FittedModel, data: FitData) -> dict[str, Nuisance]:
@@ -251,9 +251,9 @@ def fit_turning(fitted: FittedModel, data: FitData) -> dict[str, Nuisance]:
 
     For judging a calibration on a recording that it was not fitted to: the direction of north is not known in advance.
     """
-    left = residuals(fitted, data)
+    residuals_dps = residuals(fitted, data)
     by_axis: dict[str, Nuisance] = {}
-    for axis, values in left.items():
+    for axis, values in residuals_dps.items():
         columns = turning_columns(data.info, data.channels, axis)
         independent = columns.shape[1] > 0 and rank_of(columns) == columns.shape[1]
         turning = np.asarray(np.linalg.lstsq(columns, values)[0] if independent else [], dtype=np.float64)

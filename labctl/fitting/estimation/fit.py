@@ -83,24 +83,24 @@ def _tested(
     errors: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
     tested = 0
     for fitted_to, left_out in pairs:
-        seen = data.take(fitted_to)
-        low, high = float(seen.temperature_c.min()) - BEYOND_K, float(seen.temperature_c.max()) + BEYOND_K
-        rest = data.take(left_out & (data.temperature_c >= low) & (data.temperature_c <= high))
-        if len(rest) == 0:
+        data_used = data.take(fitted_to)
+        low, high = float(data_used.temperature_c.min()) - BEYOND_K, float(data_used.temperature_c.max()) + BEYOND_K
+        data_tested = data.take(left_out & (data.temperature_c >= low) & (data.temperature_c <= high))
+        if len(data_tested) == 0:
             return _answer(names, None, 0, f"no data set of the {names[1]} is at a temperature of the {names[0]}")
-        lost = [a for a in BODY_AXES if seen.distinct_rates(a) < TOLD_APART <= data.distinct_rates(a)]
+        lost = [a for a in BODY_AXES if data_used.distinct_rates(a) < TOLD_APART <= data.distinct_rates(a)]
         if lost:
             return _answer(names, None, 0, f"the {names[0]} do not turn the unit about {' and '.join(lost)}")
         try:
-            model, rows = preset.build(seen)
-            used = seen.take(rows)
+            model, rows = preset.build(data_used)
+            used = data_used.take(rows)
             require_enough_data(used, model)
             solved = solve_axes(used, model, solutions)
-            left = residuals(FittedModel(model, solved.fits), rest, solved.nuisance)
+            residuals_dps = residuals(FittedModel(model, solved.fits), data_tested, solved.nuisance)
         except LabctlError as error:
             return _answer(names, None, 0, f"the {names[0]} alone does not determine the model: {error}")
-        tested += len(rest)
-        for axis, values in left.items():
+        tested += len(data_tested)
+        for axis, values in residuals_dps.items():
             errors[axis].append(values)
     return _answer(names, rms({axis: np.concatenate(parts) for axis, parts in errors.items()}), tested, "")
 
@@ -138,11 +138,15 @@ def depends_on_rate(model: ErrorModel, data: FitData, *, held: bool = True) -> b
     rows = np.unique(np.linspace(0, len(data) - 1, min(len(data), MOST_ROWS)).astype(np.int64))
     channels = data.channels.take(rows)
     fastest = max(1.0, *(abs(end) for axis in data.outputs for end in data.covered.rate_dps[axis]))
-    seen = [_at_rate(channels, share * fastest) for share in SHARES]
+    channels_at_rates = [_at_rate(channels, share * fastest) for share in SHARES]
     for axis in data.outputs:
         first, *others = [
-            [c.values for owner, c in model.columns(each, axis) if held or model.held.of(axis, owner, c.name) is None]
-            for each in seen
+            [
+                c.values
+                for owner, c in model.columns(channels_at_rate, axis)
+                if held or model.held.of(axis, owner, c.name) is None
+            ]
+            for channels_at_rate in channels_at_rates
         ]
         for other in others:
             if len(other) != len(first) or not all(map(np.array_equal, first, other)):
@@ -166,24 +170,24 @@ def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solut
     if preset.inner_only:
         pairs = pairs[1:-1]
     errors: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
-    for seen, left_out in pairs:
-        if len(seen) == 0:
+    for data_used, left_out in pairs:
+        if len(data_used) == 0:
             return {}
         try:
-            model, rows = preset.build(seen)
-            require_enough_data(seen.take(rows), model)
-            solved = solve_axes(seen.take(rows), model, solutions)
+            model, rows = preset.build(data_used)
+            require_enough_data(data_used.take(rows), model)
+            solved = solve_axes(data_used.take(rows), model, solutions)
         except NotEnoughData:
             return {}
         try:
-            left = residuals(FittedModel(model, solved.fits), left_out, solved.nuisance)
+            residuals_dps = residuals(FittedModel(model, solved.fits), left_out, solved.nuisance)
         except NotConverged as error:
             at_c = float(left_out.temperature_c.mean())
             raise NotConverged(
                 f"{error}; this fit left out the data sets near {at_c:.1f} deg C, to test the "
                 "model at a temperature that it was not fitted to"
             ) from None
-        for axis, values in left.items():
+        for axis, values in residuals_dps.items():
             errors[axis].append(values)
     return {axis: np.concatenate(parts) for axis, parts in errors.items() if parts}
 
@@ -247,9 +251,12 @@ def _left_out_dps(fitted: FittedModel, data: FitData) -> dict[str, float]:
     by_effect = {}
     for term in fitted.model.terms:
         if not is_exported(term):
-            rest = without(fitted, term.effect)
+            without_effect = without(fitted, term.effect)
             channels = data.seen_by(fitted.model.argument)
-            parts = {axis: fitted.error_dps(channels, axis) - rest.error_dps(channels, axis) for axis in data.outputs}
+            parts = {
+                axis: fitted.error_dps(channels, axis) - without_effect.error_dps(channels, axis)
+                for axis in data.outputs
+            }
             by_effect[term.effect] = rms(parts) or 0.0
     return by_effect
 

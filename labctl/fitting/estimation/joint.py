@@ -78,13 +78,13 @@ def agreement_of(
 
 def _estimated(fit: AxisFit, held: tuple[str, ...]) -> AxisFit:
     """Return the coefficients of an axis without those that are held."""
-    kept = [k for k, name in enumerate(fit.names) if name not in held]
+    estimated = [k for k, name in enumerate(fit.names) if name not in held]
     flat = np.repeat([name not in held for name in fit.names], fit.values.shape[1])
     return AxisFit(
-        tuple(fit.effects[k] for k in kept),
-        tuple(fit.names[k] for k in kept),
-        tuple(fit.units[k] for k in kept),
-        fit.values[kept],
+        tuple(fit.effects[k] for k in estimated),
+        tuple(fit.names[k] for k in estimated),
+        tuple(fit.units[k] for k in estimated),
+        fit.values[estimated],
         fit.covariance[np.ix_(flat, flat)],
     )
 
@@ -216,11 +216,11 @@ def _held_out(data: FitData, preset: Preset) -> tuple[list[HeldOutRecording], di
     of, lines = np.asarray(data.channels["recording"]), []
     pooled: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
     for number, left_out in of_each_recording(data).items():
-        seen = data.take(of != number)
+        data_used = data.take(of != number)
         try:
-            model, rows = preset.build(seen)
-            require_enough_data(seen.take(rows), model)
-            fitted = FittedModel(model, solve_axes(seen.take(rows), model).fits)
+            model, rows = preset.build(data_used)
+            require_enough_data(data_used.take(rows), model)
+            fitted = FittedModel(model, solve_axes(data_used.take(rows), model).fits)
             errors = residuals(fitted, left_out, fit_turning(fitted, left_out))
         except (NotEnoughData, NotConverged) as error:
             lines.append(HeldOutRecording(recording=number, rms_dps=None, why=str(error)))

@@ -80,10 +80,10 @@ def _nearest(data: FitData, axis: str, responses: list[Response]) -> Response:
     """Return the response at which a straight line through the output leaves the smallest residuals."""
 
     def left(response: Response) -> float:
-        seen = data.through(response).true_rate_dps(axis)
-        seen, output = seen - seen.mean(), data.outputs[axis] - data.outputs[axis].mean()
-        along = float(seen @ output)
-        return float(output @ output) - along**2 / max(float(seen @ seen), 1e-300)
+        delayed = data.through(response).true_rate_dps(axis)
+        delayed, output = delayed - delayed.mean(), data.outputs[axis] - data.outputs[axis].mean()
+        along = float(delayed @ output)
+        return float(output @ output) - along**2 / max(float(delayed @ delayed), 1e-300)
 
     return min(responses, key=left)
 

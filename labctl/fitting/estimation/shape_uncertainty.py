@@ -88,17 +88,17 @@ def _beside_base(
     own, moved = rows[:, : base.shape[1]], rows[:, base.shape[1] :]
     size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
     coordinates, *_ = np.linalg.lstsq(own / size, moved, rcond=1e-9)
-    left = moved - own / size @ coordinates
+    residual = moved - own / size @ coordinates
     noise = float(np.sqrt(solution.scale)) if np.isfinite(solution.scale) else np.inf
-    return np.asarray(left / max(noise, 1e-300))
+    return np.asarray(residual / max(noise, 1e-300))
 
 
 def _u(information: NDArray[np.float64]) -> Array:
     """Return standard uncertainties from an information matrix (k, k); infinite where it has none."""
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    seen = size > LEAST
+    is_seen = size > LEAST
     u = np.full(len(size), np.inf)
-    if seen.any():
-        scaled = information[np.ix_(seen, seen)] / np.outer(size[seen], size[seen])
-        u[seen] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(scaled, rcond=1e-10)), 0.0)) / size[seen]
+    if is_seen.any():
+        scaled = information[np.ix_(is_seen, is_seen)] / np.outer(size[is_seen], size[is_seen])
+        u[is_seen] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(scaled, rcond=1e-10)), 0.0)) / size[is_seen]
     return u

@@ -57,9 +57,9 @@ def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> 
         return preset
 
     def build(some: FitData) -> tuple[ErrorModel, Rows]:
-        made, rows = preset.build(some)
-        terms = (replace(t, parameters=shapes[t.effect].parameters) if t.effect in shapes else t for t in made.terms)
-        return made.with_terms(tuple(terms)), rows
+        built, rows = preset.build(some)
+        terms = (replace(t, parameters=shapes[t.effect].parameters) if t.effect in shapes else t for t in built.terms)
+        return built.with_terms(tuple(terms)), rows
 
     return Preset(preset.name, build, preset.inner_only)
 
@@ -97,10 +97,12 @@ def _found(data: FitData, model: ErrorModel, effects: Sequence[str]) -> list[Ter
         return [terms[name] for name in effects]
 
     def at(logarithms: Array) -> dict[str, Term]:
-        made = dict(terms)
+        shaped = dict(terms)
         for (name, parameter), value in zip(free, logarithms.tolist(), strict=True):
-            made[name] = replace(made[name], parameters={**made[name].parameters, parameter.name: float(np.exp(value))})
-        return made
+            shaped[name] = replace(
+                shaped[name], parameters={**shaped[name].parameters, parameter.name: float(np.exp(value))}
+            )
+        return shaped
 
     from scipy.optimize import minimize
 
@@ -110,8 +112,8 @@ def _found(data: FitData, model: ErrorModel, effects: Sequence[str]) -> list[Ter
         lambda x: search.left(at(x)), np.clip(begin, *np.array(bounds).T), method="Nelder-Mead", bounds=bounds,
         options={"xatol": TOLERANCE, "fatol": 0.01, "maxfev": EVALUATIONS * len(free)},
     )  # fmt: skip
-    made = at(np.asarray(best.x)) if best.fun < search.left(terms) else terms
-    return [made[name] for name in effects]
+    terms_found = at(np.asarray(best.x)) if best.fun < search.left(terms) else terms
+    return [terms_found[name] for name in effects]
 
 
 @dataclass(frozen=True)

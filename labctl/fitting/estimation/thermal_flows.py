@@ -127,21 +127,21 @@ class Axis:
     def lags(self) -> NDArray[np.float64]:
         """The columns of every time constant of the grid (m, .): of each part in turn, then of pairs of them."""
         behind = [self._behind_k(float(tau_s)) for tau_s in GRID_S]
-        made = [LagElement("", "", part, 0.0).values(lag, self.above_k) for part in PARTS for lag in behind]
+        lag_columns = [LagElement("", "", part, 0.0).values(lag, self.above_k) for part in PARTS for lag in behind]
         channels, (warming, cooling) = self.data.channels, GRID_S[PAIRS.T]
         both = channels.history.lags_two_ways_k(channels.columns, warming, cooling)
-        return np.column_stack([*made, both]) * self.factor[:, None]
+        return np.column_stack([*lag_columns, both]) * self.factor[:, None]
 
     def _behind_k(self, tau_s: float, cooling_tau_s: float | None = None) -> Array:
         return self.data.channels.history.lag_k(self.data.channels.columns, tau_s, cooling_tau_s)
 
     def columns(self, structure: Structure, taus_s: Mapping[str, float]) -> NDArray[np.float64]:
         """Return the columns (m, k) of a structure at time constants, s."""
-        made = (
+        elements = (
             LagElement("", "", part, 0.0).values(self._behind_k(taus_s[name], taus_s.get("cooling_tau")), self.above_k)
             for name, part in structure.columns
         )
-        return np.column_stack([np.zeros((len(self.y), 0)), *made]) * self.factor[:, None]
+        return np.column_stack([np.zeros((len(self.y), 0)), *elements]) * self.factor[:, None]
 
     def projected(self, in_fit: NDArray[np.bool_]) -> Projected:
         """Return the time constants' columns beside the base, over the noise, of the data sets of a mask."""
@@ -177,17 +177,17 @@ class Projected:
 
     def __init__(self, axis: Axis, in_fit: NDArray[np.bool_]) -> None:
         rows = axis.over_noise(np.column_stack([axis.base, axis.lags, axis.y]), in_fit)
-        base, rest = rows[:, : axis.base.shape[1]], rows[:, axis.base.shape[1] :]
-        whole = (rest**2).sum(axis=0)
+        base, other_columns = rows[:, : axis.base.shape[1]], rows[:, axis.base.shape[1] :]
+        whole = (other_columns**2).sum(axis=0)
         if base.shape[1]:
             directions, sizes, _ = np.linalg.svd(
                 base / np.maximum(np.linalg.norm(base, axis=0), 1e-300), full_matrices=False
             )
             directions = directions[:, sizes > 1e-9 * sizes[0]]
-            rest = rest - directions @ (directions.T @ rest)
-        alone = rest[:, : len(PARTS) * len(GRID_S)]  # columns that are also tried in twos
-        self._gram, self._pull = alone.T @ alone, rest[:, :-1].T @ rest[:, -1]
-        size = (rest[:, :-1] ** 2).sum(axis=0)
+            other_columns = other_columns - directions @ (directions.T @ other_columns)
+        alone = other_columns[:, : len(PARTS) * len(GRID_S)]  # columns that are also tried in twos
+        self._gram, self._pull = alone.T @ alone, other_columns[:, :-1].T @ other_columns[:, -1]
+        size = (other_columns[:, :-1] ** 2).sum(axis=0)
         self._kept = size > LEAST_LEFT * np.maximum(whole[:-1], 1e-300)
         self._single = self._pull**2 / np.where(self._kept, size, np.inf)
 
@@ -197,10 +197,10 @@ class Projected:
             return self._single[columns[:, 0]]
         i, j = columns.T
         a, b, c = self._gram[i, i], self._gram[j, j], self._gram[i, j]
-        left = a * b - c**2
-        good = self._kept[i] & self._kept[j] & (left > LEAST_LEFT * a * b)
+        determinant = a * b - c**2
+        good = self._kept[i] & self._kept[j] & (determinant > LEAST_LEFT * a * b)
         both = b * self._pull[i] ** 2 - 2 * c * self._pull[i] * self._pull[j] + a * self._pull[j] ** 2
-        return np.where(good, both / np.where(good, left, 1.0), np.maximum(self._single[i], self._single[j]))
+        return np.where(good, both / np.where(good, determinant, 1.0), np.maximum(self._single[i], self._single[j]))
 
 
 def _choices(structure: Structure) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -216,8 +216,8 @@ def _choices(structure: Structure) -> tuple[NDArray[np.int64], NDArray[np.int64]
         at = np.repeat(places, len(structure.columns), axis=1)
     else:
         first, second = np.indices((n, n)).reshape(2, -1)
-        kept = second >= first + APART
-        places = at = np.column_stack([first[kept], second[kept]])
+        is_apart = second >= first + APART
+        places = at = np.column_stack([first[is_apart], second[is_apart]])
     offsets = np.array([PARTS.index(part) * n for _, part in structure.columns])
     return at + offsets, places
 
@@ -266,10 +266,10 @@ def left_out_by(
 def errors_of(axes: Sequence[Axis], structure: Structure, stretches: Sequence[Stretch]) -> Errors:
     """Return the same, axis by axis and stretch by stretch."""
     error_list = []
-    for seen, tested in stretches:
-        taus_s = best_taus(axes, structure, seen)
+    for in_fit, tested in stretches:
+        taus_s = best_taus(axes, structure, in_fit)
         error_list += [
-            (axis, tested, axis.errors(axis.columns(structure, taus_s[axis.name]), seen, tested)) for axis in axes
+            (axis, tested, axis.errors(axis.columns(structure, taus_s[axis.name]), in_fit, tested)) for axis in axes
         ]
     return error_list
 

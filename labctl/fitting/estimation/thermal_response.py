@@ -67,8 +67,8 @@ def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalRes
     kind = kind_of(term)
     if not stretches or not isinstance(kind, Lag) or data.channels.missing(kind.channels):
         return None
-    rest = model.with_terms(tuple(t for t in model.terms if t.effect != term.effect))
-    axes = [Axis(data, rest, axis, kind) for axis in data.outputs]
+    model_left = model.with_terms(tuple(t for t in model.terms if t.effect != term.effect))
+    axes = [Axis(data, model_left, axis, kind) for axis in data.outputs]
     tried = [structure for structure in STRUCTURES if structure.id != "per_axis" or len(axes) > 1]
     errors = {structure.id: errors_of(axes, structure, stretches) for structure in (NONE, *tried)}
     held_out = {name: pooled(axis_errors) for name, axis_errors in errors.items()}
@@ -107,7 +107,7 @@ def _of_axis(
         axis_errors = [each for each in errors.get(structure.id, ()) if each[0] is axis]
         tried.append(of_axis)
         own[of_axis.id] = axis_errors if structure.per_axis else errors_of([axis], of_axis, stretches)
-    held_out = {name: pooled(left) for name, left in own.items()}
+    held_out = {name: pooled(axis_terms) for name, axis_terms in own.items()}
     while True:
         structure, structure_errors = _told_apart([axis], tried, held_out, all_rows)
         taus_s = structure_errors[axis.name]
@@ -124,12 +124,12 @@ def _is_seen(
     Few stretches are left out of one axis, and the errors within one are those of one extrapolation: chance.
     """
     simple_s = best_taus([axis], simplest, all_rows, MOST_STEPS)[axis.name]
-    left, simple = (
+    full_chi2, simple = (
         float(np.sum(axis.left_over_noise(axis.columns(each, taus), all_rows) ** 2))
         for each, taus in ((structure, taus_s), (simplest, simple_s))
     )
     more = structure.coefficients(1) - simplest.coefficients(1)
-    return simple - left > SEEN * max(more, 1) * max(left / len(all_rows), 1.0)
+    return simple - full_chi2 > SEEN * max(more, 1) * max(full_chi2 / len(all_rows), 1.0)
 
 
 def _by_axis(structures: Mapping[str, Structure]) -> Structure:
@@ -209,11 +209,11 @@ def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool
         parts += [np.isin(np.arange(len(data)), piece) for piece in pieces]
     stretches = []
     for part in parts:
-        seen, temperature_c = ~part, data.temperature_c
-        low, high = float(temperature_c[seen].min()) - BEYOND_K, float(temperature_c[seen].max()) + BEYOND_K
+        in_fit, temperature_c = ~part, data.temperature_c
+        low, high = float(temperature_c[in_fit].min()) - BEYOND_K, float(temperature_c[in_fit].max()) + BEYOND_K
         tested = part & (temperature_c >= low) & (temperature_c <= high)
         if tested.sum() >= LEAST_SETS:
-            stretches.append((seen, tested))
+            stretches.append((in_fit, tested))
     return stretches if len(stretches) > 1 else []
 
 
@@ -226,14 +226,14 @@ def _rises(data: FitData, leg: NDArray[np.bool_]) -> bool:
 def _term_of(axes: Sequence[Axis], term: Term, structures: Mapping[str, Structure], taus: Taus) -> Term:
     """Return the term with the time constants of the axes' structures, those of each axis or of all."""
     named = {name: value for name, value in term.parameters.items() if not name.endswith("_s")}
-    kept = {name: value for name, value in named.items() if not name.startswith("curved")}
+    parameters = {name: value for name, value in named.items() if not name.startswith("curved")}
     curved = [axis for axis, each in structures.items() if any(part == "curved" for _, part in each.columns)]
-    kept |= {"curved": 1.0} if len(curved) == len(axes) else {f"curved_{axis}": 1.0 for axis in curved}
+    parameters |= {"curved": 1.0} if len(curved) == len(axes) else {f"curved_{axis}": 1.0 for axis in curved}
     apart = any(structure.per_axis for structure in structures.values()) and len(axes) > 1
     for axis in axes if apart else axes[:1]:
         of_axis = f"_{axis.name}" if apart else ""
-        kept |= {f"{name}{of_axis}_s": value for name, value in taus[axis.name].items()}
-    return replace(term, parameters=kept)
+        parameters |= {f"{name}{of_axis}_s": value for name, value in taus[axis.name].items()}
+    return replace(term, parameters=parameters)
 
 
 def lags_of(model: ErrorModel) -> list[Term]:

@@ -56,24 +56,24 @@ class ReadingBuffer:
         Data set 1 is all of it.
         """
         n = len(columns["t_s"]) if "t_s" in columns else 0
-        given = {"dataset": np.ones(n, dtype=np.int64), **columns}
+        extended = {"dataset": np.ones(n, dtype=np.int64), **columns}
         serial = self._info.serial
         if not self._columns:
-            if absent := [name for name in needed(self._info) if name not in given]:
+            if absent := [name for name in needed(self._info) if name not in extended]:
                 raise BadInput(
                     f"{serial}: the stream has no {', '.join(absent)}; add rates and specific forces of all three axes"
                 )
-            self._columns = {name: np.zeros(FIRST, dtype=_type(name)) for name in given}
-        if set(given) != set(self._columns) or any(len(values) != n for values in given.values()):
+            self._columns = {name: np.zeros(FIRST, dtype=_type(name)) for name in extended}
+        if set(extended) != set(self._columns) or any(len(values) != n for values in extended.values()):
             raise BadInput(f"{serial}: a block has other columns than those before it; send the same columns each time")
         if n == 0:
             return
-        times = np.asarray(given["t_s"], dtype=np.float64)
+        times = np.asarray(extended["t_s"], dtype=np.float64)
         last = float(np.asarray(self._columns["t_s"])[self._n - 1]) if self._n else -np.inf
         if not np.all(np.diff(np.concatenate([[last], times])) > 0):
             raise BadInput(f"{serial}: t_s does not rise after {max(last, 0.0):.6f} s; send readings in order of time")
         self._grow(self._n + n)
-        for name, values in given.items():
+        for name, values in extended.items():
             self._columns[name][self._n : self._n + n] = values
         self._n += n
 
@@ -207,12 +207,12 @@ class LiveCalibration:
             readings = readings_of(recording)
             up = _up(readings)
             rests = self._rests(readings)
-            why = ""
+            reason = ""
         except NotEnoughData as error:
-            rests, why = _Rests(np.zeros((0, 3)), 0, 0.0), self._plain(error)
-        if not why and (len(rests.up) != self._fitted[0] or finally_):
+            rests, reason = _Rests(np.zeros((0, 3)), 0, 0.0), self._plain(error)
+        if not reason and (len(rests.up) != self._fitted[0] or finally_):
             self._fitted = (len(rests.up), *self._fit(recording))
-        return self._state(recording, rests, why, up)
+        return self._state(recording, rests, reason, up)
 
     def _rests(self, readings: PoseReadings) -> _Rests:
         rests = find_rests(readings)

@@ -74,12 +74,12 @@ def align_field(
 
     Raises NotEnoughData where rests and turns do not determine it.
     """
-    seen = _seen(readings, solved, field_ut, magnetometer)
-    turn = _start(seen)
-    dip = float(np.mean(np.sum(solved.accelerometer.up * (seen.direction @ turn.T), axis=1)))
+    field_seen = _seen(readings, solved, field_ut, magnetometer)
+    turn = _start(field_seen)
+    dip = float(np.mean(np.sum(solved.accelerometer.up * (field_seen.direction @ turn.T), axis=1)))
     change, place, extra = np.inf, 0.0, 0.0
     for _ in range(STEPS):
-        residual, jacobian, noise, by_place = _equations(seen, turn, dip)
+        residual, jacobian, noise, by_place = _equations(field_seen, turn, dip)
         if change > SETTLED:
             place, extra = components(
                 jacobian, residual, noise, by_place, lambda _: 0.0, float(np.mean(np.diag(noise)))
@@ -154,26 +154,28 @@ def _equations(
     solved, k = field_seen.solved, len(field_seen.direction)
     accelerometer, gyro, moves = solved.accelerometer, solved.gyro, solved.moves
     body = field_seen.direction @ turn.T
-    rest = np.flatnonzero(accelerometer.used)
+    rest_numbers = np.flatnonzero(accelerometer.used)
     up = accelerometer.up
-    size = len(rest) + 2 * int(np.count_nonzero(gyro.used))
+    size = len(rest_numbers) + 2 * int(np.count_nonzero(gyro.used))
     residual, jacobian = np.zeros(size), np.zeros((size, 4))
     by_seen, by_tilt = np.zeros((size, k, 3)), np.zeros((size, k, 3))
     by_bias, by_gyro, by_force = np.zeros((size, k, 3)), np.zeros((size, 9)), np.zeros((size, 9))
-    here = np.arange(len(rest))
-    residual[here] = np.sum(up[rest] * body[rest], axis=1) - dip
-    jacobian[here, :3] = -np.einsum("ka,kab->kb", up[rest], cross_matrix(body[rest]))
+    here = np.arange(len(rest_numbers))
+    residual[here] = np.sum(up[rest_numbers] * body[rest_numbers], axis=1) - dip
+    jacobian[here, :3] = -np.einsum("ka,kab->kb", up[rest_numbers], cross_matrix(body[rest_numbers]))
     jacobian[here, 3] = -1.0
-    by_seen[here, rest] = up[rest] @ turn
-    by_tilt[here, rest] = np.einsum("ka,kab->kb", body[rest], level_by_reading(accelerometer)[rest])
-    by_force[here] = np.einsum("ka,kab->kb", body[rest], level_by_parameters(accelerometer)[rest])
+    by_seen[here, rest_numbers] = up[rest_numbers] @ turn
+    by_tilt[here, rest_numbers] = np.einsum(
+        "ka,kab->kb", body[rest_numbers], level_by_reading(accelerometer)[rest_numbers]
+    )
+    by_force[here] = np.einsum("ka,kab->kb", body[rest_numbers], level_by_parameters(accelerometer)[rest_numbers])
     own = np.zeros((size, size))
     before = moves.before[gyro.used]
     parts = gyro.equations.take(gyro.used).rotations
     start, end = body[before], body[before + 1]
     across, back = tangents(end), parts.matrix.transpose(0, 2, 1)
     turned = across @ change_of_direction(start, parts.matrix)
-    pairs = len(rest) + np.arange(size - len(rest)).reshape(-1, 2)
+    pairs = len(rest_numbers) + np.arange(size - len(rest_numbers)).reshape(-1, 2)
     residual[pairs] = np.einsum("mca,ma->mc", across, seen_at_end(start, parts.matrix) - end)
     jacobian[pairs, :3] = across @ (cross_matrix(end) - back @ cross_matrix(start))
     by_seen[pairs, before[:, None]] = across @ back @ turn
@@ -182,7 +184,7 @@ def _equations(
     by_bias[pairs, before[:, None] + 1] = turned @ parts.by_bias_after
     by_gyro[pairs] = turned @ parts.by_error
     each = of_each_move(moves.take(gyro.used), parts.white, turned, field_seen.readings_u)
-    own[len(rest) :, len(rest) :] = block_diag(*each)
+    own[len(rest_numbers) :, len(rest_numbers) :] = block_diag(*each)
 
     flat = by_seen.reshape(size, -1)
     tilt = (by_tilt * accelerometer.u_rest_g[:, None]).reshape(size, -1)

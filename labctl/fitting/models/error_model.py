@@ -74,8 +74,8 @@ class ErrorModel:
         """
         added = tuple(replace(term, steady=True) for term in terms)
         freed = {term.effect for term in added} & self.held.effects
-        kept = tuple(term for term in self.terms if term.effect not in freed)
-        return replace(self, terms=(*kept, *added), held=self.held.beside(tuple(freed)))
+        kept_terms = tuple(term for term in self.terms if term.effect not in freed)
+        return replace(self, terms=(*kept_terms, *added), held=self.held.beside(tuple(freed)))
 
     def to_dict(self) -> ErrorModelJson:
         """Return the model without coefficients, as JSON."""
@@ -129,8 +129,8 @@ def _by_recording(term: Term, columns: list[Column], channels: Channels) -> list
             replace(column, name=f"{column.name}_of_{int(numbers[rows][0])}", values=np.where(rows, column.values, 0.0))
             for rows in parts
         ]
-        shown = [part for part in split if np.any(part.values)]
-        recording_columns += [column] if column.law is not None or len(shown) < 2 else shown
+        split_parts = [part for part in split if np.any(part.values)]
+        recording_columns += [column] if column.law is not None or len(split_parts) < 2 else split_parts
     return recording_columns
 
 

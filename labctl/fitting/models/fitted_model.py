@@ -86,8 +86,8 @@ class FittedModel:
         """
         across = across_dps or {}
         if self.model.argument == "output":
-            seen = channels.with_rates({**across, **outputs})
-            return {axis: outputs[axis] - self.error_dps(seen, axis) for axis in outputs}
+            delayed = channels.with_rates({**across, **outputs})
+            return {axis: outputs[axis] - self.error_dps(delayed, axis) for axis in outputs}
         coefficients = {axis: self._coefficients(channels, axis) for axis in outputs}
         return invert(
             outputs,
@@ -97,7 +97,7 @@ class FittedModel:
 
     def exported(self) -> tuple[FittedModel, list[LeftOut]]:
         """Return the part that belongs to the unit, and what was left out with its origin."""
-        kept = tuple(t for t in self.model.terms if is_exported(t))
+        kept_terms = tuple(t for t in self.model.terms if is_exported(t))
         left_out: list[LeftOut] = [
             {"effect": t.effect, "origin": kind_of(t).origin, "term": kind_of(t).term}
             for t in self.model.terms
@@ -105,7 +105,7 @@ class FittedModel:
         ]
         if not left_out:
             return self, []
-        model = self.model.with_terms(kept)
+        model = self.model.with_terms(kept_terms)
         return FittedModel(
             model, {axis: _only(fit, set(model.effect_ids)) for axis, fit in self.axes.items()}
         ), left_out
@@ -165,14 +165,18 @@ def without(fitted: FittedModel, effect_id: str) -> FittedModel:
 
 def _only(fit: AxisFit, effects: set[str]) -> AxisFit:
     """Return the coefficients of some effects, with their part of the covariance."""
-    kept = [index for index, owner in enumerate(fit.effects) if owner in effects]
+    indices = [index for index, owner in enumerate(fit.effects) if owner in effects]
     m = fit.values.shape[1]
-    flat = np.concatenate([np.arange(index * m, (index + 1) * m) for index in kept]) if kept else np.zeros(0, dtype=int)
+    flat = (
+        np.concatenate([np.arange(index * m, (index + 1) * m) for index in indices])
+        if indices
+        else np.zeros(0, dtype=int)
+    )
     return AxisFit(
-        tuple(fit.effects[i] for i in kept),
-        tuple(fit.names[i] for i in kept),
-        tuple(fit.units[i] for i in kept),
-        fit.values[kept],
+        tuple(fit.effects[i] for i in indices),
+        tuple(fit.names[i] for i in indices),
+        tuple(fit.units[i] for i in indices),
+        fit.values[indices],
         fit.covariance[np.ix_(flat, flat)],
         tuple(part.take(flat) for part in fit.parts),
     )

@@ -62,11 +62,11 @@ class Held:
 
     def beside(self, effects: tuple[str, ...]) -> Held:
         """Return what is held without the coefficients of some effects."""
-        kept = {
+        remaining = {
             axis: {name: one for name, one in names.items() if one.effect not in effects}
             for axis, names in self.axes.items()
         }
-        return Held({axis: names for axis, names in kept.items() if names}, self.source)
+        return Held({axis: names for axis, names in remaining.items() if names}, self.source)
 
     def as_exact(self) -> Held:
         """Return the same values without uncertainty, for what compares fits that all hold them."""

@@ -34,9 +34,9 @@ class Linear:
         b = np.column_stack([self.fitted.error_dps(Channels(channels, still), axis) for axis in self.axes])
         k = np.zeros((n, len(self.axes), len(self.axes)))
         for column, turning in enumerate(self.axes):
-            seen = Channels(channels, still | {turning: np.ones(n)})
+            delayed = Channels(channels, still | {turning: np.ones(n)})
             for row, axis in enumerate(self.axes):
-                k[:, row, column] = self.fitted.error_dps(seen, axis) - b[:, row] + (row == column)
+                k[:, row, column] = self.fitted.error_dps(delayed, axis) - b[:, row] + (row == column)
         return k, b
 
     def correct(self, raw: Array, temperature_c: Array) -> Array:

@@ -309,13 +309,13 @@ def split_memory(fitted: FittedModel, axes: tuple[str, ...]) -> tuple[FittedMode
     remembering = [term.effect for term in fitted.model.terms if kind_of(term).remembers]
     if not remembering:
         return fitted, None
-    rest, part = fitted, fitted
+    without_memory, part = fitted, fitted
     for effect in fitted.model.effect_ids:
         if effect in remembering:
-            rest = without(rest, effect)
+            without_memory = without(without_memory, effect)
         else:
             part = without(part, effect)
-    return rest, Memory(part, axes)
+    return without_memory, Memory(part, axes)
 
 
 def state_json(fitted: FittedModel) -> StateJson | None:

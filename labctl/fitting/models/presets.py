@@ -197,14 +197,14 @@ def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ..
     What the model holds stays held, but for the effects that are added: their coefficients are estimated.
     """
     held = model.forward().held.beside((*remove, *(term.effect for term in add)))
-    kept = tuple(t for t in model.terms if t.effect not in {*remove, *(term.effect for term in add)})
+    kept_terms = tuple(t for t in model.terms if t.effect not in {*remove, *(term.effect for term in add)})
     name = model.name + "".join(f"+{t.effect}" for t in add) + "".join(f"-{effect_id}" for effect_id in remove)
 
     def build(data: FitData) -> tuple[ErrorModel, Rows]:
         table = model.temperature
         if isinstance(table, LagrangeTable):
             table = LagrangeTable(_nodes(data, table.points, model.name), table.points)
-        terms = (*kept, *(replace(term, steady=True) for term in add))
+        terms = (*kept_terms, *(replace(term, steady=True) for term in add))
         return replace(model.forward(), name=name, terms=terms, temperature=table, held=held), _all(data)
 
     return Preset(name, build, isinstance(model.temperature, LagrangeTable))

@@ -56,10 +56,10 @@ class SineForm:
         rate = arcsine_dps(raw - bias, squares)
         for _ in range(STEPS):
             x = squares * np.deg2rad(rate) ** 2
-            left = np.einsum("nij,nj->ni", gain, rate) + bias + rate * (sine_ratio(x) - 1.0) - raw
+            residual = np.einsum("nij,nj->ni", gain, rate) + bias + rate * (sine_ratio(x) - 1.0) - raw
             slope = gain.copy()
             slope[:, diagonal, diagonal] += np.maximum(cosine_of_root(x), 1 - FOLLOWED) - 1.0
-            step = np.linalg.solve(slope, left[:, :, None])[:, :, 0]
+            step = np.linalg.solve(slope, residual[:, :, None])[:, :, 0]
             rate = rate - step
             if np.max(np.abs(step), initial=0.0) < 1e-12 * max(np.max(np.abs(rate), initial=0.0), 1.0):
                 break

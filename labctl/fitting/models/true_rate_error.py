@@ -24,8 +24,10 @@ def errors_at_true_rates(fitted: FittedModel, channels: Channels) -> dict[str, A
     errors: dict[str, Array] = {axis: np.zeros(len(channels)) for axis in fitted.axes}
     fastest = max(float(np.max(np.abs(rate), initial=0.0)) for rate in channels.rates.values())
     for _ in range(ROUNDS):
-        seen = channels.with_rates({**channels.rates, **{axis: channels.rates[axis] + errors[axis] for axis in errors}})
-        error_at_rate = {axis: fitted.error_dps(seen, axis) for axis in errors}
+        with_errors = channels.with_rates(
+            {**channels.rates, **{axis: channels.rates[axis] + errors[axis] for axis in errors}}
+        )
+        error_at_rate = {axis: fitted.error_dps(with_errors, axis) for axis in errors}
         change = max(float(np.max(np.abs(error_at_rate[axis] - errors[axis]), initial=0.0)) for axis in errors)
         errors = error_at_rate
         if change < CLOSE_DPS * max(1.0, fastest):

@@ -72,8 +72,11 @@ def whitened(
     """
     order = np.lexsort((scatter.t_s, scatter.run))
     ordered = values[order]
-    kept, total, share = _filter(scatter, drifts, white_var, order)
-    before, own = kept * np.roll(share, 1, axis=1), kept * np.roll(1.0 - share, 1, axis=1)  # kept is 0 in the first row
+    remaining, total, share = _filter(scatter, drifts, white_var, order)
+    before, own = (
+        remaining * np.roll(share, 1, axis=1),
+        remaining * np.roll(1.0 - share, 1, axis=1),
+    )  # kept is 0 in the first row
     expect = _expected_of_one if len(drifts) == 1 else _expected_of_many
     expected = expect(ordered, before, own)
     np.subtract(ordered, expected, out=expected)
@@ -117,19 +120,19 @@ def _filter(
     """
     size_var, tau_s, per_rate = np.array([(d.drift_dps**2, d.tau_s, d.per_rate) for d in drifts]).T[:, :, None]
     begins = np.concatenate([[True], np.diff(scatter.run[order]) != 0])
-    kept = np.where(begins, 0.0, np.exp(-np.diff(scatter.t_s[order], prepend=scatter.t_s[order[0]]) / tau_s))
+    decay = np.where(begins, 0.0, np.exp(-np.diff(scatter.t_s[order], prepend=scatter.t_s[order[0]]) / tau_s))
     white = white_var[order] + (per_rate * scatter.rate_dps[order]) ** 2
     size: Any = size_var[:, 0]
-    rows: Any = zip((kept**2).T, white.T, strict=True)
+    rows: Any = zip((decay**2).T, white.T, strict=True)
     if len(drifts) == 1:  # single numbers are faster than arrays of one
-        size, rows = float(size[0]), zip((kept[0] ** 2).tolist(), white[0].tolist(), strict=True)
+        size, rows = float(size[0]), zip((decay[0] ** 2).tolist(), white[0].tolist(), strict=True)
     variances, variance = [], size
     for part, noise in rows:
         before = size + part * (variance - size)
         variances.append(before)
         variance = before * noise / (before + noise)
     drift_var = np.array(variances).reshape(len(order), len(drifts)).T
-    return kept, drift_var + white, drift_var / (drift_var + white)
+    return decay, drift_var + white, drift_var / (drift_var + white)
 
 
 def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:

@@ -93,16 +93,16 @@ class Steps:
         lag_k = np.empty_like(self.now_c)
         begin = 0
         while True:
-            rest = slice(begin, None)
-            lag_k[rest] = self._two_ways(warming_s, cooling_s, cools, begin, start_k)
-            cooled = np.empty_like(cools[rest])
+            after_begin = slice(begin, None)
+            lag_k[after_begin] = self._two_ways(warming_s, cooling_s, cools, begin, start_k)
+            cooled = np.empty_like(cools[after_begin])
             cooled[0] = start_k + self.fall_k[begin] > 0
             np.greater(lag_k[begin:-1] + self.fall_k[begin + 1 :], 0.0, out=cooled[1:])
-            changed = cooled != cools[rest]
+            changed = cooled != cools[after_begin]
             first = int(np.argmax(changed))
             if not changed[first]:
                 return lag_k
-            cools[rest] = cooled
+            cools[after_begin] = cooled
             begin += first
             start_k = behind_k if begin == 0 else float(lag_k[begin - 1])
 
@@ -111,17 +111,17 @@ class Steps:
     ) -> Array:
         """Return the follower from a step on, where it is known which steps cool (n,)."""
         own = cools[begin:]
-        rest = Steps(
+        after_begin = Steps(
             self.step_s[begin:] if len(self.step_s) > 1 else self.step_s,
             self.passed_s[begin:] - (self.passed_s[begin - 1] if begin else 0.0),
             self.fall_k[begin:], self.now_c[begin:],
         )  # fmt: skip
         if own.all() or not own.any():
-            return rest.lagged(cooling_s if own[0] else warming_s, behind_k)
+            return after_begin.lagged(cooling_s if own[0] else warming_s, behind_k)
         per_s = np.where(own, 1.0 / cooling_s, 1.0 / warming_s)
-        ratios = rest.step_s * per_s
+        ratios = after_begin.step_s * per_s
         exponents = _decaying_sum(1.0, ratios.copy(), 0.0)
-        return _decayed(ratios, exponents, _means(ratios) * rest.fall_k, behind_k)
+        return _decayed(ratios, exponents, _means(ratios) * after_begin.fall_k, behind_k)
 
     def played(self, width_k: float, at_c: float) -> Array:
         """Return a follower that the temperature carries along at the edges of a play of this width, (n,) deg C.
@@ -209,12 +209,12 @@ def _decaying_sum(keep: float, values: Array, start: float) -> Array:
     within, whole_lane = _lane(keep)
     sums = np.empty(n)
     lanes = sums[:whole].reshape(-1, LANE)
-    given = values[:whole].reshape(-1, LANE)
-    given[0, 0] += keep * start
-    ends = _decaying_sum(whole_lane, given[:-1] @ within[:, -1], 0.0)
-    given[1:, 0] += keep * ends
+    in_lanes = values[:whole].reshape(-1, LANE)
+    in_lanes[0, 0] += keep * start
+    ends = _decaying_sum(whole_lane, in_lanes[:-1] @ within[:, -1], 0.0)
+    in_lanes[1:, 0] += keep * ends
     for begin in range(0, len(lanes), LANES):
-        np.matmul(given[begin : begin + LANES], within, out=lanes[begin : begin + LANES])
+        np.matmul(in_lanes[begin : begin + LANES], within, out=lanes[begin : begin + LANES])
     if whole < n:
         sums[whole:] = _one_by_one(keep, values[whole:], float(sums[whole - 1]))
     return sums
@@ -233,4 +233,6 @@ def _one_by_one(keep: Array | float, pull: Array, start: float) -> Array:
     """Return x with x_k = keep_k x_(k-1) + pull_k, (n,), from `start`."""
     keeps = keep.tolist() if isinstance(keep, np.ndarray) else repeat(keep)
     steps = zip(keeps, pull.tolist(), strict=False)
-    return np.fromiter((start := kept * start + pulled for kept, pulled in steps), dtype=np.float64, count=len(pull))
+    return np.fromiter(
+        (start := factor * start + pulled for factor, pulled in steps), dtype=np.float64, count=len(pull)
+    )

@@ -108,8 +108,8 @@ def _by_normal_equations(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64]
     gram = rows.transpose(0, 2, 1) @ rows
     factor: NDArray[np.float64] = np.asarray(np.linalg.cholesky(gram[:, :-1, :-1]), dtype=np.float64)
     projected: Array = np.asarray(np.linalg.solve(factor, gram[:, :-1, -1:])[:, :, 0], dtype=np.float64)
-    left = np.maximum(gram[:, -1, -1] - np.sum(projected**2, axis=1), 0.0)
-    return factor.transpose(0, 2, 1), projected, np.asarray(left)
+    residual_squares = np.maximum(gram[:, -1, -1] - np.sum(projected**2, axis=1), 0.0)
+    return factor.transpose(0, 2, 1), projected, np.asarray(residual_squares)
 
 
 def rank_of(design: NDArray[np.float64]) -> int:

@@ -14,14 +14,14 @@ def nonnegative_least_squares(columns: NDArray[np.float64], y: Array) -> Array:
     By active sets (Lawson and Hanson 1974, chapter 23). SciPy's takes longer to import than this takes altogether.
     """
     gram, inner = columns.T @ columns, columns.T @ y
-    solution, kept = np.zeros(len(inner)), np.zeros(len(inner), dtype=np.bool_)
+    solution, is_positive = np.zeros(len(inner)), np.zeros(len(inner), dtype=np.bool_)
     tolerance = 10 * max(columns.shape) * np.finfo(np.float64).eps * float(np.abs(columns).sum(axis=0).max())
     for _ in range(3 * len(inner)):
-        slope = np.where(kept, -np.inf, inner - gram @ solution)
+        slope = np.where(is_positive, -np.inf, inner - gram @ solution)
         if not slope.max() > tolerance:
             break
-        kept[np.argmax(slope)] = True
-        solution = _feasible(gram, inner, solution, kept)
+        is_positive[np.argmax(slope)] = True
+        solution = _feasible(gram, inner, solution, is_positive)
     return solution
 
 

@@ -91,5 +91,5 @@ def _weighted(time: Array, values: Array, variance: Array) -> tuple[float, float
     columns = np.column_stack([root, root * time])
     covariance: NDArray[np.float64] = np.asarray(np.linalg.pinv(columns.T @ columns), dtype=np.float64)
     coefficients = covariance @ (columns.T @ (root * values))
-    left = root * values - columns @ coefficients
-    return float(coefficients[0]), float(coefficients[1]), covariance, float(left @ left)
+    residual = root * values - columns @ coefficients
+    return float(coefficients[0]), float(coefficients[1]), covariance, float(residual @ residual)

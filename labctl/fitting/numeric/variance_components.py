@@ -195,13 +195,15 @@ def _component(
 
 def _scatter(information: _Information, rows: NDArray[np.bool_], random: RandomEffects) -> tuple[float, int]:
     """Return chi2 of the effects of one kind with the others free, and its degrees of freedom."""
-    rest = ~rows
+    other_rows = ~rows
     matrix, product = information.matrix[np.ix_(rows, rows)], information.product[rows]
-    if rest.any():
-        crossed = information.matrix[np.ix_(rows, rest)]
-        others = information.matrix[np.ix_(rest, rest)] + np.diag(np.asarray(random.wide)[rest] ** -2.0)
+    if other_rows.any():
+        crossed = information.matrix[np.ix_(rows, other_rows)]
+        others = information.matrix[np.ix_(other_rows, other_rows)] + np.diag(
+            np.asarray(random.wide)[other_rows] ** -2.0
+        )
         matrix = matrix - crossed @ np.linalg.solve(others, crossed.T)
-        product = product - crossed @ np.linalg.solve(others, information.product[rest])
+        product = product - crossed @ np.linalg.solve(others, information.product[other_rows])
     sizes, vectors = np.linalg.eigh(matrix)
     is_seen = sizes > 1e-6 * max(float(sizes.max()), 1e-300)
     along = vectors[:, is_seen].T @ product

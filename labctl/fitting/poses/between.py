@@ -68,17 +68,17 @@ def _restricted(jacobian: NDArray[np.float64], residual: Array, covariance: NDAr
     weighted = cho_solve(factor, jacobian)
     normal = jacobian.T @ weighted
     step = np.linalg.solve(normal, weighted.T @ residual)
-    left = residual - jacobian @ step
+    residual_left = residual - jacobian @ step
     _, of_normal = np.linalg.slogdet(normal)
     of_covariance = 2 * np.sum(np.log(np.diag(factor[0])))
-    return float(of_covariance + of_normal + left @ cho_solve(factor, left)) / 2
+    return float(of_covariance + of_normal + residual_left @ cho_solve(factor, residual_left)) / 2
 
 
 def chi2_of(jacobian: NDArray[np.float64], residual: Array, covariance: NDArray[np.float64]) -> float:
     """Return the chi2 that generalised least squares leaves of residuals (m,)."""
     step, _ = gls(jacobian, residual, covariance)
-    left = residual - jacobian @ step
-    return float(left @ cho_solve(cho_factor(covariance), left))
+    residual_left = residual - jacobian @ step
+    return float(residual_left @ cho_solve(cho_factor(covariance), residual_left))
 
 
 def gls(

@@ -111,7 +111,7 @@ def alignment_text(alignment: AlignmentJson) -> str:
 
 def _moves(all_moves: Moves, moves: Moves, gyro: Gyroscope, applied_rms_dps: float) -> MovesJson:
     used = gyro.used
-    left = gyro.equations.residual.reshape(-1, 2)[used]
+    residual = gyro.equations.residual.reshape(-1, 2)[used]
     variances = np.diag(gyro.noise).reshape(-1, 2)[used]
     rows = np.repeat(used, 2)
     return {
@@ -119,7 +119,7 @@ def _moves(all_moves: Moves, moves: Moves, gyro: Gyroscope, applied_rms_dps: flo
         "used": int(np.count_nonzero(used)),
         "left_out": _left_out(all_moves, moves, gyro),
         "turned_deg": {str(a): float(v) for a, v in zip(AXES, turned_deg(moves.take(used)), strict=True)},
-        "residual_deg": float(np.degrees(np.sqrt(np.mean(left**2)))),
+        "residual_deg": float(np.degrees(np.sqrt(np.mean(residual**2)))),
         "applied_rms_dps": applied_rms_dps,
         "known_deg": float(np.degrees(np.sqrt(np.mean(variances)))),
         "extra_deg": float(np.degrees(gyro.extra_rad)),

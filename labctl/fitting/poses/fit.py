@@ -136,11 +136,11 @@ def _axes(bias: Bias, gyro: Gyroscope) -> dict[str, AxisFit]:
         others = [j for j in range(3) if j != i]
         solution, order = bias.solutions[i], [0, 1 + i, *(1 + j for j in others)]
         row, places = gyro.errors[i], [3 * i + i, *(3 * i + j for j in others)]
-        rest = solution.covariance[np.ix_(order, order)]
+        covariance = solution.covariance[np.ix_(order, order)]
         matrix = gyro.covariance[np.ix_(places, places)]
         values = _between(solution.values[order], row[[i, *others]])
-        whole = block_diag(rest[:1, :1], matrix, rest[1:, 1:])
-        whole[0, 4:] = whole[4:, 0] = rest[0, 1:]
+        whole = block_diag(covariance[:1, :1], matrix, covariance[1:, 1:])
+        whole[0, 4:] = whole[4:, 0] = covariance[0, 1:]
         matrix_names = ("scale_factor", *(f"misalignment_{AXES[j]}" for j in others))
         names = ("bias", *matrix_names, "g_own", *(f"g_{AXES[j]}" for j in others))
         axis_fits[str(axis)] = AxisFit(EFFECTS, names, UNITS, values[:, None], whole)

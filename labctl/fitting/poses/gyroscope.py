@@ -60,15 +60,15 @@ def fit_gyroscope(
     noises = _Noises(moves, accelerometer, bias, readings_u, white_g2)
     errors = _robust_start(moves, accelerometer, bias)
     used = np.ones(len(moves), dtype=np.bool_)
-    seen: list[bytes] = []
+    earlier: list[bytes] = []
     for turn in range(ROUNDS):
         equations, noise, extra, errors = _solved(noises, errors, used, first=turn == 0)
         held_out = held_out_moves(equations, noise + extra * np.eye(len(noise)), used)
         agrees = held_out.chi2 <= chdtri(2, FALSE_ALARM)
-        if turn > 0 and (np.array_equal(agrees, used) or agrees.tobytes() in seen):
+        if turn > 0 and (np.array_equal(agrees, used) or agrees.tobytes() in earlier):
             break
         if np.count_nonzero(agrees) >= LEAST_MOVES:
-            seen.append(used.tobytes())
+            earlier.append(used.tobytes())
             used = agrees
     rows = np.repeat(used, 2)
     _, covariance = gls(

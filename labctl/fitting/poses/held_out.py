@@ -44,11 +44,11 @@ def held_out_moves(equations: Equations, covariance: NDArray[np.float64], used: 
     weighted = inverse @ jacobian
     normal = np.linalg.inv(jacobian.T @ weighted)
     gain = normal @ weighted.T  # from residuals to coefficients
-    left = inverse - weighted @ gain
+    residual_inverse = inverse - weighted @ gain
     error, spread = np.zeros((len(used), 2)), np.zeros((len(used), 2, 2))
     for place, move in enumerate(np.flatnonzero(used)):
         here = slice(2 * place, 2 * place + 2)
-        own = np.linalg.solve(left[here, here], left[here])
+        own = np.linalg.solve(residual_inverse[here, here], residual_inverse[here])
         without = -jacobian[here] @ (gain - normal @ weighted[here].T @ own)
         without[:, here] += np.eye(2)
         error[move], spread[move] = without @ residual, without @ move_covariance @ without.T

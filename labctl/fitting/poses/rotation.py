@@ -90,9 +90,9 @@ def _coarse(true: NDArray[np.float64], step_s: NDArray[np.float64], step: int) -
     keep = np.unique(np.append(np.arange(0, true.shape[1], step), true.shape[1] - 1))
     longer_s = np.add.reduceat(step_s, keep[:-1], axis=1)
     last = np.maximum(np.count_nonzero(step_s, axis=1), 1)  # the reading at which a move ends, before it is filled up
-    rows, kept = np.arange(len(true)), true[:, keep].copy()
-    kept[rows, np.searchsorted(keep, last)] = true[rows, last]
-    vectors, _ = _steps(kept, longer_s)
+    rows, kept_rows = np.arange(len(true)), true[:, keep].copy()
+    kept_rows[rows, np.searchsorted(keep, last)] = true[rows, last]
+    vectors, _ = _steps(kept_rows, longer_s)
     steps = _matrices(vectors)
     rotation = np.broadcast_to(np.eye(3), (len(true), 3, 3)).copy()
     for k in range(vectors.shape[1]):

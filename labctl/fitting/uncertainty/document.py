@@ -51,8 +51,12 @@ def uncertainty_json(
     name, temperatures_c = "calibration", covered.temperatures()
     try:
         places = [
-            (rate, each, rate_uncertainty(fitted, rate, each, evidence=evidence, name=name, bench=bench))
-            for each in temperatures_c
+            (
+                rate,
+                temperature_c,
+                rate_uncertainty(fitted, rate, temperature_c, evidence=evidence, name=name, bench=bench),
+            )
+            for temperature_c in temperatures_c
             for rate in covered.rates(evidence)
         ]
         at_c = temperatures_c[len(temperatures_c) // 2]
@@ -85,7 +89,7 @@ def _bound(places: list[tuple[float, float, RateUncertainty]], coefficients: Map
         "bound_dps": bound.expanded_dps,
         "rate_dps": rate,
         "temperature_c": temperature_c,
-        "why": "; ".join(f"{part}: {why}" for part, why in bound.unknown.items()),
+        "why": "; ".join(f"{part}: {reason}" for part, reason in bound.unknown.items()),
         "budget": bound.budget.to_json(),
         "coefficients": {name: _expanded(coefficient) for name, coefficient in coefficients.items()},
     }

@@ -89,14 +89,14 @@ def coefficient_line(
     """Return the line of the fitted coefficients: their uncertainty in the result of the law, in `unit`."""
     u = u_of_fit(law, fitted, temperature_c)
     held = fitted.model.held
-    why = PUBLISHED if u is None else BY_COVARIANCE
+    reason = PUBLISHED if u is None else BY_COVARIANCE
     if unstated := held.without_u(law.axis):
-        why = HELD_WITHOUT_U.format(", ".join(unstated))
+        reason = HELD_WITHOUT_U.format(", ".join(unstated))
     fit = fitted.axes[law.axis]
     estimated = [name for name, owner in zip(fit.names, fit.effects, strict=True) if not held.of(law.axis, owner, name)]
     count = len(estimated) * fit.values.shape[1]
     freedom = max(len(evidence.model_error.rate_dps) - count, 1) if evidence else None
-    return BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom, why=why)
+    return BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom, why=reason)
 
 
 def model_line(
@@ -112,8 +112,8 @@ def model_line(
     """
     own, across = rates_dps.get(axis, 0.0), {name: rate for name, rate in rates_dps.items() if name != axis}
     u = evidence.model_error.at(own, temperature_c, across) if evidence else None
-    why = evidence.model_error.unknown_at(own, temperature_c, across) if evidence else _lacking(fitted)
-    return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=why or BY_HELD_OUT)
+    reason = evidence.model_error.unknown_at(own, temperature_c, across) if evidence else _lacking(fitted)
+    return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=reason or BY_HELD_OUT)
 
 
 def slope_line(
@@ -126,17 +126,26 @@ def slope_line(
     """
     error = evidence.model_error if evidence else None
     u = slope_error(error, temperature_c, across) if error else None
-    why = slope_unknown(error, temperature_c, across) if error else _lacking(fitted)
+    reason = slope_unknown(error, temperature_c, across) if error else _lacking(fitted)
     return BudgetLine(
-        "model", "held-out data sets", "A", "normal", u, "1", 1.0, u, is_stated=u is not None, why=why or SLOPE_HELD_OUT
+        "model",
+        "held-out data sets",
+        "A",
+        "normal",
+        u,
+        "1",
+        1.0,
+        u,
+        is_stated=u is not None,
+        why=reason or SLOPE_HELD_OUT,
     )
 
 
 def repeatability_line(fitted: FittedModel, evidence: AxisEvidence | None) -> BudgetLine:
     """Return the line of a later power-on, deg/s."""
     if evidence is None or evidence.repeatability is None:
-        why = NO_POWER_ON if evidence else _lacking(fitted)
-        return BudgetLine("repeatability", "none", "A", "normal", None, "deg/s", 1.0, None, why=why)
+        reason = NO_POWER_ON if evidence else _lacking(fitted)
+        return BudgetLine("repeatability", "none", "A", "normal", None, "deg/s", 1.0, None, why=reason)
     repeatability = evidence.repeatability
     return BudgetLine(
         "repeatability", repeatability.name, "B" if repeatability.source == "data sheet" else "A",

@@ -61,8 +61,10 @@ class LocalModelError:
         if not turned:
             return float(np.sqrt(own))
         away = self._away(0.0, temperature_c)
-        rest = own if _unknown(away) else self._variance(away)
-        beyond = (self._variance(self._away_across(axis, rate, temperature_c)) - rest for axis, rate in turned.items())
+        remaining = own if _unknown(away) else self._variance(away)
+        beyond = (
+            self._variance(self._away_across(axis, rate, temperature_c)) - remaining for axis, rate in turned.items()
+        )
         return float(np.sqrt(own + sum(max(each, 0.0) for each in beyond)))
 
     def _variance(self, distance: Array) -> float:
@@ -70,10 +72,10 @@ class LocalModelError:
         is_finite, weight = np.isfinite(self.left_var), near_weights(distance)
         near = effective_number(weight)
         weight /= weight.sum()
-        left = float(weight @ self.left_var[is_finite])
+        residual_var = float(weight @ self.left_var[is_finite])
         noise = float(weight @ self.white_var[is_finite])
-        unseen = LEAST_SHARE * np.sqrt(2 / near) * max(left, noise)
-        return float(max(left - noise, unseen))
+        unseen = LEAST_SHARE * np.sqrt(2 / near) * max(residual_var, noise)
+        return float(max(residual_var - noise, unseen))
 
     def thinned(self) -> LocalModelError:
         """Return the same with the means over groups of neighbouring data sets where there are more than are kept.
@@ -112,11 +114,11 @@ class LocalModelError:
         away = self._away(rate_dps, temperature_c)
         if len(away) == 0:
             return NONE_LEFT_OUT
-        if (why := _unknown(away)) is not None:
-            return why
+        if (reason := _unknown(away)) is not None:
+            return reason
         for axis, rate in across_dps.items():
-            if rate and (why := self._unknown_across(axis, rate, temperature_c)) is not None:
-                return why
+            if rate and (reason := self._unknown_across(axis, rate, temperature_c)) is not None:
+                return reason
         return None
 
     def _unknown_across(self, axis: str, rate_dps: float, temperature_c: float) -> str | None:
@@ -128,8 +130,8 @@ class LocalModelError:
         away = self._away_across(axis, rate_dps, temperature_c)
         if len(away) == 0:
             return NONE_LEFT_OUT
-        why = _unknown(away)
-        return None if why is None else f"about {axis}, {why}"
+        reason = _unknown(away)
+        return None if reason is None else f"about {axis}, {reason}"
 
     def _away(self, rate_dps: float, temperature_c: float) -> Array:
         """Return how far a place is from each data set whose variance is known, in widths of the neighbourhood."""

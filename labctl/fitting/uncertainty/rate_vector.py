@@ -124,9 +124,9 @@ def _require_numbers(rates_dps: Mapping[str, float], temperature_c: float) -> No
             f"rate about {', '.join(sorted(strange))}: a unit has the body axes x, y and z; name one of them"
         )
     numbers = [(f"rate_dps about {axis}", rate, "deg/s") for axis, rate in rates_dps.items()]
-    for what, value, unit in [*numbers, ("temperature_c", temperature_c, "deg C")]:
+    for name, value, unit in [*numbers, ("temperature_c", temperature_c, "deg C")]:
         if not abs(value) <= LARGEST:  # also false for NaN
-            raise BadInput(f"{what} = {value} {unit}: give a number between {-LARGEST:g} and {LARGEST:g} {unit}")
+            raise BadInput(f"{name} = {value} {unit}: give a number between {-LARGEST:g} and {LARGEST:g} {unit}")
 
 
 @dataclass(frozen=True)
@@ -182,11 +182,11 @@ class _Place:
             for axis in self.outputs
         ]
         about = " and ".join(unread)
-        why = f"the unit has no output about {about}, so the correction cannot take it off"
+        reason = f"the unit has no output about {about}, so the correction cannot take it off"
         lines = tuple(
             BudgetLine(
                 CROSS_RATES, f"rate about {about}", "B", "normal", None, "deg/s", None, 0.0, uncorrected=float(error),
-                why=why,
+                why=reason,
             )
             for error in self.gain @ np.array(added)
         )  # fmt: skip

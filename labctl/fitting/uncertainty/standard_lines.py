@@ -123,10 +123,10 @@ def _matters(quantity: str, bench: BenchConditions) -> bool:
 
 
 def _of_standard(standard: Standard, bench: BenchConditions, s: Sensitivities) -> SourceLines:
-    sensitivity, why = _sensitivity(standard, bench, s)
+    sensitivity, reason = _sensitivity(standard, bench, s)
     n, u = len(s.angle_squared), standard.standard_u
     if sensitivity is None:
-        line = _line(standard, bench, None, None, why)
+        line = _line(standard, bench, None, None, reason)
         return SourceLines((line,) * n, np.zeros((n, n)))
     second = np.zeros(n)
     if standard.quantity in ANGLE_QUANTITIES:
@@ -138,7 +138,7 @@ def _of_standard(standard: Standard, bench: BenchConditions, s: Sensitivities) -
             bench,
             _size(sensitivity[row]),
             math.sqrt(covariance[row, row]),
-            why or SECOND * int(second[row] > 0),
+            reason or SECOND * int(second[row] > 0),
         )
         for row in range(n)
     )
@@ -151,8 +151,8 @@ def _sensitivity(standard: Standard, bench: BenchConditions, s: Sensitivities) -
         return np.zeros_like(s.temperature), OWN_THERMOMETER
     if standard.quantity == "turn_angle" and bench.turn_common_u is not None:
         return np.zeros_like(s.relative_rate), IN_COEFFICIENTS
-    if standard.quantity in ANGLE_QUANTITIES and (why := _why_less(standard.quantity, bench)):
-        return _SENSITIVITY[standard.quantity, standard.unit_name](s, bench), why
+    if standard.quantity in ANGLE_QUANTITIES and (reason := _why_less(standard.quantity, bench)):
+        return _SENSITIVITY[standard.quantity, standard.unit_name](s, bench), reason
     sensitivity = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)
     if sensitivity is None:
         return None, NO_SENSITIVITY if standard.quantity == "supply" else NO_LATITUDE

@@ -51,14 +51,14 @@ def left_variance(data: FitData, preset: Preset) -> dict[str, Array]:
     if preset.inner_only:
         by_temperature = by_temperature[1:-1]
     outside = [_left_out(data, preset, masks, axis_solutions.solutions) for masks in (by_temperature, rate_folds(data))]
-    left = {}
+    residual_var = {}
     for axis, values in inside.items():
         within = within_runs(data, values)
         products = np.stack([within * within_runs(data, without[axis]) for without in outside])
         is_finite = np.isfinite(products)
         total = np.where(is_finite, products, 0.0).sum(axis=0)
-        left[axis] = np.where(is_finite.any(axis=0), total / np.maximum(is_finite.sum(axis=0), 1), np.nan)
-    return left
+        residual_var[axis] = np.where(is_finite.any(axis=0), total / np.maximum(is_finite.sum(axis=0), 1), np.nan)
+    return residual_var
 
 
 def within_runs(data: FitData, values: Array) -> Array:
@@ -67,11 +67,11 @@ def within_runs(data: FitData, values: Array) -> Array:
     numbers = np.unique(runs)
     if len(numbers) < 2:
         return values
-    left = values.copy()
+    residuals_within = values.copy()
     for number in numbers:
         here = (runs == number) & np.isfinite(values)
-        left[here] -= values[here].mean() if here.any() else 0.0
-    return left
+        residuals_within[here] -= values[here].mean() if here.any() else 0.0
+    return residuals_within
 
 
 def rate_folds(data: FitData) -> list[NDArray[np.bool_]]:
@@ -90,13 +90,13 @@ def _left_out(
     """Return axis -> (m,) residuals of each data set by the fit without its fold, NaN where there is none."""
     residual_dps = {axis: np.full(len(data), np.nan) for axis in data.outputs}
     for mask in masks:
-        seen = data.take(~mask)
+        data_used = data.take(~mask)
         if mask.all():
             continue
         try:
-            model, rows = preset.build(seen)
-            require_enough_data(seen.take(rows), model)
-            solved = solve_axes(seen.take(rows), model, solutions)
+            model, rows = preset.build(data_used)
+            require_enough_data(data_used.take(rows), model)
+            solved = solve_axes(data_used.take(rows), model, solutions)
             without = residuals(FittedModel(model, solved.fits), data.take(mask), solved.nuisance)
         except LabctlError:  # too little is left, or a law that cannot be inverted: this fold says nothing
             continue
@@ -142,10 +142,14 @@ class AxisEvidence:
     def from_json(record: AxisEvidenceJson) -> AxisEvidence:
         """Return what `to_json` described."""
         columns = (record["rate_dps"], record["temperature_c"], record["left_var"], record["white_var"])
-        rate, temperature_c, left, white = (np.asarray(column, dtype=np.float64) for column in columns)
-        kept = record.get("across_dps")
-        across = None if kept is None else {axis: np.asarray(each, dtype=np.float64) for axis, each in kept.items()}
-        local = LocalModelError(rate, temperature_c, left, white, across)
+        rate, temperature_c, residual_var, white = (np.asarray(column, dtype=np.float64) for column in columns)
+        across_values = record.get("across_dps")
+        across = (
+            None
+            if across_values is None
+            else {axis: np.asarray(across_value, dtype=np.float64) for axis, across_value in across_values.items()}
+        )
+        local = LocalModelError(rate, temperature_c, residual_var, white, across)
         u_dps, correlation = record["repeatability_dps"], record.get("correlation", {})
         if u_dps is None:
             return AxisEvidence(local, None, correlation)
@@ -167,7 +171,7 @@ def use_evidence(
     """
     model, rows = preset.build(data)
     solutions = solve_axes(data.take(rows), model)
-    left = left_variance(data, preset)
+    residual_var = left_variance(data, preset)
     inside = residuals(FittedModel(model, solutions.fits), data, solutions.nuisance)
     repeatability = repeatability_of(data, inside, instability_dps or {})
     correlation = _correlation({axis: within_runs(data, values) for axis, values in inside.items()})
@@ -176,7 +180,7 @@ def use_evidence(
             LocalModelError(
                 data.true_rate_dps(axis),
                 data.channels.temperature_c(axis),
-                left[axis],
+                residual_var[axis],
                 data.white_var[axis] if data.white_var is not None else np.zeros(len(data)),
                 _turned_across(data, axis),
             ).thinned(),

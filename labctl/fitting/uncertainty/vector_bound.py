@@ -62,7 +62,7 @@ def _bound(axis: str, uncertainties: Sequence[RateVectorUncertainty], reach_dps:
         "reach_dps": reach_dps,
         "rates_dps": dict(place.rates_dps),
         "temperature_c": place.temperature_c,
-        "why": "; ".join(f"{part}: {why}" for part, why in place.unknown[axis].items()),
+        "why": "; ".join(f"{part}: {reason}" for part, reason in place.unknown[axis].items()),
     }
 
 
@@ -80,10 +80,10 @@ def cross_rates(fitted: FittedModel, coefficients: Mapping[str, Budget]) -> Cros
         other: budget.expanded for other, budget in misalignments.items() if budget is not None and budget.expanded
     }
     if missing := [other for other in unread if other not in expanded]:
-        why = (
+        reason = (
             f"the misalignment towards {' and '.join(missing)} is not known: measure the unit with this axis up too, "
             "and fit misalignment"
         )
-        return {"about": unread, "per_dps": None, "why": why}
+        return {"about": unread, "per_dps": None, "why": reason}
     size = math.hypot(*(budget.value or 0.0 for budget in misalignments.values() if budget is not None))
     return {"about": unread, "per_dps": half_width(max(expanded.values()), size), "why": ""}

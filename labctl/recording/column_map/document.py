@@ -49,8 +49,8 @@ def checked_map(document: object, name: str = "map") -> ColumnMap:
 def _line(error: Any) -> str:
     place = ".".join(str(part) for part in error["loc"])[:LONGEST_PLACE]
     text = error["msg"].removeprefix("Value error, ")
-    given = "" if error["type"] in {"missing", "value_error"} else f" (is {shown(error['input'])})"
-    return f"{place}: {text}{given}" if place else f"{text}{given}"
+    value_text = "" if error["type"] in {"missing", "value_error"} else f" (is {shown(error['input'])})"
+    return f"{place}: {text}{value_text}" if place else f"{text}{value_text}"
 
 
 def map_document(column_map: ColumnMap) -> dict[str, JsonValue]:

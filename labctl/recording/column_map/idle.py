@@ -32,10 +32,10 @@ def _units(table: RawTable, column_map: ColumnMap) -> Iterator[str]:
         begins = QUANTITY_COLUMNS[quantity]
         targets = [target for target in column_map.columns if target.startswith(begins)]
         if not targets:
-            left = ", ".join(repr(name) for name in unused(table, column_map)[:_SHOWN]) or "none"
+            unused_text = ", ".join(repr(name) for name in unused(table, column_map)[:_SHOWN]) or "none"
             yield (
                 f"[units] {quantity} changes nothing: no column of the map is {begins}...; write which of the file's "
-                f"columns these are in [columns] (not used: {left}), or leave the entry out"
+                f"columns these are in [columns] (not used: {unused_text}), or leave the entry out"
             )
         elif all(column_map.columns[target].unit != keys.unit for target in targets):
             yield (

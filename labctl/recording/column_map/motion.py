@@ -43,11 +43,12 @@ def free_motion(columns: Columns, movement: Movement, t_s: Array, at_rest: Seque
     `at_rest` is what an inspection of the readings finds if the unit is taken to rest.
     """
     n = _poses(columns, movement, t_s)
-    seen = f"; its accelerometer shows {n} poses at rest, {LEAST_POSES} are needed" if n else ""
+    poses_text = f"; its accelerometer shows {n} poses at rest, {LEAST_POSES} are needed" if n else ""
     spread = f"its output varies by {movement.spread_dps:.3g} deg/s"
     return (
         f"the unit moves in {100 * movement.share:.0f} % of the time ({spread}) and no column gives the rate or the "
-        f"angle{seen}: free motion without a reference cannot calibrate a gyro; add a column with the table's rate "
+        f"angle{poses_text}: free motion without a reference cannot calibrate a gyro; add a column with the table's "
+        "rate "
         "(table_rate_dps), the angle of each turn (turn_deg), an accelerometer with rests in at least "
         f"{LEAST_POSES} poses (accel_x_g, accel_y_g, accel_z_g), or a log at rest; if the unit was to rest, write "
         f'motion = "rest" in a map{_named(at_rest)}'
@@ -55,9 +56,9 @@ def free_motion(columns: Columns, movement: Movement, t_s: Array, at_rest: Seque
 
 
 def _named(findings: Sequence[Finding]) -> str:
-    shown = "; ".join(f"{finding.what}: {finding.where}: {finding.said}" for finding in findings[:MOST_NAMED])
+    findings_text = "; ".join(f"{finding.what}: {finding.where}: {finding.said}" for finding in findings[:MOST_NAMED])
     more = f"; and {len(findings) - MOST_NAMED} more" if len(findings) > MOST_NAMED else ""
-    return f". Taken to rest, its readings have this wrong: {shown}{more}" if findings else ""
+    return f". Taken to rest, its readings have this wrong: {findings_text}{more}" if findings else ""
 
 
 def missing_columns(info: RecordingInfo, columns: Columns) -> list[str]:

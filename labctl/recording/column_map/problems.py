@@ -45,6 +45,6 @@ def rows_text(wrong: NDArray[np.bool_] | Sequence[int], total: int | None = None
     n = len(wrong_rows) if total is None else total
     if n == 1:
         return f"row {wrong_rows[0]}"
-    shown = wrong_rows[:MOST_ROWS]
-    more = n - len(shown)
-    return f"rows {', '.join(map(str, shown))}" + (f" and {more} more" if more > 0 else "")
+    shown_rows = wrong_rows[:MOST_ROWS]
+    more = n - len(shown_rows)
+    return f"rows {', '.join(map(str, shown_rows))}" + (f" and {more} more" if more > 0 else "")

@@ -79,8 +79,8 @@ def completed(table: RawTable, column_map: ColumnMap) -> Proposal:
         }
         return Proposal(column_map.model_copy(update={"columns": columns}))
     proposal = propose(table, column_map.serial, column_map.units)
-    kept = {"kind": proposal.column_map.kind, "datasets": proposal.column_map.datasets}
-    changes: dict[str, Any] = {key: value for key, value in kept.items() if key not in column_map.model_fields_set}
+    base_map = {"kind": proposal.column_map.kind, "datasets": proposal.column_map.datasets}
+    changes: dict[str, Any] = {key: value for key, value in base_map.items() if key not in column_map.model_fields_set}
     columns = proposal.column_map.columns
     if column_map.sample_rate_hz is not None and "t_s" in columns and _is_open(table, columns["t_s"]):
         columns = {target: mapped for target, mapped in columns.items() if target != "t_s"}
@@ -197,10 +197,10 @@ def _guess_force(columns: dict[str, MappedColumn], sources_by_target: dict[str, 
     unit, scale = "", None
     if len(there) == len(names):
         force = np.column_stack([sources_by_target[name].values for name in names])
-        unit, scale, why = force_unit(force, _still(sources_by_target, len(force)))
+        unit, scale, evidence = force_unit(force, _still(sources_by_target, len(force)))
         if unit:
             scaled = f", {scale:g} words per g" if scale else ""
-            guesses.append(f"accelerometer: unit taken for {unit}{scaled} ({why})")
+            guesses.append(f"accelerometer: unit taken for {unit}{scaled} ({evidence})")
     for name in there:
         if unit:
             columns[name] = columns[name].model_copy(update={"unit": unit, "scale": scale})
@@ -219,8 +219,8 @@ def _still(sources_by_target: dict[str, RawColumn], n: int) -> NDArray[np.bool_]
 
 def serial_of(table: RawTable) -> str:
     """Return the serial number that a file states, else its name as one."""
-    given = table.facts.get("serial")
-    text = str(given) if given else table.path.name.partition(".")[0]
+    stated_serial = table.facts.get("serial")
+    text = str(stated_serial) if stated_serial else table.path.name.partition(".")[0]
     cleaned = re.sub(r"[^A-Za-z0-9._+# -]", "-", text)[:64].lstrip("._+# -")
     return cleaned or "unit"
 

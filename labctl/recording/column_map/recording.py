@@ -209,12 +209,12 @@ def _assembled(
     if info is not None:
         for line in missing_columns(info, columns):
             problems.add(line)
-    kept = division.numbers > 0
-    if not kept.any():
+    in_data_set = division.numbers > 0
+    if not in_data_set.any():
         problems.add("no row is left in any data set; correct [datasets] and [parts]")
     problems.raise_if_any()
     assert info is not None
-    whole = {name: values[kept] for name, values in columns.items()} if not kept.all() else columns
+    whole = {name: values[in_data_set] for name, values in columns.items()} if not in_data_set.all() else columns
     return MappedLog(Recording(info, whole), motion, unused(table, column_map))
 
 

@@ -85,5 +85,5 @@ def _not_there(table: RawTable, column_name: str | int, target: str) -> str:
     near = difflib.get_close_matches(str(column_name), names, n=1, cutoff=0.6)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     listed = ", ".join(repr(name[:40]) for name in names[:20]) + (" ..." if len(names) > 20 else "")
-    what = f"number {column_name}" if isinstance(column_name, int) else repr(column_name[:60])
-    return f"column {what} (for {target}) is not in the file{hint} (it has {listed})"
+    column_text = f"number {column_name}" if isinstance(column_name, int) else repr(column_name[:60])
+    return f"column {column_text} (for {target}) is not in the file{hint} (it has {listed})"

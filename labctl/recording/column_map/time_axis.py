@@ -75,11 +75,12 @@ def _unknown(column: RawColumn, rows: int) -> str:
     readable = rows > 1 and not column.is_text
     step = float(np.median(np.diff(column.values))) if readable else float("nan")
     implied = time_unit(column.values).why if readable else ""
-    shown = f"; {implied}" if implied else ""
-    where = "[units] or [columns.t_s] of the column map"
+    implied_text = f"; {implied}" if implied else ""
+    location = "[units] or [columns.t_s] of the column map"
     return (
-        f"column {column.name!r} for t_s: no unit is given (its typical step is {step:g}{shown}); write its unit in "
-        f"{where}: one of {names_of('s').rpartition(',')[0]}"
+        f"column {column.name!r} for t_s: no unit is given (its typical step is {step:g}{implied_text}); write its "
+        "unit in "
+        f"{location}: one of {names_of('s').rpartition(',')[0]}"
     )
 
 

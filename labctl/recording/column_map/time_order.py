@@ -37,13 +37,13 @@ def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, 
         (values - values[0]) * (unit.factor if unit is not None else 1.0), np.ones(n, dtype=np.int64), None,
         np.zeros(n, dtype=bool), {}, {}, {}, "rest",
     )  # fmt: skip
-    kept = rows_in_order(values)
+    in_order = rows_in_order(values)
     columns = {
-        name: replace(each, values=each.values[kept], words=None if each.words is None else each.words[kept])
+        name: replace(each, values=each.values[in_order], words=None if each.words is None else each.words[in_order])
         for name, each in table.columns.items()
     }
-    problem = _twice(table, values, kept) or next((marked.finding for marked in check_clock(series)), None)
-    return replace(table, columns=columns, rows=int(kept.sum()), first_rows=()), problem
+    problem = _twice(table, values, in_order) or next((marked.finding for marked in check_clock(series)), None)
+    return replace(table, columns=columns, rows=int(in_order.sum()), first_rows=()), problem
 
 
 def _twice(table: RawTable, values: NDArray[np.float64], is_used: NDArray[np.bool_]) -> Finding | None:

@@ -60,12 +60,12 @@ def read(path: Path, _: TableOptions) -> RawTable:
     if len(lengths) > 1 and _has_gyro(_without_prefix(columns[lengths[1]])):
         both = " and ".join(f"{columns[n][0].name} ({n} rows)" for n in lengths[:2])
         raise BadRecording(f"{path}: arrays of two lengths are outputs of a gyro: {both}; write one of them per file")
-    rows, kept = lengths[0], _without_prefix(columns[lengths[0]])
-    refuse_too_many(path, rows, len(kept))
-    checked_names(path, [column.name for column in kept])
-    left = [f"{column.name} ({n})" for n in lengths[1:] for column in columns[n]][:_SHOWN]
-    facts = {"notes": f"arrays of other lengths are left out: {', '.join(left)}"} if left else {}
-    return RawTable(path, {column.name: column for column in kept}, rows, facts=facts)
+    rows, main_columns = lengths[0], _without_prefix(columns[lengths[0]])
+    refuse_too_many(path, rows, len(main_columns))
+    checked_names(path, [column.name for column in main_columns])
+    other_columns = [f"{column.name} ({n})" for n in lengths[1:] for column in columns[n]][:_SHOWN]
+    facts = {"notes": f"arrays of other lengths are left out: {', '.join(other_columns)}"} if other_columns else {}
+    return RawTable(path, {column.name: column for column in main_columns}, rows, facts=facts)
 
 
 def _has_gyro(columns: list[RawColumn]) -> bool:

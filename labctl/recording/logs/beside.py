@@ -47,8 +47,8 @@ def joined(table: RawTable, tables: Sequence[RawTable], column_map: ColumnMap | 
                 )
             columns[called] = replace(column, name=called)
     unread = of_several([table.unread, *(other.unread for other in tables)])
-    made = replace(table, columns=columns, problems=tuple(problems), first_rows=(), unread=unread)
-    return made if tables else table
+    joined_table = replace(table, columns=columns, problems=tuple(problems), first_rows=(), unread=unread)
+    return joined_table if tables else table
 
 
 def _time(table: RawTable, column_map: ColumnMap | None, main: RawColumn | None) -> RawColumn | None:

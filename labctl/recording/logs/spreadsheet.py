@@ -57,15 +57,15 @@ def read(path: Path, options: SheetOptions) -> RawTable:
         sheets = {name: book.get_sheet_by_name(name) for name in book.sheet_names}
         rows = sheets[_chosen(path, sheets, options.sheet)].to_python(skip_empty_area=False)
     with tempfile.TemporaryDirectory(prefix="labctl-sheet-") as folder:
-        made = Path(folder) / "sheet.csv"
-        with made.open("w", encoding="utf-8", newline="") as file:
+        csv_file = Path(folder) / "sheet.csv"
+        with csv_file.open("w", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows([_text(cell) for cell in row] for row in rows)
         if not rows:
             raise BadRecording(f"{path}: the sheet is empty; expected readings of a gyro")
         try:
-            table = read_text(made, TextOptions.model_validate({**options.model_dump(exclude={"sheet"})}))
+            table = read_text(csv_file, TextOptions.model_validate({**options.model_dump(exclude={"sheet"})}))
         except BadRecording as error:
-            raise BadRecording(str(error).replace(str(made), str(path))) from error
+            raise BadRecording(str(error).replace(str(csv_file), str(path))) from error
     return replace(table, path=path, layout=None)
 
 

@@ -112,14 +112,14 @@ def sound_bytes(content: bytes) -> tuple[bytes, Unread | None]:
 
     The message before a gap is left out where it holds data: its end may be damaged too.
     """
-    kept, gaps = list[tuple[int, int]](), list[Gap]()
+    sound_parts, gaps = list[tuple[int, int]](), list[Gap]()
     for start, end, gap in _runs(content):
-        kept.append((start, end))
+        sound_parts.append((start, end))
         if gap is not None:
             gaps.append(gap)
     if not gaps:
         return content, None
-    body = b"".join(content[start:end] for start, end in kept)
+    body = b"".join(content[start:end] for start, end in sound_parts)
     size = int.from_bytes(body[:2], "little")
     if body[2:3] == bytes([FLAGS]):  # the places of appended data that it states are others now
         body = body[MESSAGE + size :]

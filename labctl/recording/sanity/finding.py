@@ -53,6 +53,6 @@ def certain(findings: Iterable[Finding]) -> list[Finding]:
 def numbers_in_words(numbers: Iterable[int], most: int = 6) -> str:
     """Return "data set 7" or "data sets 1, 2, 3 and 40 more" for the numbers of data sets."""
     whole_numbers = [int(number) for number in numbers]
-    shown = ", ".join(str(number) for number in whole_numbers[:most])
+    listed = ", ".join(str(number) for number in whole_numbers[:most])
     more = f" and {len(whole_numbers) - most} more" if len(whole_numbers) > most else ""
-    return f"data set{'s' if len(whole_numbers) > 1 else ''} {shown}{more}"
+    return f"data set{'s' if len(whole_numbers) > 1 else ''} {listed}{more}"

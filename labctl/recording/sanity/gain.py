@@ -81,21 +81,21 @@ def _crossed(crossed: Mapping[str, str], responses_by_axis: Mapping[str, Mapping
         exchanged = {Position.of(p).axis for p in mutual} == {axis, other}
         if exchanged and (pair := frozenset((axis, other))) not in reported:
             reported.add(pair)
-            where, do = (
+            place_text, do = (
                 f"axes {min(pair)} and {max(pair)}",
                 f"exchange columns gyro_{min(pair)} and gyro_{max(pair)}, or the positions",
             )
         elif exchanged:
             continue
         else:
-            where = f"position {position}"
+            place_text = f"position {position}"
             do = (
                 f"mark these data sets with the position in which the unit was mounted ({other}?), or correct the "
                 "columns' order"
             )
         gain = responses_by_axis[position][other].gain
         yield Finding(
-            "axes", "certain", where,
+            "axes", "certain", place_text,
             f"while axis {axis} is along the table's axis, output {axis} has gain "
             f"{responses_by_axis[position][axis].gain:.3g} "
             f"and output {other} has gain {gain:.3g}",
@@ -115,8 +115,8 @@ def _of_axis(summary: Summary, axis: str, responses: list[tuple[str, Response]])
     gains = [gain for _, gain, _ in signed]
     negative = [position for position, gain, one in signed if gain < -SIGNIFICANT * one.u]
     if negative and len(negative) < len(signed):
-        where = f"axis {axis}, position {', '.join(negative)}"
-        yield _sign(where, min(gains), f"mark these data sets as position {_turned(negative[0])}")
+        place_text = f"axis {axis}, position {', '.join(negative)}"
+        yield _sign(place_text, min(gains), f"mark these data sets as position {_turned(negative[0])}")
     elif negative and POSSIBLE[0] <= abs(float(np.median(gains))) <= POSSIBLE[1]:
         scale = _output_unit(summary, axis).scale
         do = f"give [output.{axis}] scale = {-scale:.6g}, or correct the sign of the table's rate or the position"
@@ -143,14 +143,14 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
     size = abs(gain)
     if USUAL[0] <= size <= USUAL[1]:
         return
-    where = f"axis {axis}" if len(signed) == 1 else f"axis {axis}, position {position}"
+    place_text = f"axis {axis}" if len(signed) == 1 else f"axis {axis}, position {position}"
     if size < max(SIGNIFICANT * one.u, 1e-9):
         text = (
             f"the output does not follow the table: gain {gain:.3g} (output rate divided by table rate), u = "
             f"{one.u:.2g}"
         )
         do = "check that the table turned, that this axis is along it, and which column is the output"
-        yield Finding("no_response", "certain", where, text, gain, "1", EXPECTED, do)
+        yield Finding("no_response", "certain", place_text, text, gain, "1", EXPECTED, do)
         return
     output = _output_unit(summary, axis)
     right = f"with [output.{axis}] scale = {output.scale * gain:.6g} the gain is 1"
@@ -158,13 +158,13 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
     if cause is not None:
         text = f"the gain (output rate divided by table rate) is {gain:.4g}, near {cause}"
         yield Finding(
-            "unit", "certain", where, text, gain, "1", EXPECTED, f"correct the unit in recording.toml; {right}"
+            "unit", "certain", place_text, text, gain, "1", EXPECTED, f"correct the unit in recording.toml; {right}"
         )
         return
     odd = POSSIBLE[0] <= size <= POSSIBLE[1]
     text = f"gain {gain:.4g}" + ("" if odd else ": the output is not in the unit that recording.toml gives")
     do = f"give unit and scale of the output (raw counts, mV?); {right}"
-    yield Finding("scale", "likely" if odd else "certain", where, text, gain, "1", EXPECTED, do)
+    yield Finding("scale", "likely" if odd else "certain", place_text, text, gain, "1", EXPECTED, do)
 
 
 def _unsigned(summary: Summary, position: str, response: Response) -> Finding | None:

@@ -159,12 +159,13 @@ def _of_position(sets: Summary, along: Position) -> Iterator[Finding]:
     if not off.any() or agreeing < LEAST_AGREEING or agreeing < AGREEING_SHARE * len(off):
         return
     for row in np.flatnonzero(off):
-        given, shown = float(rate[row]), float(rate[row] - apart[row])
+        stated_dps, shown_dps = float(rate[row]), float(rate[row] - apart[row])
         yield Finding(
             "one_data_set", "likely", f"data set {int(numbers[row])}, axis {along.axis}",
-            f"the rate is given as {along.sign * given:.6g} deg/s, but the output shows {along.sign * shown:.4g} "
+            f"the rate is given as {along.sign * stated_dps:.6g} deg/s, but the output shows "
+            f"{along.sign * shown_dps:.4g} "
             f"deg/s, where {agreeing} other data sets agree with their rate",
-            along.sign * shown, "deg/s", f"{along.sign * given:.6g} deg/s",
+            along.sign * shown_dps, "deg/s", f"{along.sign * stated_dps:.6g} deg/s",
             "correct the rate, its sign or the number of the data set, or leave the data set out",
         )  # fmt: skip
 
@@ -240,8 +241,8 @@ def _deviation(rate: NDArray[np.float64], turning: NDArray[np.float64], u: NDArr
     """Return the ratio of two rates (m,) less 1, and its standard uncertainty: the scatter, or what is known of it."""
     weight = rate**2
     off = float(np.sum(rate * (turning - rate)) / np.sum(weight))
-    left = turning - (1 + off) * rate
-    scatter = float(np.sqrt(left @ left / (len(rate) - 1) / weight.sum())) if len(rate) >= LEAST_SETS else 0.0
+    residual = turning - (1 + off) * rate
+    scatter = float(np.sqrt(residual @ residual / (len(rate) - 1) / weight.sum())) if len(rate) >= LEAST_SETS else 0.0
     u_mean = float(np.sqrt(np.sum((rate * np.nan_to_num(u)) ** 2)) / np.sum(weight))
     return off, max(scatter, u_mean)
 

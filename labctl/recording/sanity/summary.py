@@ -73,15 +73,18 @@ def level_change(values: NDArray[np.float64], noise: float) -> Change:
     means = block_means(values, blocks)
     noise_of_block = noise / np.sqrt(len(values) / blocks)
     at = np.arange(2, blocks)
-    left, right = np.concatenate([at, at[:-1]]), np.concatenate([at, at[:-1] + 1])  # with and without a block between
+    left_columns, right = (
+        np.concatenate([at, at[:-1]]),
+        np.concatenate([at, at[:-1] + 1]),
+    )  # with and without a block between
     sums, squares = (np.concatenate([[0.0], np.cumsum((means - means[0]) ** power)]) for power in (1, 2))
     after = blocks - right
-    low, high = sums[left] / left, (sums[-1] - sums[right]) / after
-    scatter = squares[left] - left * low**2 + squares[-1] - squares[right] - after * high**2
-    rests = np.sqrt(np.maximum(scatter, 0.0) / (left + after - 2))
+    low, high = sums[left_columns] / left_columns, (sums[-1] - sums[right]) / after
+    scatter = squares[left_columns] - left_columns * low**2 + squares[-1] - squares[right] - after * high**2
+    rests = np.sqrt(np.maximum(scatter, 0.0) / (left_columns + after - 2))
     k = int(np.argmin(rests))
     best_rest = float(rests[k])
-    best = Change(float(high[k] - low[k]), int((left[k] + right[k]) / 2 * len(values) / blocks))
+    best = Change(float(high[k] - low[k]), int((left_columns[k] + right[k]) / 2 * len(values) / blocks))
     still = best_rest <= max(STILL_NOISES * noise_of_block, STILL_SHARE * abs(best.size))
     large = abs(best.size) > CHANGE_RATIO * max(best_rest, noise_of_block)
     return best if still and large else NO_CHANGE
@@ -105,8 +108,8 @@ def wander(values: NDArray[np.float64], temperature_c: NDArray[np.float64] | Non
             columns += [((block_c - block_c.mean()) / span) ** power for power in (1, 2, 3)]
     design = np.column_stack(columns)
     q, _ = np.linalg.qr(design)
-    left = means - q @ (q.T @ means)
-    square = float(np.sum(left**2)) / (blocks - design.shape[1])
+    residual = means - q @ (q.T @ means)
+    square = float(np.sum(residual**2)) / (blocks - design.shape[1])
     return float(np.sqrt(max(square - noise**2 * blocks / len(values), 0.0)))
 
 

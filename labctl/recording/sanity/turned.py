@@ -100,12 +100,12 @@ def _consensus(ratios: NDArray[np.float64]) -> float:
 
 def check_turned(summary: Summary, turns: list[OffTurn]) -> Iterator[Finding]:
     """Yield the turns whose integral differs from the stated angle, and uncertainties that are not stated."""
-    for each in turns:
-        number, position = summary["dataset"][each.row], summary["position"][each.row]
+    for turn in turns:
+        number, position = summary["dataset"][turn.row], summary["position"][turn.row]
         yield Finding(
-            "turn", "certain" if each.certain else "likely", f"data set {number}, axis {str(position).lstrip('-')}",
-            turn_in_words(each), each.came_deg, "deg", f"{each.said_deg:g} +- {each.tolerance_deg:.2g} deg",
-            what_to_do(each),
+            "turn", "certain" if turn.certain else "likely", f"data set {number}, axis {str(position).lstrip('-')}",
+            turn_in_words(turn), turn.came_deg, "deg", f"{turn.said_deg:g} +- {turn.tolerance_deg:.2g} deg",
+            what_to_do(turn),
         )  # fmt: skip
     if is_turned(summary).any() and not bool(np.all(summary["turn_u_known"])):
         yield Finding(

@@ -119,12 +119,12 @@ def check_codes(summary: Summary) -> Iterator[Finding]:
         step, u = steps_of(summary, axis)
         if step is None:
             continue
-        shown = u > SHOWN_SHARE * step
-        if not shown.any():
+        is_shown = u > SHOWN_SHARE * step
+        if not is_shown.any():
             continue
-        noise = float(np.median(summary.of_axis("std", axis)[shown]))
+        noise = float(np.median(summary.of_axis("std", axis)[is_shown]))
         yield Finding(
-            "quantised", "likely", f"axis {axis}, {numbers_in_words(summary['dataset'][shown])}",
+            "quantised", "likely", f"axis {axis}, {numbers_in_words(summary['dataset'][is_shown])}",
             f"the output changes in steps of {step:.4g} deg/s, the readings of these data sets spread by {noise:.2g} "
             f"deg/s, and their mean has an uncertainty of u = {float(u.max()):.2g} deg/s",
             step, "deg/s", "a step below twice the noise", "log the output with more digits or a finer converter",

@@ -68,13 +68,13 @@ class KeyMemory:
 
         Raises NotIdentified for a key that is not in force.
         """
-        known = self._known(authorization)
-        if known is None:
+        known_caller = self._known(authorization)
+        if known_caller is None:
             await self._read_again()
-            known = self._known(authorization)
-        if known is None:
+            known_caller = self._known(authorization)
+        if known_caller is None:
             raise unknown_key()
-        return known
+        return known_caller
 
     def _known(self, authorization: str) -> Caller | None:
         scheme, _, key = authorization.partition(" ")

@@ -36,8 +36,8 @@ def read_description(source: str) -> Described:
     try:
         document = read_toml(path)
     except FileNotFoundError:
-        known = ", ".join(shipped_descriptions())
-        raise BadInput(f"{source!r} is neither a file nor a description that ships with labctl ({known})") from None
+        names = ", ".join(shipped_descriptions())
+        raise BadInput(f"{source!r} is neither a file nor a description that ships with labctl ({names})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
         raise BadInput(f"description {source}: not TOML: {error}; correct it") from error
     kind = document.get("kind")

@@ -28,8 +28,8 @@ def reported_of(bench: BenchFile, said: Reported) -> dict[str, dict[str, str]]:
     identities: dict[str, dict[str, str]] = {}
     for name, section in bench.sections.items():
         adapter = adapter_of(section.port)
-        if known := dict(said.get(name, {})) | ({ADAPTER: adapter} if adapter else {}):
-            identities[name] = known
+        if identity := dict(said.get(name, {})) | ({ADAPTER: adapter} if adapter else {}):
+            identities[name] = identity
     return identities
 
 
@@ -51,9 +51,10 @@ def pinned(bench: BenchFile, reported: Reported) -> BenchFile:
 def refuse_otherwise_set(bench: BenchFile, reported: Reported) -> None:
     """Raise Conflict where a unit is not set as its bench file states."""
     for gyro in bench.gyros:
-        if said := not_as_stated(gyro.configuration, reported.get(gyro.name, {})):
+        if difference := not_as_stated(gyro.configuration, reported.get(gyro.name, {})):
             raise Conflict(
-                f"{gyro.name}: unit {gyro.serial} is not set as the bench file states: {'; '.join(said)}; set the unit "
+                f"{gyro.name}: unit {gyro.serial} is not set as the bench file states: {'; '.join(difference)}; set "
+                "the unit "
                 "so, or correct `configuration` in its section of the bench file"
             )
 
@@ -86,10 +87,10 @@ def _refuse_other_settings(
 ) -> None:
     changes = {name: both for name, both in changed(then, now).items() if name not in gyro.configuration}
     if changes:
-        said = ", ".join(f"{name} was {was} and is {new}" for name, (was, new) in changes.items())
+        text = ", ".join(f"{name} was {was} and is {new}" for name, (was, new) in changes.items())
         stated = ", ".join(f'{name} = "{new}"' for name, (_, new) in changes.items())
         raise Conflict(
-            f"{gyro.name}: unit {gyro.serial} is set otherwise than in campaign {before.id}: {said}. Its calibration "
+            f"{gyro.name}: unit {gyro.serial} is set otherwise than in campaign {before.id}: {text}. Its calibration "
             "may not hold so. Set the unit as it was; or, if this is meant, state it in the section of the unit in the "
             f"bench file: configuration = {{ {stated} }}"
         )
@@ -126,7 +127,7 @@ def _other_unit(name: str, serial: str, own: tuple[str, str], before: CampaignRo
 def _owner(before: CampaignRow, what: str, value: str) -> str:
     """Return the device that reported a value in a campaign; empty for none."""
     then = reported_in(before)
-    return next((name for name, said in then.items() if said.get(what) == value), "")
+    return next((name for name, identity in then.items() if identity.get(what) == value), "")
 
 
 def _name_then(before: CampaignRow, serial: str) -> str:

@@ -187,12 +187,12 @@ def open_for(bench: BenchFile, location: str) -> Iterator[Store]:
     """Open a database to run a campaign on a bench. Raises Conflict naming who holds the database, and the bench."""
     try:
         opened = Store(Database(location, write=True))
-    except Conflict as taken:
+    except Conflict as lease:
         with open_store(location, write=False) as store:
             holder = store.leases.holder(bench.name)
         if holder is None:
             raise
-        raise Conflict(f"{described(holder)}. {taken}") from taken
+        raise Conflict(f"{described(holder)}. {lease}") from lease
     try:
         opened.imports.discard_unfinished()
         yield opened

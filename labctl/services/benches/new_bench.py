@@ -126,8 +126,8 @@ def document(name: str, latitude_deg: float | None, sections: Sequence[Section])
 
 def write(path: Path, made: Mapping[str, object], sections: Sequence[Section]) -> None:
     """Write a bench file; raises BadInput."""
-    said = [f"#   {s.name}: {s.found.recognised.text} at {s.found.address}" for s in sections if s.found.recognised]
-    head = [f"# Written by `labctl bench new` at {WallClock().utc():%Y-%m-%d %H:%M} UTC. What answered:", *said]
+    header = [f"#   {s.name}: {s.found.recognised.text} at {s.found.address}" for s in sections if s.found.recognised]
+    head = [f"# Written by `labctl bench new` at {WallClock().utc():%Y-%m-%d %H:%M} UTC. What answered:", *header]
     foot = "# `labctl bench check` asks every instrument; nothing moves. Keys: docs/reference/instruments.md."
     try:
         path.write_text("\n".join([*head, foot, tomli_w.dumps(dict(made))]), encoding="utf-8")

@@ -27,13 +27,13 @@ def reference_channels(bench: Bench, bench_file: BenchFile) -> tuple[RawChannelJ
         channels = [raw_channel(channel) for channel in bench.references[settings.name].channels]
         refuse_doubled_columns(settings.name, tuple(channels), tuple(raw_channels))
         if settings.is_temperature:
-            warm = next((each for each in channels if each["unit"] == "deg C"), None)
-            if warm is None:
+            temperature_channel = next((each for each in channels if each["unit"] == "deg C"), None)
+            if temperature_channel is None:
                 raise BadInput(
                     f"{settings.name}: is_temperature is set, but this instrument measures no temperature; set "
                     "is_temperature for a thermometer"
                 )
-            warm["stands_for"] = TEMPERATURE
+            temperature_channel["stands_for"] = TEMPERATURE
         raw_channels += channels
     return tuple(raw_channels)
 

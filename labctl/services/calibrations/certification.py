@@ -40,12 +40,12 @@ def certification_response(row: CertificationRow) -> CertificationResponse:
     if (second := row.release) is not None:
         update = {"released_by": second.by, "released_key": second.by_key, "release_reason": second.reason}
         response = response.model_copy(update=update)
-    known = row.judgement
-    if known is None:
+    judgement = row.judgement
+    if judgement is None:
         return response
     verdict = {
-        "verdict": known.verdict, "verdict_recording": known.recording, "verdict_at": known.at,
-        "override": known.override, **known.detail,
+        "verdict": judgement.verdict, "verdict_recording": judgement.recording, "verdict_at": judgement.at,
+        "override": judgement.override, **judgement.detail,
     }  # fmt: skip
     return CertificationResponse.model_validate({**response.model_dump(), **verdict})
 
@@ -78,10 +78,10 @@ def release(store: Store, serial: str, version: int, request: ReleaseRequest, at
     Raises NotFound where nothing waits, ReleaseRefused for the first person and without a key, CertificationRefused.
     """
     key = key_of_person(f"releasing {serial} version {version}")
-    asked = waiting_request(store, store.units.get(serial).serial, version, key)
-    first = CertifyRequest(by=asked.by, reason=asked.reason, due_days=asked.due_days, override=asked.override)
-    second = Release(request.by, key, request.reason, asked.id)
-    return put_in_force(store, serial, version, first, at, asked.by_key, second)
+    waiting = waiting_request(store, store.units.get(serial).serial, version, key)
+    first = CertifyRequest(by=waiting.by, reason=waiting.reason, due_days=waiting.due_days, override=waiting.override)
+    second = Release(request.by, key, request.reason, waiting.id)
+    return put_in_force(store, serial, version, first, at, waiting.by_key, second)
 
 
 def put_in_force(
@@ -95,11 +95,12 @@ def put_in_force(
 ) -> CertificationResponse:
     """Put a version in force in the name of one person, or of two; keep the verdict on it. Raises as `certify` does."""
     days, due_from = interval_days(store, store.units.get(serial).serial, version, request.due_days)
-    known = assess(store, serial, version)
-    _refuse_objections(known, request)
+    assessment = assess(store, serial, version)
+    _refuse_objections(assessment, request)
     judgement = Judgement(
-        known.verdict, known.verdict_recording, at if known.verdict else None, bool(known.objections),
-        cast(JudgementDetail, {**known.model_dump(mode="json", include=set(KEPT)), "due_from": due_from}),
+        assessment.verdict, assessment.verdict_recording, at if assessment.verdict else None,
+        bool(assessment.objections),
+        cast(JudgementDetail, {**assessment.model_dump(mode="json", include=set(KEPT)), "due_from": due_from}),
     )  # fmt: skip
     due = None if days is None else at + timedelta(days=days)
     row = store.calibrations.certify(
@@ -119,28 +120,28 @@ def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: 
 
     The answer names these, and who fetched the version and has to be notified.
     """
-    known = store.units.get(serial).serial
-    before = {row.number for row in store.certificates.of_unit(known) if row.withdrawal is not None}
+    known_serial = store.units.get(serial).serial
+    before = {row.number for row in store.certificates.of_unit(known_serial) if row.withdrawal is not None}
     key = acting_key()
     row = store.calibrations.certify(
         serial, version, "revoke", by=request.by, reason=request.reason, at=at, who=key or request.by, by_key=key
     )
     withdrawn = [
         row.number
-        for row in reversed(store.certificates.of_unit(known))
+        for row in reversed(store.certificates.of_unit(known_serial))
         if row.version == version and row.number not in before
     ]
-    answer = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
+    answer = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known_serial, version)}
     return certification_response(row).model_copy(update=answer)
 
 
 def refusal(known: AssessmentResponse) -> str:
     """Return in one message why a version is not certified, and what to do; of wrong data only the first is said."""
     data = [objection for objection in known.objections if objection.what == "data"]
-    said = [objection for objection in known.objections if objection not in data[1:]]
+    named_objections = [objection for objection in known.objections if objection not in data[1:]]
     more = f" (and {len(data) - 1} more in its data)" if len(data) > 1 else ""
-    objections = "; ".join(each.text for each in said)
-    todo = "; ".join(dict.fromkeys(each.do for each in said))
+    objections = "; ".join(named_objection.text for named_objection in named_objections)
+    todo = "; ".join(dict.fromkeys(named_objection.do for named_objection in named_objections))
     return (
         f"certification of version {known.version} of {known.serial} is refused: {objections}{more}. To do: {todo}. "
         "To certify it nevertheless:"

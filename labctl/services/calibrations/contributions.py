@@ -25,15 +25,15 @@ def contributions_over(
     """Return axis -> lines over the rate at the middle temperature, and over the temperature at the fastest rate."""
     middle_c = temperatures_c[len(temperatures_c) // 2]
     fastest_dps = max(rates_dps, key=abs)
-    rates, warm = _between(rates_dps), _between(temperatures_c)
+    rates, temperatures = _between(rates_dps), _between(temperatures_c)
     over_rate = [uncertainty(rate, middle_c) for rate in rates]
-    over_temperature = [uncertainty(fastest_dps, each) for each in warm]
+    over_temperature = [uncertainty(fastest_dps, temperature) for temperature in temperatures]
     return {
         axis: ContributionsOver(
             temperature_c=middle_c,
             rate_dps=fastest_dps,
             over_rate=_lines(rates, [each[axis].budget for each in over_rate]),
-            over_temperature=_lines(warm, [each[axis].budget for each in over_temperature]),
+            over_temperature=_lines(temperatures, [each[axis].budget for each in over_temperature]),
         )
         for axis in over_rate[0]
     }

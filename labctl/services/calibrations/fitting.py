@@ -98,8 +98,8 @@ def several(recordings: tuple[int, ...]) -> dict[str, list[int]]:
 def reference_of(rows: Sequence[RecordingRow]) -> dict[str, str]:
     """Return what a calibration's provenance says of the rates of its recordings, where that is known."""
     infos = [RecordingInfo.model_validate(row.info) for row in rows]
-    known = dict.fromkeys(REFERENCES[info.rate_reference] for info in infos if info.rate_reference is not None)
-    return {"rate_reference": "; ".join(known)} if known else {}
+    references = dict.fromkeys(REFERENCES[info.rate_reference] for info in infos if info.rate_reference is not None)
+    return {"rate_reference": "; ".join(references)} if references else {}
 
 
 def days_of(rows: Sequence[RecordingRow]) -> list[date]:

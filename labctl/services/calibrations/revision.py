@@ -102,8 +102,8 @@ def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewR
     def work() -> PreviewResponse:
         change = _change(store, serial, request)
         _, left_out = change.after.exported()
-        said = {"serial": serial, **change.figures, "left_out": left_out, "residuals": _residuals(change)}
-        return PreviewResponse.model_validate(said, extra="forbid")
+        preview = {"serial": serial, **change.figures, "left_out": left_out, "residuals": _residuals(change)}
+        return PreviewResponse.model_validate(preview, extra="forbid")
 
     return cached(PreviewResponse, _question(row, measured, request), work)
 
@@ -113,10 +113,10 @@ def _asked(store: Store, serial: str, request: ImproveRequest, row: CalibrationR
 
     One that was asked for by number is what it is fitted to, whatever the version was fitted to.
     """
-    wanted: Sequence[int] = request.recordings
-    if request.recording is None and not wanted and len(row.recordings) > 1:
-        wanted = row.recordings
-    return measurements_of(store, serial, request.recording, wanted)
+    numbers: Sequence[int] = request.recordings
+    if request.recording is None and not numbers and len(row.recordings) > 1:
+        numbers = row.recordings
+    return measurements_of(store, serial, request.recording, numbers)
 
 
 def _question(row: CalibrationRecord, measured: Measurements, request: ImproveRequest) -> dict[str, object]:
@@ -140,8 +140,8 @@ def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
     """Fit a changed model, or return the fit of a moment ago."""
     row = version_of(store, serial, request.version)
     measured = _asked(store, serial, request, row)
-    asked = json.dumps(_question(row, measured, request), sort_keys=True)
-    return _RECENT.get(asked, lambda: _fitted(row, measured, request))
+    question_json = json.dumps(_question(row, measured, request), sort_keys=True)
+    return _RECENT.get(question_json, lambda: _fitted(row, measured, request))
 
 
 def _refuse_what_changes_nothing(
@@ -171,12 +171,12 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
                 f"effect {effect_id!r} is not in version {row.version}; choose one of {', '.join(model.effect_ids)}"
             )
     written = read_formulas(request.formula)
-    wanted = [*_terms(request.add), *(Term(f.id, formula=f.text) for f in written)]
-    if not wanted and not request.remove:
+    terms = [*_terms(request.add), *(Term(f.id, formula=f.text) for f in written)]
+    if not terms and not request.remove:
         raise BadInput("give the change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
-    _refuse_what_changes_nothing(wanted, model, request, row.version)
+    _refuse_what_changes_nothing(terms, model, request, row.version)
     base, _ = changed(model, (), tuple(request.remove)).build(context)
-    add = tuple(_shaped(measured, base, term) for term in wanted)
+    add = tuple(_shaped(measured, base, term) for term in terms)
     before = fit_preset(context, changed(model))
     after = fit_preset(context, with_shapes(context, changed(model, add, tuple(request.remove)), all_of_them=bool(add)))
     hint = hint_of_added(context, base, [term.effect for term in add])

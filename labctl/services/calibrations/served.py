@@ -114,14 +114,14 @@ class CalibrationFile:
 
     def headers(self, now: datetime) -> dict[str, str]:
         """Return the HTTP headers beside the bytes at an aware time: tag, state, due date, warning and notice."""
-        known = self.certification
+        certification = self.certification
         response_headers = {"ETag": f'"{self.etag}"', "Cache-Control": "no-cache", "X-Labctl-State": NOT_CERTIFIED}
-        if known is None:
+        if certification is None:
             return response_headers
-        response_headers["X-Labctl-State"] = known.state
-        if known.due is not None and known.state != "revoked":
-            response_headers["X-Labctl-Due"] = f"{known.due.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}"
-        if text := known.warning(self.what, now):
+        response_headers["X-Labctl-State"] = certification.state
+        if certification.due is not None and certification.state != "revoked":
+            response_headers["X-Labctl-Due"] = f"{certification.due.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        if text := certification.warning(self.what, now):
             response_headers["Warning"] = f"299 labctl {quoted(text)}"
         if self.withdrawn is not None:
             response_headers[HEADER] = self.withdrawn.header()
@@ -140,22 +140,33 @@ def calibration_file(
     if served is None:
         document, hash_ = store.calibrations.document(serial, version)  # says why there is none
         served = ServedCalibration(document, hash_, None, in_force=False)
-    known = _certification(served)
+    certification = _certification(served)
     number = served.act.version if served.act else version or store.calibrations.certified_version(serial)
-    content, tag = (served.document, served.hash) if known is None else _certified(served.document, known)
+    content, tag = (
+        (served.document, served.hash) if certification is None else _certified(served.document, certification)
+    )
     if format_name == "json" and not options:
-        return CalibrationFile(content, "application/json", tag, serial, number, known, withdrawn=notice_of(served))
+        return CalibrationFile(
+            content, "application/json", tag, serial, number, certification, withdrawn=notice_of(served)
+        )
     file = exported(store, content, format_name, options)
     return CalibrationFile(
-        file.content, file.media_type, f"{tag}-{file.tag}", serial, number, known, file.losses, notice_of(served)
+        file.content,
+        file.media_type,
+        f"{tag}-{file.tag}",
+        serial,
+        number,
+        certification,
+        file.losses,
+        notice_of(served),
     )
 
 
 def calibration_state(store: Store, serial: str, calibration_hash: str) -> CalibrationStateResponse:
     """Return which state a version is in, by the hash of its calibration. Raises NotFound."""
-    known = store.units.get(serial).serial
-    version = store.calibrations.version_of(known, calibration_hash)
-    served = store.certifications.served(known, version) if version is not None else None
+    known_serial = store.units.get(serial).serial
+    version = store.calibrations.version_of(known_serial, calibration_hash)
+    served = store.certifications.served(known_serial, version) if version is not None else None
     if version is None or served is None:
         raise NotFound(
             f"unit {serial!r} has no calibration with the hash {calibration_hash[:64]!r}; give `calibration_hash` of a "
@@ -163,11 +174,11 @@ def calibration_state(store: Store, serial: str, calibration_hash: str) -> Calib
         )
     certification, gone = _certification(served), notice_of(served)
     return CalibrationStateResponse(
-        serial=known, version=version, calibration_hash=served.hash,
+        serial=known_serial, version=version, calibration_hash=served.hash,
         state=certification.state if certification else NOT_CERTIFIED,
         due=certification.due if certification else None,
         withdrawn=gone and WithdrawnResponse(at=gone.at, by=gone.by, reason=gone.reason, certificate=gone.certificate),
-        in_force=version_in_force(store, known),
+        in_force=version_in_force(store, known_serial),
     )  # fmt: skip
 
 

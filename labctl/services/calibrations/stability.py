@@ -108,5 +108,5 @@ def years_until(measured: datetime, until: datetime) -> float:
 def version_measured_at(store: Store, row: CalibrationRecord) -> datetime | None:
     """Return when the newest recording of a version was begun; None where one of them has no date."""
     begun = [measured_at(store.recordings.get(n).info) for n in row.recordings]
-    known = [each for each in begun if each is not None]
-    return max(known, default=row.created_at) if len(known) == len(begun) else None
+    begin_times = [each for each in begun if each is not None]
+    return max(begin_times, default=row.created_at) if len(begin_times) == len(begun) else None

@@ -84,9 +84,9 @@ def _histories(
     simulated = {
         number: has_simulated_instrument(bench) for number, bench in store.certified_versions.benches(campaigns).items()
     }
-    wanted = _is_simulated(own, calibration, simulated)
+    is_wanted = _is_simulated(own, calibration, simulated)
     for unit in chosen:
-        if all(_is_simulated(each, calibrations[each.id], simulated) == wanted for each in unit):
+        if all(_is_simulated(each, calibrations[each.id], simulated) == is_wanted for each in unit):
             yield _History(*rates_of(unit, calibrations, grid))
 
 

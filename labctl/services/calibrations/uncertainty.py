@@ -70,11 +70,11 @@ def uncertainty_of_unit(
     """
     calibration = read_calibration(version_of(store, serial, version).document)
     covered = Covered(calibration.rate_dps, calibration.temperature_c)
-    rates, warm = covered.rates(_Known.of(calibration).evidence), covered.temperatures()
+    rates, temperatures_c = covered.rates(_Known.of(calibration).evidence), covered.temperatures()
     return uncertainty_answer(
         calibration,
         [max(rates) / 2] if rate_dps is None else rate_dps,
-        warm[len(warm) // 2] if temperature_c is None else temperature_c,
+        temperatures_c[len(temperatures_c) // 2] if temperature_c is None else temperature_c,
         grid=grid,
     )
 
@@ -87,11 +87,17 @@ def uncertainty_answer(
 
     Raises BadInput, NotEnoughData.
     """
-    known = _Known.of(calibration)
-    vector = None if len(rate_dps) == 1 else known.at_vector(_vector(rate_dps), temperature_c)
-    uncertainty = known.at(rate_dps[0], temperature_c) if vector is None else known.of_vector(vector)
+    known_uncertainty = _Known.of(calibration)
+    vector = None if len(rate_dps) == 1 else known_uncertainty.at_vector(_vector(rate_dps), temperature_c)
+    uncertainty = (
+        known_uncertainty.at(rate_dps[0], temperature_c) if vector is None else known_uncertainty.of_vector(vector)
+    )
     coefficients = coefficient_budgets(
-        known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench
+        known_uncertainty.fitted,
+        temperature_c,
+        evidence=known_uncertainty.evidence,
+        name=known_uncertainty.name,
+        bench=known_uncertainty.bench,
     )
     budgets = {axis: BudgetResponse.model_validate(one.budget.to_json()) for axis, one in uncertainty.items()}
     response = calibration.document.get("response", {})
@@ -156,11 +162,11 @@ def over_any_axis(calibration: Calibration) -> dict[str, AnyAxisUncertainty]:
 @single_threaded
 def uncertainty_grid(calibration: Calibration) -> UncertaintyGrid:
     """Return the uncertainty about each axis on a small grid over the validity. Raises BadInput, NotEnoughData."""
-    covered, known = Covered(calibration.rate_dps, calibration.temperature_c), _Known.of(calibration)
-    rates, temperatures = covered.rates(known.evidence), covered.temperatures()
-    grid = [[known.at(rate, warm) for rate in rates] for warm in temperatures]
+    covered, known_uncertainty = Covered(calibration.rate_dps, calibration.temperature_c), _Known.of(calibration)
+    rates, temperatures = covered.rates(known_uncertainty.evidence), covered.temperatures()
+    grid = [[known_uncertainty.at(rate, temperature_c) for rate in rates] for temperature_c in temperatures]
     axes = {axis: [[_response(place[axis]) for place in row] for row in grid] for axis in grid[0][0]}
-    over = contributions_over(rates, temperatures, known.at)
+    over = contributions_over(rates, temperatures, known_uncertainty.at)
     return UncertaintyGrid(rate_dps=rates, temperature_c=temperatures, axes=axes, contributions=over)
 
 
@@ -175,7 +181,7 @@ def widening_of(calibration: Calibration, about: Literal["any axis", "own axis"]
     Over all outputs, temperatures and rate vectors up to the calibrated rate, or rates about the axis of each output.
     Raises BadInput, NotEnoughData.
     """
-    known, (rates, temperatures) = _Known.of(calibration), places_of(calibration)
+    known_uncertainty, (rates, temperatures) = _Known.of(calibration), places_of(calibration)
     reach = max(map(abs, rates))
     if about == "any axis":
         places = [{a: reach * part for a, part in zip(BODY_AXES, place, strict=True)} for place in PLACES]
@@ -183,7 +189,10 @@ def widening_of(calibration: Calibration, about: Literal["any axis", "own axis"]
     else:
         places = [{axis: rate} for axis in calibration.axes for rate in rates]
         seen = [list(place) for place in places]
-    every = [widening([known.at_vector(place, warm) for place in places], seen) for warm in temperatures]
+    every = [
+        widening([known_uncertainty.at_vector(place, temperature_c) for place in places], seen)
+        for temperature_c in temperatures
+    ]
     return float(np.max(every))  # NaN where one of them is
 
 
@@ -194,16 +203,25 @@ def budgets_at(
 
     Raises BadInput, NotEnoughData.
     """
-    known = _Known.of(calibration)
+    known_uncertainty = _Known.of(calibration)
     if isinstance(rate_dps, Mapping):
-        return known.at_vector(rate_dps, temperature_c).budgets
-    return {axis: axis_uncertainty.budget for axis, axis_uncertainty in known.at(rate_dps, temperature_c).items()}
+        return known_uncertainty.at_vector(rate_dps, temperature_c).budgets
+    return {
+        axis: axis_uncertainty.budget
+        for axis, axis_uncertainty in known_uncertainty.at(rate_dps, temperature_c).items()
+    }
 
 
 def coefficients_at(calibration: Calibration, temperature_c: float) -> dict[str, dict[str, Budget]]:
     """Return axis -> coefficient -> its budget at a temperature. Raises BadInput, NotEnoughData."""
-    known = _Known.of(calibration)
-    return coefficient_budgets(known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench)
+    known_uncertainty = _Known.of(calibration)
+    return coefficient_budgets(
+        known_uncertainty.fitted,
+        temperature_c,
+        evidence=known_uncertainty.evidence,
+        name=known_uncertainty.name,
+        bench=known_uncertainty.bench,
+    )
 
 
 def places_of(calibration: Calibration) -> tuple[list[float], list[float]]:
@@ -217,10 +235,10 @@ def is_inside(calibration: Calibration, rate_dps: Sequence[float], temperature_c
 
     A rate vector is where no rate about any axis is faster than the fastest that was calibrated.
     """
-    (cold, warm), (slow, fast) = calibration.temperature_c, calibration.rate_dps
+    (low_c, high_c), (slow, fast) = calibration.temperature_c, calibration.rate_dps
     if len(rate_dps) == 1:
-        return cold <= temperature_c <= warm and slow <= rate_dps[0] <= fast
-    return cold <= temperature_c <= warm and math.hypot(*rate_dps) <= max(abs(slow), abs(fast))
+        return low_c <= temperature_c <= high_c and slow <= rate_dps[0] <= fast
+    return low_c <= temperature_c <= high_c and math.hypot(*rate_dps) <= max(abs(slow), abs(fast))
 
 
 @dataclass(frozen=True)
@@ -256,6 +274,6 @@ class _Known:
 
 
 def _response(uncertainty: RateUncertainty) -> AxisUncertainty:
-    known = asdict(uncertainty)
-    known.pop("budget")
-    return AxisUncertainty.model_validate(known)
+    figures = asdict(uncertainty)
+    figures.pop("budget")
+    return AxisUncertainty.model_validate(figures)

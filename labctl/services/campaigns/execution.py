@@ -120,8 +120,8 @@ def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse
 
 
 def _stopped(store: Store, prepared: Prepared, engine: Engine) -> str:
-    left = describe_safe_state(store.campaigns.get(prepared.id).bench_name, "; ".join(engine.complaints))
-    return f"campaign {prepared.id} was stopped; {left}; `labctl campaign resume {prepared.id}` continues it"
+    state_text = describe_safe_state(store.campaigns.get(prepared.id).bench_name, "; ".join(engine.complaints))
+    return f"campaign {prepared.id} was stopped; {state_text}; `labctl campaign resume {prepared.id}` continues it"
 
 
 def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: StoreError) -> str:
@@ -129,14 +129,16 @@ def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: S
     complaints, ended, marked = "; ".join(engine.complaints), False, ""
     with suppress(StoreError):
         ended, marked = store.campaigns.get(campaign).state in ENDED, store.benches.unconfirmed(bench)
-    left = describe_safe_state(bench, complaints)
+    state_text = describe_safe_state(bench, complaints)
     if complaints and not marked:  # nothing that `labctl bench clear` could take back
-        left = f"bench {bench} is NOT confirmed safe, and that could not be recorded: {complaints}; inspect the bench"
+        state_text = (
+            f"bench {bench} is NOT confirmed safe, and that could not be recorded: {complaints}; inspect the bench"
+        )
     elif not complaints and not ended:
-        left += ", but that could not be recorded"
+        state_text += ", but that could not be recorded"
     again = "there is free space again" if isinstance(error, DiskFull) else "the database can be written again"
     return (
-        f"campaign {campaign} was interrupted: {error.cause}; the data measured before are stored; {left}; once "
+        f"campaign {campaign} was interrupted: {error.cause}; the data measured before are stored; {state_text}; once "
         f"{again}, "
         f"`labctl campaign resume {campaign}` continues it"
     )

@@ -66,8 +66,8 @@ def answering_stops(store: Store, bench: BenchFile, campaign: int, control: Cont
         ended.set()
         with contextlib.suppress(OSError):
             safe = control.is_at_rest(0.0) and not control.hindrance
-            left = f"campaign {campaign} ended; {control.hindrance or 'the bench is in its safe state'}"
-            stops.place.write_note(DriverNote(bench.name, document=document, left=left, left_safe=safe))
+            outcome = f"campaign {campaign} ended; {control.hindrance or 'the bench is in its safe state'}"
+            stops.place.write_note(DriverNote(bench.name, document=document, left=outcome, left_safe=safe))
         server.close()
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -140,12 +140,12 @@ def _statuses(store: Store, read: Callable[[], list[CampaignRow]]) -> list[Campa
     tested: rows are read again before a campaign is called abandoned.
     """
     rows = read()
-    left = {row.id for row in rows if row.state not in ENDED}
-    if left and store.is_held:
-        left.clear()
-    if left:
+    unfinished = {row.id for row in rows if row.state not in ENDED}
+    if unfinished and store.is_held:
+        unfinished.clear()
+    if unfinished:
         rows = read()
-    return [mark_abandoned(answer, attended=answer.id not in left) for answer in statuses_of(store, rows)]
+    return [mark_abandoned(answer, attended=answer.id not in unfinished) for answer in statuses_of(store, rows)]
 
 
 def abandoned_campaigns(store: Store) -> list[CampaignResponse]:

@@ -26,8 +26,8 @@ def stop_first(database: str | None, campaign: int, reason: str, say: Callable[[
     `say` gets a line where the bench is not known to stand, at once and at the end. Raises nothing.
     """
     location = database or default_database()
-    known, row = _row(location, campaign)
-    if known and (row is None or row.state in ENDED):
+    database_row, row = _row(location, campaign)
+    if database_row and (row is None or row.state in ENDED):
         return None
     stop = StopRequest.new(actor().name, actor().via, reason, campaign)
     results = [

@@ -65,7 +65,7 @@ def assembled(
     measurements, uncertainty = evidence.measurements, evidence.results.uncertainty
     if first is None or last is None or act is None or measurements is None or uncertainty is None:
         raise MissingFacts.of(facts.what, [])  # refused before
-    before, left, adjustment = _states(store, facts, measurements)
+    before, after, adjustment = _states(store, facts, measurements)
     order, number = facts.order, _number(store, facts, at)
     stability = stability_until(store, facts, act.due_at) if order.state_due and act.due_at else None
     return Certificate(
@@ -89,7 +89,7 @@ def assembled(
         coefficients=measured.coefficients(facts.calibration),
         sensors=tuple(facts.sensors.results(order, request.by)),
         as_found=before,
-        as_left=left,
+        as_left=after,
         adjustment=adjustment,
         conformity=None if order.conformity is None else conformity(
             order.conformity, errors_of(measurements, facts.calibration, order.conformity.about),
@@ -166,20 +166,20 @@ def _standard(given: Standard) -> StandardUsed:
 def _states(store: Store, facts: Facts, measurements: Measurements) -> tuple[StateOfItem, StateOfItem, str]:
     """Return the errors as found and as left, and what was adjusted between."""
     row, calibration = facts.row, facts.calibration
-    left = measured.corrected(
+    after = measured.corrected(
         measurements, calibration, f"the calibration that is certified, version {row.version}", calibration
     )
     before = _version_before(store, facts)
     new = f"The coefficients of the correction were determined anew: version {row.version}."
-    said = f"{new} {facts.order.adjustment or 'Nothing else was adjusted or repaired.'}"
+    text = f"{new} {facts.order.adjustment or 'Nothing else was adjusted or repaired.'}"
     if before is not None:
         document, _ = store.calibrations.document(row.serial, before)
         try:
             basis = f"the calibration in force before, version {before}"
-            return measured.corrected(measurements, read_calibration(document), basis, calibration), left, said
+            return measured.corrected(measurements, read_calibration(document), basis, calibration), after, text
         except (BadInput, NotEnoughData):  # its model needs what was not recorded this time
             pass
-    return measured.uncorrected(measurements, calibration.axes), left, said
+    return measured.uncorrected(measurements, calibration.axes), after, text
 
 
 def _version_before(store: Store, facts: Facts) -> int | None:

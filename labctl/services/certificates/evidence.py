@@ -114,11 +114,11 @@ class _Part:
         knows = math.isfinite(calibration.temperature_c[0])
         for axis, values in self.errors_dps.items():
             if self.belongs(row, axis, about):
-                warm = float(self.data.channels.temperature_c(axis)[row])
-                budget = budgets_at(calibration, rates if about == "any axis" else rates[axis], warm)[axis]
+                temperature_c = float(self.data.channels.temperature_c(axis)[row])
+                budget = budgets_at(calibration, rates if about == "any axis" else rates[axis], temperature_c)[axis]
                 budget = self._with_placement(budget, row, axis, calibration)
                 place = (rates["x"], rates["y"], rates["z"])
-                yield VerifiedError(axis, place, warm if knows else None, float(values[row]), budget)
+                yield VerifiedError(axis, place, temperature_c if knows else None, float(values[row]), budget)
 
 
 def errors_of(measured: Measurements, calibration: Calibration, about: Use) -> Errors:
@@ -149,9 +149,9 @@ def errors_of(measured: Measurements, calibration: Calibration, about: Use) -> E
 
 def _is_anew(whole: Recording, part: Recording) -> bool:
     """Return whether the data sets that verify share no mounting and no powered session with those that were fitted."""
-    rest = fitted_part(whole)
+    fitted_rest = fitted_part(whole)
     return all(
-        name in part.columns and not set(part.columns[name].tolist()) & set(rest.columns[name].tolist())
+        name in part.columns and not set(part.columns[name].tolist()) & set(fitted_rest.columns[name].tolist())
         for name in ("run", "mounting")
     )
 
@@ -169,10 +169,10 @@ def _require_cover(verified: Sequence[VerifiedError], calibration: Calibration, 
             rates = [each.rates_dps[place] for each in verified if each.output == output]
             if rates and min(rates) <= low + third + 1e-9 and max(rates) >= high - third - 1e-9:
                 continue
-            said = f"at {min(rates):.4g} to {max(rates):.4g} deg/s" if rates else "at no rate"
+            text = f"at {min(rates):.4g} to {max(rates):.4g} deg/s" if rates else "at no rate"
             beyond = f" ({outside} data sets lie beyond the range of the calibration)" if outside else ""
             raise NotVerified(
-                f"output {output} was verified about {turned} {said}{beyond}; a statement about {about} for {low:.4g} "
+                f"output {output} was verified about {turned} {text}{beyond}; a statement about {about} for {low:.4g} "
                 f"to {high:.4g} deg/s needs rates in the outer thirds of this range. Verify there ([verification] of "
                 "the recipe), or leave [conformity] out of the order"
             )

@@ -125,10 +125,10 @@ def _refuse_dates(facts: Facts) -> None:
             "correct the date"
         )
     if bad := [standard for standard in facts.standards if _off(standard, first, last)]:
-        said = "; ".join(f"{each.label}: calibrated {each.calibrated or 'not stated'}, due {each.due}" for each in bad)
+        text = "; ".join(f"{each.label}: calibrated {each.calibrated or 'not stated'}, due {each.due}" for each in bad)
         raise CertificateRefused(
             f"no certificate of {facts.what}: measured from {first} to {last}, when the calibration of a "
-            f"reference standard was not valid ({said}). Have the standard calibrated, and measure again"
+            f"reference standard was not valid ({text}). Have the standard calibrated, and measure again"
         )
 
 

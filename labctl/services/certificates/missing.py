@@ -28,8 +28,8 @@ class MissingFacts(BadInput):
         for fact, place in facts:
             places.setdefault(place, []).append(fact)
         count = "1 fact is missing" if len(facts) == 1 else f"{len(facts)} facts are missing"
-        said = "; ".join(f"{', '.join(names)}: {place}" for place, names in places.items())
-        return cls(f"no certificate of {what}: {count}. {said}", facts)
+        text = "; ".join(f"{', '.join(names)}: {place}" for place, names in places.items())
+        return cls(f"no certificate of {what}: {count}. {text}", facts)
 
     @property
     def members(self) -> JsonObject:

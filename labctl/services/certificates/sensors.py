@@ -133,12 +133,12 @@ def accelerometer_result(
         quantity="local gravity", value=ordered.gravity_m_s2, u=ordered.gravity_u_m_s2, unit="m/s^2",
         traceability=ordered.traceability.strip(),
     )  # fmt: skip
-    warm = "" if result.temperature is None else (
+    temperature_text = "" if result.temperature is None else (
         f" from {result.temperature.range_c[0]:.1f} °C to {result.temperature.range_c[1]:.1f} °C, the coefficients "
         f"without a power those at {result.temperature.reference_c:g} °C,"
     )  # fmt: skip
     holds_for = (
-        f"Specific forces of the size of gravity in any direction,{warm} at the conditions of the "
+        f"Specific forces of the size of gravity in any direction,{temperature_text} at the conditions of the "
         f"{result.rests - result.left_out} rests in {result.poses} poses."
     )
     converted = (
@@ -217,10 +217,10 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
 
 def _freedom_of(result: AccelerometerResponse) -> float:
     """Return the degrees of freedom of the fit: rests beyond what the parameters take."""
-    known = KNOWN_BEFORE if result.earlier is not None else 0
-    warm = result.temperature
-    parameters = ACCELEROMETER_PARAMETERS if warm is None else len(warm.covariance)
-    return max(float(result.rests - result.left_out + known - parameters), 1.0)
+    n_known = KNOWN_BEFORE if result.earlier is not None else 0
+    over_temperature = result.temperature
+    parameters = ACCELEROMETER_PARAMETERS if over_temperature is None else len(over_temperature.covariance)
+    return max(float(result.rests - result.left_out + n_known - parameters), 1.0)
 
 
 def _coefficient(

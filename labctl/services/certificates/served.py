@@ -51,9 +51,9 @@ def notice_of(now: CertificateResponse) -> Withdrawn | None:
 
 def format_of(name: str) -> CertificateFormat:
     """Return the format that a suffix names, with or without its dot. Raises BadInput."""
-    for known in get_args(CertificateFormat):
-        if name.lower().removeprefix(".") == known:
-            return known
+    for format_name in get_args(CertificateFormat):
+        if name.lower().removeprefix(".") == format_name:
+            return format_name
     raise BadInput(f"{name!r} is not a format of a certificate; give pdf, xml or json")
 
 
@@ -96,6 +96,6 @@ def public_certificate(store: Store, number: str, calibration: str) -> PublicCer
     if len(calibration) < HASH_DIGITS or not hash_.startswith(calibration.lower()):
         raise none
     issued = json.loads(store.certificates.forms(number).document)
-    said = now.model_dump(include=set(PublicCertificate.model_fields) - {"notices"})
+    public = now.model_dump(include=set(PublicCertificate.model_fields) - {"notices"})
     notices = Notices.of(store).for_customers(store.calibrations.get(now.serial, now.version).recordings)
-    return PublicCertificate(**said, calibration_hash=hash_, laboratory=issued["laboratory"]["name"], notices=notices)
+    return PublicCertificate(**public, calibration_hash=hash_, laboratory=issued["laboratory"]["name"], notices=notices)

@@ -30,12 +30,12 @@ class _Change:
 
 def list_certificates(store: Store, serial: str) -> list[CertificateResponse]:
     """Return every certificate of a unit with its state, newest first. Raises NotFound."""
-    known = store.units.get(serial).serial
+    known_serial = store.units.get(serial).serial
     notices = Notices.of(store)
-    behind = {row.version: row.recordings for row in store.calibrations.of_unit(known)} if notices.bad else {}
+    behind = {row.version: row.recordings for row in store.calibrations.of_unit(known_serial)} if notices.bad else {}
     return [
         row.model_copy(update={"notices": list(notices.of_recordings(behind.get(row.version, ())))})
-        for row in stated(store.certificates.of_unit(known), store.calibrations.history(known))
+        for row in stated(store.certificates.of_unit(known_serial), store.calibrations.history(known_serial))
     ]
 
 

@@ -40,11 +40,11 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
     `signers` are expected to have signed it, one of them: subjects as RFC 4514 writes them, or fingerprints. Without
     any, those that the environment names. Raises BadInput.
     """
-    wanted = [*signers] or expected_signers()
-    if wanted:
+    expected = [*signers] or expected_signers()
+    if expected:
         with libraries("the verification of signatures"):
             from labctl.certificates.signing.expected import refuse_unreadable  # noqa: PLC0415  only where one is named
-        refuse_unreadable(wanted)
+        refuse_unreadable(expected)
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -58,7 +58,7 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
         kept = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[form]
         in_register = "same" if kept == content else "differs"
     signatures = _signatures(content, form, path, ca)
-    answers = [_answer(signature, wanted) for signature in signatures]
+    answers = [_answer(signature, expected) for signature in signatures]
     certificate = None if row is None else certificate_by_number(store, row.number)
     # a DCC that is attached to a PDF is signed by itself, which says nothing of the pages
     own = [answer for answer in answers if answer.valid and answer.form == OWN.get(form)]
@@ -67,7 +67,7 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
         by = [certificate.signed_by]
     against = in_register == "differs" or not all(answer.valid for answer in answers)
     against = against or any(answer.trust == "not trusted" or answer.expected is False for answer in answers)
-    against = against or (bool(wanted) and not any(_is_one_of(each, wanted) for each in by))
+    against = against or (bool(expected) and not any(_is_one_of(each, expected) for each in by))
     vouched = in_register == "same" or any(each.trust == "trusted" for each in own)
     state: CertificateState | Literal["unknown"] = "unknown" if certificate is None else certificate.state
     return VerifiedFileResponse(
@@ -78,7 +78,7 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
         certificate=certificate,
         state=state,
         signed_by=next(iter(by), None),
-        expected_signers=wanted,
+        expected_signers=expected,
         signatures=answers,
         ok=vouched and not against and state != "withdrawn",
     )

@@ -57,12 +57,13 @@ def coarse_steps(criticism: Criticism) -> list[str]:
     if not criticism.data.steps:
         return []
     axes = ", ".join(f"{axis} by {step['step_dps']:.3g} deg/s" for axis, step in criticism.data.steps.items())
-    left = max(step["left_dps"] for step in criticism.data.steps.values())
-    said = (
+    largest_step_dps = max(step["left_dps"] for step in criticism.data.steps.values())
+    text = (
         f"Quantization: the output comes in steps ({axes}) that its noise does not average out. They leave "
-        f"{left:.2g} deg/s (standard deviation) in a mean, which no model corrects: record at a finer resolution."
+        f"{largest_step_dps:.2g} deg/s (standard deviation) in a mean, which no model corrects: record at a finer "
+        "resolution."
     )
-    return [said]
+    return [text]
 
 
 def doubtful(criticism: Criticism) -> str:

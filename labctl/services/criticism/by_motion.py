@@ -45,22 +45,22 @@ LEGS = {1: "heating", -1: "cooling", 0: ""}
 def rest_columns(data: FitData, errors: Errors) -> RestColumns:
     """Return the data sets at rest, axis by axis, in order of time."""
     channels, m = data.channels, len(data)
-    t_s, known = channels.columns.get("t_s"), channels.history.thermometer
+    t_s, thermometer = channels.columns.get("t_s"), channels.history.thermometer
     run = np.asarray(channels["run"], dtype=np.int64) if "run" in channels else np.ones(m, dtype=np.int64)
-    legs = np.sign(legs_of(data.temperature_c, run)) if known and t_s is not None else np.zeros(m, dtype=np.int64)
+    legs = np.sign(legs_of(data.temperature_c, run)) if thermometer and t_s is not None else np.zeros(m, dtype=np.int64)
 
     def of(axis: str) -> _Rows:
-        bias, left = data.outputs[axis] - data.true_rate_dps(axis), _left(errors, axis)
+        bias, residual = data.outputs[axis] - data.true_rate_dps(axis), _left(errors, axis)
         return {
             "axis": [axis] * m,
             "dataset": _dataset(data),
             "t_s": _optional(t_s, m),
-            "temperature_c": _optional(channels.temperature_c(axis) if known else None, m),
+            "temperature_c": _optional(channels.temperature_c(axis) if thermometer else None, m),
             "leg": [LEGS[int(leg)] for leg in legs],
             "bias_dps": bias.tolist(),
             "u_dps": _optional(None if data.white_var is None else np.sqrt(data.white_var[axis]), m),
-            "modelled_dps": _optional(None if left is None else bias - left, m),
-            "residual_dps": _optional(left, m),
+            "modelled_dps": _optional(None if residual is None else bias - residual, m),
+            "residual_dps": _optional(residual, m),
         }
 
     return RestColumns(**_joined(data, errors, of))
@@ -73,8 +73,8 @@ def turn_columns(data: FitData, errors: Errors) -> TurnColumns:
     about = np.asarray(data.channels["position"]).astype(np.str_)[rows].tolist()
 
     def of(axis: str) -> _Rows:
-        left, true = _left(errors, axis), data.true_rate_dps(axis)[rows]
-        left = None if left is None else left[rows]
+        residual, true = _left(errors, axis), data.true_rate_dps(axis)[rows]
+        residual = None if residual is None else residual[rows]
         u_dps = None if data.white_var is None else np.sqrt(data.white_var[axis][rows])
         return {
             "axis": [axis] * m,
@@ -82,8 +82,8 @@ def turn_columns(data: FitData, errors: Errors) -> TurnColumns:
             "about": about,
             "asked_deg": (true * duration_s).tolist(),
             "output_deg": (data.outputs[axis][rows] * duration_s).tolist(),
-            "corrected_deg": _optional(None if left is None else (true + left) * duration_s, m),
-            "residual_deg": _optional(None if left is None else left * duration_s, m),
+            "corrected_deg": _optional(None if residual is None else (true + residual) * duration_s, m),
+            "residual_deg": _optional(None if residual is None else residual * duration_s, m),
             "u_deg": _optional(None if u_dps is None else u_dps * duration_s, m),
         }
 
@@ -96,16 +96,16 @@ def profile_columns(data: FitData, errors: Errors, responses: Mapping[str, Respo
     m = len(rows)
 
     def of(axis: str) -> _Rows:
-        left, true, followed = _left(errors, axis), data.true_rate_dps(axis), None
-        if left is not None and axis in responses:
-            followed = (true + left - data.through(responses[axis]).true_rate_dps(axis))[rows]
+        residual, true, followed = _left(errors, axis), data.true_rate_dps(axis), None
+        if residual is not None and axis in responses:
+            followed = (true + residual - data.through(responses[axis]).true_rate_dps(axis))[rows]
         return {
             "axis": [axis] * m,
             "dataset": np.asarray(_dataset(data))[rows].tolist(),
             "t_s": np.asarray(data.channels["t_s"], dtype=np.float64)[rows].tolist(),
             "true_dps": true[rows].tolist(),
             "output_dps": data.outputs[axis][rows].tolist(),
-            "residual_dps": _optional(None if left is None else left[rows], m),
+            "residual_dps": _optional(None if residual is None else residual[rows], m),
             "followed_dps": _optional(followed, m),
         }
 

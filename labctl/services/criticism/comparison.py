@@ -53,8 +53,8 @@ def lines_over(
     over_rate, over_temperature = [], []
     for there in np.unique(position).tolist():
         for axis in (axis for axis in data.info.axes if axis in fitted.axes):
-            warm = channels.temperature_c(axis)
-            temperatures = np.unique(level_centres(warm, temperature_rows(warm, position, level)))
+            temperature_c = channels.temperature_c(axis)
+            temperatures = np.unique(level_centres(temperature_c, temperature_rows(temperature_c, position, level)))
 
             def error(across: Array, down: Array, *, by_rate: bool, axis: str = axis, there: str = there) -> Any:
                 grid = np.meshgrid(across, down)
@@ -179,11 +179,11 @@ def _axis(
 ) -> dict[str, list[int] | list[str] | list[float] | list[float | None]]:
     """Return the rows of one output axis."""
     channels = data.channels
-    rate, own, warm = channels.table_rate_dps(), channels.rate_dps(axis), channels.temperature_c(axis)
+    rate, own, temperature_c = channels.table_rate_dps(), channels.rate_dps(axis), channels.temperature_c(axis)
     measured = data.outputs[axis] - own
     own_turn = axis_in(position) == axis
     before, after = (
-        turn_errors(error - bias_at_rest(error, rate, warm, position), np.where(own_turn, rate, 0.0))
+        turn_errors(error - bias_at_rest(error, rate, temperature_c, position), np.where(own_turn, rate, 0.0))
         for error in (measured, residual)
     )
     return {
@@ -191,8 +191,8 @@ def _axis(
         "position": position.tolist(),
         "table_rate_dps": rate.tolist(),
         "own_rate_dps": own.tolist(),
-        "temperature_c": warm.tolist(),
-        "temperature_level_c": level_centres(warm, temperature_rows(warm, position, level)).tolist(),
+        "temperature_c": temperature_c.tolist(),
+        "temperature_level_c": level_centres(temperature_c, temperature_rows(temperature_c, position, level)).tolist(),
         "rate_level_dps": rate_level.tolist(),
         "measured_error_dps": measured.tolist(),
         "modelled_error_dps": (measured - residual).tolist(),

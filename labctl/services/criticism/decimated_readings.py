@@ -52,11 +52,11 @@ def read_recording_of(store: Store, row: RecordingRow) -> ReadRecording:
 @contextmanager
 def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decimated]:
     """Begin to read the recordings; gives the function that returns the readings of each when they are needed."""
-    wanted = [row for row in rows if is_decimated(row)]
+    decimated_rows = [row for row in rows if is_decimated(row)]
 
     def read() -> dict[int, ReadRecording]:
         with open_store(store.location, write=False) as own:
-            return {row.id: read_recording_of(own, row) for row in wanted}
+            return {row.id: read_recording_of(own, row) for row in decimated_rows}
 
     with closing(Forked(read)) as forked:
         readings: dict[int, ReadRecording] = {}

@@ -32,16 +32,16 @@ def held_sentences(model: ErrorModel) -> list[str]:
     listed = "; ".join(f"axis {axis}: {', '.join(names)}" for axis, names in model.held.axes.items())
     source = f" ({model.held.source})" if model.held.source else ""
     if model.forward().held.axes:
-        said = (
+        text = (
             f"These coefficients are held at their values{source}, within their stated uncertainties, and are not "
             f"fitted: {listed}."
         )
     else:
-        said = (
+        text = (
             f"The version holds these coefficients at their values{source}: {listed}. They belong to a law of the "
             "output; this comparison fits a law of the true rate, in which they are estimated."
         )
-    return [said]
+    return [text]
 
 
 def evaluate(

@@ -131,10 +131,10 @@ class Measurements:
         """What was read of each recording of which a criticism takes decimated readings."""
         for row in self.rows:
             refuse_unmeasured(row, self.of_each[row.id])
-        wanted = [row for row in self.rows if is_decimated(row)]
+        decimated_rows = [row for row in self.rows if is_decimated(row)]
         return {
             row.id: read_recording_of(self.store, row) if self.decimated is None else self.decimated(row)
-            for row in wanted
+            for row in decimated_rows
         }
 
     @property
@@ -177,22 +177,22 @@ def undated_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
     if not undated or len(rows) < 2:
         return
     named = recordings_text(undated)
-    said = f"{named} {'have' if len(undated) > 1 else 'has'} no date of measurement, so their order is not known"
+    text = f"{named} {'have' if len(undated) > 1 else 'has'} no date of measurement, so their order is not known"
     yield DataWarning(
-        what="date", severity="likely", where=named, said=said, value=None, unit="",
+        what="date", severity="likely", where=named, said=text, value=None, unit="",
         expected="a date of measurement of each recording", do=GIVE_DATE,
-        text=f"{said}, and no trend over the recordings is looked for; {GIVE_DATE}",
+        text=f"{text}, and no trend over the recordings is looked for; {GIVE_DATE}",
     )  # fmt: skip
 
 
 def other_settings_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
     """Yield that the unit was set otherwise in one of several recordings than in the first one that says how."""
-    known = [(row.id, RecordingInfo.model_validate(row.info).configuration) for row in rows]
-    first, *others = [each for each in known if each[1]] or [(0, {})]
+    configurations = [(row.id, RecordingInfo.model_validate(row.info).configuration) for row in rows]
+    first, *others = [configuration for configuration in configurations if configuration[1]] or [(0, {})]
     for number, settings in others:
         if differs := changed(first[1], settings):
-            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in differs.items())
-            text = f"the unit is set otherwise than in recording {first[0]}: {said}"
+            sentence = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in differs.items())
+            text = f"the unit is set otherwise than in recording {first[0]}: {sentence}"
             do = "fit the recordings of each setting by themselves"
             yield DataWarning(
                 what="configuration", severity="likely", where=f"recording {number}", said=text, value=None, unit="",

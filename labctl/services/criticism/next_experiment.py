@@ -48,7 +48,7 @@ def experiments_for(store: Store, campaign: int | None, criticism: Criticism) ->
     leader, *others = criticism.verdict.indistinguishable
     signal = leading_signal(criticism.comparison, leader)
     rivals = [name for name in others[:PAIRS] if name in effects]
-    floor_dps = {axis: float(np.median(left.floor_dps)) for axis, left in criticism.residuals.items()}
+    floor_dps = {axis: float(np.median(residuals.floor_dps)) for axis, residuals in criticism.residuals.items()}
     tried = (
         _experiment(text, changes, recipe, bench, signal, rivals, criticism.comparison.model, floor_dps)
         for text, changes in menu(recipe)
@@ -135,8 +135,10 @@ def _recipe_of(store: Store, campaign: int | None, criticism: Criticism) -> tupl
 def _recipe_like(criticism: Criticism) -> Recipe:
     """Return a recipe with the temperatures, rates, positions and durations of a recording."""
     data = criticism.data
-    warm = data.nodes["chamber_setpoint_c"] if "chamber_setpoint_c" in data.nodes else data.nodes.temperature_c("")
-    levels = np.unique(np.round(data.at_sets(np.asarray(warm, dtype=np.float64))))
+    temperature_c = (
+        data.nodes["chamber_setpoint_c"] if "chamber_setpoint_c" in data.nodes else data.nodes.temperature_c("")
+    )
+    levels = np.unique(np.round(data.at_sets(np.asarray(temperature_c, dtype=np.float64))))
     rates = np.unique(np.round(data.at_sets(data.nodes.table_rate_dps()), 1))
     history = data.nodes.history
     each = 1 < len(history.numbers("mounting")) <= len(history.numbers("run"))

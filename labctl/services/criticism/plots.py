@@ -28,8 +28,8 @@ def ladder_json(answer: LadderResponse) -> LadderJson:
 
 def pictures_unit(store: Store, serial: str, version: int | None, recording: int | None) -> list[PictureResponse]:
     """Return the pictures of a version's criticism and of its unit's ladder. Raises NotFound, BadInput."""
-    said, steps = criticise_unit(store, serial, version, recording), ladder(store, serial)
-    compared = comparison_json(store, serial, said.version, said.recording)
+    verdict, steps = criticise_unit(store, serial, version, recording), ladder(store, serial)
+    compared = comparison_json(store, serial, verdict.version, verdict.recording)
 
     def work() -> PicturesResponse:
         from labctl.plots import pictures_of  # noqa: PLC0415  a service starts without a drawing library
@@ -39,9 +39,9 @@ def pictures_unit(store: Store, serial: str, version: int | None, recording: int
                 id=picture.id, title=picture.title, how_to_read=picture.caption, effects=list(picture.effects),
                 figure=json.loads(picture.figure.to_json()),
             )
-            for picture in pictures_of(criticism_json(said), ladder_json(steps), compared)
+            for picture in pictures_of(criticism_json(verdict), ladder_json(steps), compared)
         ]  # fmt: skip
         return PicturesResponse(pictures=responses)
 
-    numbers = "\n".join([*(answer.model_dump_json() for answer in (said, steps)), json.dumps(compared)])
+    numbers = "\n".join([*(answer.model_dump_json() for answer in (verdict, steps)), json.dumps(compared)])
     return cached(PicturesResponse, {"numbers": hashlib.sha256(numbers.encode()).hexdigest()}, work).pictures

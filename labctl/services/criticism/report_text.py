@@ -36,8 +36,10 @@ DATA_FIRST = {"certain": "The data are wrong", "likely": "Check the data"}
 
 def with_warnings(answer: CriticismResponse, warnings: list[DataWarning]) -> CriticismResponse:
     """Return an answer that says first what is wrong with the data: a verdict on wrong data means nothing."""
-    said = [f"{DATA_FIRST[warning.severity]}: {warning.text}." for warning in warnings]
-    return answer.model_copy(update={"warnings": [*warnings, *answer.warnings], "text": [*said, *answer.text]})
+    warning_sentences = [f"{DATA_FIRST[warning.severity]}: {warning.text}." for warning in warnings]
+    return answer.model_copy(
+        update={"warnings": [*warnings, *answer.warnings], "text": [*warning_sentences, *answer.text]}
+    )
 
 
 #: Up to this many noise floors an error counts as noise: a model does not follow drift, and points that are measured
@@ -103,11 +105,11 @@ def answer_of(
 def _noise(criticism: Criticism) -> CriticisedNoise:
     static = criticism.data.static.to_json() if criticism.data.static is not None else None
     largest = max(criticism.floor.axes.values(), key=lambda noise: noise.drift.drift_dps)
-    known = [noise.white_dps for noise in criticism.floor.axes.values() if noise.white_dps is not None]
-    if not known:
+    white_dps = [noise.white_dps for noise in criticism.floor.axes.values() if noise.white_dps is not None]
+    if not white_dps:
         return {"white_dps": None, "drift_dps": None, "drift_tau_s": None, "vs_datasheet": None, "static": static}
     return {
-        "white_dps": float(np.sqrt(np.mean(np.square(known)))),
+        "white_dps": float(np.sqrt(np.mean(np.square(white_dps)))),
         "drift_dps": largest.drift.drift_dps,
         "drift_tau_s": largest.drift.tau_s if largest.drift.drift_dps > 0 else None,
         "vs_datasheet": criticism.drift_over_datasheet,
@@ -119,8 +121,8 @@ def _lack_of_fit(criticism: Criticism) -> LackOfFit:
     """Chi2 of the whitened residual over its degrees of freedom, and its p-value."""
     if not criticism.residuals:
         return {"statistic": None, "p_value": None}
-    total = sum(left.chi2 for left in criticism.residuals.values())
-    freedom = sum(left.freedom for left in criticism.residuals.values())
+    total = sum(axis_residuals.chi2 for axis_residuals in criticism.residuals.values())
+    freedom = sum(axis_residuals.freedom for axis_residuals in criticism.residuals.values())
     return {"statistic": float(total / max(freedom, 1)), "p_value": float(chdtrc(max(freedom, 1), total))}
 
 
@@ -163,53 +165,55 @@ def sentences(criticism: Criticism, experiments: Sequence[Experiment] = ()) -> l
     family = [] if criticism.family is None else [criticism.family.sentence]
     family += [] if criticism.hint is None else [criticism.hint.hint]
     first = not_logged(criticism) or doubtful(criticism) or _first(criticism)
-    said = [first, *family, *what_to_log(criticism), *coarse_steps(criticism)]
+    all_sentences = [first, *family, *what_to_log(criticism), *coarse_steps(criticism)]
     if verdict.remainder is not None and verdict.groups:
-        said.append(_remainder(verdict))
+        all_sentences.append(_remainder(verdict))
     if verdict.form == "unexplained" and verdict.confounded:
-        said.append(
+        all_sentences.append(
             f"This schedule cannot distinguish {verdict.depends_on[0]} from {_list(verdict.confounded)}: confounded."
         )
     if _leg(criticism) and (verdict.groups or verdict.form == "unexplained"):
-        said.append(
+        all_sentences.append(
             "Since the temperature only rises in this recording, an error that grows with time cannot be "
             "distinguished from one that grows with temperature."
         )
     if verdict.form == "ambiguous" and verdict.indistinguishable:
-        wanted = [str(experiment["do"]) for experiment in experiments[:1]]
-        if not wanted:
-            wanted = list(
+        advice = [str(experiment["do"]) for experiment in experiments[:1]]
+        if not advice:
+            advice = list(
                 dict.fromkeys(CATALOGUE[e].experiment for e in verdict.indistinguishable[:3] if e in CATALOGUE)
             )
-        said += [f"To tell: {experiment}." for experiment in wanted]
-    said += advice_sentences(criticism.advice)
+        all_sentences += [f"To tell: {experiment}." for experiment in advice]
+    all_sentences += advice_sentences(criticism.advice)
     if verdict.not_physical and verdict.groups:
         technology = criticism.data.info.technology or "this technology"
-        said.append(f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}.")
-    said += _further(criticism)
+        all_sentences.append(
+            f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}."
+        )
+    all_sentences += _further(criticism)
     if criticism.data.info.rate_reference == "demanded":
-        said.append(UNMEASURED)
+        all_sentences.append(UNMEASURED)
     if verdict.form == "adequate" and criticism.has_large_drift:
-        said.append(
+        all_sentences.append(
             f"The drift is larger than specified: {criticism.drift_over_datasheet:.1f} times the value expected from "
             "the "
             "data sheet."
         )
     if criticism.data.left_out:
-        said.append(f"{criticism.data.left_out} readings far outside their data set were left out.")
-    return said
+        all_sentences.append(f"{criticism.data.left_out} readings far outside their data set were left out.")
+    return all_sentences
 
 
 def _remainder(verdict: Verdict) -> str:
-    left = verdict.remainder
-    assert left is not None
-    share, channels = float(left["share"]), left["depends_on"]
+    remainder = verdict.remainder
+    assert remainder is not None
+    share, channels = float(remainder["share"]), remainder["depends_on"]
     explained = f"{100 * (1 - share):.1f}".rstrip("0").rstrip(".")
     follows = f", and follows {channels[0]}" if channels else ""
     return (
         f"{' and '.join(group[0] for group in verdict.groups)} {'explains' if len(verdict.groups) == 1 else 'explain'} "
         f"{explained} % of the excess over the noise floor; the remaining residual is "
-        f"{float(left['over_floor']):.1f} times the noise floor{follows}."
+        f"{float(remainder['over_floor']):.1f} times the noise floor{follows}."
     )
 
 
@@ -240,11 +244,12 @@ def _list(names: Sequence[str]) -> str:
 
 
 def _adequate(criticism: Criticism) -> str:
-    floor, left = criticism.floor.rms_dps, criticism.base.error.rms_dps if criticism.base else None
-    if not floor or left is None or left <= AT_FLOOR * floor:
+    floor, error_dps = criticism.floor.rms_dps, criticism.base.error.rms_dps if criticism.base else None
+    if not floor or error_dps is None or error_dps <= AT_FLOOR * floor:
         return "Adequate: no effect is missing, the residual is noise."
     return (
-        f"Adequate: no effect is missing that this recording can detect; the residual is {left / floor:.1f} times the "
+        f"Adequate: no effect is missing that this recording can detect; the residual is {error_dps / floor:.1f} "
+        "times the "
         f"noise floor, and depends on no recorded channel.{drifts(criticism)}"
     )
 

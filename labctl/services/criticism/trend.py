@@ -172,8 +172,8 @@ def line_left(error_dps: Array, rate_dps: Array) -> AxisPoint:
     turned = len(np.unique(np.round(rate_dps, 3))) >= LEAST_RATES
     columns = np.column_stack([np.ones(len(rate_dps)), rate_dps] if turned else [np.ones(len(rate_dps))])
     coefficients, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
-    left = error_dps - columns @ coefficients
-    variance = float(left @ left) / max(len(left) - columns.shape[1], 1)
+    residual = error_dps - columns @ coefficients
+    variance = float(residual @ residual) / max(len(residual) - columns.shape[1], 1)
     u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
     return AxisPoint(
         bias_dps=float(coefficients[0]), u_bias_dps=float(u[0]),
@@ -186,11 +186,11 @@ def _lines(points: Sequence[TrendPoint]) -> Iterator[tuple[str, str, str, TrendL
     series: dict[tuple[str, str, str], list[tuple[float, float, float]]] = {}
     for point in points:
         years = (point.at - points[0].at) / YEAR
-        for axis, left in point.axes.items():
-            series.setdefault((axis, "bias", "deg/s"), []).append((years, left.bias_dps, left.u_bias_dps))
-            if left.scale_factor is not None and left.u_scale_factor is not None:
+        for axis, axis_error in point.axes.items():
+            series.setdefault((axis, "bias", "deg/s"), []).append((years, axis_error.bias_dps, axis_error.u_bias_dps))
+            if axis_error.scale_factor is not None and axis_error.u_scale_factor is not None:
                 series.setdefault((axis, "scale_factor", "1"), []).append(
-                    (years, left.scale_factor, left.u_scale_factor)
+                    (years, axis_error.scale_factor, axis_error.u_scale_factor)
                 )
         if point.rms_dps is not None:
             series.setdefault(("all", "error", "deg/s"), []).append((years, point.rms_dps, 0.0))
@@ -212,25 +212,25 @@ def _drawn(points: Sequence[TrendPoint], leaves: Sequence[Leaving]) -> Array:
 
 def _course(line: TrendLine, points: Sequence[TrendPoint], years: Array) -> DriftLine:
     value, half = line.at(years)
-    known = line.freedom > 0
+    has_freedom = line.freedom > 0
     return DriftLine(
         at=[points[0].at + year * YEAR for year in years.tolist()],
         value=value.tolist(),
-        low=(value - half).tolist() if known else [None] * len(years),
-        high=(value + half).tolist() if known else [None] * len(years),
+        low=(value - half).tolist() if has_freedom else [None] * len(years),
+        high=(value + half).tolist() if has_freedom else [None] * len(years),
     )
 
 
 def _drift(
     axis: str, what: str, unit: str, line: TrendLine, points: Sequence[TrendPoint], years: Array
 ) -> Drift:  # fmt: skip
-    known = line.freedom > 0
+    has_freedom = line.freedom > 0
     half = line.factor * line.u_slope
     return Drift(
         axis=axis, what=what, unit=f"{unit}/year" if unit != "1" else "1/year", points=line.freedom + 2,
-        per_year=line.slope, u=line.u_slope if known else None,
-        low=line.slope - half if known else None, high=line.slope + half if known else None,
-        repeatability=line.repeatability, significant=known and abs(line.slope) > half,
+        per_year=line.slope, u=line.u_slope if has_freedom else None,
+        low=line.slope - half if has_freedom else None, high=line.slope + half if has_freedom else None,
+        repeatability=line.repeatability, significant=has_freedom and abs(line.slope) > half,
         line=_course(line, points, years),
     )  # fmt: skip
 
@@ -255,13 +255,13 @@ def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
         word = "recording" if points == 1 else "recordings"
         yield f"{points} {word} in time: a drift needs two recordings, and its uncertainty three."
     for drift in drifts:
-        said = f"Axis {drift.axis}, {drift.what}" if drift.axis != "all" else "RMS error over all axes"
+        text = f"Axis {drift.axis}, {drift.what}" if drift.axis != "all" else "RMS error over all axes"
         if drift.u is None or drift.low is None or drift.high is None:
-            figure = f"{said}: {drift.per_year:.2g} {drift.unit}"
+            figure = f"{text}: {drift.per_year:.2g} {drift.unit}"
             yield f"{figure} from two recordings; its uncertainty needs {LEAST_POINTS} recordings."
         else:
             is_drift = "drifts by" if drift.significant else "no drift beyond repeatability:"
-            yield f"{said}: {is_drift} {drift.per_year:.2g} {drift.unit} (95 %: {drift.low:.2g} to {drift.high:.2g})."
+            yield f"{text}: {is_drift} {drift.per_year:.2g} {drift.unit} (95 %: {drift.low:.2g} to {drift.high:.2g})."
 
 
 def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[str]:

@@ -141,9 +141,9 @@ def _over_temperature(seen: _Columns, axis: str, own: NDArray[np.bool_], scale_f
         for level in range(len(seen.level_c))
         if (line := seen.line(axis, own & (seen.level == level))) is not None
     }
-    warm = seen.level_c[list(lines)]
-    bias = slope_over(warm, [line.bias_dps for line in lines.values()])
-    scale = slope_over(warm, [line.scale_factor for line in lines.values()])
+    temperature_c = seen.level_c[list(lines)]
+    bias = slope_over(temperature_c, [line.bias_dps for line in lines.values()])
+    scale = slope_over(temperature_c, [line.scale_factor for line in lines.values()])
     if bias is not None:
         yield Figure("bias_temperature", axis, bias, own)
     if scale is not None:
@@ -202,7 +202,7 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
     """Yield misalignment and orthogonality from the slopes of all outputs over the rate about each axis."""
     if set(seen.data.outputs) != set(AXES):
         return
-    k, u, known = np.eye(3), np.zeros((3, 3)), True
+    k, u, has_u = np.eye(3), np.zeros((3, 3)), True
     used = np.zeros(len(seen.data), dtype=bool)
     for j, about in enumerate(AXES):
         rows = seen.own(about) & (seen.level == seen.usual)
@@ -213,10 +213,10 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
             if line is None:
                 return
             k[i, j] = line.scale_factor.value
-            known &= line.scale_factor.u is not None
+            has_u &= line.scale_factor.u is not None
             u[i, j] = math.hypot(line.scale_factor.u or 0.0, 0.0 if i == j else leaning)
     try:
-        alignment = alignment_of(k, u if known else None)
+        alignment = alignment_of(k, u if has_u else None)
     except ValueError:  # an axis has its sign reversed: no rotation takes it there
         return
     for axis, estimate in zip(AXES, alignment.misalignment_deg, strict=True):

@@ -130,10 +130,10 @@ def _of_recording(store: Store, row: RecordingRow) -> Iterator[Characteristic]:
 
 
 def _conditions(row: RecordingRow, data: FitData, figure: Figure) -> MeasuredUnder:
-    warm, rate = data.temperature_c[figure.rows], data.channels.table_rate_dps()[figure.rows]
+    temperature_c, rate = data.temperature_c[figure.rows], data.channels.table_rate_dps()[figure.rows]
     runs = len(np.unique(np.asarray(data.channels["run"])[figure.rows])) if "run" in data.channels else None
     return MeasuredUnder(
-        recording=row.id, temperature_c=(float(warm.min()), float(warm.max())),
+        recording=row.id, temperature_c=(float(temperature_c.min()), float(temperature_c.max())),
         rate_dps=(float(rate.min()), float(rate.max())), runs=runs, datasets=int(np.count_nonzero(figure.rows)),
     )  # fmt: skip
 
@@ -152,9 +152,10 @@ def _noise(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Characteristi
     if answer is None or answer.recording is None:
         return
     lines = {line.id: line for line in LINES}
-    warm = answer.temperature_c
+    temperature_c = answer.temperature_c
     under = MeasuredUnder(
-        recording=answer.recording, temperature_c=None if warm is None else (warm, warm), rate_dps=(0.0, 0.0), runs=1,
+        recording=answer.recording, temperature_c=None if temperature_c is None else (temperature_c, temperature_c),
+        rate_dps=(0.0, 0.0), runs=1,
         datasets=answer.datasets[-1] - answer.datasets[0] + 1,
     )  # fmt: skip
     for axis, noise in answer.axes.items():

@@ -35,9 +35,9 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
             f"campaign {campaign} is in the state {row.state}, but its drafts (proposed calibrations) are made "
             "when it is done; wait for its end, or resume the campaign"
         )
-    asked = row.recipe.get("fit")
-    if asked is not None:
-        rules = FitRules.model_validate(asked)
+    fit_rules = row.recipe.get("fit")
+    if fit_rules is not None:
+        rules = FitRules.model_validate(fit_rules)
         for draft in store.drafts.of_campaign(campaign):
             if draft.state in {"due", "fitted"} or (request.again and draft.state == "failed"):
                 _make(store, draft, rules, at)
@@ -73,8 +73,8 @@ def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
 
 def fail_draft(store: Store, draft: DraftRow, rules: FitRules, why: str, at: datetime) -> None:
     """Write down why a draft could not be made and what to do; the campaign stays done."""
-    asked = f"--model {rules.model}" if rules.model is not None else f"--effects {','.join(rules.effects)}"
-    reason = failure_text(draft.serial, draft.recording, asked, why)
+    option = f"--model {rules.model}" if rules.model is not None else f"--effects {','.join(rules.effects)}"
+    reason = failure_text(draft.serial, draft.recording, option, why)
     if store.drafts.fail(draft.recording, reason, DraftEvent(reason, "warning"), at):
         log.warning("draft.failed", campaign=draft.campaign, serial=draft.serial, reason=reason)
 

@@ -79,14 +79,15 @@ def report_on(store: Store, draft: CalibrationRecord, recording: int, rules: Fit
     measured = Measurements(store, (store.recordings.get(recording),))
     error = CertifiedErrors.model_validate(dict(draft.answer["error"]))
     compared = [ComparedModel(model=draft.model, error=error), *_compared(measured, rules)]
-    known = _assessed(store, draft, rules)
+    assessment = _assessed(store, draft, rules)
     as_left, as_left_why = applied(store, draft, measured)
     as_found, as_found_why, drift = _as_found(store, draft, measured, rules)
     limits = held_against(rules.limits, error, as_left, drift)
     report = DraftReport(
         model=draft.model, error=error, compared=compared, smallest_heldout=_smallest_heldout(compared, measured),
-        verdict=known.verdict if known else None, verdict_text=known.verdict_text if known else "",
-        verdict_reason=known.verdict_reason if known else NOT_ASKED, objections=known.objections if known else [],
+        verdict=assessment.verdict if assessment else None, verdict_text=assessment.verdict_text if assessment else "",
+        verdict_reason=assessment.verdict_reason if assessment else NOT_ASKED,
+        objections=assessment.objections if assessment else [],
         as_found=as_found, as_found_why=as_found_why, as_left=as_left, as_left_why=as_left_why, drift=drift,
         limits=limits, within_limits=all_within(limits), text="",
     )  # fmt: skip
@@ -115,15 +116,15 @@ def _compared(measured: Measurements, rules: FitRules) -> list[ComparedModel]:
 
 
 def _smallest_heldout(compared: list[ComparedModel], measured: Measurements) -> str | None:
-    known = [
+    errors = [
         (each.error.heldout_rms_dps, each.model)
         for each in compared
         if each.error is not None and each.error.heldout_rms_dps is not None
     ]
-    if not known:
+    if not errors:
         return None
     n = len(measured.points) * len(measured.points.info.axes)
-    return known[first_of_smallest([error for error, _ in known], n)][1]
+    return errors[first_of_smallest([error for error, _ in errors], n)][1]
 
 
 def _as_found(

@@ -21,8 +21,8 @@ def report_text(serial: str, version: int, report: DraftReport) -> str:
 def _sentences(serial: str, version: int, report: DraftReport) -> Iterator[str]:
     error = report.error
     heldout = "" if error.heldout_rms_dps is None else f", held-out {error.heldout_rms_dps:.3g} deg/s"
-    left = "not known" if error.rms_dps is None else f"{error.rms_dps:.3g} deg/s RMS"
-    yield f"Draft calibration: version {version} of {serial} ({report.model}), error {left}{heldout}."
+    error_text = "not known" if error.rms_dps is None else f"{error.rms_dps:.3g} deg/s RMS"
+    yield f"Draft calibration: version {version} of {serial} ({report.model}), error {error_text}{heldout}."
     if report.verdict is not None:
         yield f"Verdict: {report.verdict}."
     if report.smallest_heldout is not None and report.smallest_heldout != report.model:

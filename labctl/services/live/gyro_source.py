@@ -39,8 +39,8 @@ class GyroSource:
         """Choose a gyro by its serial number, default the first. Raises BadInput for an unknown one."""
         chosen = [gyro for gyro in bench.gyros if serial in (None, gyro.serial)]
         if not chosen:
-            known = ", ".join(gyro.serial for gyro in bench.gyros)
-            raise BadInput(f"{serial}: bench {bench.name} has no such unit; choose one of {known}")
+            serials = ", ".join(gyro.serial for gyro in bench.gyros)
+            raise BadInput(f"{serial}: bench {bench.name} has no such unit; choose one of {serials}")
         self._settings = chosen[0]
         # the simulated world and the seed of a unit do not depend on the other units of the bench
         self._bench_file = bench.model_copy(update={"table": None, "chamber": None, "gyros": (self._settings,)})

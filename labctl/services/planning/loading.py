@@ -62,8 +62,8 @@ def load_bench(source: str) -> BenchFile:
     try:
         return checked_settings(read_bench(source))
     except FileNotFoundError:
-        known = ", ".join(shipped_benches())
-        raise BadBench(f"bench {source!r} is neither a file nor a bench that ships with labctl ({known})") from None
+        names = ", ".join(shipped_benches())
+        raise BadBench(f"bench {source!r} is neither a file nor a bench that ships with labctl ({names})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
         raise BadBench(f"bench file {source}: not TOML: {error}; correct it") from error
     except ValidationError as error:

@@ -34,15 +34,15 @@ def _recipe(name: str, text: str, bench: BenchFile | None) -> RecipeResponse:
     recipe = load_recipe(name)
     on = bench or load_bench(bench_for(recipe, driven=True))
     remark = _lacking(recipe.positions, on)
-    said: dict[str, Any] = {
+    answer: dict[str, Any] = {
         "name": name, "description": recipe.description, "text": text, "bench": on.name, "remark": remark,
         "by_hand": recipe.turns is not None,
     }  # fmt: skip
     try:
         plan = make_plan(recipe, limits_of(on, driven=True))
     except PlanRefused as refused:
-        return RecipeResponse(**said, refused=str(refused))
-    return RecipeResponse(**said, steps=len(plan.steps), datasets=plan.datasets, expected_s=plan.expected_s)
+        return RecipeResponse(**answer, refused=str(refused))
+    return RecipeResponse(**answer, steps=len(plan.steps), datasets=plan.datasets, expected_s=plan.expected_s)
 
 
 def _lacking(positions: Sequence[str], bench: BenchFile) -> str:

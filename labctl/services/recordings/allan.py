@@ -78,8 +78,8 @@ def _longest_rest(store: Store, row: RecordingRow) -> int:
 
 
 def _response(recording: int, record: StaticRecord, info: RecordingInfo) -> AllanResponse:
-    said = {"recording": recording, "datasheet": dict(info.datasheet), **record.to_json()}
-    return AllanResponse.model_validate(said, extra="forbid")
+    answer = {"recording": recording, "datasheet": dict(info.datasheet), **record.to_json()}
+    return AllanResponse.model_validate(answer, extra="forbid")
 
 
 def _of_set(recording: Recording, dataset: int) -> StaticRecord:
@@ -98,8 +98,8 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
         raise NotEnoughData(
             f"data set {dataset}: its readings are all equal, so their noise is unknown; name another data set"
         )
-    warm = temperature_of(columns)
-    mean_c = float(warm[valid].mean()) if warm is not None else np.nan
+    temperature_c = temperature_of(columns)
+    mean_c = float(temperature_c[valid].mean()) if temperature_c is not None else np.nan
     return StaticRecord(dataset, dataset, mean_c, len(t_s) * period_s, axes)
 
 

@@ -139,8 +139,8 @@ def _of_course(what: str, courses: dict[str, NDArray[np.float64]], columns: Colu
             axes[name] = noise
     if not axes:
         raise NotEnoughData(f"{what}: its readings are all equal, so the noise cannot be estimated; check the column")
-    warm = temperature_of(columns)
-    mean_c = float("nan") if warm is None else float(warm[rows].mean())
+    temperature_c = temperature_of(columns)
+    mean_c = float("nan") if temperature_c is None else float(temperature_c[rows].mean())
     first, last = (
         int(np.asarray(columns["dataset"])[k]) if "dataset" in columns else 1 for k in (rows.start, rows.stop - 1)
     )
@@ -159,5 +159,5 @@ def _floats(values: NDArray[np.generic]) -> NDArray[np.float64]:
 
 
 def _answer(record: StaticRecord, recording: int | None, datasheet: dict[str, float]) -> AllanResponse:
-    said = {"recording": recording, "datasheet": datasheet, **record.to_json()}
-    return AllanResponse.model_validate(said, extra="forbid")
+    answer = {"recording": recording, "datasheet": datasheet, **record.to_json()}
+    return AllanResponse.model_validate(answer, extra="forbid")

@@ -20,8 +20,8 @@ def covered_of(inspection: RecordingInspection, points: Recording) -> Covered | 
     kept = [place for place, number in enumerate(inspection.dataset) if number not in aside]
     if not kept:
         return None
-    low = [warm for place in kept if (warm := inspection.temperature_low_c[place]) is not None]
-    high = [warm for place in kept if (warm := inspection.temperature_high_c[place]) is not None]
+    low = [temperature_c for place in kept if (temperature_c := inspection.temperature_low_c[place]) is not None]
+    high = [temperature_c for place in kept if (temperature_c := inspection.temperature_high_c[place]) is not None]
     span = (min(low), max(high)) if low and high else (None, None)
     rates = np.asarray(inspection.rate_low_dps)[kept], np.asarray(inspection.rate_high_dps)[kept]
     return covered_by(rates, np.asarray(inspection.position)[kept], span, up_rate_dps(points.info))

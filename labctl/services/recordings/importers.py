@@ -103,9 +103,10 @@ def surest(path: Path) -> str:
     names = [name for name, confidence in sure.items() if confidence == best]
     if best <= 0.0:
         if path.is_file():
-            known = ", ".join(f"{name}: {importer.title}" for name, importer in IMPORTERS.all().items())
+            importer_names = ", ".join(f"{name}: {importer.title}" for name, importer in IMPORTERS.all().items())
             raise BadRecording(
-                f"{path}: no installed importer recognises this file (installed: {known}); install the package "
+                f"{path}: no installed importer recognises this file (installed: {importer_names}); install the "
+                "package "
                 "of an importer for it, or name an importer with --format"
             )
         return INTERCHANGE
@@ -213,8 +214,8 @@ def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Import
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
         names = [key for key in importer.options.model_fields if key != "file"]
-        known = f"its options are {', '.join(names)}" if names else "it has no options"
-        raise BadInput(f"importer {name}: option {key}: {first['msg']} ({known}); correct the option") from error
+        option_text = f"its options are {', '.join(names)}" if names else "it has no options"
+        raise BadInput(f"importer {name}: option {key}: {first['msg']} ({option_text}); correct the option") from error
 
 
 def _confidence(name: str, importer: Importer[Any] | TableImporter[Any], path: Path) -> float:

@@ -112,20 +112,20 @@ def chosen_rows(
 
     Raises BadInput where both are given and differ, and what `newest_row` raises.
     """
-    wanted = sorted(set(recordings))
-    if recording is not None and wanted and wanted != [recording]:
+    numbers = sorted(set(recordings))
+    if recording is not None and numbers and numbers != [recording]:
         raise BadInput(
-            f"recording {recording} and recordings {', '.join(map(str, wanted))} were both requested: give "
+            f"recording {recording} and recordings {', '.join(map(str, numbers))} were both requested: give "
             "one of the two"
         )
-    if len(wanted) > MOST_TOGETHER:
+    if len(numbers) > MOST_TOGETHER:
         raise BadInput(
-            f"{len(wanted)} recordings were given, but at most {MOST_TOGETHER} can be fitted together; name fewer"
+            f"{len(numbers)} recordings were given, but at most {MOST_TOGETHER} can be fitted together; name fewer"
         )
-    if len(wanted) < 2:
-        asked = wanted[0] if wanted else recording
-        return (newest_row(store, serial, asked, other_unit=other_unit, to_fit=True),)
-    return tuple(newest_row(store, serial, number, other_unit=other_unit) for number in wanted)
+    if len(numbers) < 2:
+        newest = numbers[0] if numbers else recording
+        return (newest_row(store, serial, newest, other_unit=other_unit, to_fit=True),)
+    return tuple(newest_row(store, serial, number, other_unit=other_unit) for number in numbers)
 
 
 def is_to_verify(store: Store, row: RecordingRow) -> bool:

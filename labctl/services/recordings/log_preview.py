@@ -47,8 +47,8 @@ def preview_log(
     refuse_unknown(leave_out)
     mapped_log = log_with_map(path, importer, options, column_map, OutOfOrder() if leaves_out_rows(leave_out) else None)
     table, chosen = mapped_log.table, mapped_log.column_map
-    taken = {target: source(table, mapped.source) for target, mapped in chosen.columns.items()}
-    target_of = {column.name: target for target, column in taken.items() if column is not None}
+    sources = {target: source(table, mapped.source) for target, mapped in chosen.columns.items()}
+    target_of = {column.name: target for target, column in sources.items() if column is not None}
     log = mapped_log.log
     return LogPreview(
         file=path.name,

@@ -29,7 +29,7 @@ def trace(
     info = RecordingInfo.model_validate(head.info)
     rows = [row for row in store.recordings.data_sets(recording) if row.state == "complete" and row.n]
     if head.kind == "samples":
-        known = courses_of(store.recordings.dataset(recording, rows[0].number)) if rows else []
+        courses = courses_of(store.recordings.dataset(recording, rows[0].number)) if rows else []
         begins, ends = [row.t_from_s for row in rows], [row.t_until_s for row in rows]
     else:
         table = dict(store.recordings.points(recording).columns)
@@ -38,10 +38,10 @@ def trace(
                 f"recording {recording} holds {head.kind} without times (no column t_s), so no channel can be "
                 "shown over time; show its data sets instead"
             )
-        known = courses_of(table)
+        courses = courses_of(table)
         begins = ends = np.asarray(table["t_s"], dtype=np.float64).tolist()
-    if known and channel not in known:
-        raise BadInput(f"recording {recording} has no channel {channel!r}; choose one of {', '.join(sorted(known))}")
+    if courses and channel not in courses:
+        raise BadInput(f"recording {recording} has no channel {channel!r}; choose one of {', '.join(sorted(courses))}")
     low, high = _window(from_s, until_s, [t for t in begins if t is not None], [t for t in ends if t is not None])
     raw = True
     if head.kind != "samples":
@@ -54,7 +54,7 @@ def trace(
     return TraceResponse(
         recording=recording, channel=channel, unit=_unit(info, channel), from_s=low, until_s=high, raw=raw,
         t_s=shown.t_s.tolist(), min=shown.low.tolist(), max=shown.high.tolist(), mean=shown.mean.tolist(),
-        n=shown.n.astype(np.int64).tolist(), channels=sorted(known),
+        n=shown.n.astype(np.int64).tolist(), channels=sorted(courses),
     )  # fmt: skip
 
 

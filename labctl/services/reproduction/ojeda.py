@@ -83,13 +83,13 @@ def _of(measured: Measured, axis: str | None) -> Findings:
 
 
 def _rms(values: Array) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else None
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if len(finite) else None
 
 
 def _most(values: Array) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.abs(known).max()) if len(known) else None
+    finite = values[np.isfinite(values)]
+    return float(np.abs(finite).max()) if len(finite) else None
 
 
 def _over(before: float | None, after: float | None) -> float | None:
@@ -99,14 +99,14 @@ def _over(before: float | None, after: float | None) -> float | None:
 def _of_surface(surface: Surface) -> list[Value]:
     error = surface.result.error
     rates = f"{len(surface.rate_dps)} data sets up to {np.abs(surface.rate_dps).max():.0f} deg/s"
-    warm = f"{surface.temperature_c.min():.0f} to {surface.temperature_c.max():.0f} deg C"
+    temperature_text = f"{surface.temperature_c.min():.0f} to {surface.temperature_c.max():.0f} deg C"
     coefficients = len(surface.result.fitted.axes[surface.axis].names)
     before, after = surface.turn_before_deg, surface.turn_after_deg
     largest_after = _most(after)
-    said = {
+    sentences = {
         "coefficients": (coefficients, "cubic in rate, parabola in temperature"
                          if coefficients == 12 else "with misalignment, since the unit has several axes"),
-        "raw_max": (_most(surface.raw_dps), f"another unit than the paper's: {rates}, {warm}"),
+        "raw_max": (_most(surface.raw_dps), f"another unit than the paper's: {rates}, {temperature_text}"),
         "left_max": (_most(surface.left_dps), "the paper gives a figure only"),
         "ratio": (_over(_rms(surface.raw_dps), _rms(surface.left_dps)),
                   f"larger where more of the error is smooth; {_rms(surface.left_dps):.4f} deg/s RMS are left"),
@@ -121,7 +121,7 @@ def _of_surface(surface: Surface) -> list[Value]:
                            "the largest errors are at the slowest rates, where a turn takes longest and drift counts"),
     }  # fmt: skip
     return [Value(name, surface.name, None if value is None else float(value), why)
-            for name, (value, why) in said.items()]  # fmt: skip
+            for name, (value, why) in sentences.items()]  # fmt: skip
 
 
 def _of_rest(findings: Findings, measured: Measured, rest: Rest, axis: str, surface: Surface | None) -> None:
@@ -157,7 +157,7 @@ def _of_rest(findings: Findings, measured: Measured, rest: Rest, axis: str, surf
         still = np.abs(surface.rate_dps) <= AT_REST_DPS
         if np.any(still):
             first = int(np.flatnonzero(still)[0])
-            left = bias.bias_dps - (surface.output_dps[first] - surface.left_dps[first] - surface.rate_dps[first])
+            residual = bias.bias_dps - (surface.output_dps[first] - surface.left_dps[first] - surface.rate_dps[first])
             findings.values.append(
-                Value("bias_after", measured.name, float(left), "the surface takes off its value at rest (eq. 15)")
+                Value("bias_after", measured.name, float(residual), "the surface takes off its value at rest (eq. 15)")
             )

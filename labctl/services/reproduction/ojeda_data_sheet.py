@@ -35,8 +35,8 @@ def lines_of(surface: Surface) -> Lines | None:
         if len(np.unique(np.round(rate))) < LEAST_RATES:
             continue
         slope, bias = np.polyfit(rate, error, 1)
-        left = float(np.sqrt(np.mean((error - slope * rate - bias) ** 2)))
-        lines.append((float(surface.temperature_c[here].mean()), float(slope), float(bias), left))
+        residual_dps = float(np.sqrt(np.mean((error - slope * rate - bias) ** 2)))
+        lines.append((float(surface.temperature_c[here].mean()), float(slope), float(bias), residual_dps))
     if not lines:
         return None
     return Lines(*np.array(lines).T)
@@ -62,12 +62,17 @@ def of_recording(surface: Surface, max_rate_dps: float | None) -> Findings:
         findings.values.append(Value("sheet_range", name, max_rate_dps, stated))
     if lines is not None:
         full, at = paper.PAPER.value("sheet_range"), int(np.argmin(np.abs(lines.temperature_c - paper.MIDDLE_C)))
-        warm = f"{lines.temperature_c.min():.0f} to {lines.temperature_c.max():.0f} deg C"
+        temperature_text = f"{lines.temperature_c.min():.0f} to {lines.temperature_c.max():.0f} deg C"
         straight = f"RMS about the line at {lines.temperature_c[at]:.0f} deg C, over {full:.0f} deg/s"
         findings.values += [
             Value("sheet_nonlinearity", name, float(100.0 * lines.left_dps[at] / full), straight),
-            Value("sheet_scale_warm", name, float(100.0 * np.ptp(lines.slope)), f"of the lines' slopes, {warm}"),
-            Value("sheet_bias_warm", name, float(np.ptp(lines.bias_dps)), f"of the lines at rest, {warm}"),
+            Value(
+                "sheet_scale_warm",
+                name,
+                float(100.0 * np.ptp(lines.slope)),
+                f"of the lines' slopes, {temperature_text}",
+            ),
+            Value("sheet_bias_warm", name, float(np.ptp(lines.bias_dps)), f"of the lines at rest, {temperature_text}"),
         ]
     findings.missing.append(
         Missing(

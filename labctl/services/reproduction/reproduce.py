@@ -73,11 +73,11 @@ def _rows(printed: Printed, findings: Findings) -> list[NumberResponse]:
     """Return a row for each source that a printed number was reproduced from; one without a number where none is."""
 
     def row(of: str, value: float | None, why: str, origin: str = "") -> NumberResponse:
-        known = value is not None and printed.value is not None
+        has_both = value is not None and printed.value is not None
         return NumberResponse(
             place=printed.place, quantity=printed.quantity, unit=printed.unit, relation=printed.relation,
             printed=printed.value, of=of, reproduced=value,
-            difference=(value or 0.0) - (printed.value or 0.0) if known else None, why=why, origin=origin,
+            difference=(value or 0.0) - (printed.value or 0.0) if has_both else None, why=why, origin=origin,
         )  # fmt: skip
 
     made = [row(value.of, value.value, value.why, value.origin) for value in findings.values if value.id == printed.id]

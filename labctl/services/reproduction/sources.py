@@ -70,8 +70,8 @@ def of_unit(store: Store, serial: str, recording: int | None) -> Measured:
     """Return a unit's recording, default the newest. Raises NotFound, NotEnoughData."""
     report_stage(f"read the recording of {serial}")
     row = newest_row(store, serial, recording, to_fit=True)
-    taken = source_of(store, row)
-    points = to_points(taken) if taken.info.motion != "poses" else taken
+    source = source_of(store, row)
+    points = to_points(source) if source.info.motion != "poses" else source
     rest = None
     if row.kind == "samples" and (number := _longest_rest(store, row.id)) is not None:
         rest = rest_in(store.recordings.dataset(row.id, number), points)

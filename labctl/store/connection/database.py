@@ -275,11 +275,11 @@ class Database:
         if self._backend.is_disk_full(error):
             cause = f"{self._shown}: the disk is full"
             return DiskFull(f"{cause}; nothing was stored. Free disk space, then continue", cause=cause)
-        said = " ".join(str(error.orig).split())
+        text = " ".join(str(error.orig).split())
         if self._backend.is_unreachable(error):
-            cause = f"{self._shown}: the database server does not answer ({said})"
+            cause = f"{self._shown}: the database server does not answer ({text})"
             return DatabaseUnreachable(f"{cause}; nothing was stored. Try again once it runs", cause=cause)
-        cause = f"{self._shown}: {self._backend.words_for(error) or said}"
+        cause = f"{self._shown}: {self._backend.words_for(error) or text}"
         return StoreError(f"{cause}; nothing was stored, try again", cause=cause)
 
     @contextmanager

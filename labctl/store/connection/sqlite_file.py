@@ -60,10 +60,10 @@ class FileIdentity:
         The log is remembered when it is there for the first time. It stays for as long as a connection is open.
         """
         for index, path in enumerate(self._paths):
-            known, now = self._known[index], identity_of(path)
-            if known is None:
+            known_identity, now = self._known[index], identity_of(path)
+            if known_identity is None:
                 self._known[index] = now
-            elif known != now:
+            elif known_identity != now:
                 was = "deleted" if now is None else "replaced by another file"
                 return (
                     f"{self._paths[0]}: {Path(path).name} was {was} while this process had it open; labctl writes "

@@ -103,12 +103,12 @@ class _Check:
 
     def result(self) -> Checked:
         """Return what was found so far."""
-        said = Checked(tuple(self.findings), self.blocks, self.calibrations, self.audit_rows)
+        checked = Checked(tuple(self.findings), self.blocks, self.calibrations, self.audit_rows)
         if self._manifests is None:
-            return replace(said, remarks=tuple(self._remarks))
+            return replace(checked, remarks=tuple(self._remarks))
         chain = self._manifests.chain
         return replace(
-            said, manifests=chain.head.length, not_sealed=chain.not_sealed, signed=chain.signed,
+            checked, manifests=chain.head.length, not_sealed=chain.not_sealed, signed=chain.signed,
             keys=tuple(sorted(chain.keys)), head=chain.head if chain.head.length else None,
             remarks=tuple(self._remarks),
         )  # fmt: skip
@@ -178,10 +178,10 @@ class _Check:
         kinds = {int(number): kind for number, kind in connection.execute(sa.select(r.id, r.kind).where(whole))}
         total = sa.select(sa.func.count(b.id)).where(_of_whole_recordings(b.recording_id))
         valid = self._valid_readings(connection, int(connection.scalar(total) or 0))
-        known = set()
+        block_places = set()
         heads = sa.select(d.recording_id, d.number, d.state, d.n).where(_of_whole_recordings(d.recording_id))
         for recording, number, state, n in connection.execute(heads):
-            known.add((recording, number))
+            block_places.add((recording, number))
             n_valid = valid.get((recording, number), 0)
             if kinds.get(recording) == "samples" and state != "open" and n_valid is not None and n_valid != n:
                 self.find(
@@ -192,7 +192,7 @@ class _Check:
         for recording, kind in kinds.items():
             if kind != "samples" and (recording, WHOLE_TABLE) not in valid:
                 self.find("readings", f"recording {recording} ({kind}): its table of data sets is missing")
-        for recording, number in sorted(valid.keys() - known):
+        for recording, number in sorted(valid.keys() - block_places):
             if number != WHOLE_TABLE:
                 self.find("readings", f"recording {recording} holds readings of data set {number}, which is missing")
         return True
@@ -268,8 +268,10 @@ class _Check:
                 self.find("calibrations", f"{serial} version {version}: {error}")
                 continue
             if (calibration.serial, calibration.version, calibration.hash) != (serial, version, own):
-                said = f"{calibration.serial} version {calibration.version}"
-                self.find("calibrations", f"{serial} version {version}: the stored calibration was changed ({said})")
+                version_text = f"{calibration.serial} version {calibration.version}"
+                self.find(
+                    "calibrations", f"{serial} version {version}: the stored calibration was changed ({version_text})"
+                )
         return True
 
     def _check_audit(self, connection: sa.Connection) -> bool:

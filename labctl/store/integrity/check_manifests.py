@@ -61,7 +61,7 @@ class ManifestCheck:
     def check_chain(self, anchors: Mapping[str, ChainHead], *, trail_fits: bool) -> None:
         """Read the chain; `anchors` are heads that were noted down elsewhere, by where that is."""
         trail = list(self._connection.scalars(sa.select(tables.audit.c.hash).order_by(tables.audit.c.id)))
-        wanted = {(head.length, head.hash): where for where, head in anchors.items()}
+        name_by_head = {(head.length, head.hash): where for where, head in anchors.items()}
         hashes: dict[int, str] = {}
         for row, document in self._rows():
             checked_chain = self.chain
@@ -74,12 +74,12 @@ class ManifestCheck:
             if trail_fits and not _fits_trail(document, trail):
                 trail_fits = False
                 self._find("audit", f"the audit trail was written anew: it does not fit manifest {sequence}")
-            if any(length == sequence for length, _ in wanted):
+            if any(length == sequence for length, _ in name_by_head):
                 hashes[sequence] = str(row.hash)
         if trail_fits and self.chain.trail < len(trail):
             text = f"the last {len(trail) - self.chain.trail} rows of the audit trail are in no manifest"
             self._find("audit", f"{text}: they were added without labctl, or manifests were removed")
-        self._check_end(wanted, hashes)
+        self._check_end(name_by_head, hashes)
         self._check_signed()
 
     def _rows(self) -> Iterator[tuple[sa.Row[*tuple[Any, ...]], Mapping[str, Any]]]:
@@ -118,12 +118,12 @@ class ManifestCheck:
             self.chain.signed = int(row.sequence)
 
     def _check_end(self, expected: Mapping[tuple[int, str], str], hashes: Mapping[int, str]) -> None:
-        computed, said = self.chain.head, chain.head_of(self._connection)
-        if said is None:
+        computed, stored_head = self.chain.head, chain.head_of(self._connection)
+        if stored_head is None:
             self._find("manifests", "the head of the chain, which counts the manifests, is missing")
-        elif said.length > computed.length:
-            self._find("manifests", f"the last {said.length - computed.length} manifests are missing")
-        elif said != computed:
+        elif stored_head.length > computed.length:
+            self._find("manifests", f"the last {stored_head.length - computed.length} manifests are missing")
+        elif stored_head != computed:
             self._find("manifests", "the last manifest is not the one that the head of the chain names")
         for (length, digest), where in expected.items():
             if length > computed.length:
@@ -196,8 +196,8 @@ def _misfits(row: sa.Row[*tuple[Any, ...]], document: Mapping[str, Any], previou
 
 
 def _fits_trail(document: Mapping[str, Any], trail: Sequence[str]) -> bool:
-    said = document.get("audit")
-    if not isinstance(said, dict) or not said.get("length"):
+    audit_entry = document.get("audit")
+    if not isinstance(audit_entry, dict) or not audit_entry.get("length"):
         return True
-    length = said["length"]
-    return isinstance(length, int) and length <= len(trail) and trail[length - 1] == said.get("hash")
+    length = audit_entry["length"]
+    return isinstance(length, int) and length <= len(trail) and trail[length - 1] == audit_entry.get("hash")

@@ -61,11 +61,11 @@ def _block_parts(connection: sa.Connection, recording: int) -> Parts:
         .order_by(b.number, b.seq)
     )
     made = BlockParts()
-    for number, seq, n, *known in connection.execute(query).all():
-        if known[0] is None:  # of a data set that was never closed
+    for number, seq, n, *digests in connection.execute(query).all():
+        if digests[0] is None:  # of a data set that was never closed
             made.take(number, seq, n, _digests_of_block(connection, recording, number, seq))
         else:
-            made.take(number, seq, n, dict(zip(GROUPS, known, strict=True)))
+            made.take(number, seq, n, dict(zip(GROUPS, digests, strict=True)))
     return made.parts()
 
 

@@ -154,9 +154,9 @@ class Campaigns:
         )
         last_s = sa.select(sa.func.max(v.t_s)).where(v.recording_id.in_(newest.recordings.values()))
         with self._database.reading() as connection:
-            known = [at for query in queries if (at := connection.scalar(query)) is not None]
+            times = [at for query in queries if (at := connection.scalar(query)) is not None]
             read_s = connection.scalar(last_s)
-        return max([newest.started_at, *known, newest.started_at + timedelta(seconds=float(read_s or 0.0))])
+        return max([newest.started_at, *times, newest.started_at + timedelta(seconds=float(read_s or 0.0))])
 
     def all(self) -> list[CampaignRow]:
         """Return every campaign, newest first."""

@@ -57,12 +57,12 @@ def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArr
     if any(row[11] for row in heads):
         columns[VERIFICATION] = np.array([bool(row[11]) for row in heads], dtype=np.int64)
     columns["table_rate_dps"] = _floats(heads, 4)
-    known = {
+    channels = {
         "table_angle_deg": _floats(heads, 5),
         "chamber_setpoint_c": _floats(heads, 6),
         "power_s": t_s - _floats(heads, 9),
     }
-    columns |= {name: values for name, values in known.items() if np.isfinite(values).all()}
+    columns |= {name: values for name, values in channels.items() if np.isfinite(values).all()}
     columns["n"] = np.array([row[10] for row in heads], dtype=np.int64)
     means = connection.execute(
         sa.select(m.channel, m.number, m.mean, m.std, m.white_std).where(m.recording_id == recording)
@@ -176,8 +176,8 @@ class Recordings:
         )
         with self._database.reading() as connection:
             rows = [[tuple(row) for row in connection.execute(query)] for query in ours[: 2 if complete else 3]]
-        said = json.dumps([head.serial, head.campaign, head.kind, dict(head.info), rows], sort_keys=True)
-        return hashlib.sha256(said.encode()).hexdigest()
+        content = json.dumps([head.serial, head.campaign, head.kind, dict(head.info), rows], sort_keys=True)
+        return hashlib.sha256(content.encode()).hexdigest()
 
     def points(self, recording: int, *, head: RecordingRow | None = None) -> Recording:
         """Return one row per complete data set, from the statistics alone (kind "points"), or the table imported.

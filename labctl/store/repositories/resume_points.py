@@ -85,9 +85,9 @@ class ResumePoints:
         complete = frozenset(
             step[0] for step in steps if step[1] not in FINISHED and step[2].get("dataset") in planned - {None}
         )
-        left = [step[0] for step in steps if step[1] not in FINISHED and step[0] not in complete]
+        steps_left = [step[0] for step in steps if step[1] not in FINISHED and step[0] not in complete]
         return ResumePoint(
-            start_at=left[0] if left else len(steps),
+            start_at=steps_left[0] if steps_left else len(steps),
             complete=complete,
             skipped=frozenset(step[0] for step in steps if step[1] == "skipped"),
             last_t_s=last_t_s,
@@ -150,10 +150,10 @@ class ResumePoints:
             self._database.writing() as connection,
             changing(connection, records, how.at, f"resumed: {how.reason}", prepared),
         ):
-            taken = connection.execute(
+            updated = connection.execute(
                 sa.update(c).where(c.c.id == campaign, c.c.state != CampaignState.DONE).values(**values)
             )
-            if taken.rowcount == 0:
+            if updated.rowcount == 0:
                 raise Conflict(f"campaign {campaign} is done and cannot be resumed; start a new one")
             mine = s.c.campaign_id == campaign
             self._mark(connection, mine & s.c.number.in_(point.complete), "done", how, "its data set was complete")

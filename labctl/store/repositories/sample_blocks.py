@@ -238,8 +238,8 @@ def _turned(turn_deg: float, turn_u_deg: float, valid_s: NDArray[np.float64], n:
     """
     duration_s = float(valid_s[-1] - valid_s[0]) if len(valid_s) > 1 else 0.0
     rate_dps = turn_deg / duration_s if duration_s > 0 else 0.0
-    said = {"table_rate_dps": rate_dps, "turn_deg": turn_deg, "turn_u_deg": turn_u_deg}
-    return {name: np.full(n, value) for name, value in said.items()}
+    columns = {"table_rate_dps": rate_dps, "turn_deg": turn_deg, "turn_u_deg": turn_u_deg}
+    return {name: np.full(n, value) for name, value in columns.items()}
 
 
 def _floats(values: NDArray[np.generic]) -> NDArray[np.float64]:

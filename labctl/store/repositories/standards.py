@@ -203,9 +203,9 @@ class Standards:
     @transaction
     def add(self, row: StandardRow) -> None:
         """Enter a standard. Raises Conflict for a label, or a serial number, that another one has."""
-        taken = self.find(row.label) or (self.find(row.serial) if row.serial else None)
-        if taken is not None:
-            raise Conflict(_taken(taken.row, row))
+        duplicate = self.find(row.label) or (self.find(row.serial) if row.serial else None)
+        if duplicate is not None:
+            raise Conflict(_taken(duplicate.row, row))
         try:
             with self._database.writing() as connection:
                 t = tables.standards

@@ -33,12 +33,12 @@ SEEN = _measured()
 
 def add_missing_unit(connection: sa.Connection, serial: str, model: str, technology: str | None, at: datetime) -> bool:
     """Keep a unit that is seen for the first time; returns whether it was."""
-    known = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial))
-    if known is None:
+    known_serial = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial))
+    if known_serial is None:
         connection.execute(
             sa.insert(tables.units).values(serial=serial, model=model, technology=technology, first_seen_at=at)
         )
-    return known is None
+    return known_serial is None
 
 
 def remember_unit(connection: sa.Connection, serial: str, model: str, technology: str | None, at: datetime) -> None:
@@ -70,22 +70,22 @@ class Units:
 
     def has(self, serial: str) -> bool:
         """Return whether a unit is there."""
-        wanted = sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN)
+        query = sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN)
         with self._database.reading() as connection:
-            return connection.scalar(wanted) is not None
+            return connection.scalar(query) is not None
 
     def most_similar(self, serial: str) -> str | None:
         """Return the serial number of the unit that differs from this one by least, such as by one digit; None: none.
 
         Compared are those of nearly the same length that begin or end alike.
         """
-        known, k = tables.units.c.serial, min(ALIKE, len(serial))
-        begins = sa.func.substr(known, 1, k) == serial[:k]
-        ends = sa.func.substr(known, sa.func.length(known) - k + 1) == serial[-k:]
-        near = sa.func.abs(sa.func.length(known) - len(serial)) <= 1
-        wanted = sa.select(known).where(SEEN, near, begins | ends, known != serial).limit(MAX_COMPARED)
+        known_serials, k = tables.units.c.serial, min(ALIKE, len(serial))
+        begins = sa.func.substr(known_serials, 1, k) == serial[:k]
+        ends = sa.func.substr(known_serials, sa.func.length(known_serials) - k + 1) == serial[-k:]
+        near = sa.func.abs(sa.func.length(known_serials) - len(serial)) <= 1
+        query = sa.select(known_serials).where(SEEN, near, begins | ends, known_serials != serial).limit(MAX_COMPARED)
         with self._database.reading() as connection:
-            near_by = difflib.get_close_matches(serial, list(connection.scalars(wanted)), n=10, cutoff=SIMILARITY)
+            near_by = difflib.get_close_matches(serial, list(connection.scalars(query)), n=10, cutoff=SIMILARITY)
         return min(near_by, key=lambda each: sum(a != b for a, b in zip_longest(each, serial)), default=None)
 
     def count(self) -> int:
@@ -121,8 +121,8 @@ def _with_certificate(joined: sa.FromClause) -> sa.Join:
         .correlate(tables.calibrations)
         .scalar_subquery()
     )
-    known = joined.outerjoin(tables.certificates, _Z.id == newest)
-    return known.outerjoin(tables.certificate_withdrawals, _W.number == _Z.number)
+    with_certificates = joined.outerjoin(tables.certificates, _Z.id == newest)
+    return with_certificates.outerjoin(tables.certificate_withdrawals, _W.number == _Z.number)
 
 
 def _served_in_force() -> sa.Select[*tuple[Any, ...]]:

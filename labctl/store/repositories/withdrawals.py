@@ -63,7 +63,7 @@ def withdraw_of_revocations(connection: sa.Connection) -> None:
     revoked = sa.select(x.id, x.serial, x.version, x.by, x.reason, x.at).where(x.act == "revoke").order_by(x.id)
     chain.begin(connection)
     for row in connection.execute(revoked).all():
-        said = Withdrawal(row.by, None, row.reason, row.at, int(row.id))
+        withdrawal = Withdrawal(row.by, None, row.reason, row.at, int(row.id))
         for number in _standing(connection, row.serial, row.version, row.at):
-            withdraw(connection, number, said, sealed_at, why)
+            withdraw(connection, number, withdrawal, sealed_at, why)
     chain.finish(connection)

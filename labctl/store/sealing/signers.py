@@ -129,8 +129,8 @@ class TokenSigner:
             public: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PUBLIC_KEY, label=uri.object)
             der = encode_ec_public_key(public)
         except (PKCS11Error, RuntimeError, KeyError, OSError) as error:
-            said = " ".join(str(error).split()) or type(error).__name__
-            raise BadInput(f"{where}: {said}; check token, object, module and PIN") from error
+            text = " ".join(str(error).split()) or type(error).__name__
+            raise BadInput(f"{where}: {text}; check token, object, module and PIN") from error
         self._where, self._mechanism, self._trouble = where, pkcs11.Mechanism.ECDSA, PKCS11Error
         self.pem = _pem_of(der)
         self.public = public_key(self.pem, where)

@@ -75,9 +75,9 @@ def _stepper(within: Within, residual: Residual, count: NDArray[np.int64]) -> li
     spectral_lines: list[AngleLine] = []
     for k, cycles in enumerate(STEP_LINES):
         pair = residual.lines[2 * k : 2 * k + 2]
-        shown = np.any(within.basis[1 + 2 * k : 3 + 2 * k], axis=(0, 2))
-        if shown.any():
-            squared = 2 * (pair**2).sum(axis=0)[shown] / count[shown]
+        is_shown = np.any(within.basis[1 + 2 * k : 3 + 2 * k], axis=(0, 2))
+        if is_shown.any():
+            squared = 2 * (pair**2).sum(axis=0)[is_shown] / count[is_shown]
             spectral_lines.append({"cycles_per_turn": cycles, "amplitude_dps": plain(np.sqrt(squared.mean()))})
     return spectral_lines
 

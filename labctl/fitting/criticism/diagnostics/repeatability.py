@@ -108,19 +108,21 @@ def repeats(view: AxisView) -> Repeats | None:
     floor = float(np.sqrt(np.mean(expected) / 2))
     scatter = float(np.sqrt(np.mean(difference**2) / 2))
     everything = np.arange(len(first))
-    shown = everything if len(first) <= MOST_PAIRS else np.sort(np.argsort(difference)[_evenly(len(first), MOST_PAIRS)])
+    pairs_shown = (
+        everything if len(first) <= MOST_PAIRS else np.sort(np.argsort(difference)[_evenly(len(first), MOST_PAIRS)])
+    )
     repeats_json: Repeats = {
         "axis": view.axis,
         "pairs": len(first),
         "scatter_dps": plain(scatter),
         "floor_dps": plain(floor),
         "over_floor": plain(scatter / floor) if floor > 0 else None,
-        "datasets": [[int(a), int(b)] for a, b in view.data.dataset[np.stack([first, second], axis=1)[shown]]],
-        "apart_sets": np.abs(second - first)[shown].tolist(),
-        "difference_dps": plain_list(difference[shown]),
+        "datasets": [[int(a), int(b)] for a, b in view.data.dataset[np.stack([first, second], axis=1)[pairs_shown]]],
+        "apart_sets": np.abs(second - first)[pairs_shown].tolist(),
+        "difference_dps": plain_list(difference[pairs_shown]),
     }
     if view.timed:
-        repeats_json["apart_s"] = plain_list(np.abs(view.t_s[second] - view.t_s[first])[shown])
+        repeats_json["apart_s"] = plain_list(np.abs(view.t_s[second] - view.t_s[first])[pairs_shown])
     return repeats_json
 
 

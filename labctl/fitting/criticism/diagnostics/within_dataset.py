@@ -58,9 +58,9 @@ class Within:
         values = values - self._earth(values, axis)
         spread = 1.4826 * float(np.median(np.abs(values[self.there > 0])))
         inside = np.abs(values) <= OUTLIER * spread
-        kept = (self.there * inside).sum(axis=1)
+        n_inside = (self.there * inside).sum(axis=1)
         # where most readings are equal, as of a coarse output, the usual spread says nothing of the others
-        inside |= (kept < LEAST_KEPT * self.there.sum(axis=1))[:, None]
+        inside |= (n_inside < LEAST_KEPT * self.there.sum(axis=1))[:, None]
         return Residual(np.where(inside, values, 0.0), self.there * inside, inner[-1], spread, inner[1:-1])
 
     def _earth(self, values: NDArray[np.float64], axis: str) -> NDArray[np.float64]:
@@ -137,7 +137,7 @@ def _basis(
         for _ in range(2):
             inner = np.einsum("rmn,mn->rm", basis[:k], values)
             values = values - np.einsum("rm,rmn->mn", inner, basis[:k])
-        left = np.sqrt(np.einsum("mn,mn->m", values, values))
-        independent = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
-        basis[k] = np.where(independent[:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
+        norm = np.sqrt(np.einsum("mn,mn->m", values, values))
+        independent = norm > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+        basis[k] = np.where(independent[:, None], values / np.maximum(norm, 1e-300)[:, None], 0.0)
     return basis

@@ -20,8 +20,8 @@ from labctl.fitting.numeric.arrays import Array
 
 def stack(rows: NDArray[np.float64], scale: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the coordinates besides the means, (rows, k), over their scale (R, m): each present one is a row."""
-    kept = present[1:]
-    return rows[1:][kept] / scale[1:][kept][:, None]
+    present_after = present[1:]
+    return rows[1:][present_after] / scale[1:][present_after][:, None]
 
 
 @dataclass(frozen=True)

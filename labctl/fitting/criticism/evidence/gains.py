@@ -43,12 +43,12 @@ class OptionPairs:
     @staticmethod
     def of(slices: Sequence[slice]) -> OptionPairs:
         """Return the pairs of options whose columns are at these places."""
-        widths = np.array([where.stop - where.start for where in slices], dtype=np.int64)
+        widths = np.array([option_rows.stop - option_rows.start for option_rows in slices], dtype=np.int64)
         groups, left, right, count = [], [], [], 0
         for width in np.unique(widths).tolist():
             options = np.flatnonzero(widths == width)
             here = [slices[i] for i in options.tolist()]
-            columns = np.array([np.arange(where.start, where.stop) for where in here])
+            columns = np.array([np.arange(option_rows.start, option_rows.stop) for option_rows in here])
             i, j = np.triu_indices(width)
             among = np.zeros((width, width), dtype=np.int64)
             among[i, j] = among[j, i] = np.arange(len(i))
@@ -77,9 +77,11 @@ class OptionPairs:
             else:
                 values, vectors = np.linalg.eigh(scaled)
                 inner = np.einsum("oij,oi->oj", vectors, inner)
-            kept = values > LEAST_LEFT
-            gain[group.options] = np.where(kept, inner**2 / np.where(kept, values, 1.0), 0.0).sum(axis=1)
-            dimensions[group.options] = kept.sum(axis=1)
+            is_estimable = values > LEAST_LEFT
+            gain[group.options] = np.where(is_estimable, inner**2 / np.where(is_estimable, values, 1.0), 0.0).sum(
+                axis=1
+            )
+            dimensions[group.options] = is_estimable.sum(axis=1)
         return gain, dimensions
 
 
@@ -93,8 +95,8 @@ def solve_option(base: EliminatedBase, option_rows: slice) -> tuple[Array, NDArr
     """Return the coefficients (k,) of an option beside the base, and their covariance (k, k)."""
     size = np.sqrt(np.maximum(base.squared_norms[option_rows], 1e-300))
     values, vectors = np.linalg.eigh(base.gram[option_rows, option_rows] / np.outer(size, size))
-    kept = values > LEAST_LEFT
-    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    is_estimable = values > LEAST_LEFT
+    inverse = (vectors[:, is_estimable] / values[is_estimable]) @ vectors[:, is_estimable].T
     coefficients = inverse @ (base.data_products[option_rows] / size) / size
     return coefficients, inverse / np.outer(size, size)
 
@@ -116,5 +118,5 @@ def reproduced(base: EliminatedBase, signal: slice, values: Array, by: slice) ->
     inner = base.gram[by, signal] @ values
     scale = np.sqrt(np.maximum(base.squared_norms[by], 1e-300))
     sizes, vectors = np.linalg.eigh(base.gram[by, by] / np.outer(scale, scale))
-    kept = sizes > LEAST_LEFT
-    return float(((vectors[:, kept].T @ (inner / scale)) ** 2 / sizes[kept]).sum())
+    is_estimable = sizes > LEAST_LEFT
+    return float(((vectors[:, is_estimable].T @ (inner / scale)) ** 2 / sizes[is_estimable]).sum())

@@ -110,8 +110,8 @@ class DriftModes:
     @staticmethod
     def of(tau_s: float, white_var: Array, t_s: Array, run: NDArray[np.int64]) -> DriftModes:
         """Return the modes of m data sets; `white_var` (m,) is the white variance of the means, (deg/s)^2."""
-        given = (np.ascontiguousarray(values, dtype=np.float64).tobytes() for values in (white_var, t_s))
-        return _modes(tau_s, *given, np.ascontiguousarray(run, dtype=np.int64).tobytes())
+        cache_key = (np.ascontiguousarray(values, dtype=np.float64).tobytes() for values in (white_var, t_s))
+        return _modes(tau_s, *cache_key, np.ascontiguousarray(run, dtype=np.int64).tobytes())
 
     def amplitudes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return values (m, k) as amplitudes of the modes, (m, k), over white noise."""
@@ -150,10 +150,10 @@ def _of_one_run(t_s: Array, tau_s: float, white_dps: Array) -> tuple[Array, NDAr
     lag = np.diff(t_s) / tau_s if tau_s > 0 else np.zeros(len(t_s) - 1)
     if len(lag) == 0 or lag.min() < LEAST_LAG:
         return np.linalg.eigh(correlation(t_s, tau_s) / np.outer(white_dps, white_dps))
-    next_to, left = np.exp(-lag), -np.expm1(-2 * lag)
-    diagonal = np.append(1 / left, 1.0) + np.append(0.0, next_to**2 / left)
+    next_to, step_share = np.exp(-lag), -np.expm1(-2 * lag)
+    diagonal = np.append(1 / step_share, 1.0) + np.append(0.0, next_to**2 / step_share)
     values, vectors = eigh_tridiagonal(
-        diagonal * white_dps**2, -next_to / left * white_dps[:-1] * white_dps[1:], check_finite=False
+        diagonal * white_dps**2, -next_to / step_share * white_dps[:-1] * white_dps[1:], check_finite=False
     )
     return 1 / values[::-1], vectors[:, ::-1]
 

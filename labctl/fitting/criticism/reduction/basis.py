@@ -43,9 +43,9 @@ def orthonormal_basis(
         for _ in range(2):
             inner = np.einsum("rmn,mn->rm", basis[:k], values)
             values = values - np.einsum("rm,rmn->mn", inner, basis[:k])
-        left = np.sqrt((values**2).sum(axis=1))
-        present[k] = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+        norm = np.sqrt((values**2).sum(axis=1))
+        present[k] = norm > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
         if k < len(lines):
             present[k] &= steady < STEADY
-        basis[k] = np.where(present[k][:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
+        basis[k] = np.where(present[k][:, None], values / np.maximum(norm, 1e-300)[:, None], 0.0)
     return basis[len(lines) :], present[len(lines) :]

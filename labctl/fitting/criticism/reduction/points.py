@@ -42,8 +42,8 @@ def _white_of_points(points: Recording) -> dict[str, Array] | None:
             white_by_axis[axis] = np.maximum(variance, LEAST_SHARE * float(np.median(variance)))
             continue
         n = np.maximum(np.asarray(points.columns["n"], dtype=np.float64), 1.0)
-        left = quantisation_var_of(points, axis)
-        white_by_axis[axis] = float(np.median((variance - left) * n)) / n + left
+        quantisation_var = quantisation_var_of(points, axis)
+        white_by_axis[axis] = float(np.median((variance - quantisation_var) * n)) / n + quantisation_var
         if not np.all(white_by_axis[axis] > 0):
             return None
     return white_by_axis

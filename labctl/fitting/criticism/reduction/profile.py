@@ -100,7 +100,7 @@ def _basis(
         for _ in range(2):
             inner = np.einsum("rmb,mb->rm", basis[:k], values)
             values = values - np.einsum("rm,rmb->mb", inner, basis[:k])
-        left = np.sqrt((values**2).sum(axis=1))
-        present[k] = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
-        basis[k] = np.where(present[k][:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
+        norm = np.sqrt((values**2).sum(axis=1))
+        present[k] = norm > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+        basis[k] = np.where(present[k][:, None], values / np.maximum(norm, 1e-300)[:, None], 0.0)
     return basis, present

@@ -150,8 +150,8 @@ def reduce_samples(recording: Recording, *, outliers: bool) -> ReducedRecording:
 
 def _steps_var(recording: Recording, numbers: Mapping[str, Array], axis: str) -> Array:
     """Return what coarse steps of an output leave in a mean, at each reading (n,), (deg/s)^2."""
-    left = numbers.get(f"gyro_{axis}{QUANTISATION}")
-    if left is None:
+    step_columns = numbers.get(f"gyro_{axis}{QUANTISATION}")
+    if step_columns is None:
         return np.zeros(len(numbers[f"gyro_{axis}"]))
     output = next((unit for name, unit in recording.info.output.items() if name == axis), None)
-    return np.asarray((left / (output.scale if output else 1.0)) ** 2)
+    return np.asarray((step_columns / (output.scale if output else 1.0)) ** 2)

@@ -123,13 +123,13 @@ def _named(
     comparison: Comparison, axis: str, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]
 ) -> list[CandidateShape]:
     """Return what is to be named on one axis as one option; none where it does not touch the axis."""
-    made = (
+    pair_options = (
         option_of(comparison.data, axis, comparison.model.reference, catalogue[term.effect], term) for term in terms
     )
     base, precision = comparison.designs[axis].base, comparison.designs[axis].precision
     level = constant_coordinates(base, comparison.data)
     exact = base[:, :, precision == 0]
-    options = [orthogonalised(centred(option, level), exact) for option in made if option is not None]
+    options = [orthogonalised(centred(option, level), exact) for option in pair_options if option is not None]
     if not options:
         return []
     rows = np.concatenate([option.rows for option in options], axis=2)

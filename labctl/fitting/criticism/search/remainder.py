@@ -74,9 +74,9 @@ def _excess(first: Comparison, final: Comparison, axis: str, design: Design) -> 
     """Return the chi2 beyond the degrees of freedom beside a base, at the noise of the final comparison, and these."""
     noise = final.axes[axis].best.noise
     y = first.data.error_dps(axis)
-    (left,) = eliminate_base(design, y, final.white_var[axis], final.scales[axis], [noise])
+    (eliminated,) = eliminate_base(design, y, final.white_var[axis], final.scales[axis], [noise])
     freedom = float(design.present.sum() - (design.precision == 0).sum())
-    return left.chi2 - freedom, freedom
+    return eliminated.chi2 - freedom, freedom
 
 
 def is_better_than_smooth(

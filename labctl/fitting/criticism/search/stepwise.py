@@ -86,13 +86,13 @@ def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray
         values, _ = solve_option(axis_comparison.best, axis_comparison.slices[index])
         scale = comparison.scales[axis].copy()
         scale[0] = np.sqrt(comparison.white_var[axis] + axis_comparison.best.noise.size_dps**2)
-        kept = design.present
-        base, signal = (rows[kept] / scale[kept][:, None] for rows in (design.base, design.options[index].rows))
+        present = design.present
+        base, signal = (rows[present] / scale[present][:, None] for rows in (design.base, design.options[index].rows))
         size = np.maximum(np.linalg.norm(base, axis=0), 1e-300)
         coordinates, *_ = np.linalg.lstsq(base / size, signal @ values, rcond=1e-9)
-        left = np.zeros(kept.shape)
-        left[kept] = signal @ values - base / size @ coordinates
-        total += (np.sum(left[1:] ** 2), np.sum(left[0] ** 2))
+        residual = np.zeros(present.shape)
+        residual[present] = signal @ values - base / size @ coordinates
+        total += (np.sum(residual[1:] ** 2), np.sum(residual[0] ** 2))
     return np.asarray(total / max(float(total.sum()), 1e-300))
 
 
@@ -113,7 +113,7 @@ def merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
         "missing" if all(len(group) == 1 for group in axes) else "ambiguous", tuple(axes), joint.depends_on,
         terms={group[0]: terms[group[0]] for group in axes if group[0] in terms},
         remainder=max(remainders, key=lambda remainder: float(remainder["share"]), default=None),
-        axes={group[0]: where for group, where in axes.items()},
+        axes={group[0]: group_axes for group, group_axes in axes.items()},
     )  # fmt: skip
 
 
@@ -186,15 +186,15 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
     if remainder is not None and remainder["share"] > MOST_LEFT:
         return _unnamed(initial, tuple(remainder["depends_on"]))
     terms = {term.effect: term for term in with_findings}
-    kept = depends if findings or form == "unexplained" else ()
+    channel_names = depends if findings or form == "unexplained" else ()
     groups = tuple(finding.group for finding in findings)
     alike = not_physical_group(initial, step.leader) if step.leader is not None and findings else ()
-    confounded = _confounded(initial, kept) if form == "unexplained" else ()
+    confounded = _confounded(initial, channel_names) if form == "unexplained" else ()
     if form == "unexplained":
         also = (*confounded, *channels_beside_smooth(first, catalogue))
-        confounded = tuple(dict.fromkeys(name for name in also if name not in kept[:1]))
+        confounded = tuple(dict.fromkeys(name for name in also if name not in channel_names[:1]))
     verdict = Verdict(
-        form, groups, kept, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder,
+        form, groups, channel_names, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder,
         axes={finding.group[0]: finding.axes for finding in findings},
     )  # fmt: skip
     return verdict, initial, final
@@ -257,19 +257,19 @@ def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]
     if step.form not in {"missing", "ambiguous"} or step.leader is None:
         return None
     candidate_by_id = {c.id: c for c in comparison.candidates if not c.smooth}
-    left: list[str] = []
+    group: list[str] = []
     for name in step.group:
-        if left:
-            left.append(name)
+        if group:
+            group.append(name)
             continue
         term = refined_term(comparison, candidate_by_id[name])
         if not held_out_rises(comparison, (term,), catalogue):
-            left, chosen = [name], candidate_by_id[name]
+            group, chosen = [name], candidate_by_id[name]
             missing_term = term
-    if not left or (len(left) == 1 and chosen.log_bf < step.leader.log_bf - LEAD):
+    if not group or (len(group) == 1 and chosen.log_bf < step.leader.log_bf - LEAD):
         return None
     axes = axes_of(comparison, chosen)
-    return Finding(tuple(left), missing_term, chosen.log_bf, discrepancies(comparison, chosen), axes)
+    return Finding(tuple(group), missing_term, chosen.log_bf, discrepancies(comparison, chosen), axes)
 
 
 def _compared_beside(

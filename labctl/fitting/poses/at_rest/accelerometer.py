@@ -57,11 +57,11 @@ def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Acceleromet
     theta, sigma, used = fit_sizes(law, gravity, rests.accel_white_var.mean(axis=1), LEAST_POSES)
     jacobian = _jacobian(theta, rests.accel_g[used]) / sigma[used][:, None]
     covariance = _covariance(readings.info.serial, jacobian, rests.accel_g[used])
-    left = _sizes(theta, rests.accel_g[used]) - gravity
+    residual = _sizes(theta, rests.accel_g[used]) - gravity
     errors, bias = matrices(theta)
     return Accelerometer(
         errors, bias, covariance, unit(corrected(rests.accel_g, errors, bias)), sigma, used,
-        float(np.sqrt(np.mean(left**2))), gravity,
+        float(np.sqrt(np.mean(residual**2))), gravity,
     )  # fmt: skip
 
 
@@ -167,12 +167,12 @@ def _fitted(law: Law, gravity: float, sigma: Array, *, robust: bool, start: Arra
 
 def different_poses(directions: NDArray[np.float64]) -> int:
     """Return how many directions (k, 3) are further than SAME_POSE_DEG from each other."""
-    kept: list[NDArray[np.float64]] = []
+    distinct: list[NDArray[np.float64]] = []
     limit = np.cos(np.radians(SAME_POSE_DEG))
     for each in unit(directions):
-        if all(float(each @ other) < limit for other in kept):
-            kept.append(each)
-    return len(kept)
+        if all(float(each @ other) < limit for other in distinct):
+            distinct.append(each)
+    return len(distinct)
 
 
 def require_poses(serial: str, rests: Rests) -> None:

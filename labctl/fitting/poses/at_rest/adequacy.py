@@ -54,13 +54,13 @@ def left_out_adequacy(
     `white` (k,) is the variance of a mean by its noise, g^2, `before` (k,) what was left before the fit.
     """
     hat = jacobian @ covariance @ jacobian.T
-    kept = np.maximum(1 - np.diag(hat), 1e-6)
+    remaining_share = np.maximum(1 - np.diag(hat), 1e-6)
     # residual / sigma = (1 - hat) noise / sigma: the noise of every rest is in what the others predict of one
     spread = (np.eye(len(hat)) - hat) * (np.sqrt(white) / sigma)
     if known is not None:
         spread = np.hstack([spread, jacobian @ covariance @ known.T])
-    expected = sigma * np.linalg.norm(spread, axis=1) / kept
-    return Adequacy(_rms(before), _rms(residual / kept), _rms(expected))
+    expected = sigma * np.linalg.norm(spread, axis=1) / remaining_share
+    return Adequacy(_rms(before), _rms(residual / remaining_share), _rms(expected))
 
 
 def _rms(values: Array) -> float:

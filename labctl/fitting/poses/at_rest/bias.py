@@ -41,7 +41,7 @@ def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], 
     Where the latitude is known the vertical part of the Earth's rate is taken off. Its horizontal part turns with the
     unknown heading; it scatters from pose to pose, and is in the uncertainty by that.
     """
-    rest = rests.gyro_dps - up_rate_dps(readings.info) * unit(force_g)
+    rest_rate_dps = rests.gyro_dps - up_rate_dps(readings.info) * unit(force_g)
     white = rests.gyro_white_var
     design = np.column_stack([np.ones(len(rests)), force_g])
     k = int(np.count_nonzero(used))
@@ -49,16 +49,16 @@ def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], 
     def of(axis: int) -> Solution:
         stability = readings.info.stability_dps
         scatter = Scatter(rests.t_s[used], np.ones(k, dtype=np.int64), np.zeros(k), white[used, axis], stability)
-        return solve(design[used], rest[used, axis], scatter)
+        return solve(design[used], rest_rate_dps[used, axis], scatter)
 
     solutions = tuple(_with_earth(of(axis), axis, readings) for axis in range(3))
     per_g = np.array([solution.values[1:] for solution in solutions])
-    left = rest - force_g @ per_g.T
-    change = np.diff(left, axis=0)
+    residual = rest_rate_dps - force_g @ per_g.T
+    change = np.diff(residual, axis=0)
     # robust: a pull at the cable in one rest is no drift
     scatter = (1.4826 * np.median(np.abs(change), axis=0)) ** 2 / 2
     extra = np.maximum(scatter - np.median(white, axis=0), 0.0)
-    return Bias(left, np.sqrt(white + extra), solutions)
+    return Bias(residual, np.sqrt(white + extra), solutions)
 
 
 def _with_earth(solution: Solution, axis: int, readings: PoseReadings) -> Solution:

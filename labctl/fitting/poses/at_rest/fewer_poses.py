@@ -93,10 +93,10 @@ def by_fewer_poses(readings: PoseReadings, rests: Rests, prior: Known) -> ByFewe
         )
     errors, bias = matrices(theta)
     force = corrected(rests.accel_g, errors, bias)
-    left = np.linalg.norm(force, axis=1) - gravity
+    residual_g = np.linalg.norm(force, axis=1) - gravity
     result = Accelerometer(
         errors, bias, np.asarray(covariance, dtype=np.float64), unit(force), np.sqrt(white + extra),
-        np.ones(len(rests), dtype=np.bool_), float(np.sqrt(np.mean(left**2))), gravity,
+        np.ones(len(rests), dtype=np.bool_), float(np.sqrt(np.mean(residual_g**2))), gravity,
     )  # fmt: skip
     return ByFewer(result, float(chdtrc(freedom, first)))
 

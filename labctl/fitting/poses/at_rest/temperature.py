@@ -141,18 +141,18 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
         )
     gravity = local_gravity_g(readings.info)
     theta, sigma, used = fit_sizes(law, gravity, rests.accel_white_var.mean(axis=1), law.parameters + LEAST_FREEDOM)
-    kept = law.take(used)
-    jacobian = kept.jacobian(theta) / sigma[used][:, None]
+    used_law = law.take(used)
+    jacobian = used_law.jacobian(theta) / sigma[used][:, None]
     covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
     _require_determined(serial, jacobian, covariance, law)
     white = rests.accel_white_var.mean(axis=1)[used]
-    left = kept.sizes(theta) - gravity
-    before = np.linalg.norm(kept.accel_g, axis=1) - gravity
-    worth = left_out_adequacy(left, jacobian, covariance, sigma[used], white, before)
+    residual_g = used_law.sizes(theta) - gravity
+    before = np.linalg.norm(used_law.accel_g, axis=1) - gravity
+    worth = left_out_adequacy(residual_g, jacobian, covariance, sigma[used], white, before)
     errors, bias = matrices(theta[:PARAMETERS])
     at_reference = Accelerometer(
         errors, bias, covariance[:PARAMETERS, :PARAMETERS], unit(law.forces(theta)[0]), sigma, used,
-        float(np.sqrt(np.mean(left**2))), gravity,
+        float(np.sqrt(np.mean(residual_g**2))), gravity,
     )  # fmt: skip
     powers = np.concatenate([np.repeat(np.arange(1.0, order + 1), 3) for order in orders])
     per_k = np.concatenate([np.ones(PARAMETERS), half**-powers])
@@ -161,7 +161,7 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
     return OverTemperature(
         at_reference, reference, (low, high), levels, in_kelvin[PARAMETERS:split].reshape(-1, 3),
         in_kelvin[split:].reshape(-1, 3), np.asarray(covariance * np.outer(per_k, per_k)), worth,
-        _constant_g(SizeLaw(kept.accel_g), gravity, white),
+        _constant_g(SizeLaw(used_law.accel_g), gravity, white),
     )  # fmt: skip
 
 

@@ -44,12 +44,12 @@ def rows_in_order(t_s: Array) -> Rows:
             last.append(row)
         else:
             ends[length], last[length] = value, row
-    kept = np.zeros(len(t_s), dtype=bool)
+    in_order = np.zeros(len(t_s), dtype=bool)
     row = last[-1] if last else -1
     while row >= 0:
-        kept[row] = True
+        in_order[row] = True
         row = int(before[row])
-    return kept
+    return in_order
 
 
 def check_clock(series: Series) -> Iterator[Marked]:

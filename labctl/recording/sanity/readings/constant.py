@@ -75,14 +75,14 @@ def step_of_one_code(series: Series, name: str) -> float | None:
 def _one_code(series: Series, name: str, step: float) -> Marked:
     values = series.outputs[name]
     if step:
-        why = f"another output comes in steps of {step:.4g} deg/s, and this value is a multiple of them"
+        reason = f"another output comes in steps of {step:.4g} deg/s, and this value is a multiple of them"
     else:
-        why = "no other output changes either"
+        reason = "no other output changes either"
     return Marked(
         Finding(
             "quantised", "likely", name,
             f"the output is {values[0]:.6g} deg/s in all {len(values)} readings: its steps are far larger than its "
-            f"noise ({why}), or the unit does not measure",
+            f"noise ({reason}), or the unit does not measure",
             step or None, "deg/s", "readings that differ by their noise",
             "log the output with more digits or a finer converter, and check that the unit is switched on",
             channel=name, n=len(values),
@@ -100,8 +100,8 @@ def frozen_rows(series: Series, name: str, values: Array) -> Rows:
         return is_frozen
     usual = [end - begin for begin, end in steady if end - begin <= USUAL_RUN]
     long = sum(end - begin for begin, end in steady if end - begin > USUAL_RUN)
-    rest = len(values) - long
-    share = min(sum(length - 1 for length in usual) / rest, 0.9) if rest > LEAST_RUN else 0.9
+    last_begin = len(values) - long
+    share = min(sum(length - 1 for length in usual) / last_begin, 0.9) if last_begin > LEAST_RUN else 0.9
     is_coarse = series.code_steps[name] > COARSE_NOISES * series.noises[name]
     least = LEAST_RUN if is_coarse else max(LEAST_RUN, np.log(CHANCE / len(values)) / np.log(max(share, 1e-3)))
     ends = (float(values.min()), float(values.max()))

@@ -158,11 +158,11 @@ def check_clipped(series: Series, repeated: Rows) -> Iterator[Marked]:
         if not ends:
             continue
         rows = np.any([at_end for _, at_end in ends], axis=0)
-        shown = " and ".join(f"{top:.5g}" for top, _ in ends)
+        limits_text = " and ".join(f"{top:.5g}" for top, _ in ends)
         yield Marked(
             Finding(
                 "clipped", "likely", f"{name}, {rows_in_words(rows)}",
-                f"{int(rows.sum())} readings are exactly at {shown} deg/s, and none beyond",
+                f"{int(rows.sum())} readings are exactly at {limits_text} deg/s, and none beyond",
                 ends[0][0], "deg/s", "readings that thin out towards the ends of their range",
                 "leave out the data sets or readings at the limit, or measure at lower rates or in a larger range: "
                 "means of clipped readings are too small",

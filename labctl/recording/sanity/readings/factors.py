@@ -154,12 +154,12 @@ def _marked(series: Series, name: str, row: int, change: Change) -> Marked:
     rows = np.zeros(len(series), dtype=bool)
     rows[row:] = True
     size = abs(change.factor)
-    where = f"{name}, from row {row + 1} on"
+    place_text = f"{name}, from row {row + 1} on"
     n = int(rows.sum())
     if change.factor < 0:
         return Marked(
             Finding(
-                "sign", "certain", where,
+                "sign", "certain", place_text,
                 f"the output changes its sign at row {row + 1}: its level is {change.factor:g} times that before, with "
                 "the same noise",
                 change.factor, "1", "one sign in a recording", f"change the sign of {name} from row {row + 1} on, or "
@@ -172,7 +172,7 @@ def _marked(series: Series, name: str, row: int, change: Change) -> Marked:
         unit, other = ("deg/s", "rad/s") if size > 1 else ("rad/s", "deg/s")
         return Marked(
             Finding(
-                "mixed_units", "certain", where,
+                "mixed_units", "certain", place_text,
                 f"level and noise of {name} are {size:.3g} times those of the rows before, 180/pi or its inverse: "
                 f"from row {row + 1} on the output is in {unit}, before in {other}",
                 size, "1", "one unit in a file",
@@ -184,7 +184,7 @@ def _marked(series: Series, name: str, row: int, change: Change) -> Marked:
         )  # fmt: skip
     return Marked(
         Finding(
-            "gain_changes", "certain", where,
+            "gain_changes", "certain", place_text,
             f"level and noise of {name} are {size:.3g} times those of the rows before: the range was switched, and the "
             "scale of the output was not",
             size, "1", "one scale in a recording",

@@ -33,16 +33,16 @@ def without(recording: Recording, kinds: Sequence[str], name: str) -> Recording:
         return recording
     n = len(recording)
     valid = np.asarray(recording.columns["valid"]) != 0 if "valid" in recording.columns else np.ones(n, dtype=bool)
-    left: list[LeftOut] = []
+    left_out: list[LeftOut] = []
     for each in chosen:
         rows = each.rows & valid
         valid &= ~each.rows
-        left.append(
+        left_out.append(
             LeftOut(
                 what=each.finding.what, channel=each.finding.channel, n=int(rows.sum()), of=n, why=each.finding.said
             )
         )
     if not valid.any():
         raise BadInput(f"{name}: no reading would be left without those of {', '.join(kinds)}; measure again")
-    info = recording.info.model_copy(update={"left_out": (*recording.info.left_out, *left)})
+    info = recording.info.model_copy(update={"left_out": (*recording.info.left_out, *left_out)})
     return replace(recording, info=info, columns={**recording.columns, "valid": valid.astype(np.int64)})

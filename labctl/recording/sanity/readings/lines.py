@@ -87,9 +87,9 @@ def _over_background(spectrum: Array) -> Array:
     padded = np.log(np.maximum(spectrum, 1e-300))
     excess = np.zeros(len(spectrum))
     for k in range(FIRST_BIN, len(spectrum)):
-        left = padded[max(k - GUARD - BACKGROUND, 1) : k - GUARD]
+        below = padded[max(k - GUARD - BACKGROUND, 1) : k - GUARD]
         right = padded[k + GUARD + 1 : k + GUARD + 1 + BACKGROUND]
-        sides = [float(np.median(side)) for side in (left, right) if len(side) >= 2]
+        sides = [float(np.median(side)) for side in (below, right) if len(side) >= 2]
         excess[k] = np.exp(padded[k] - max(sides))
     return excess
 
@@ -104,8 +104,8 @@ def mains_at(hz: float, step_s: float, tolerance_hz: float) -> float | None:
     """Return which line of the mains, Hz, is seen at a frequency when sampled every `step_s`; None for none."""
     rate_hz = 1.0 / step_s
     for mains in MAINS_HZ:
-        seen = abs(mains - rate_hz * round(mains / rate_hz))
-        if abs(seen - hz) < tolerance_hz + MAINS_SHARE * mains:
+        folded_hz = abs(mains - rate_hz * round(mains / rate_hz))
+        if abs(folded_hz - hz) < tolerance_hz + MAINS_SHARE * mains:
             return mains
     return None
 

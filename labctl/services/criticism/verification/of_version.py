@@ -115,11 +115,11 @@ def independent_groups(points: Recording) -> int:
     """Return the number of powered sessions times temperature levels of a recording, at least 1."""
     n = len(points)
     runs = np.asarray(points.columns.get("run", np.ones(n)))
-    warm = np.asarray(points.columns.get("temperature_c", np.zeros(n)), dtype=np.float64)
+    temperature_c = np.asarray(points.columns.get("temperature_c", np.zeros(n)), dtype=np.float64)
     n_groups = 0
     for run in np.unique(runs):
         reached = -np.inf
-        for each in np.sort(warm[runs == run]).tolist():
+        for each in np.sort(temperature_c[runs == run]).tolist():
             if each > reached:
                 n_groups, reached = n_groups + 1, each + LEVEL_K
     return max(n_groups, 1)
@@ -184,23 +184,23 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
 
     Raises BadInput, NotEnoughData as `left_by`.
     """
-    left, expected = left_by(store, row, measured), expected_dps(row)
-    own = _own_errors(store, row, measured, left) if expected is not None and len(left.errors) > 1 else {}
-    axes = judged(left.errors, expected, own, left.groups, left.mounted_dps)
+    errors_left, expected = left_by(store, row, measured), expected_dps(row)
+    own = _own_errors(store, row, measured, errors_left) if expected is not None and len(errors_left.errors) > 1 else {}
+    axes = judged(errors_left.errors, expected, own, errors_left.groups, errors_left.mounted_dps)
     return VerificationResponse(
         serial=row.serial,
         version=row.version,
         recording=measured.row.id,
         recorded_unit=measured.row.serial,
-        seen=not left.is_part and measured.row.id in row.recordings,
-        part=left.part,
-        datasets=len(left.outside),
-        rms_dps=left.rms_dps,
-        max_dps=left.max_dps,
-        bias_dps=left.bias_dps,
+        seen=not errors_left.is_part and measured.row.id in row.recordings,
+        part=errors_left.part,
+        datasets=len(errors_left.outside),
+        rms_dps=errors_left.rms_dps,
+        max_dps=errors_left.max_dps,
+        bias_dps=errors_left.bias_dps,
         axes=axes,
         axes_off=[axis for axis, axis_errors in axes.items() if axis_errors.ok is False],
-        outside_validity=int(np.count_nonzero(left.outside)),
+        outside_validity=int(np.count_nonzero(errors_left.outside)),
         expected_dps=expected,
         ok=all(axis_errors.ok is True for axis_errors in axes.values()),
     )
@@ -276,9 +276,9 @@ def applied_errors(
         )
     compensator = Compensator(calibration)
     raw = np.column_stack([data.outputs[axis] for axis in calibration.axes])
-    warm = np.column_stack([data.channels.temperature_c(axis) for axis in calibration.axes])
+    temperature_c = np.column_stack([data.channels.temperature_c(axis) for axis in calibration.axes])
     corrected = compensator.compensate(
-        raw, warm, _channels(compensator, data), history=data.channels.history,
+        raw, temperature_c, _channels(compensator, data), history=data.channels.history,
         cross_rates_dps=(data.across_dps or None) if across_known else None,
     )  # fmt: skip
     errors = {axis: corrected.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
@@ -334,5 +334,5 @@ def expected_dps(row: CalibrationRecord) -> float | None:
         return row.answer["poses"]["moves"]["applied_rms_dps"]
     error, joint = row.answer["error"], row.answer.get("joint")
     later = joint["heldout_rms_dps"] if joint else None  # of several recordings each was predicted by the others
-    known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"], later) if figure is not None]
-    return max(known, default=None)
+    errors_dps = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"], later) if figure is not None]
+    return max(errors_dps, default=None)
