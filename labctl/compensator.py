@@ -125,7 +125,7 @@ class Compensator:
         return self._memory is not None
 
     def reset(self) -> None:
-        """Forget the temperatures that were seen, as after the unit was switched off."""
+        """Clear the temperature history, as after the unit was switched off."""
         if self._running is not None:
             self._running.reset()
 

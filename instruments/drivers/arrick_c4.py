@@ -94,7 +94,7 @@ class ArrickC4:
         return math.copysign(move.step_hz * self._step_deg, rate_dps)
 
     def home(self) -> None:
-        """Control the table to its home switch (`!1h1`, one `o`); the angle is 0 deg there.
+        """Turn the table to its home switch (`!1h1`, one `o`); the angle is 0 deg there.
 
         Raises RequestRejected, NoReply, LinkError.
         """
@@ -105,7 +105,7 @@ class ArrickC4:
         self._steps, self._active, self._counted = 0.0, None, True
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
-        """Control the table to a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
+        """Turn the table at a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
 
         Raises LimitError (nothing was sent), RequestRejected, NoReply, LinkError.
         """
@@ -121,7 +121,7 @@ class ArrickC4:
         return Spin(rate_dps, achieved_dps, steady_from_s, steady_from_s + move.steady_s, from_deg, self._step_deg)
 
     def settle(self, spin: Spin) -> None:
-        """Control the end of a run: wait for the `o` that confirms every step, at the time it must come.
+        """Wait for the `o` that confirms every step, at the time it must come.
 
         Raises MalformedReply for an `o` that comes too early, NoReply, LinkError.
         """
@@ -143,7 +143,7 @@ class ArrickC4:
         self._steps += move.steps
 
     def stop(self) -> None:
-        """Control the table to rest (`!1a`) and wait until it stands. Until the next homing the angle is computed.
+        """Stop the table (`!1a`) and wait until it stands. Until the next homing the angle is computed.
 
         A new process does not know what an earlier one left: it ends the line that may be half sent, and aborts
         without asking first. Raises NoReply, LinkError.
@@ -246,7 +246,7 @@ class ArrickC4:
         return (checks.NO_SPEED,) if self.settings.speed_template is None else ()
 
     def close(self) -> None:
-        """Control the link: close it; safe to call twice."""
+        """Close the link; safe to call twice."""
         self._link.close()
 
     def _begin(self, move: Move) -> float:

@@ -53,7 +53,7 @@ class CanGyro:
         )
 
     def start(self) -> None:
-        """Control the stream: open the bus, send the frames that start the unit, drop what is old; LinkError."""
+        """Open the bus, send the frames that start the unit, drop what is old; LinkError."""
         self._readings.begin([packed(frame_of_text(text)) for text in self.settings.start])
 
     def read(self, duration_s: float) -> Readings:
@@ -73,7 +73,7 @@ class CanGyro:
         return readings
 
     def stop(self) -> None:
-        """Control the stream: close the bus; safe to call twice."""
+        """Close the bus; safe to call twice."""
         self._stream.close()
 
     @property

@@ -97,7 +97,7 @@ class Gyrostar:
         )
 
     def start(self) -> None:
-        """Control the stream: readings are polled from now on."""
+        """Start the readings, which are polled from now on."""
         self._start_s, self._index = self._clock.now_s(), 0
 
     def read(self, duration_s: float) -> Readings:
@@ -133,7 +133,7 @@ class Gyrostar:
         return self._readings([self._poll()], [self._start_s])
 
     def stop(self) -> None:
-        """Control the link: close it; safe to call twice."""
+        """Close the link; safe to call twice."""
         self._registers.close()
 
     def _due_s(self) -> float:

@@ -103,7 +103,7 @@ class KvhGyro:
         )  # fmt: skip
 
     def start(self) -> None:
-        """Control the stream: open the port, ask for rates, and drop stale or partial lines; raises LinkError."""
+        """Open the port, ask for rates, and drop stale or partial lines; raises LinkError."""
         self._stream.open()
         if command := self._model.format.start_command:
             self._stream.write(command.encode() * START_REPEATS)
@@ -134,7 +134,7 @@ class KvhGyro:
         raise self._no_line(SILENCE_S)
 
     def stop(self) -> None:
-        """Control the stream: close the port; safe to call twice."""
+        """Close the port; safe to call twice."""
         self._stream.close()
 
     @property

@@ -46,7 +46,7 @@ class LibraryReference:
         return ReferenceState(self._clock.now_s(), raw)
 
     def close(self) -> None:
-        """Control the link: close it; safe to call twice."""
+        """Close the link; safe to call twice."""
         self._instrument.close()
 
 

@@ -89,7 +89,7 @@ class LineReference:
         return round(float(match["value"]) / quantity.resolution)
 
     def close(self) -> None:
-        """Control the link: close it; safe to call twice."""
+        """Close the link; safe to call twice."""
         self._lines.close()
 
 

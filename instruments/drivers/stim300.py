@@ -122,7 +122,7 @@ class Stim300:
         )  # fmt: skip
 
     def start(self) -> None:
-        """Control the stream: open the port and drop stale bytes; raises LinkError."""
+        """Open the port and drop stale bytes; raises LinkError."""
         self._stream.open()
         self._set = self._serial = self._trim_dps = None
         self._questions = 0
@@ -164,7 +164,7 @@ class Stim300:
         raise self._no_datagram(f"within {START_WITHIN_S:g} s") if newest is None else self._no_answer()
 
     def stop(self) -> None:
-        """Control the stream: close the port; safe to call twice."""
+        """Close the port; safe to call twice."""
         self._stream.close()
 
     @property

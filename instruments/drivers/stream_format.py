@@ -64,7 +64,7 @@ class StreamFormatGyro:
         )  # fmt: skip
 
     def start(self) -> None:
-        """Control the stream: open the port, send what the format sends at the start, drop what is old; LinkError."""
+        """Open the port, send what the format sends at the start, drop what is old; LinkError."""
         self._readings.begin([text.encode("latin-1") for text in self._format.start])
 
     def read(self, duration_s: float) -> Readings:
@@ -80,7 +80,7 @@ class StreamFormatGyro:
         return self._readings.read_latest()
 
     def stop(self) -> None:
-        """Control the stream: close the port; safe to call twice."""
+        """Close the port; safe to call twice."""
         self._stream.close()
 
     @property

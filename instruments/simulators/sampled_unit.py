@@ -35,7 +35,7 @@ class SampledUnit:
         return self._sent / self._rate_hz
 
     def skip(self, t_s: float) -> None:
-        """Lose the samples up to `t_s`."""
+        """Drop the samples up to `t_s`."""
         self._sent = max(self._sent, self._newest(t_s))
 
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the unit never waits

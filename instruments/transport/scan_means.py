@@ -20,7 +20,7 @@ class ScanMeans:
         self.drop()
 
     def drop(self) -> None:
-        """Forget what waits."""
+        """Drop what waits."""
         self._numbers: Counts = np.zeros(0, dtype=np.int64)
         self._codes: Counts = np.zeros((0, self._inputs), dtype=np.int64)
         self._good: NDArray[np.bool_] = np.zeros(0, dtype=bool)

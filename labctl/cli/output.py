@@ -27,7 +27,7 @@ STDERR = 2
 
 
 def give_up_blocked_stderr() -> None:
-    """Let standard error go nowhere when its reader stands still: the end of this process does not wait for it."""
+    """Discard standard error when its reader is blocked: the end of this process does not wait for it."""
     from labctl.log.writer import takes_text
 
     if not takes_text(STDERR, TAKES_WITHIN_S):

@@ -79,7 +79,7 @@ class TerminalOperator:
 
 
 def _how_to_answer(prompt: Prompt) -> str:
-    """Say what to type, and by when."""
+    """Return what to type, and by when."""
     again = f", {AGAIN} to be asked for the turn again" if prompt.kind == "turn" else ""
     limit = "" if prompt.within_s is None else f" Time limit: {prompt.within_s:g} s."
     return f"Press Enter when this is done{again}, or type the reason why it cannot be done.{limit}"

@@ -62,7 +62,7 @@ def cached_only() -> Iterator[None]:
 
 
 def compute(question: str) -> None:
-    """Say that what follows takes long. Raises NotCached where only cached results are wanted."""
+    """Announce a long computation. Raises NotCached where only cached results are wanted."""
     if _cached_only.get():
         raise NotCached(question)
 

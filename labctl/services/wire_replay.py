@@ -140,7 +140,7 @@ def _response(path: Path, session: Session, begun_s: float) -> ReplayResponse:
 
 
 def _different(session: Session, recorded: SessionResult) -> list[str]:
-    """Say what of the result is not that of the session."""
+    """Return what of the result differs from the session."""
     result, said = session.result, []
     if left := session.replay.not_sent():
         said.append("requests that the session made and this replay did not: " + ", ".join(left))

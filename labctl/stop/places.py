@@ -103,7 +103,7 @@ class BenchPlace:
         _write(self.folder / NOTE, asdict(note))
 
     def register(self) -> None:
-        """Let a stop that does not know the database find this bench; raises nothing: it can still be named."""
+        """Register this bench for a stop without the database; raises nothing: the bench can still be named."""
         with contextlib.suppress(OSError, RuntimeError):
             pointers = state_folder() / POINTERS
             pointers.mkdir(parents=True, exist_ok=True, mode=FOLDER)

@@ -166,7 +166,7 @@ def _gate(spin: Spin, step: Acquire) -> tuple[float, float]:
 
 
 def _wait_for_gate(context: ExecutionContext, watch: TableWatch, from_s: float) -> None:
-    """Let the table settle, then drop what the streams have buffered meanwhile, unless the gate is open already."""
+    """Wait until the table settles, then drop what the streams have buffered, unless the gate is open already."""
     clear_s = from_s - LEAD_S - latency_s(context.clock)
     while watch.next_s < clear_s:
         pass_time(context, watch.next_s - context.clock.now_s(), pausing=False)

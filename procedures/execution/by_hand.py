@@ -165,7 +165,7 @@ class TurnReadings:
 
 
 def turn(context: ExecutionContext, step: Turn) -> dict[str, float]:
-    """Have the units turned until a turn is good; returns what came out of it, by unit.
+    """Ask for a turn by hand until one is good; returns its result, by unit.
 
     Raises StepFailed after as many refused attempts as the recipe allows, and for an answer that does not come, or is
     no; InstrumentError, Aborted.

@@ -174,7 +174,7 @@ class StepExecutor:
         self._recorder.step_ended(index, StepResult(outcome="done", figures=figures))
 
     def _prepare(self, step: Step) -> None:
-        """Obey a request to pause or abort; before a data set, repeat a soak that is owed."""
+        """Act on a request to pause or abort; before a data set, repeat a soak that is owed."""
         context = self._context
         checkpoint(context)
         with context.owing_soak():

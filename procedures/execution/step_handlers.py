@@ -44,7 +44,7 @@ def home(context: ExecutionContext, _step: Home) -> Figures:
 
 
 def power_on(context: ExecutionContext, step: PowerOn) -> Figures:
-    """Have the units switched on, check that they are those of the bench file, open their streams, warm up."""
+    """Switch the units on, check that they are those of the bench file, open their streams, warm up."""
     context.soaked = None
     run = step.run + context.added_runs
     ask(context, Prompt(context.new_prompt_id(), "power_on", f"switch the units on (session {run})"))
@@ -99,7 +99,7 @@ def power_off(context: ExecutionContext, step: PowerOff) -> Figures:
 
 
 def mount(context: ExecutionContext, step: Mount) -> Figures:
-    """Have a person turn the units."""
+    """Ask a person to turn the units."""
     context.soaked = None
     text = mounting_text(step.position)
     if (rules := context.recipe.turns) is not None:
@@ -178,7 +178,7 @@ def _unsettled(context: ExecutionContext, step: Soak, judge: SoakCriterion, took
 
 
 def rest(context: ExecutionContext, step: Rest) -> Figures:
-    """Let nothing move for a while."""
+    """Wait at rest."""
     with context.monitor.taking_readings():
         record_for(context, step.duration_s)
     return {}

@@ -50,7 +50,7 @@ def measure_clock(context: ExecutionContext, step: MeasureClock) -> dict[str, fl
 
 
 def _use(context: ExecutionContext, measured_clock: MeasuredClock) -> None:
-    """Let every rate be by the step clock as it is known now, those of the data sets so far, too."""
+    """Compute every rate by the measured step clock, also those of the data sets so far."""
     before = step_clock.fitted([run for run in context.clock_runs if run.used])
 
     def factor(t_s: float) -> float:
@@ -62,7 +62,7 @@ def _use(context: ExecutionContext, measured_clock: MeasuredClock) -> None:
 
 
 def follow_clock(context: ExecutionContext) -> None:
-    """Have the table compute its rates by its step clock as it is known now; before, they are by the nominal one."""
+    """Make the table compute its rates by its step clock as it is known now; before, they are by the nominal one."""
     table = context.bench.table
     fit = step_clock.fitted([run for run in context.clock_runs if run.used])
     if fit is not None and isinstance(table, OpenLoopTable):
@@ -169,7 +169,7 @@ def _figures(measured_clock: MeasuredClock) -> dict[str, float]:
 
 
 def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
-    """Look for missed steps. Those that were found end the campaign, and the data sets since the last check with it.
+    """Check for missed steps. Those that are found end the campaign, and the data sets since the last check with it.
 
     Raises TableStopped, InstrumentError.
     """
@@ -227,7 +227,7 @@ def _missing_text(name: str, home_check: HomeCheck, temperature_c: float) -> str
 
 
 def _watched_wait(context: ExecutionContext, wait_s: float) -> None:
-    """Let time pass under control of requests, with the bench watched."""
+    """Wait while requests are obeyed and the bench is watched."""
     until_s = context.clock.now_s() + wait_s
     while (left_s := until_s - context.clock.now_s()) > 0:
         if context.monitor.is_due():

@@ -112,7 +112,7 @@ class _StepWriter:
             self.measure_clock(LATER_RUNS)
 
     def check_home(self, level: Level) -> None:
-        """Look for missed steps, where the table does that and turns at this level."""
+        """Write a check for missed steps, where the table does that and turns at this level."""
         table = self.limits.table
         if table is not None and table.checks_home and any(level.rates_dps):
             self.steps.append(CheckHome(temperature_c=level.temperature_c, expected_s=CHECK_S))

@@ -83,7 +83,7 @@ class Recipe(Table):
     @model_validator(mode="before")
     @classmethod
     def _without_rates(cls, document: Any) -> Any:
-        """Give a recipe of turns no rates and no temperatures."""
+        """Fill in empty rates and temperatures in a recipe of turns."""
         if isinstance(document, dict) and document.get("turns") is not None:
             return {"temperatures_c": (), "rates_dps": (), **document}
         return document

@@ -72,7 +72,7 @@ class Acutrol3000:
         return round(rate_dps, acl.DECIMALS)
 
     def home(self) -> None:
-        """Control the table to the zero of its encoder, by the shorter way.
+        """Turn the table to the zero of its encoder, by the shorter way.
 
         Raises RequestRejected for an open interlock that does not close, NoReply, MalformedReply, LinkError.
         """
@@ -91,7 +91,7 @@ class Acutrol3000:
             self._clock.sleep(POLL_S)
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
-        """Control the table to a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
+        """Turn the table at a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
 
         Raises LimitError (nothing was sent), RequestRejected, NoReply, MalformedReply, LinkError.
         """
@@ -109,7 +109,7 @@ class Acutrol3000:
         return Spin(rate_dps, demand_dps, angle_deg.t_s, self._clock.now_s() + steady_s + SPARE_S, angle_deg.angle_deg)
 
     def settle(self, spin: Spin) -> None:
-        """Control the end of a run: stop the table, and return when it is at rest.
+        """Stop the table and return when it is at rest.
 
         Raises RequestRejected where it stopped by itself before, NoReply, MalformedReply, LinkError.
         """
@@ -124,7 +124,7 @@ class Acutrol3000:
             )
 
     def begin_course(self, course: RateCourse) -> CourseRun:
-        """Bring the table to the rate from which a course begins, then begin it.
+        """Turn the table at the rate from which a course begins, then begin it.
 
         Raises LimitError (nothing was sent), RequestRejected, NoReply, MalformedReply, LinkError.
         """
@@ -144,7 +144,7 @@ class Acutrol3000:
         return self._courses.angle(run)
 
     def end_course(self, run: CourseRun) -> None:
-        """Control the table to rest, and set the limits of constant rates again.
+        """Stop the table and set the limits of constant rates again.
 
         Raises RequestRejected where an interlock ended the course, NoReply, MalformedReply, LinkError.
         """
@@ -153,7 +153,7 @@ class Acutrol3000:
         self._prepare()
 
     def stop(self) -> None:
-        """Control the table to rest (Off mode). It is sent before anything is read; raises LinkError."""
+        """Stop the table (Off mode). The command is sent before anything is read; raises LinkError."""
         self._rate_dps, self._last = 0.0, None
         self._link.send_stop(acl.off(self._axis))
 
@@ -199,7 +199,7 @@ class Acutrol3000:
         return self._last
 
     def close(self) -> None:
-        """Control the link: close it; safe to call twice. The table goes on as commanded."""
+        """Close the link; safe to call twice. The table goes on as commanded."""
         self._link.close()
 
     @property

@@ -74,7 +74,7 @@ class LabJackGyro:
         return analog_identity(self.settings, f"analog gyro on {self._model}", self._said)
 
     def start(self) -> None:
-        """Control the stream: set it up and begin; one that runs goes on. Raises InstrumentError."""
+        """Set up and start the stream; one that runs goes on. Raises InstrumentError."""
         if self._stream.is_open:
             self._discard()
             return
@@ -116,7 +116,7 @@ class LabJackGyro:
         raise self._silent(SILENCE_S)
 
     def stop(self) -> None:
-        """Control the stream: end it and close both links; safe to call twice, and without a reply."""
+        """Stop the stream and close both links; safe to call twice, and without a reply."""
         if self._stream.is_open:
             self._stream.close()
             with contextlib.suppress(InstrumentError):  # the next start ends a stream that goes on

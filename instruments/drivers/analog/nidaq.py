@@ -235,7 +235,7 @@ class NidaqGyro:
         return analog_identity(self.settings, f"analog gyro on {reported['inputs']}", reported)
 
     def start(self) -> None:
-        """Control the scans: begin; those that run go on. Raises LinkError, WrongInstrument for another rate."""
+        """Start the scans; those that run go on. Raises LinkError, WrongInstrument for another rate."""
         if self._task.is_open:
             self._discard()
             return
@@ -274,7 +274,7 @@ class NidaqGyro:
         raise self._silent()
 
     def stop(self) -> None:
-        """Control the scans: end them; safe to call twice, and where nidaqmx fails."""
+        """Stop the scans; safe to call twice, and where nidaqmx fails."""
         self._task.close()
 
     def _available(self) -> Readings:

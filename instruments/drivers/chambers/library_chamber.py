@@ -27,7 +27,7 @@ class LibraryChamber(SetpointChamber):
         return f"{self._names.instrument} of {self._names.library} {identity}".strip()
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe set point, and off where the bench file says so; returns the value read back.
+        """Set the safe set point, and switch the chamber off where the bench file says so; returns the value read back.
 
         Raises as `set_temperature_c` does.
         """

@@ -43,7 +43,7 @@ class TextChamber(SetpointChamber):
         self._ends_off = settings.safe_state == "off"
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe set point, and off where the bench file says so; returns the value read back.
+        """Set the safe set point, and switch the chamber off where the bench file says so; returns the value read back.
 
         Raises as `set_temperature_c` does.
         """
@@ -83,7 +83,7 @@ class LineChamber(TextChamber):
         return f"{self._dialect.maker} {text}"
 
     def set_temperature_c(self, temperature_c: float) -> float:
-        """Control the set point, with the panel locked afterwards where the bench file says so.
+        """Set the temperature; the panel is locked afterwards where the bench file says so.
 
         Raises as every chamber does, and RequestRejected where the panel is not locked after the command.
         """
@@ -101,7 +101,7 @@ class LineChamber(TextChamber):
         return setpoint_c
 
     def make_safe(self) -> float:
-        """Control the panel, which is unlocked first, and the chamber to its safe state; returns the value read back.
+        """Unlock the panel, then bring the chamber to its safe state; returns the value read back.
 
         A panel that cannot be unlocked keeps no set point from being written. Raises as `set_temperature_c` does.
         """

@@ -110,7 +110,7 @@ class SetpointChamber(ABC):
             self._start()
 
     def set_temperature_c(self, temperature_c: float) -> float:
-        """Control the set point: limited, rounded, written on change only (EEPROM wear); returns the value read back.
+        """Write the set point: limited, rounded, written on change only (EEPROM wear); returns the value read back.
 
         Raises LimitError (nothing was written), RequestRejected while a profile runs or when another value is read
         back, and what an exchange with the controller raises.
@@ -122,7 +122,7 @@ class SetpointChamber(ABC):
         return self._write_and_verify(rounded)
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe set point; returns the value read back, deg C. Switches nothing on.
+        """Set the chamber to its safe set point; returns the value read back, deg C. Switches nothing on.
 
         Raises as `set_temperature_c` does.
         """
@@ -145,7 +145,7 @@ class SetpointChamber(ABC):
         return tuple(filter(None, [hindrance]))
 
     def close(self) -> None:
-        """Control the link: close it. The controller keeps its set point."""
+        """Close the link. The controller keeps its set point."""
         self._link.close()
 
     def _checked(self, temperature_c: float) -> float:

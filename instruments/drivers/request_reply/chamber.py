@@ -38,7 +38,7 @@ class DescribedChamber(TextChamber):
         return text
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe state, then end its remote operation; returns the set point read back.
+        """Bring the chamber to its safe state, then end its remote operation; returns the set point read back.
 
         What ends the remote operation is sent also where the safe state is refused. Raises as `set_temperature_c`.
         """

@@ -49,7 +49,7 @@ class CycleDecoder:
         return [self._layout.database.message_name(key) for key in self._layout.parts if key not in self.seen]
 
     def drop(self) -> None:
-        """Forget the unfinished frame and the unfinished cycle."""
+        """Drop the unfinished frame and the unfinished cycle."""
         self._scanner.drop()
         self._cycle, self._is_fit, self._is_headless = {}, True, False
         self._damaged = self._missed = 0

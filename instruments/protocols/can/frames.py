@@ -66,7 +66,7 @@ class FrameScanner:
         self._rest = b""
 
     def drop(self) -> None:
-        """Forget the unfinished frame."""
+        """Drop the unfinished frame."""
         self._rest = b""
 
     @property

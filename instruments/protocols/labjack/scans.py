@@ -24,7 +24,7 @@ class PacketScans:
         self.drop()
 
     def drop(self) -> None:
-        """Forget the count: the next packet is the first."""
+        """Reset the count: the next packet is the first."""
         self._number: int | None = None
         self._base = 0
 

@@ -40,7 +40,7 @@ class FrameScanner:
         self._skipped = 0  #: bytes since the last intact frame
 
     def drop(self) -> None:
-        """Forget the unfinished frame; bytes before the next intact one are no damage."""
+        """Drop the unfinished frame; bytes before the next intact one are no damage."""
         self._unfinished, self._in_step, self._skipped = b"", False, 0
 
     def feed(self, new: bytes) -> tuple[list[tuple[Bytes, Whole]], int]:
@@ -146,7 +146,7 @@ class FrameDecoder:
         self._held: dict[str, int] = {}  #: newest value of the fields that come more rarely
 
     def drop(self) -> None:
-        """Forget the unfinished frame."""
+        """Drop the unfinished frame."""
         self._scanner.drop()
 
     def feed(self, data: bytes) -> Decoded:

@@ -32,7 +32,7 @@ class LineDecoder:
         self._unfinished, self._in_line = b"", False
 
     def drop(self) -> None:
-        """Forget the unfinished line."""
+        """Drop the unfinished line."""
         self._unfinished, self._in_line = b"", False
 
     def feed(self, data: bytes) -> Decoded:

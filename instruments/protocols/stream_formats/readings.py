@@ -60,7 +60,7 @@ class Decoder(Protocol):
     """Takes the bytes of a stream as they come."""
 
     def drop(self) -> None:
-        """Forget the unfinished message: what comes next may begin anywhere in one."""
+        """Drop the unfinished message: what comes next may begin anywhere in one."""
         ...
 
     def feed(self, data: bytes) -> Decoded:

@@ -54,7 +54,7 @@ class _SimulatedLines(ABC):
         return self._sent / self._rate_hz
 
     def skip(self, t_s: float) -> None:
-        """Lose the lines up to `t_s`."""
+        """Drop the lines up to `t_s`."""
         self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))
 
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the stream never waits

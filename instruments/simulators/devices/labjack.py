@@ -155,7 +155,7 @@ class SimulatedT7Stream:
         return b"".join(packets)
 
     def skip(self, t_s: float) -> None:
-        """Lose the packets up to `t_s`."""
+        """Drop the packets up to `t_s`."""
         self.stream.sent = max(self.stream.sent, self.stream.packets_by(t_s))
 
     @property

@@ -42,7 +42,7 @@ class XpsController:
         }
 
     def stall(self, t_s: float) -> None:
-        """Lose the motion where a fault says so."""
+        """Drop the motion where a fault says so."""
         if self.faults.trigger(["stall"], t_s) is not None and self.status == JOGGING:
             self.axis.run(t_s, 0.0, MAX_DPS2)
             self.status = AFTER_ERROR

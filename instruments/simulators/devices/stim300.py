@@ -138,7 +138,7 @@ class SimulatedStim300:
             self._execute(command + b"\r", int(np.floor(t_s * self._rate_hz + 1e-9)) + 1)
 
     def _execute(self, command: bytes, index: int) -> None:
-        """Obey a command that came before the frame of an index was sent."""
+        """Execute a command that arrived before the frame of an index was sent."""
         if command == RESET:
             index = self._silent_until = index + round(SILENT_AFTER_RESET_S * self._rate_hz)
             self._starts_until = index + round(STARTS_UP_S * self._rate_hz)
@@ -163,7 +163,7 @@ class SimulatedStim300:
         return self._with_replies(index, frames) if self._replies else frames.tobytes()
 
     def skip(self, t_s: float) -> None:
-        """Lose the frames up to `t_s`."""
+        """Drop the frames up to `t_s`."""
         self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))
 
     @property

@@ -122,7 +122,7 @@ class FaultyWire:
         return sent
 
     def skip(self, t_s: float) -> None:
-        """Lose the bytes that have arrived and the delayed ones; raises serial.SerialException on a dropped link."""
+        """Drop the bytes that have arrived and the delayed ones; raises serial.SerialException on a dropped link."""
         self._check_link(t_s)
         self._held.clear()
         self._device.skip(t_s)

@@ -107,7 +107,7 @@ class ServoMotion:
         return angle, self._rate[k] + max(share, 0.0) * (self._rate[k + 1] - self._rate[k])
 
     def _end_sine(self, t_s: float) -> None:
-        """Let the sine that is followed end at a time, with a corner where it ends."""
+        """End the sine that is followed at a time, with a corner where it ends."""
         if not self._sines or self._sines[-1][1] < math.inf:
             return
         from_s, _, motion = self._sines[-1]

@@ -70,7 +70,7 @@ class Tumbling:
         self._asked: tuple[float, ...] = ()
 
     def lay(self, t_s: float, up: Sequence[float]) -> None:
-        """Have the person lay the units down with direction `up` (3,) of the body pointing up.
+        """Make the person lay the units down with direction `up` (3,) of the body pointing up.
 
         A person who still turns them, or has just met this pose, does nothing.
         """

@@ -262,7 +262,7 @@ class WireRecorder:
         return RecordedUnitHandler(handler, partial(self.note, UNIT_HANDLER))
 
     def rename(self, path: Path) -> None:
-        """Give the file of the log another name. Raises OSError."""
+        """Rename the file of the log. Raises OSError."""
         self._log.rename(path)
 
     def note(self, port: str, kind: Kind, data: bytes = b"", **more: object) -> None:
@@ -316,12 +316,12 @@ class RecordedUnitHandler:
         self._handler, self._note = handler, note
 
     def mount(self, position: str) -> None:
-        """Control the units: turn them so that `position` is up."""
+        """Turn the units so that `position` is up."""
         self._handler.mount(position)
         self._note("sent", mount_line(position).encode())
 
     def turn(self, position: str, turn_deg: float) -> None:
-        """Control the units: have them turned by hand."""
+        """Have the units turned by hand."""
         self._handler.turn(position, turn_deg)
         self._note("sent", turn_line(position, turn_deg).encode())
 
@@ -333,6 +333,6 @@ class RecordedUnitHandler:
         return turns
 
     def power(self, on: bool) -> None:
-        """Control the units: switch their power on or off."""
+        """Switch the power of the units on or off."""
         self._handler.power(on)
         self._note("sent", power_line(on).encode())

@@ -46,7 +46,7 @@ class Difference:
 
 
 def _nothing(_: Difference) -> None:
-    """Let the session find out by itself."""
+    """Do nothing: the session finds out by itself."""
 
 
 class Replay:

@@ -306,11 +306,11 @@ class ReplayedUnitHandler:
         self._replay = replay
 
     def mount(self, position: str) -> None:
-        """Control the units: as recorded."""
+        """Replay what was recorded."""
         self._request(mount_line(position))
 
     def turn(self, position: str, turn_deg: float) -> None:
-        """Control the units: as recorded."""
+        """Replay what was recorded."""
         self._request(turn_line(position, turn_deg))
 
     def is_turning(self) -> bool:
@@ -320,7 +320,7 @@ class ReplayedUnitHandler:
         return event is not None and event.kind == "received" and self._replay.take(UNIT_HANDLER).data == BUSY.encode()
 
     def power(self, on: bool) -> None:
-        """Control the units: as recorded."""
+        """Replay what was recorded."""
         self._request(power_line(on))
 
     def _request(self, line: str) -> None:

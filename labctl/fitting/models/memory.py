@@ -211,7 +211,7 @@ class RunningMemory:
         return MemoryState(t_s, temperature_c, tuple(at_c))
 
     def reset(self) -> None:
-        """Forget all, as after the unit was switched off for long."""
+        """Clear the history, as after the unit was switched off for long."""
         self._last = None
 
     def start(self, state: MemoryState) -> None:

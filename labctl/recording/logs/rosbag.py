@@ -153,7 +153,7 @@ def read(path: Path, options: BagOptions) -> RawTable:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """Give the reader of a bag; raises BadRecording for whatever broken bytes lead it to."""
+    """Yield the reader of a bag; raises BadRecording for whatever broken bytes lead it to."""
     from rosbags.highlevel import AnyReader  # noqa: PLC0415  0.3 s that only bags need
     from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  as above
 

@@ -173,7 +173,7 @@ def hold_bench(store: Store, bench: BenchFile, clock: Clock | None = None) -> Be
 
 @contextmanager
 def holding(store: Store, bench: BenchFile) -> Iterator[Control]:
-    """Hold a bench for one campaign; gives the campaign's control. Raises Conflict naming who has it."""
+    """Hold the lease on a bench for one campaign; yields the campaign's control. Raises Conflict naming who has it."""
     hold = hold_bench(store, bench)
     try:
         yield Control() if hold is None else hold.control()
@@ -207,7 +207,7 @@ def driver_of(store: Store, bench_name: str, now: datetime) -> LeaseRow | None:
 
 
 def described(lease: LeaseRow) -> str:
-    """Say who holds a bench."""
+    """Return a sentence that names the holder of a bench."""
     who = f"process {lease.pid} on {lease.host} since {lease.since:%Y-%m-%d %H:%M:%S} UTC"
     if lease.url is not None:
         who = f"the service at {lease.url}, {who}"

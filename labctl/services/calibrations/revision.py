@@ -92,7 +92,7 @@ def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetim
 
 
 def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewResponse:
-    """Say what `improve_unit` would make, and what it would leave of the recording; nothing is changed.
+    """Return what `improve_unit` would make, and the residuals it would leave; nothing is changed.
 
     Raises NotFound, BadInput, NotEnoughData.
     """

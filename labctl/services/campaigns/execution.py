@@ -125,7 +125,7 @@ def _stopped(store: Store, prepared: Prepared, engine: Engine) -> str:
 
 
 def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: StoreError) -> str:
-    """Say how a campaign ended that could not be written any more, and what is known of its bench."""
+    """Describe the end of a campaign that could not be written, and the state of its bench."""
     complaints, ended, marked = "; ".join(engine.complaints), False, ""
     with suppress(StoreError):
         ended, marked = store.campaigns.get(campaign).state in ENDED, store.benches.unconfirmed(bench)
@@ -210,7 +210,7 @@ def _session(request: StartRequest) -> RecordedSession:
 
 
 def _left_on(store: Store, bench: BenchFile) -> list[str]:
-    """Say which campaigns were left on a bench that this process holds."""
+    """Return which campaigns were left on a bench that this process holds."""
     if bench.is_simulated and not store.is_sole_writer:  # it has no lease: another process may run them
         return []
     rows = [row for row in store.campaigns.unfinished() if row.bench_name == bench.name]

@@ -24,7 +24,7 @@ from procedures.contracts.control import Control
 
 
 def let_move(store: Store, bench: str, by: str, at: datetime) -> None:
-    """Let a bench move again in the name of the person who starts or resumes a campaign at a terminal.
+    """Allow a bench to move again, in the name of the person who starts or resumes a campaign at a terminal.
 
     A stop that no process carried out is written down first, and what it was to end is ended. Raises StoreError.
     """

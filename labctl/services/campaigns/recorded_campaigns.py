@@ -96,7 +96,7 @@ class RecordedCampaigns:
             self._open, self._log = opened.pop_all(), session_log
 
     def _name(self, name: str) -> None:
-        """Give the log of a campaign whose number is known its name; one that is there keeps its own."""
+        """Name the log of a campaign whose number is known; a log that is there keeps its name."""
         if self._log is None or self._folder is None:
             return
         path, n = self._folder / f"{name}{SUFFIX}", 1

@@ -154,12 +154,12 @@ def abandoned_campaigns(store: Store) -> list[CampaignResponse]:
 
 
 def how_far(answer: CampaignResponse) -> str:
-    """Say that a campaign was left, and how far it was."""
+    """Describe how far an interrupted campaign was."""
     return f"campaign {answer.id} was interrupted at {100 * answer.progress:.0f} %"
 
 
 def describe_interrupted(answer: CampaignResponse) -> str:
-    """Say that a campaign was left, and what a person can do about it."""
+    """Describe an interrupted campaign and what a person can do about it."""
     resumes, ends = f"`labctl campaign resume {answer.id}`", f"`labctl campaign abort {answer.id}`"
     return f"{how_far(answer)}; {resumes} resumes the campaign, {ends} ends it"
 

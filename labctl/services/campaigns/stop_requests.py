@@ -112,7 +112,7 @@ class NotHere:
     campaign: int | None = None
 
     def __init__(self, text: str, *, stands: bool) -> None:
-        """Say why; `stands`: whether nothing moves that this service could stop."""
+        """Set the reason; `stands`: whether nothing moves that this service could stop."""
         self.text, self.stands = text, stands
 
     def is_heard(self, within_s: float) -> bool:  # noqa: ARG002  there is nothing to wait for

@@ -97,7 +97,7 @@ class GyroSource:
         return columns | {"valid": readings.valid.astype(np.int64)}
 
     def ask(self, request: PoseRequest | None) -> None:
-        """Have the simulated person of a simulated bench do it; at a real one a person reads it."""
+        """Ask the simulated person of a simulated bench; at a real one a person reads it."""
         if self._bench.simulation is not None and request is not None:
             lay_simulated(self._bench.simulation, self.clock, request.pose.up)
 

@@ -79,7 +79,7 @@ def with_drivers(bench: BenchFile) -> BenchFile:
 
 
 def _first(error: ValidationError) -> str:
-    """Say the first thing that is wrong: its place, what is wrong there, and the value that was given."""
+    """Return the first error as text: its place, what is wrong there, and the value that was given."""
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
     given = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"

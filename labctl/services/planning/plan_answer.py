@@ -136,7 +136,7 @@ LocalStart = tuple[datetime, ZoneInfo]
 def describe_plan(
     recipe: str, bench: str | None, *, clip: bool, look: Look | None = None, start: LocalStart | None = None
 ) -> PlanResponse:
-    """Say what a campaign would do and how long it takes, as `plan_answer` does."""
+    """Describe what a campaign would do and how long it takes, as `plan_answer` does."""
     plan, bench_file = plan_for(recipe, bench, clip=clip)
     return plan_answer(plan, bench_file, look, start)
 

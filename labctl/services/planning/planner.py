@@ -46,7 +46,7 @@ def _recipe(name: str, text: str, bench: BenchFile | None) -> RecipeResponse:
 
 
 def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
-    """Say which axes a recipe turns that no unit of the bench records, if any; it would run, and show little."""
+    """Return which axes a recipe turns that no unit of the bench records, if any; it would run, and show little."""
     recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
     if lacking := sorted({Position.of(position).axis for position in positions} - recorded):
         return (

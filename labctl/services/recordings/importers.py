@@ -45,7 +45,7 @@ def as_interchange(
     beside: Sequence[Path] = (),
     leave_out: Sequence[str] = (),
 ) -> Iterator[Path]:
-    """Give the folder of a recording in the interchange format: the path itself, or one made of what `path` holds.
+    """Yield the folder of a recording in the interchange format: the path itself, or one made of what `path` holds.
 
     `name` is an importer's; without it the importer that is surest. `options` are KEY=VALUE. `column_map` says what the
     columns of a log are; without it one is proposed. `accept` is shown what a log would become, and raises where that

@@ -159,7 +159,7 @@ class Scheduler:
         self._knows_the_past = True
 
     def _why_missed(self, row: StartRow, due: datetime, now: datetime) -> str:
-        """Say why a start that is due is too late to begin, and what to do; empty while it may begin."""
+        """Return why a start that is due is too late to begin, and what to do; empty while it may begin."""
         late_s = (now - due).total_seconds()
         limit_s, counted_s, of_bench = row.late_limit_s, late_s, ""
         if limit_s is None:

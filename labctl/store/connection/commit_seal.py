@@ -58,7 +58,7 @@ def count_commit(connection: sa.Connection) -> int:
 
 
 def missing(connection: sa.Connection | None, location: str) -> str | None:
-    """Say what is missing when a database is older than its seal; None when all is there."""
+    """Return what is missing when a database is older than its seal; None when all is there."""
     counted = sealed(location)
     n_commits = commits_of(connection) if connection is not None else 0
     if n_commits >= counted:

@@ -94,7 +94,7 @@ class Backend(Protocol):
         ...
 
     def close(self) -> None:
-        """Let the next writer in. Safe to call twice."""
+        """Release the writer's lock. Safe to call twice."""
         ...
 
 
@@ -188,7 +188,7 @@ class Database:
             return self.outlast(self._revision)
 
     def upgrade(self) -> None:
-        """Bring the database to today's tables in one transaction: all of it, or nothing. Raises StoreError."""
+        """Migrate the database to the present tables in one transaction: all of it, or nothing. Raises StoreError."""
         with self._as_database(), self._engine.begin() as connection:
             self._backend.before_migration(connection)
             migrate.upgrade(connection)
@@ -232,7 +232,7 @@ class Database:
 
     @contextmanager
     def writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
-        """Give the one writing connection inside a transaction: all of it is kept, or nothing.
+        """Yield the one writing connection inside a transaction, which is committed as a whole or rolled back.
 
         What is not `synced` outlives this process at once, but a power cut only when the next synced transaction ends:
         a log is written in order, so that one carries all before it to the disk. Raises StoreError, naming who holds
@@ -284,7 +284,7 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:
-        """Give a connection to read with. Raises StoreError."""
+        """Yield a connection to read with. Raises StoreError."""
         self._backend.refuse_other()  # a new connection would make an empty file, or read another one's rows
         try:
             with self.outlast(self._connect_reader) as connection:

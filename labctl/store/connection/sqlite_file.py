@@ -55,7 +55,7 @@ class FileIdentity:
         self._known[1] = None
 
     def changed(self) -> str:
-        """Say what has become of the files since they were opened; empty while they are the same.
+        """Return what has become of the files since they were opened; empty while they are the same.
 
         The log is remembered when it is there for the first time. It stays for as long as a connection is open.
         """
@@ -154,7 +154,7 @@ class SqliteFile:
             sa_event.listen(engine, event, lambda *_: identity.forget_log())
 
     def _make_private(self) -> None:
-        """Give the files of the database to their owner alone; SQLite makes its log as it finds the database."""
+        """Restrict the files of the database to their owner; SQLite makes its log as it finds the database."""
         if self._lock is None:
             return
         make_private(Path(self._location))
@@ -171,7 +171,7 @@ class SqliteFile:
             raise StoreError(f"{text}. Nothing was stored; try again", cause=text)
 
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
-        """Let the next commits reach the disk before they return, or with a later one: the log is written in order."""
+        """Make the next commits reach the disk before they return, or with a later one: the log is written in order."""
         if synced == self._synced:
             return
         driver = engine.raw_connection()
@@ -223,7 +223,7 @@ class SqliteFile:
                 self._lock.note(address)
 
     def close(self) -> None:
-        """Let the next writer in."""
+        """Release the writer's lock."""
         self._identity = None  # the log goes with the last connection
         if self._lock is not None:
             self._lock.release()

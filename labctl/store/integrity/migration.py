@@ -33,7 +33,7 @@ def needs_migration(location: str) -> bool:
 
 
 def migrate_database(location: str, *, copy: bool) -> Migrated:
-    """Bring a database to today's schema; no other process may hold it meanwhile.
+    """Migrate a database to the present schema; no other process may hold it meanwhile.
 
     Raises BadInput where a copy is asked for that labctl cannot make, StoreError where there is no database, it is
     newer than this code or damaged, and Conflict where another process writes to it. Then it is as it was before.

@@ -26,7 +26,7 @@ _NAMES = frozenset({COPY, *(f"{COPY}{end}" for end in ("-wal", "-shm", "-journal
 
 @contextmanager
 def temporary_copy(folder: Path) -> Iterator[Path]:
-    """Give the path of an empty private file on the file system of a folder; it is removed if it is still there.
+    """Yield the path of an empty private file on the file system of a folder; it is removed if it is still there.
 
     What killed processes left in the folder is removed first. Raises OSError.
     """

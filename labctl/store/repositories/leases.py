@@ -87,7 +87,7 @@ class Leases:
 
     @transaction
     def release(self, bench_name: str, owner: str) -> None:
-        """Let a bench go; nothing happens when the lease is another's by now."""
+        """Release a bench; nothing happens when the lease is another's by now."""
         x = tables.leases
         with self._database.writing() as connection:
             connection.execute(sa.delete(x).where(x.c.bench_name == bench_name, x.c.owner == owner))

@@ -22,7 +22,7 @@ def timed_runs(connection: sa.Connection, campaign: int) -> tuple[ClockRun, ...]
 def write_step_clock(
     connection: sa.Connection, campaign: int, measured: Mapping[str, object], factor: Callable[[float], float]
 ) -> None:
-    """Let the runs of this session count: correct the rates of the data sets, and state their uncertainty.
+    """Apply the timed runs of this session: correct the rates of the data sets, and state their uncertainty.
 
     Runs of an earlier session that never counted stay so: they disagreed, or the session ended before they were used.
     `measured` replaces what the head of a recording says of that standard; `factor` is by the campaign time of a gate.
