@@ -160,8 +160,8 @@ class Client:
         path = f"/api/units/{_part(serial)}/calibration"
         response = self._connection.request("GET", path, params=query, headers=headers)
         due, warning = response.headers.get("x-labctl-due"), _warning(response.headers.get("warning", ""))
-        given = response.headers.get(HEADER)
-        notice = None if given is None else read_withdrawn(given)
+        header = response.headers.get(HEADER)
+        notice = None if header is None else read_withdrawn(header)
         if notice is not None and not accept_withdrawn:
             known = held is not None and response.status_code == httpx.codes.NOT_MODIFIED
             content = held.content if known and held is not None else response.content

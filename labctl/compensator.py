@@ -186,10 +186,10 @@ class Compensator:
         for name in self.needs:
             if name not in known:
                 raise BadInput(f"{self.calibration.serial}: its model needs channel {name!r}; give it with `channels`")
-        given = np.asarray(raw_dps, dtype=np.float64)
-        raw = given.reshape(len(given), -1) if given.size and given.ndim else given.reshape(-1, 1)
+        raw_rows = np.asarray(raw_dps, dtype=np.float64)
+        raw = raw_rows.reshape(len(raw_rows), -1) if raw_rows.size and raw_rows.ndim else raw_rows.reshape(-1, 1)
         if raw.size == 0:
-            return Compensated(given, np.zeros(len(raw), dtype=bool))
+            return Compensated(raw_rows, np.zeros(len(raw), dtype=bool))
         if raw.shape[1] != len(self.axes):
             raise BadInput(
                 f"rates of {raw.shape[1]} axes given; the calibration has axes {', '.join(self.axes)}; give one rate "
@@ -209,7 +209,7 @@ class Compensator:
                 running, beside, raw, warm, known, correct, len(raw) if cross_rates_dps else BLOCK
             )
         left_out = self._left_out_dps if specific_force_g is None else None
-        return Compensated(compensated.rate_dps.reshape(given.shape), compensated.outside, left_out)
+        return Compensated(compensated.rate_dps.reshape(raw_rows.shape), compensated.outside, left_out)
 
     def _followed(
         self, running: RunningMemory, by_force: Remembered | None, raw: Array, temperature_c: Array,
@@ -331,13 +331,13 @@ class Compensator:
         fast: NDArray[np.bool_] = ~np.all((raw >= self._slow) & (raw <= self._fast), axis=1)
         if self._outside == "refuse" and (cold.any() or fast.any()):
             row = int(np.argmax(cold | fast))
-            what = (
+            sentence = (
                 f"temperature {spread[row].tolist()} deg C outside {self._low_c:g} to {self._high_c:g} deg C"
                 if cold[row]
                 else f"rate {raw[row].tolist()} deg/s outside {self._slow:g} to {self._fast:g} deg/s"
             )
             raise BadInput(
-                f"sample {first + row + 1}: {what} (the range calibrated for {self.calibration.serial} version "
+                f"sample {first + row + 1}: {sentence} (the range calibrated for {self.calibration.serial} version "
                 f"{self.calibration.version}); set outside = 'clamp' to correct such a sample as at the "
                 "edge of the range and flag it"
             )

@@ -23,8 +23,8 @@ class Withdrawn:
     @property
     def text(self) -> str:
         """The notice in words."""
-        what = f"certificate {self.certificate} was withdrawn" if self.certificate else "the version was revoked"
-        return f"{what} at {self.at.astimezone(UTC):%Y-%m-%d %H:%M} UTC by {self.by} ({self.reason})"
+        subject = f"certificate {self.certificate} was withdrawn" if self.certificate else "the version was revoked"
+        return f"{subject} at {self.at.astimezone(UTC):%Y-%m-%d %H:%M} UTC by {self.by} ({self.reason})"
 
     def header(self) -> str:
         """Return the value of `HEADER`: members with strings (RFC 8941, 3.2), in visible ASCII."""

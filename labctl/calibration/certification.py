@@ -101,5 +101,5 @@ def _said(at: datetime) -> str:
 
 def with_certification(content: bytes, certification: Certification) -> tuple[bytes, str]:
     """Return the bytes of a calibration file with its certification, and their hash, which covers it."""
-    whole, digest = with_own_hash({**json.loads(content), "certification": certification.to_json()})
-    return whole + b"\n", digest
+    full, digest = with_own_hash({**json.loads(content), "certification": certification.to_json()})
+    return full + b"\n", digest

@@ -57,10 +57,10 @@ def _administrative(parent: ET.Element, certificate: Certificate) -> None:
 
 def _software(parent: ET.Element, software: str) -> None:
     name, _, release = software.rpartition(" ")
-    made = child(parent, "software")
-    texts(made, "name", name)
-    child(made, "release", f"v{release}")
-    child(made, "type", "application")
+    element = child(parent, "software")
+    texts(element, "name", name)
+    child(element, "release", f"v{release}")
+    child(element, "type", "application")
 
 
 def _core(parent: ET.Element, certificate: Certificate) -> None:
@@ -102,30 +102,30 @@ def _core(parent: ET.Element, certificate: Certificate) -> None:
 
 
 def _identification(parent: ET.Element, issuer: str, value: str, name: str) -> None:
-    made = child(parent, "identification")
-    child(made, "issuer", issuer)
-    child(made, "value", value)
-    texts(made, "name", name)
+    element = child(parent, "identification")
+    child(element, "issuer", issuer)
+    child(element, "value", value)
+    texts(element, "name", name)
 
 
 def _item(parent: ET.Element, certificate: Certificate) -> None:
-    made = child(parent, "item")
+    element = child(parent, "item")
     item = certificate.item
-    texts(made, "name", item.description)
-    texts(made, "description", f"Axes: {', '.join(item.axes)}.", f"Condition on receipt: {item.condition}")
-    texts(child(made, "manufacturer"), "name", item.manufacturer)
-    child(made, "model", item.model)
-    identifications = child(made, "identifications")
+    texts(element, "name", item.description)
+    texts(element, "description", f"Axes: {', '.join(item.axes)}.", f"Condition on receipt: {item.condition}")
+    texts(child(element, "manufacturer"), "name", item.manufacturer)
+    child(element, "model", item.model)
+    identifications = child(element, "identifications")
     _identification(identifications, "manufacturer", item.serial, "Serial number")
     if item.identification:
         _identification(identifications, "customer", item.identification, "Customer's number")
 
 
 def _person(parent: ET.Element, name: str, role: str, *, signs: bool) -> None:
-    made = child(parent, "respPerson")
-    texts(child(made, "person"), "name", name)
-    child(made, "role", role)
-    child(made, "mainSigner", "true" if signs else "false")
+    element = child(parent, "respPerson")
+    texts(child(element, "person"), "name", name)
+    child(element, "role", role)
+    child(element, "mainSigner", "true" if signs else "false")
 
 
 def _statements(parent: ET.Element, certificate: Certificate) -> None:
@@ -137,17 +137,17 @@ def _statements(parent: ET.Element, certificate: Certificate) -> None:
     _statement(parent, "Authorisation", f"{authorised.persons}, {authorised.at:%Y-%m-%d %H:%M} UTC: "
                f"{authorised.reason}")  # fmt: skip
     if certificate.due is not None:
-        made = _statement(parent, "Next calibration", "Agreed with the customer.", ref_type="basic_recalibration")
-        child(made, "date", certificate.due.isoformat())
+        element = _statement(parent, "Next calibration", "Agreed with the customer.", ref_type="basic_recalibration")
+        child(element, "date", certificate.due.isoformat())
     if certificate.conformity is not None:
         _conformity(parent, certificate.conformity, max(result.k for result in certificate.results))
 
 
 def _conformity(parent: ET.Element, judged: Conformity, k: float) -> None:
-    made = _statement(parent, "Conformity", judged.statement, norm=("ILAC-G8:09/2019",), reference=judged.specification,
+    node = _statement(parent, "Conformity", judged.statement, norm=("ILAC-G8:09/2019",), reference=judged.specification,
                       ref_type="basic_conformity")  # fmt: skip
-    child(made, "conformity", "pass" if judged.passed else "fail")
-    data = child(made, "data")
+    child(node, "conformity", "pass" if judged.passed else "fail")
+    data = child(node, "data")
     for name, limit, ref_type in (
         ("Limit of the error", judged.limit_dps, "basic_toleranceLimit"),
         ("Acceptance limit of the error", judged.acceptance_dps, "basic_acceptanceLimit"),
@@ -162,39 +162,39 @@ def _conformity(parent: ET.Element, judged: Conformity, k: float) -> None:
 def _statement(
     parent: ET.Element, name: str, text: str, *, norm: tuple[str, ...] = (), reference: str = "", ref_type: str = ""
 ) -> ET.Element:
-    made = child(parent, "statement", **referred(ref_type))
-    texts(made, "name", name)
+    element = child(parent, "statement", **referred(ref_type))
+    texts(element, "name", name)
     for each in norm:
-        child(made, "norm", each)
-    optional(made, "reference", reference)
-    texts(made, "declaration", text)
-    return made
+        child(element, "norm", each)
+    optional(element, "reference", reference)
+    texts(element, "declaration", text)
+    return element
 
 
 def _measured(parent: ET.Element, certificate: Certificate) -> None:
-    made = child(parent, "measurementResult")
-    texts(made, "name", f"Calibration of {certificate.item.serial}, version {certificate.calibration.version}")
-    methods = child(made, "usedMethods")
+    element = child(parent, "measurementResult")
+    texts(element, "name", f"Calibration of {certificate.item.serial}, version {certificate.calibration.version}")
+    methods = child(element, "usedMethods")
     _method(child(methods, "usedMethod"), certificate)
     stated = child(methods, "usedMethod", **referred("basic_uncertainty"))
     texts(stated, "name", "Uncertainty of measurement")
     texts(stated, "description", uncertainty_text(certificate))
     child(stated, "norm", "JCGM 100:2008")
-    _software(child(made, "usedSoftware"), certificate.method.software)
-    equipment = child(made, "measuringEquipments")
+    _software(child(element, "usedSoftware"), certificate.method.software)
+    equipment = child(element, "measuringEquipments")
     for standard in certificate.standards:
         _standard(equipment, standard)
-    conditions = child(made, "influenceConditions")
+    conditions = child(element, "influenceConditions")
     for condition in certificate.environment:
         _condition(conditions, condition)
-    _results(child(made, "results"), certificate)
+    _results(child(element, "results"), certificate)
 
 
 def _condition(parent: ET.Element, condition: Condition) -> None:
     ref_type = CONDITIONS.get(condition.name, "")
-    made = child(parent, "influenceCondition", **referred(ref_type))
-    texts(made, "name", condition.name)
-    data = child(made, "data")
+    element = child(parent, "influenceCondition", **referred(ref_type))
+    texts(element, "name", condition.name)
+    data = child(element, "data")
     for name, value, suffix in (("Least", condition.low, "Min"), ("Largest", condition.high, "Max")):
         said = f"{name} value during the calibration"
         quantity(data, said, [value], condition.unit, ref_type=ref_type and f"{ref_type}{suffix}")
@@ -216,18 +216,18 @@ def _method(made: ET.Element, certificate: Certificate) -> None:
 
 
 def _standard(parent: ET.Element, standard: StandardUsed) -> None:
-    made = child(parent, "measuringEquipment", **referred("basic_standardUsed"))
-    texts(made, "name", standard.name or standard.quantity)
+    element = child(parent, "measuringEquipment", **referred("basic_standardUsed"))
+    texts(element, "name", standard.name or standard.quantity)
     said = [f"Reference standard of {standard.quantity}."]
     said += [f"Calibrated {standard.calibrated}."] if standard.calibrated else []
     said += [f"Due {standard.due}."] if standard.due else []
     said += [f"Traceability: {standard.traceability}."] if standard.traceability else []
-    texts(made, "description", *said)
+    texts(element, "description", *said)
     if standard.certificate:
-        identification = child(made, "identifications")
+        identification = child(element, "identifications")
         _identification(identification, "calibrationLaboratory", standard.certificate,
                         f"Certificate of {standard.issued_by or 'its calibration'}")  # fmt: skip
-    stated = child(made, "measuringEquipmentQuantities")
+    stated = child(element, "measuringEquipmentQuantities")
     quantity(stated, "Standard uncertainty", [standard.u], standard.unit, element="measuringEquipmentQuantity")
 
 
@@ -235,8 +235,8 @@ def _results(parent: ET.Element, certificate: Certificate) -> None:
     probability = certificate.uncertainty.coverage_probability
     for axis, of_axis in groupby(certificate.results, key=lambda point: point.axis):
         points = list(of_axis)
-        made = _result(parent, f"Error of indication of axis {axis}", "Output by its nominal scale minus true rate.")
-        table = child(made, "list")
+        element = _result(parent, f"Error of indication of axis {axis}", "Output by its nominal scale minus true rate.")
+        table = child(element, "list")
         rates = [each.rate_dps for each in points]
         quantity(table, "True rate", rates, "deg/s", ref_type="basic_referenceValue")
         warm = [each.temperature_c for each in points if each.temperature_c is not None]
@@ -250,18 +250,18 @@ def _results(parent: ET.Element, certificate: Certificate) -> None:
     _any_axis(parent, certificate)
     _state(parent, "Errors as found, before adjustment", certificate.as_found)
     _state(parent, "Errors as left, after adjustment", certificate.as_left)
-    made = _result(
+    element = _result(
         parent,
         "Coefficients of the correction",
         "Of the error model that the method names; standard uncertainties contain the standards of the bench, or are "
         "those of the fit alone where the name says so.",
     )
     for coefficient in certificate.coefficients:
-        where = "" if coefficient.temperature_c is None else f" at {coefficient.temperature_c:g} °C"
+        place_text = "" if coefficient.temperature_c is None else f" at {coefficient.temperature_c:g} °C"
         alone = "" if coefficient.has_standards or coefficient.u is None else ", u of the fit alone"
         own = coefficient.name_text if coefficient.unit == "s" else coefficient.name
-        name = f"Axis {coefficient.axis}: {own}{where}{alone}"
-        quantity(made, name, [coefficient.value], coefficient.unit, u=coefficient.u)
+        name = f"Axis {coefficient.axis}: {own}{place_text}{alone}"
+        quantity(element, name, [coefficient.value], coefficient.unit, u=coefficient.u)
     _budget(parent, certificate)
     for sensor in certificate.sensors:
         _sensor(parent, sensor, probability)
@@ -269,7 +269,7 @@ def _results(parent: ET.Element, certificate: Certificate) -> None:
 
 def _sensor(parent: ET.Element, result: SensorResult, probability: float) -> None:
     """Add the result of an accelerometer or magnetometer."""
-    made = _result(
+    element = _result(
         parent,
         f"{result.sensor.capitalize()}, version {result.version}",
         f"{result.formula}. Verdict: {result.verdict}. {' '.join(result.found)} Holds for: {result.holds_for} "
@@ -278,10 +278,10 @@ def _sensor(parent: ET.Element, result: SensorResult, probability: float) -> Non
         f"{result.hash}.",
     )
     reference = result.reference
-    quantity(made, f"Reference: {reference.quantity}", [reference.value], reference.unit, u=reference.u)
+    quantity(element, f"Reference: {reference.quantity}", [reference.value], reference.unit, u=reference.u)
     for coefficient in result.coefficients:
         quantity(
-            made,
+            element,
             coefficient.name,
             [coefficient.value],
             coefficient.unit,
@@ -295,7 +295,7 @@ def _any_axis(parent: ET.Element, certificate: Certificate) -> None:
     known = [each for each in certificate.any_axis if each.expanded_dps is not None]
     if not known:
         return
-    made = _result(
+    element = _result(
         parent,
         "Largest expanded uncertainty of a corrected rate about any axis",
         f"Rate vectors of any direction up to {max(each.reach_dps for each in known):.6g} °/s.",
@@ -306,30 +306,30 @@ def _any_axis(parent: ET.Element, certificate: Certificate) -> None:
             ("up to a rotation of the frame", each.aligned_expanded_dps),
         ):
             if value is not None:
-                quantity(made, f"Output {each.output}, {frame}", [value], "deg/s")
+                quantity(element, f"Output {each.output}, {frame}", [value], "deg/s")
         if each.per_dps_across is not None:
             name = f"Output {each.output}, error per deg/s about {' and '.join(each.across)}"
-            quantity(made, name, [each.per_dps_across], "1")
+            quantity(element, name, [each.per_dps_across], "1")
 
 
 def _budget(parent: ET.Element, certificate: Certificate) -> None:
     uncertainty = certificate.uncertainty
     warm = "" if uncertainty.temperature_c is None else f" and {uncertainty.temperature_c:g} °C"
-    where = f"Of axis {uncertainty.axis} at {uncertainty.rate_dps:g} °/s{warm}, where U is largest."
-    made = _result(parent, "Contributions to the standard uncertainty", where)
+    place_text = f"Of axis {uncertainty.axis} at {uncertainty.rate_dps:g} °/s{warm}, where U is largest."
+    element = _result(parent, "Contributions to the standard uncertainty", place_text)
     for each in uncertainty.budget:
-        quantity(made, f"{each.source}, type {each.type}", [each.contribution_dps], "deg/s")
+        quantity(element, f"{each.source}, type {each.type}", [each.contribution_dps], "deg/s")
 
 
 def _result(parent: ET.Element, name: str, description: str) -> ET.Element:
-    made = child(parent, "result")
-    texts(made, "name", name)
-    texts(made, "description", description)
-    return child(made, "data")
+    element = child(parent, "result")
+    texts(element, "name", name)
+    texts(element, "description", description)
+    return child(element, "data")
 
 
 def _state(parent: ET.Element, name: str, state: StateOfItem) -> None:
-    made = _result(parent, name, f"Corrected by {state.basis}; over {state.datasets} data sets.")
+    element = _result(parent, name, f"Corrected by {state.basis}; over {state.datasets} data sets.")
     for each in state.axes:
         for what, value in (("RMS error", each.rms_dps), ("Largest error", each.max_dps)):
-            quantity(made, f"{what} of axis {each.axis}, {readable('deg/s')}", [value], "deg/s")
+            quantity(element, f"{what} of axis {each.axis}, {readable('deg/s')}", [value], "deg/s")

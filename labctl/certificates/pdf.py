@@ -35,16 +35,16 @@ def pdf_of(certificate: Certificate, xml: bytes) -> bytes:
     }
     issued = datetime.combine(certificate.issued_on, time(), UTC)
     try:
-        made = compiled(files, ignore_system_fonts=True, pdf_standards=[STANDARD], timestamp=issued)
+        content = compiled(files, ignore_system_fonts=True, pdf_standards=[STANDARD], timestamp=issued)
     except typst.TypstError as error:
         raise BadInput(
             f"certificate {certificate.number} cannot be printed: {error.message}; use Latin, Greek or Cyrillic "
             "letters "
             "in the names and texts of the order"
         ) from error
-    if not isinstance(made, bytes):
-        raise TypeError(f"typst answered {type(made).__name__} instead of the bytes of one PDF")
-    return made
+    if not isinstance(content, bytes):
+        raise TypeError(f"typst answered {type(content).__name__} instead of the bytes of one PDF")
+    return content
 
 
 def _qr(address: str) -> bytes:

@@ -181,8 +181,10 @@ def _facts(certificate: Certificate) -> list[list[object]]:
 
 
 def _place(certificate: Certificate) -> str:
-    where = PLACES[certificate.laboratory.place]
-    return f"{where}, {certificate.laboratory.city}" if certificate.laboratory.place == "laboratory" else where
+    place_name = PLACES[certificate.laboratory.place]
+    return (
+        f"{place_name}, {certificate.laboratory.city}" if certificate.laboratory.place == "laboratory" else place_name
+    )
 
 
 def _method(certificate: Certificate) -> list[list[str]]:

@@ -63,12 +63,12 @@ def print_json(answer: BaseModel | Sequence[BaseModel] | Mapping[str, JsonValue]
 
 def table(title: str, *columns: str, numbers: int = 0) -> Table:
     """Make a table whose last `numbers` columns are numbers, right-aligned."""
-    made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim")
+    rows = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim")
     for index, column in enumerate(columns):
-        made.add_column(
+        rows.add_column(
             column, justify="right" if index >= len(columns) - numbers else "left", no_wrap=index == 0, overflow="fold"
         )
-    return made
+    return rows
 
 
 def format_number(value: float | None, digits: int = 4) -> str:

@@ -64,15 +64,15 @@ class TerminalOperator:
             )
             return
         try:
-            why = line.strip()
-            again = prompt.kind == "turn" and why.lower() == AGAIN
+            reason = line.strip()
+            again = prompt.kind == "turn" and reason.lower() == AGAIN
             if again:
                 operator.repeat(prompt.id, os_user(), "")
-            elif why:
-                operator.decline(prompt.id, os_user(), why)
+            elif reason:
+                operator.decline(prompt.id, os_user(), reason)
             else:
                 operator.confirm(prompt.id, os_user())
-            outcome = "to be asked again" if again else f"cannot be done; {why}" if why else "done"
+            outcome = "to be asked again" if again else f"cannot be done; {reason}" if reason else "done"
             note(f"{prompt.id}: {outcome}; {prompt.text}")
         except (StalePrompt, StoreError) as error:
             stderr.print(f"labctl: {error}")

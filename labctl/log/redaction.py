@@ -48,12 +48,12 @@ class Redaction:
 
     def text(self, text: str, longest: int = LONGEST) -> str:
         """Return a text without secrets, at most so long."""
-        whole, text = len(text), text[: 4 * longest]  # what is cut off later has been searched
+        full_length, text = len(text), text[: 4 * longest]  # what is cut off later has been searched
         for secret in self._known:
             text = text.replace(secret, REMOVED)
         for pattern, instead in _IN_TEXT:
             text = pattern.sub(instead, text)
-        return text if len(text) <= longest else f"{text[:longest]}... ({whole} characters)"
+        return text if len(text) <= longest else f"{text[:longest]}... ({full_length} characters)"
 
     def traceback(self, text: str) -> str:
         """Return a traceback without secrets; of a long one the end is kept, which names the error."""

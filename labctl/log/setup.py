@@ -45,10 +45,10 @@ def _of_a_thread(hook_args: threading.ExceptHookArgs) -> None:
 def _of_a_finalizer(hook_args: sys.UnraisableHookArgs) -> None:
     error = hook_args.exc_value or hook_args.exc_type()
     info = (hook_args.exc_type, error, hook_args.exc_traceback)
-    where = hook_args.err_msg or "ignored"
+    place_text = hook_args.err_msg or "ignored"
     with suppress(Exception):  # an object that is half gone may not have a text any more
-        where = f"{where}: {hook_args.object!r:.100}"
-    log.error("error.ignored", where=where, error_type=hook_args.exc_type.__name__, exc_info=info)
+        place_text = f"{place_text}: {hook_args.object!r:.100}"
+    log.error("error.ignored", where=place_text, error_type=hook_args.exc_type.__name__, exc_info=info)
 
 
 @contextmanager

@@ -174,30 +174,32 @@ def _readings(path: Path, source: Source) -> PoseReadings:
 
 def _joined(parts: Sequence[PoseReadings]) -> PoseReadings:
     """Return the readings of all parts, one after the other, with a break between them."""
-    whole = parts[0]
+    joined_readings = parts[0]
     for part in parts[1:]:
-        if part.info.latitude_deg != whole.info.latitude_deg:
+        if part.info.latitude_deg != joined_readings.info.latitude_deg:
             raise BadInput(
-                f"{part.info.serial}: latitude {part.info.latitude_deg} deg, but {whole.info.latitude_deg} deg of "
-                f"{whole.info.serial}; calibrate files of one place together"
+                f"{part.info.serial}: latitude {part.info.latitude_deg} deg, but {joined_readings.info.latitude_deg} "
+                "deg of "
+                f"{joined_readings.info.serial}; calibrate files of one place together"
             )
-        if part.gyro_dps.any() != whole.gyro_dps.any():
+        if part.gyro_dps.any() != joined_readings.gyro_dps.any():
             raise BadInput(
-                f"{part.info.serial} and {whole.info.serial}: one is a recording with a gyro, the other a table "
+                f"{part.info.serial} and {joined_readings.info.serial}: one is a recording with a gyro, the other a "
+                "table "
                 "without; calibrate recordings together, or tables"
             )
         breaks = part.breaks.copy()
         breaks[0] = True
-        later = part.t_s - part.t_s[0] + whole.t_s[-1] + 1.0
-        whole = replace(
-            whole,
-            t_s=np.concatenate([whole.t_s, later]),
-            accel_g=np.vstack([whole.accel_g, part.accel_g]),
-            gyro_dps=np.vstack([whole.gyro_dps, part.gyro_dps]),
-            temperature_c=_both(whole.temperature_c, part.temperature_c),
-            breaks=np.concatenate([whole.breaks, breaks]),
+        later = part.t_s - part.t_s[0] + joined_readings.t_s[-1] + 1.0
+        joined_readings = replace(
+            joined_readings,
+            t_s=np.concatenate([joined_readings.t_s, later]),
+            accel_g=np.vstack([joined_readings.accel_g, part.accel_g]),
+            gyro_dps=np.vstack([joined_readings.gyro_dps, part.gyro_dps]),
+            temperature_c=_both(joined_readings.temperature_c, part.temperature_c),
+            breaks=np.concatenate([joined_readings.breaks, breaks]),
         )
-    return whole
+    return joined_readings
 
 
 def _both(first: Array | None, then: Array | None) -> Array | None:

@@ -143,10 +143,10 @@ def cached_group(
         if (response := RESPONSES.load(file(kind), kind.model_validate_json)) is not None:
             return response
         # A fresh response takes the same way through JSON as a cached one, so both are equal.
-        made = {type(each): each.model_dump_json() for each in work()}
-        for each, text in made.items():
+        content_by_type = {type(each): each.model_dump_json() for each in work()}
+        for each, text in content_by_type.items():
             RESPONSES.save(file(each), text.encode())
-        return kind.model_validate_json(made[kind])
+        return kind.model_validate_json(content_by_type[kind])
 
 
 class RecentResults(Generic[ResultT]):

@@ -164,17 +164,17 @@ def _text(
         yield f"Check gyro {serial}: no recording has a version of its own; there is nothing to judge."
         return
     newest = results[-1]
-    where = f"campaign {newest.row.campaign}" if newest.row.campaign is not None else f"recording {newest.row.id}"
+    place_text = f"campaign {newest.row.campaign}" if newest.row.campaign is not None else f"recording {newest.row.id}"
     states = {one.state for _, one in judgements}
     for chart, one in judgements:
         if one.state == "out":
             at = f" at {at_c:g} deg C" if chart.result == "bias" else ""
             yield (
-                f"ALARM, check gyro {serial}, {where}, {chart.result} of axis {chart.axis}{at}: "
+                f"ALARM, check gyro {serial}, {place_text}, {chart.result} of axis {chart.axis}{at}: "
                 f"{out_text(one.point.value, chart.unit, one)}. Check the bench and its standards before the results "
                 "of this campaign are used."
             )
     if states == {"unknown"}:
-        yield f"Check gyro {serial}, {where}: the first result; control limits need a second one."
+        yield f"Check gyro {serial}, {place_text}: the first result; control limits need a second one."
     elif "out" not in states:
-        yield f"Check gyro {serial}, {where}: every result is within the control limits."
+        yield f"Check gyro {serial}, {place_text}: every result is within the control limits."

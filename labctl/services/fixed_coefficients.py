@@ -62,10 +62,10 @@ def _complaints(error: ValidationError) -> str:
         text = each["msg"].removeprefix("Value error, ")
         if each["type"] == "extra_forbidden" and len(loc) == 1:
             text = "is neither an axis (x, y, z) nor one of source, reference_temperature_c"
-        what = f"axis {place[0]}: {place[1]}" if len(place) == 2 else str(place[0])
+        coefficient_name = f"axis {place[0]}: {place[1]}" if len(place) == 2 else str(place[0])
         if len(loc) > 2 and loc[2] != "value":
-            what += f", {loc[2]}"
-        complaints.setdefault(place, f"{what} = {shown(each['input'])}: {text}")
+            coefficient_name += f", {loc[2]}"
+        complaints.setdefault(place, f"{coefficient_name} = {shown(each['input'])}: {text}")
     return listed(complaints.values())
 
 

@@ -42,8 +42,8 @@ class Source:
     @property
     def text(self) -> str:
         """What was read, in one line."""
-        given = "" if self.field_ut is None else f", field {self.field_ut:g} uT"
-        return f"columns {', '.join(self.columns)} in {self.unit}{given}"
+        field_text = "" if self.field_ut is None else f", field {self.field_ut:g} uT"
+        return f"columns {', '.join(self.columns)} in {self.unit}{field_text}"
 
 
 def magnetometer_of_file(path: Path, source: Source, serial: str | None = None) -> MagnetometerResponse:

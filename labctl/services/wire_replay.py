@@ -65,10 +65,11 @@ def _opened(path: Path) -> Session:
     record = WireRecord(path)
     header = record.header
     try:
-        what = RecordedSession.model_validate(header["session"])
-        if not what.can_be_replayed:
+        recorded_session = RecordedSession.model_validate(header["session"])
+        if not recorded_session.can_be_replayed:
             raise BadInput(
-                f"{path} is the log of a session of kind {what.kind!r}, which depends on more than its bytes, so it "
+                f"{path} is the log of a session of kind {recorded_session.kind!r}, which depends on more than its "
+                "bytes, so it "
                 f"cannot be replayed; read it with `zcat {path}`"
             )
         bench = with_drivers(BenchFile.model_validate(header["bench"]))
@@ -79,7 +80,7 @@ def _opened(path: Path) -> Session:
             f"{path}: its header is not one of labctl {version('labctl')} ({one_line(error)}); install labctl "
             f"{header.get('labctl', 'of that time')} to replay it"
         ) from error
-    return Session(bench, what, Replay(record, clock))
+    return Session(bench, recorded_session, Replay(record, clock))
 
 
 @contextmanager
@@ -96,7 +97,7 @@ def _store(database: str | None) -> Iterator[Store]:
 
 
 def _run_campaign(store: Store, session: Session) -> None:
-    control, what, wire = Control(), session.what, ReplayedWire(session.replay)
+    control, recorded_session, wire = Control(), session.what, ReplayedWire(session.replay)
 
     def end(difference: Difference) -> None:
         control.abort(difference.text)
@@ -104,7 +105,8 @@ def _run_campaign(store: Store, session: Session) -> None:
     session.replay.on_over = end
     try:
         prepared = prepare(
-            store, what.recipe, session.bench, session.replay.clock, clip=what.clip, fit=what.fit, wire=wire
+            store, recorded_session.recipe, session.bench, session.replay.clock, clip=recorded_session.clip,
+            fit=recorded_session.fit, wire=wire
         )  # fmt: skip
         if session.bench.needs_person:
             prepared = replace(prepared, operator=ReplayedOperator(session.replay))

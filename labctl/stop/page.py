@@ -62,10 +62,10 @@ class PageAccess:
 
 def write_keys(path: Path, keys: dict[str, tuple[str, str]]) -> None:
     """Write digest -> (name, role) of the keys in force for a process that has no database. Raises OSError."""
-    made = path.with_suffix(".new")
-    made.touch(mode=0o600)
-    made.write_text(json.dumps(keys), encoding="ascii")
-    made.replace(path)
+    new_file = path.with_suffix(".new")
+    new_file.touch(mode=0o600)
+    new_file.write_text(json.dumps(keys), encoding="ascii")
+    new_file.replace(path)
 
 
 class StopPage:
@@ -261,13 +261,13 @@ class _Handler(BaseHTTPRequestHandler):
         if match is None:
             self._problem(503, "no-web-process", f"{NO_WEB}. {self.describe().text}")
             return
-        given = _fields(body, self.headers.get("Content-Type", ""))
-        caller = self._caller(str(given.get("key", "")))
+        fields = _fields(body, self.headers.get("Content-Type", ""))
+        caller = self._caller(str(fields.get("key", "")))
         if caller is None:
             return
-        by = str(given.get("by") or caller)
+        by = str(fields.get("by") or caller)
         campaign = int(match[1]) if match[1] else None
-        reason = f"{given.get('reason') or 'stopped on the page'} ({by})"
+        reason = f"{fields.get('reason') or 'stopped on the page'} ({by})"
         stop = StopRequest.new(by, "stop page", reason, campaign)
         last = _followed(self.respond(stop))
         if last.phase == "stands" and self.web_is_back():
@@ -371,7 +371,7 @@ def _fields(body: bytes, kind: str) -> dict[str, Any]:
     try:
         if "urlencoded" in kind:
             return dict(parse_qsl(body.decode(), max_num_fields=10))
-        given = json.loads(body or b"{}") if "json" in kind else {}
+        document = json.loads(body or b"{}") if "json" in kind else {}
     except ValueError:
         return {}
-    return given if isinstance(given, dict) else {}
+    return document if isinstance(document, dict) else {}

@@ -91,9 +91,9 @@ class BenchPlace:
     def note(self) -> DriverNote | None:
         """Return who drives the bench; None where no process ever wrote that down, or it cannot be read."""
         try:
-            given = json.loads((self.folder / NOTE).read_bytes())
-            driver, guardian = ProcessId(**given.pop("driver")), ProcessId(**given.pop("guardian"))
-            return DriverNote(driver=driver, guardian=guardian, **given)
+            note_fields = json.loads((self.folder / NOTE).read_bytes())
+            driver, guardian = ProcessId(**note_fields.pop("driver")), ProcessId(**note_fields.pop("guardian"))
+            return DriverNote(driver=driver, guardian=guardian, **note_fields)
         except (OSError, ValueError, TypeError, KeyError, AttributeError):
             return None
 
@@ -141,8 +141,8 @@ def known_places() -> list[BenchPlace]:
 
 def state_folder() -> Path:
     """Return the folder for what outlives a process: systemd's, XDG's, or that in the home folder."""
-    if given := os.environ.get("STATE_DIRECTORY", ""):
-        return Path(given.partition(":")[0])
+    if state_directory := os.environ.get("STATE_DIRECTORY", ""):
+        return Path(state_directory.partition(":")[0])
     named = os.environ.get("XDG_STATE_HOME", "")
     return (Path(named) if named.startswith("/") else Path.home() / ".local" / "state") / "labctl"
 

@@ -45,11 +45,12 @@ def _wanted(expected: str) -> Attributes:
     try:
         if attributes := _attributes(expected):
             return attributes
-        why = "it is empty"
+        reason = "it is empty"
     except ValueError as error:
-        why = str(error)
+        reason = str(error)
     raise BadInput(
-        f"the expected signer {expected!r} is no subject as RFC 4514 writes it ({why}) and no fingerprint; give it as "
+        f"the expected signer {expected!r} is no subject as RFC 4514 writes it ({reason}) and no fingerprint; give it "
+        "as "
         "'CN=Ada Authoriser,O=Laboratory', or the SHA-256 of the certificate in 64 hexadecimal digits"
     )
 

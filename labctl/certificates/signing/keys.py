@@ -66,10 +66,10 @@ class SigningKey:
 
         Raises BadInput where the token does not sign, or the key is not that of the certificate.
         """
-        made = self._sign(data)
-        if not fits(_public(self.certificate, self.where), self.digest, made, data):
+        signature = self._sign(data)
+        if not fits(_public(self.certificate, self.where), self.digest, signature, data):
             raise BadInput(_mismatch(self.where, self.signatory))
-        return made
+        return signature
 
 
 def signatory_of(certificate: x509.Certificate) -> Signatory:
@@ -109,23 +109,23 @@ def open_signing_key(settings: SigningSettings) -> SigningKey:
 
 def _of_file(path: Path, settings: SigningSettings) -> SigningKey:
 
-    where = f"signing key {path}"
+    place_text = f"signing key {path}"
     refuse_open_key(path, SIGNING_KEY)
     password = read_secret(Path(settings.password_file), PASSWORD_FILE).encode() if settings.password_file else None
     content = path.read_bytes()
-    key, beside = (_pem if b"-----BEGIN" in content else _pkcs12)(content, password, where)
+    key, beside = (_pem if b"-----BEGIN" in content else _pkcs12)(content, password, place_text)
     if not isinstance(key, RSAPrivateKey | EllipticCurvePrivateKey):
-        raise _unused(where)
-    given = read_certificates(Path(settings.certificate)) if settings.certificate else beside
-    certificate, chain = _own(given, key.public_key(), where)
-    digest = digest_of(_public(certificate, where))
+        raise _unused(place_text)
+    certificates = read_certificates(Path(settings.certificate)) if settings.certificate else beside
+    certificate, chain = _own(certificates, key.public_key(), place_text)
+    digest = digest_of(_public(certificate, place_text))
 
     def sign(data: bytes) -> bytes:
         if isinstance(key, RSAPrivateKey):
             return key.sign(data, PKCS1v15(), _hash(digest))
         return key.sign(data, ECDSA(_hash(digest)))
 
-    return SigningKey(where, certificate, chain, sign)
+    return SigningKey(place_text, certificate, chain, sign)
 
 
 def _pem(content: bytes, password: bytes | None, location: str) -> tuple[object, list[x509.Certificate]]:
@@ -173,28 +173,32 @@ def _of_token(uri: TokenUri, settings: SigningSettings) -> SigningKey:
     from pkcs11 import Attribute, ObjectClass  # noqa: PLC0415  only where a token is used
     from pkcs11.exceptions import PKCS11Error  # noqa: PLC0415  as above
 
-    where = f"signing key {uri.named}"
+    place_text = f"signing key {uri.named}"
     try:
         session = open_session(uri)
         key = session.get_key(object_class=ObjectClass.PRIVATE_KEY, label=uri.object)
         certificates = session.get_objects({Attribute.CLASS: ObjectClass.CERTIFICATE, Attribute.LABEL: uri.object})
-        kept = [x509.load_der_x509_certificate(certificate[Attribute.VALUE]) for certificate in certificates]
+        token_certificates = [
+            x509.load_der_x509_certificate(certificate[Attribute.VALUE]) for certificate in certificates
+        ]
     except (PKCS11Error, RuntimeError, KeyError, OSError, ValueError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
-        raise BadInput(f"{where}: {said}; check token, object, module and PIN") from error
-    given = read_certificates(Path(settings.certificate)) if settings.certificate else kept
-    if not given:
-        raise BadInput(f"{where}: the token holds no certificate of it; name a PEM file by {SIGN_CERTIFICATE_VARIABLE}")
-    digest = digest_of(_public(given[0], where))
+        raise BadInput(f"{place_text}: {said}; check token, object, module and PIN") from error
+    own_certificates = read_certificates(Path(settings.certificate)) if settings.certificate else token_certificates
+    if not own_certificates:
+        raise BadInput(
+            f"{place_text}: the token holds no certificate of it; name a PEM file by {SIGN_CERTIFICATE_VARIABLE}"
+        )
+    digest = digest_of(_public(own_certificates[0], place_text))
 
     def sign(data: bytes) -> bytes:
         try:
             return _signed_by_token(key, digest, data)
         except PKCS11Error as error:
             said = " ".join(str(error).split()) or type(error).__name__
-            raise BadInput(f"{where}: {said}; nothing was signed; check the token") from error
+            raise BadInput(f"{place_text}: {said}; nothing was signed; check the token") from error
 
-    return SigningKey(where, given[0], tuple(given[1:]), sign, session.close)
+    return SigningKey(place_text, own_certificates[0], tuple(own_certificates[1:]), sign, session.close)
 
 
 def _signed_by_token(key: Any, digest: Digest, data: bytes) -> bytes:
@@ -203,9 +207,9 @@ def _signed_by_token(key: Any, digest: Digest, data: bytes) -> bytes:
 
     if key.key_type == KeyType.RSA:
         return bytes(key.sign(data, mechanism=Mechanism.SHA256_RSA_PKCS))
-    made = bytes(key.sign(hashlib.new(digest, data).digest(), mechanism=Mechanism.ECDSA))
-    half = len(made) // 2
-    return encode_dss_signature(int.from_bytes(made[:half], "big"), int.from_bytes(made[half:], "big"))
+    signature = bytes(key.sign(hashlib.new(digest, data).digest(), mechanism=Mechanism.ECDSA))
+    half = len(signature) // 2
+    return encode_dss_signature(int.from_bytes(signature[:half], "big"), int.from_bytes(signature[half:], "big"))
 
 
 def read_certificates(path: Path) -> list[x509.Certificate]:

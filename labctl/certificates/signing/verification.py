@@ -147,8 +147,10 @@ def _with_trust(
 ) -> SignatureFound:
     """Return a valid signature with whether an authority that is trusted vouches for the signer at the time `at`."""
     if roots is None:
-        what = "self-signed" if own.issuer == own.subject else f"issued by {own.issuer.rfc4514_string()}"
-        return replace(signature, reason=f"{what}: trust not established; name the file of a trusted authority by --ca")
+        issuer_text = "self-signed" if own.issuer == own.subject else f"issued by {own.issuer.rfc4514_string()}"
+        return replace(
+            signature, reason=f"{issuer_text}: trust not established; name the file of a trusted authority by --ca"
+        )
     context = ValidationContext(trust_roots=[_asn1(root) for root in roots], allow_fetching=False, moment=at)
     validator = CertificateValidator(_asn1(own), [_asn1(each) for each in chain], validation_context=context)
     try:

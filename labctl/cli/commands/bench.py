@@ -115,8 +115,8 @@ def new(
     asks = asking if not yes and not as_json and is_terminal() else not_asking
     with one_clear_line():
         settings = dict(map(parse_setting, setting or []))
-        given = {"name": name or file.stem, "latitude_deg": latitude_deg, "ports": port or [], "hosts": host or []}
-        request = NewBenchRequest.model_validate({**given, "settings": settings})
+        options = {"name": name or file.stem, "latitude_deg": latitude_deg, "ports": port or [], "hosts": host or []}
+        request = NewBenchRequest.model_validate({**options, "settings": settings})
         answer = new_bench(file, request, asks, lambda line: None if as_json else print_search(line), force=force)
     if as_json:
         print_json(answer)

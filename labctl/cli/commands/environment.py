@@ -44,7 +44,7 @@ def add(
     from labctl.services.schemas.validity import RoomEnvironmentRequest, RoomRecord, RoomValue
 
     with one_clear_line():
-        given = [
+        values = [
             RoomValue.model_validate({"quantity": quantity, "value": value, "unit": unit})
             for quantity, value, unit in (
                 ("temperature", temperature_c, "deg C"),
@@ -53,15 +53,15 @@ def add(
             )
             if value is not None
         ]  # fmt: skip
-        if not given:
+        if not values:
             raise BadInput("nothing was read: give --temperature-c, --humidity-pct or --pressure-hpa")
-        record = RoomRecord(measured_at=instant(at, "--at"), values=given)
+        record = RoomRecord(measured_at=instant(at, "--at"), values=values)
         request = RoomEnvironmentRequest(readings=[record], source=source, bench=bench, by=by or actor().name)
         answer = execute(database, ADD_ENVIRONMENT, request)
     if as_json:
         print_json(answer)
         return
-    for reading in answer.readings[: len(given)]:
+    for reading in answer.readings[: len(values)]:
         console.print(
             f"{reading.measured_at:%Y-%m-%d %H:%M}  {reading.quantity} {reading.value:g} {reading.unit}", markup=False
         )

@@ -56,7 +56,7 @@ def magnetometer(
     from labctl.services.sensor_exports import check_export, write_export
     from labctl.services.sensor_versions import measured_data
 
-    kept = None
+    kept_version = None
     with one_clear_line():
         check_export(export, out)
         source = Source([name.strip() for name in columns.split(",")], unit, field_ut)
@@ -64,8 +64,8 @@ def magnetometer(
         write_export(answer, export, out, instance, device_id)
         if serial is not None:
             request = MagnetometerRequest(data=measured_data([path], source.text), result=answer, by=who(by))
-            kept = execute(database, KEEP_MAGNETOMETER, ToUnit(serial, request))
+            kept_version = execute(database, KEEP_MAGNETOMETER, ToUnit(serial, request))
     if as_json:
-        print_json(answer if kept is None else kept)
+        print_json(answer if kept_version is None else kept_version)
     else:
-        print_sensor(answer) if kept is None else print_kept(kept)
+        print_sensor(answer) if kept_version is None else print_kept(kept_version)

@@ -46,14 +46,16 @@ def print_fit(answer: FitResponse) -> None:
         rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
         for name, entry in coefficients.items():
             (value, *_), (u, *_), unit = _at_nodes(entry)
-            shown = rounded_to_uncertainty(value, u)
-            rows.add_row(name, unit, shown.value + shown.power, shown.u + shown.power if shown.u else "-")
+            rounded = rounded_to_uncertainty(value, u)
+            rows.add_row(name, unit, rounded.value + rounded.power, rounded.u + rounded.power if rounded.u else "-")
         console.print(rows)
     for effect, quantities in answer.shapes.items():
         rows = table(effect, "quantity", "unit", "value", "u", numbers=2)
         for name, entry in quantities.items():
-            shown = rounded_to_uncertainty(entry["value"], entry["u"])
-            rows.add_row(name, entry["unit"], shown.value + shown.power, shown.u + shown.power if shown.u else "-")
+            rounded = rounded_to_uncertainty(entry["value"], entry["u"])
+            rows.add_row(
+                name, entry["unit"], rounded.value + rounded.power, rounded.u + rounded.power if rounded.u else "-"
+            )
         console.print(rows)
     if answer.poses is not None:
         print_poses(answer.poses)
@@ -74,8 +76,8 @@ def print_poses(poses: PosesJson) -> None:
     rows = table("accelerometer", "axis", "coefficient", "unit", "value", "u", numbers=2)
     for axis, coefficients in poses["accelerometer"]["axes"].items():
         for name, entry in coefficients.items():
-            shown = rounded_to_uncertainty(entry["value"], entry["u"])
-            rows.add_row(axis, name, entry["unit"], shown.value + shown.power, (shown.u or "-") + shown.power)
+            rounded = rounded_to_uncertainty(entry["value"], entry["u"])
+            rows.add_row(axis, name, entry["unit"], rounded.value + rounded.power, (rounded.u or "-") + rounded.power)
     console.print(rows)
     if (alignment := poses.get("alignment")) is not None:
         console.print(alignment_text(alignment), soft_wrap=True)
@@ -87,8 +89,8 @@ def print_poses(poses: PosesJson) -> None:
         soft_wrap=True,
     )
     for left_move in moves["left_out"]:
-        where = f"{left_move['from_s']:.1f} to {left_move['until_s']:.1f} s"
-        console.print(f"  turn left out, from {where}: {left_move['why']}", style="yellow", soft_wrap=True)
+        place_text = f"{left_move['from_s']:.1f} to {left_move['until_s']:.1f} s"
+        console.print(f"  turn left out, from {place_text}: {left_move['why']}", style="yellow", soft_wrap=True)
     console.print(f"frame: {poses['accelerometer']['frame']}", style="dim", soft_wrap=True)
     console.print(f"not determined: {poses['not_determined']}", style="dim", soft_wrap=True)
 
@@ -165,8 +167,8 @@ def print_table(coefficients: Coefficients) -> None:
 
 def _cell(entry: Entry, index: int) -> str:
     values, us, _ = _at_nodes(entry)
-    shown = rounded_to_uncertainty(values[index], us[index])
-    return shown.value + shown.power
+    rounded = rounded_to_uncertainty(values[index], us[index])
+    return rounded.value + rounded.power
 
 
 def _at_nodes(entry: Entry) -> tuple[list[float], list[float | None], str]:

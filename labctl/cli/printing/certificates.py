@@ -17,6 +17,6 @@ def state_text(answer: CertificateResponse) -> str:
     """Return the state of a certificate in words."""
     if answer.state == "valid" or answer.state_since is None:
         return answer.state
-    why = f" ({answer.state_reason})" if answer.state_reason else ""
+    reason = f" ({answer.state_reason})" if answer.state_reason else ""
     instead = f"valid instead: {answer.valid_instead}" if answer.valid_instead else "none is valid instead"
-    return f"{answer.state} since {answer.state_since:%Y-%m-%d %H:%M} UTC by {answer.state_by}{why}; {instead}"
+    return f"{answer.state} since {answer.state_since:%Y-%m-%d %H:%M} UTC by {answer.state_by}{reason}; {instead}"

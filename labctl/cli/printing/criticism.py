@@ -43,10 +43,10 @@ def print_verification(answer: VerificationResponse) -> None:
 def print_criticism(answer: CriticismResponse) -> None:
     """Print a criticism: the version without refitting, the verdict on its model refitted, the errors, a small
     map, a table."""
-    whole = not console.is_terminal  # a program that reads lines gets each sentence on one
-    _print_applied(answer, whole=whole)
+    prints_all = not console.is_terminal  # a program that reads lines gets each sentence on one
+    _print_applied(answer, whole=prints_all)
     for line in answer.text:
-        console.print(line, style="bold" if line is answer.text[0] else None, soft_wrap=whole)
+        console.print(line, style="bold" if line is answer.text[0] else None, soft_wrap=prints_all)
     error = answer.error
     of = ", ".join(map(str, answer.recordings or [answer.recording]))
     console.print(
@@ -74,8 +74,8 @@ def print_criticism(answer: CriticismResponse) -> None:
             f"to distinguish {', '.join(experiment['separates'])}: {experiment['do']} "
             f"({experiment['hours']:.0f} h, {100 * experiment['power']:.0f} % sure to)",
         )
-    for why in _not_testable(answer):
-        console.print(why, style="dim", soft_wrap=whole)
+    for sentence in _not_testable(answer):
+        console.print(sentence, style="dim", soft_wrap=prints_all)
     if answer.named:
         fitted = {each["effect"] for each in answer.suspects if each["rms_after_dps"] is not None}
         first = next((name for name in answer.named if name in fitted), answer.named[0])
@@ -115,9 +115,10 @@ def _print_static(static: StaticRecordJson) -> None:
     """Print what the longest section at rest shows."""
     for axis, noise in static["axes"].items():
         figures = (("N", noise["N"]), ("B", noise["B"]), ("K", noise["K"]))
-        shown = [(letter, figure) for letter, figure in figures if figure["value"] is not None]
+        shown_figures = [(letter, figure) for letter, figure in figures if figure["value"] is not None]
         sentence = ", ".join(
-            f"{letter} {format_number(f['value'], 3)} +- {format_number(f['u'], 2)} {f['unit']}" for letter, f in shown
+            f"{letter} {format_number(f['value'], 3)} +- {format_number(f['u'], 2)} {f['unit']}"
+            for letter, f in shown_figures
         )
         instead = "; B is the value of the data sheet" if noise["replaces_datasheet"] else ""
         text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {sentence or 'no slope shows'}{instead}"

@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 def print_left_out(left_out: Sequence[LeftOut]) -> None:
     """Print what was left out of a recording by choice, each kind on one line."""
     for entry in left_out:
-        where = f" of {entry.channel}" if entry.channel else ""
-        console.print(f"left out: {entry.n} of {entry.of} readings{where} ({entry.what}: {entry.why})", soft_wrap=True)
+        place_text = f" of {entry.channel}" if entry.channel else ""
+        console.print(
+            f"left out: {entry.n} of {entry.of} readings{place_text} ({entry.what}: {entry.why})", soft_wrap=True
+        )
 
 
 def print_inspection(answer: InspectionResponse) -> None:

@@ -44,11 +44,11 @@ def print_standard(answer: StandardResponse) -> None:
                 )  # fmt: skip
         console.print(rows)
     for prediction in answer.predictions:
-        where = "" if prediction.nominal is None else f" at {prediction.nominal:g}"
+        place_text = "" if prediction.nominal is None else f" at {prediction.nominal:g}"
         drift = _drift(prediction) if prediction.per_year is None else f"drift per year {_drift(prediction)}"
         value = "not stated" if prediction.value is None else f"{prediction.value:.4g}"
         console.print(
-            f"on {prediction.on}{where}: error {value}, u = {prediction.u:.3g} {answer.unit}; {drift}",
+            f"on {prediction.on}{place_text}: error {value}, u = {prediction.u:.3g} {answer.unit}; {drift}",
             markup=False,
             soft_wrap=True,
         )
@@ -107,8 +107,8 @@ def print_check_gyro(answer: CheckGyroResponse) -> None:
                 format_number(point.u, 3),
             )  # fmt: skip
         console.print(rows)
-    for recording, why in answer.left_out.items():
-        console.print(f"recording {recording} is not on the charts: {why}", markup=False, soft_wrap=True)
+    for recording, reason in answer.left_out.items():
+        console.print(f"recording {recording} is not on the charts: {reason}", markup=False, soft_wrap=True)
     if not answer.marked:
         console.print(f"{answer.serial} is no check gyro; --mark makes it one", markup=False)
     _print_text(answer.text)
@@ -117,9 +117,9 @@ def print_check_gyro(answer: CheckGyroResponse) -> None:
 def print_comparison(answer: LaboratoryComparison) -> None:
     """Print two calibrations compared."""
     for name, side in (("first", answer.first), ("second", answer.second)):
-        where = ", ".join(filter(None, (side.laboratory, side.bench))) or "imported"
+        place_text = ", ".join(filter(None, (side.laboratory, side.bench))) or "imported"
         day = side.measured_on or "a date that is not known"
-        text = f"{name}: {side.serial} version {side.version}, {where}, measured on {day}"
+        text = f"{name}: {side.serial} version {side.version}, {place_text}, measured on {day}"
         console.print(text, markup=False)
     title = f"at {answer.temperature_c:g} deg C"
     rows = table(title, "axis", "result", "unit", "first", "U", "second", "U", "En", "zeta", numbers=6)
@@ -129,8 +129,8 @@ def print_comparison(answer: LaboratoryComparison) -> None:
             f"{result.values[1]:.6g}", f"{result.expanded[1]:.2g}", f"{result.en:.2f}", f"{result.zeta:.2f}",
         )  # fmt: skip
     console.print(rows)
-    for what, why in answer.not_compared.items():
-        console.print(f"not compared: {what}: {why}", markup=False, soft_wrap=True)
+    for quantity, reason in answer.not_compared.items():
+        console.print(f"not compared: {quantity}: {reason}", markup=False, soft_wrap=True)
     _print_text(answer.text)
 
 

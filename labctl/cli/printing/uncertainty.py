@@ -26,9 +26,9 @@ def print_uncertainty(answer: UncertaintyResponse) -> None:
     rate = f"{answer.rate_dps:g} deg/s about this axis alone"
     if answer.vector is not None:
         rate = ", ".join(f"{axis} {value:g}" for axis, value in answer.vector.rates_dps.items()) + " deg/s"
-    where = f"{rate}, {answer.temperature_c:g} deg C"
+    place_text = f"{rate}, {answer.temperature_c:g} deg C"
     for axis, budget in answer.budget.items():
-        _print_lines(f"{answer.serial} version {answer.version}, axis {axis}, corrected rate at {where}", budget)
+        _print_lines(f"{answer.serial} version {answer.version}, axis {axis}, corrected rate at {place_text}", budget)
     if answer.vector is not None:
         _print_covariance(answer.vector)
     _print_coefficients(answer)

@@ -103,17 +103,17 @@ def back_up(
     `note` records the backup in the audit trail. When that is impossible now, the copy stays and the
     response says so. Raises BadInput, StoreError; then nothing is left of the copy.
     """
-    made = copy_database(database or default_database(), target)
+    backup = copy_database(database or default_database(), target)
     remark = ""
     try:
-        note(BackupNote(file=target.name, bytes=made.bytes, sha256=made.sha256))
+        note(BackupNote(file=target.name, bytes=backup.bytes, sha256=backup.sha256))
     except LabctlError as error:
         remark = f"the backup is made, but could not be noted in the audit trail: {error}"
     checked = check_database(str(target), progress)
     return BackupResponse(
         file=str(target),
-        bytes=made.bytes,
-        sha256=made.sha256,
+        bytes=backup.bytes,
+        sha256=backup.sha256,
         noted=not remark,
         remark=remark,
         anchor=checked.anchor,

@@ -122,9 +122,9 @@ def _found(
 
 
 def _complaint(place: tuple[str | int, ...], message: str, kind: str, given: object) -> str:
-    where = ".".join(str(part) for part in place) or "the whole file"
+    place_text = ".".join(str(part) for part in place) or "the whole file"
     value = "" if kind == "missing" or not place else f" (is {shown(given)})"
-    return f"{where}: {message.removeprefix('Value error, ')}{value}"
+    return f"{place_text}: {message.removeprefix('Value error, ')}{value}"
 
 
 def _address(port: str | None, host: str | None) -> dict[str, object] | None:

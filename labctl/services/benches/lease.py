@@ -102,8 +102,8 @@ class BenchHold:
             self._clock.sleep(RENEW_S)
             if self._over.is_set():
                 return False
-            seen = self._store.leases.holder(self._bench)
-            if seen is not None and (seen.owner, seen.beat) != (lease.owner, lease.beat):
+            holder = self._store.leases.holder(self._bench)
+            if holder is not None and (holder.owner, holder.beat) != (lease.owner, lease.beat):
                 return False
         return True
 

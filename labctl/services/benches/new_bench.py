@@ -51,9 +51,9 @@ def new_bench(
         seen(lines[-1])
     sections = sections_of(findings)
     complete(sections, request.settings, clock, ask)
-    made = document(request.name, request.latitude_deg, sections)
-    write(file, made, sections)
-    return NewBenchResponse.model_validate({"file": str(file), "found": lines, "bench": made})
+    bench_document = document(request.name, request.latitude_deg, sections)
+    write(file, bench_document, sections)
+    return NewBenchResponse.model_validate({"file": str(file), "found": lines, "bench": bench_document})
 
 
 def search(ports: Sequence[str], hosts: Sequence[str], clock: Clock) -> Iterator[tuple[PortInfo | None, Found]]:
@@ -69,24 +69,24 @@ def search(ports: Sequence[str], hosts: Sequence[str], clock: Clock) -> Iterator
 
 def sections_of(recognised: Sequence[tuple[PortInfo | None, Found]]) -> list[Section]:
     """Return the sections of what was recognised: one table, one chamber and the gyros. Raises BadInput."""
-    made: list[Section] = []
+    sections: list[Section] = []
     for info, each in recognised:
         if each.recognised is None:
             continue
-        if each.kind != "gyro" and (other := next((one for one in made if one.kind == each.kind), None)):
+        if each.kind != "gyro" and (other := next((one for one in sections if one.kind == each.kind), None)):
             raise BadInput(
                 f"two {each.kind}s answer, at {other.found.address} and {each.address}, but a bench has only "
                 f"one {each.kind}; name the ports of this bench with --port and --host"
             )
-        section = Section(_name(each, made), each.kind, each, dict(each.recognised.settings))
+        section = Section(_name(each, sections), each.kind, each, dict(each.recognised.settings))
         section.values = {"driver": each.driver, **_address(each, info), **section.values}
-        made.append(section)
-    if not any(section.kind == "gyro" for section in made):
+        sections.append(section)
+    if not any(section.kind == "gyro" for section in sections):
         raise BadInput(
             "no gyro was recognised, and a bench needs one: check power and cables, name the port of the gyro with "
             f"--port, or copy and edit {shipped_benches()['example-real']}"
         )
-    return made
+    return sections
 
 
 def complete(sections: Sequence[Section], settings: Mapping[str, object], clock: Clock, ask: Ask) -> None:
@@ -98,30 +98,34 @@ def complete(sections: Sequence[Section], settings: Mapping[str, object], clock:
     for section in sections:
         for key, value in ask_itself(section.name, section.values, clock).items():
             section.values.setdefault(key, value)
-        given = {key.rpartition(".")[2]: value for key, value in settings.items() if key.startswith(f"{section.name}.")}
-        section.values |= given
+        stated = {
+            key.rpartition(".")[2]: value for key, value in settings.items() if key.startswith(f"{section.name}.")
+        }
+        section.values |= stated
         assert section.found.recognised is not None
-        for key, what in section.found.recognised.to_confirm.items():
-            if key not in given and (value := ask(section.name, key, what, section.values.get(key))) is not None:
+        for key, question in section.found.recognised.to_confirm.items():
+            if key not in stated and (value := ask(section.name, key, question, section.values.get(key))) is not None:
                 section.values[key] = value
 
 
 def document(name: str, latitude_deg: float | None, sections: Sequence[Section]) -> dict[str, object]:
     """Return the bench file as a document, checked by the models of its drivers. Raises BadInput."""
-    made: dict[str, object] = {"name": name}
+    bench_document: dict[str, object] = {"name": name}
     if latitude_deg is not None:
-        made["latitude_deg"] = latitude_deg
-    made |= {section.kind: section.values for section in sections if section.kind != "gyro"}
-    made["gyros"] = [{"name": section.name, **section.values} for section in sections if section.kind == "gyro"]
+        bench_document["latitude_deg"] = latitude_deg
+    bench_document |= {section.kind: section.values for section in sections if section.kind != "gyro"}
+    bench_document["gyros"] = [
+        {"name": section.name, **section.values} for section in sections if section.kind == "gyro"
+    ]
     try:
-        resolve(BenchFile.model_validate(made))
+        resolve(BenchFile.model_validate(bench_document))
     except ValidationError as error:
         first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
+        place_text = ".".join(str(part) for part in first["loc"])
         raise BadInput(
-            f"the bench file would not be valid: {where}: {first['msg']}; give it with --set SECTION.KEY=VALUE"
+            f"the bench file would not be valid: {place_text}: {first['msg']}; give it with --set SECTION.KEY=VALUE"
         ) from error
-    return made
+    return bench_document
 
 
 def write(path: Path, made: Mapping[str, object], sections: Sequence[Section]) -> None:

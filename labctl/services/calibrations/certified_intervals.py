@@ -26,11 +26,11 @@ def versions_apart(
     version without a date of its measurements is left out, and alone where it is the last.
     """
     earlier = [version for version in versions if version.version != last.version]
-    kept: list[CertifiedVersion] = []
+    apart: list[CertifiedVersion] = []
     for _, _, each in sorted((one.measured_at, one.version, one) for one in earlier if one.measured_at is not None):
-        if (not kept or _is_apart(kept[-1], each, least)) and _is_apart(each, last, least):
-            kept.append(each)
-    return [*kept, last]
+        if (not apart or _is_apart(apart[-1], each, least)) and _is_apart(each, last, least):
+            apart.append(each)
+    return [*apart, last]
 
 
 def _is_apart(before: CertifiedVersion, after: CertifiedVersion, least: timedelta) -> bool:

@@ -142,7 +142,7 @@ def _follow(
         standing_s += float(t_s[row]) - before if o.standing and before is not None else 0.0
         before = float(t_s[row])
     seconds = float(t_s[moving[-1]] - t_s[moving[0]]) if len(moving) else 0.0
-    shown = (
+    shown_rows = (
         moving[np.unique(np.linspace(0, len(moving) - 1, min(len(moving), MOST_POINTS)).astype(int))]
         if len(moving)
         else moving
@@ -155,8 +155,8 @@ def _follow(
         ),
         angle_deg=o.angle_deg, drift_deg_per_min=60 * o.angle_deg / seconds if seconds > 0 else None,
         drift_between_stops_deg_per_min=_between_stops(t_s[moving], angle[moving], declared, options),
-        offset_dps=o.offset_dps, standing_s=standing_s, gap_s=o.gap_s, t_s=t_s[shown].tolist(),
-        course_deg=angle[shown].tolist(), warning=warning,
+        offset_dps=o.offset_dps, standing_s=standing_s, gap_s=o.gap_s, t_s=t_s[shown_rows].tolist(),
+        course_deg=angle[shown_rows].tolist(), warning=warning,
     )  # fmt: skip
     return answer, angle
 

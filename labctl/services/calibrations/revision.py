@@ -86,8 +86,8 @@ def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetim
     worse than no correction.
     """
     change = _change(store, serial, request)
-    what = f"change of version {change.row.version} of {serial} on {change.measured.named}"
-    refuse_wrong(change.warnings, what, accepted=request.accept_warnings)
+    job_title = f"change of version {change.row.version} of {serial} on {change.measured.named}"
+    refuse_wrong(change.warnings, job_title, accepted=request.accept_warnings)
     return _keep(store, serial, change, at)
 
 
@@ -208,14 +208,15 @@ def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
 def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveResponse:
     parent, after = change.row.version, change.after
     recording, recordings = change.measured.row.id, change.measured.recordings
-    made = {
+    provenance = {
         "recording": recording, "improved_from": parent, **several(recordings), **reference_of(change.measured.rows),
     }  # fmt: skip
     evidence = use_evidence(fit_data_of(change.points), changed(after.fitted.model))
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
-            change.points.info, after, version=version, parent=parent, issued_at=at, provenance=made, evidence=evidence,
+            change.points.info, after, version=version, parent=parent, issued_at=at, provenance=provenance,
+            evidence=evidence,
             used_on=days_of(change.measured.rows),
         )  # fmt: skip
         answer: KeptChange = {

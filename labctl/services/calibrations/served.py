@@ -36,12 +36,12 @@ def exported(store: Store, document: bytes, format_name: str, options: Sequence[
 
     Raises BadInput for an unknown format or option, and for a calibration that the format cannot carry.
     """
-    given = read_options(options, format_name)
+    given_options = read_options(options, format_name)
     chosen = format_named(format_name)
     if chosen.needs_noise:
-        given = {**_noise(store, document, chosen.options), **given}
-    written = written_calibration(document, format_name, given)
-    tag = "-".join([format_name, *(f"{key}={value}" for key, value in sorted(given.items()))])
+        given_options = {**_noise(store, document, chosen.options), **given_options}
+    written = written_calibration(document, format_name, given_options)
+    tag = "-".join([format_name, *(f"{key}={value}" for key, value in sorted(given_options.items()))])
     plain = "".join(char if char.isascii() and char.isprintable() and char not in '"\\' else "_" for char in tag)
     return Exported(written.content, chosen.media_type, plain, written.losses)
 

@@ -185,12 +185,12 @@ def widening_of(calibration: Calibration, about: Literal["any axis", "own axis"]
     reach = max(map(abs, rates))
     if about == "any axis":
         places = [{a: reach * part for a, part in zip(BODY_AXES, place, strict=True)} for place in PLACES]
-        seen = None
+        outputs = None
     else:
         places = [{axis: rate} for axis in calibration.axes for rate in rates]
-        seen = [list(place) for place in places]
+        outputs = [list(place) for place in places]
     every = [
-        widening([known_uncertainty.at_vector(place, temperature_c) for place in places], seen)
+        widening([known_uncertainty.at_vector(place, temperature_c) for place in places], outputs)
         for temperature_c in temperatures
     ]
     return float(np.max(every))  # NaN where one of them is

@@ -236,8 +236,8 @@ def run_attended(
     if wire is not None and not prepared.operator.at_once:
         prepared = replace(prepared, operator=RecordedOperator(prepared.operator, wire.note))
 
-    seen = None if observe is None else lambda progress: observe(answer_of(row, progress))
-    engine = _engine(store, prepared, control, seen)
+    observer = None if observe is None else lambda progress: observe(answer_of(row, progress))
+    engine = _engine(store, prepared, control, observer)
     bench = BenchFile.model_validate({**row.bench, "simulation": None})
     try:
         with answering_stops(store, bench, row.id, control):

@@ -175,9 +175,9 @@ def mark_abandoned(answer: CampaignResponse, *, attended: bool) -> CampaignRespo
     if answer.state in ENDED or attended:
         return answer
     left_safe = answer.state is CampaignState.INTERRUPTED
-    why = answer.reason if left_safe else "no process runs the campaign any more: inspect the bench"
+    cause = answer.reason if left_safe else "no process runs the campaign any more: inspect the bench"
     reason = (
-        f"{why}; `labctl campaign resume` or a service on its bench resumes the campaign where it stopped, "
+        f"{cause}; `labctl campaign resume` or a service on its bench resumes the campaign where it stopped, "
         "`labctl campaign abort` ends it"
     )
     return answer.model_copy(update={"reason": reason, "abandoned": True, "active": False})

@@ -134,11 +134,11 @@ def _number(store: Store, facts: Facts, at: datetime) -> str:
 
 
 def _item(facts: Facts) -> Item:
-    given = facts.order.item
+    item = facts.order.item
     return Item(
-        description=given.description, manufacturer=given.manufacturer, serial=facts.row.serial,
-        model=facts.calibration.document["unit"]["model"], identification=given.identification,
-        axes=facts.calibration.axes, condition=given.condition, received=given.received,
+        description=item.description, manufacturer=item.manufacturer, serial=facts.row.serial,
+        model=facts.calibration.document["unit"]["model"], identification=item.identification,
+        axes=facts.calibration.axes, condition=item.condition, received=item.received,
     )  # fmt: skip
 
 

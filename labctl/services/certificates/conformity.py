@@ -49,7 +49,7 @@ def conformity(
     (`widening_of`). Where a date is stated until which it holds, U contains the drift until then (`stability`).
     `left_out` are the sentences on places of the range where U is not known. Raises NoDecision, NoAcceptance.
     """
-    expanded, where = _about_any(ordered, any_axis) if ordered.about == "any axis" else _about_own(results)
+    expanded, place_text = _about_any(ordered, any_axis) if ordered.about == "any axis" else _about_own(results)
     if left_out:
         raise NoDecision(f"conformity to {ordered.specification}: {' '.join(left_out)} {_MEASURE}")
     decided = tuple(_decided(ordered, each, stability) for each in errors.verified)
@@ -58,7 +58,8 @@ def conformity(
     acceptance = _acceptance(ordered, expanded, band)
     passed = errors.largest_dps <= acceptance
     statement = (
-        f"{'PASS' if passed else 'FAIL'}: {where}{_temperatures(results)}, the largest error of the corrected rate, "
+        f"{'PASS' if passed else 'FAIL'}: {place_text}{_temperatures(results)}, the largest error of the corrected "
+        "rate, "
         f"{errors.largest_dps:.3g} °/s {_of(errors)}, "
         f"{'does not exceed' if passed else 'exceeds'} the acceptance limit of {acceptance:.3g} °/s = "
         f"{ordered.limit_dps:g} °/s − {band:.3g} °/s. Decision rule: {_rule(ordered, widening)}, "

@@ -135,15 +135,15 @@ def errors_of(measured: Measurements, calibration: Calibration, about: Use) -> E
     errors: list[VerifiedError] = []
     datasets = outside = 0
     for _, points in aside:
-        seen = _Part.of(calibration, points, anew=True)
-        outside += int(seen.outside.sum())
-        for row in np.flatnonzero(~seen.outside).tolist():
-            shown = list(seen.at(row, calibration, about))
-            errors += shown
-            datasets += bool(shown)
+        part_seen = _Part.of(calibration, points, anew=True)
+        outside += int(part_seen.outside.sum())
+        for row in np.flatnonzero(~part_seen.outside).tolist():
+            shown_errors = list(part_seen.at(row, calibration, about))
+            errors += shown_errors
+            datasets += bool(shown_errors)
     if aside:
         _require_cover(errors, calibration, about, outside)
-    is_anew = bool(aside) and all(_is_anew(whole, part) for whole, part in aside)
+    is_anew = bool(aside) and all(_is_anew(whole_recording, part) for whole_recording, part in aside)
     return Errors(max(fitted, default=0.0), len(fitted), tuple(errors), datasets, is_anew)
 
 

@@ -65,16 +65,16 @@ class Results:
     def missing(self) -> Iterator[tuple[str, str]]:
         """Yield the parts of U that are not known, where an axis has no result without them."""
         if self.axes_without:
-            for part, why in self.unknown:
-                yield f"uncertainty of the {part}", why
+            for part, output in self.unknown:
+                yield f"uncertainty of the {part}", output
 
     @property
     def left_out(self) -> tuple[str, ...]:
         """The sentences that name the places without a result."""
         return tuple(
             f"At {places} further rates and temperatures of the calibrated range no result is stated: the uncertainty "
-            f"of the {part} is not known there ({why})."
-            for (part, why), places in self.unknown.items()
+            f"of the {part} is not known there ({output})."
+            for (part, output), places in self.unknown.items()
         )
 
 
@@ -175,12 +175,12 @@ def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
             values, u = entry["value"], entry["u"]
             listed = values if isinstance(values, list) else [values]
             u_listed = u if isinstance(u, list) else [u]
-            for where, value, of_fit in zip(at, listed, u_listed, strict=True):
-                whole = budgets.u_of(axis, name, value, reference_c if where is None else where)
+            for at_c, value, of_fit in zip(at, listed, u_listed, strict=True):
+                u_total = budgets.u_of(axis, name, value, reference_c if at_c is None else at_c)
                 coefficient_results.append(
                     CoefficientResult(
-                        axis=axis, name=name, temperature_c=where, value=value, unit=entry["unit"],
-                        u=of_fit if whole is None else whole, has_standards=whole is not None,
+                        axis=axis, name=name, temperature_c=at_c, value=value, unit=entry["unit"],
+                        u=of_fit if u_total is None else u_total, has_standards=u_total is not None,
                     )
                 )  # fmt: skip
     return (*coefficient_results, *_response(calibration))

@@ -34,7 +34,7 @@ class MissingFacts(BadInput):
     @property
     def members(self) -> JsonObject:
         """Each fact, and where it is stated."""
-        return {"missing": [{"fact": fact, "where": where} for fact, where in self.facts]}
+        return {"missing": [{"fact": fact, "where": place_text} for fact, place_text in self.facts]}
 
 
 def of_contact(contact: Contact, whose: str, where: str) -> Iterator[tuple[str, str]]:

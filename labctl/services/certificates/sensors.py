@@ -95,12 +95,13 @@ def missing_of(order: CertificateOrder) -> Iterator[tuple[str, str]]:
 
 
 def _missing_day(sensor: OrderedSensor, name: str) -> Iterator[tuple[str, str]]:
-    where = f"[{name}] of the order"
+    place_text = f"[{name}] of the order"
     if sensor.performed_from is None:
-        yield f"performed_from of the {name}", where
+        yield f"performed_from of the {name}", place_text
     elif sensor.performed_until is not None and sensor.performed_until < sensor.performed_from:
         raise BadInput(
-            f"{where}: performed_until = {sensor.performed_until} is before performed_from = {sensor.performed_from}; "
+            f"{place_text}: performed_until = {sensor.performed_until} is before performed_from = "
+            f"{sensor.performed_from}; "
             "correct the dates"
         )
 

@@ -72,15 +72,15 @@ def _change(
     if (act := revoked.get(row.version)) is not None:  # revoked while the certificate was being written
         return _Change("withdrawn", act.at, act.reason, act.by, act.by_key)
     if (amendment := amended_by.get(row.number)) is not None:
-        why = amendment.reason
+        reason = amendment.reason
         if _is_gone(amendment, revoked):
-            why += f"; certificate {amendment.number}, which replaces it, was withdrawn"
-        return _Change("amended", amendment.at, why, amendment.by, amendment.by_key)
+            reason += f"; certificate {amendment.number}, which replaces it, was withdrawn"
+        return _Change("amended", amendment.at, reason, amendment.by, amendment.by_key)
     if last is not None and last.version != row.version:
         act = certified[last.version]
         too = ", which was withdrawn" if _is_gone(last, revoked) else ""
-        why = f"version {last.version} of the unit was certified, and has certificate {last.number}{too}"
-        return _Change("superseded", max(act.at, last.at), why, act.by, act.by_key)
+        reason = f"version {last.version} of the unit was certified, and has certificate {last.number}{too}"
+        return _Change("superseded", max(act.at, last.at), reason, act.by, act.by_key)
     return _Change("valid", row.at, "", row.by, row.by_key)
 
 

@@ -55,8 +55,8 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
     in_register: Literal["same", "differs", "unknown"] = "unknown"
     if row is not None:
         forms = store.certificates.forms(row.number)
-        kept = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[form]
-        in_register = "same" if kept == content else "differs"
+        stored = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[form]
+        in_register = "same" if stored == content else "differs"
     signatures = _signatures(content, form, path, ca)
     answers = [_answer(signature, expected) for signature in signatures]
     certificate = None if row is None else certificate_by_number(store, row.number)

@@ -69,8 +69,8 @@ def evaluate(
             static=measured.static,
         )  # fmt: skip
     except NotConverged as error:
-        what = f"criticism of version {calibration.version} on {measured.named}"
-        refuse_wrong(warnings, what, accepted=False, insist=f"; without refitting, {error}")
+        job_title = f"criticism of version {calibration.version} on {measured.named}"
+        refuse_wrong(warnings, job_title, accepted=False, insist=f"; without refitting, {error}")
         raise
     columns = residual_columns(criticised.data, criticised.residuals, measured.points, measured.row.id, criticised.base)
     serial, version = calibration.serial, calibration.version

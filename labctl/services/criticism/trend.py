@@ -115,7 +115,7 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
     limit = limit_dps if limit_dps is not None else _stated(reference)
     leaves = list(_leaving(lines, points, limit)) if limit and lines else []
     drawn = _drawn(points, leaves)
-    drifts = [_drift(axis, what, unit, line, points, drawn) for axis, what, unit, line in lines]
+    drifts = [_drift(axis, figure, unit, line, points, drawn) for axis, figure, unit, line in lines]
     return TrendResponse(
         serial=serial, version=reference.version, limit_dps=limit, points=points, drifts=drifts, leaves=leaves,
         undated=[row.id for row in undated],
@@ -194,10 +194,10 @@ def _lines(points: Sequence[TrendPoint]) -> Iterator[tuple[str, str, str, TrendL
                 )
         if point.rms_dps is not None:
             series.setdefault(("all", "error", "deg/s"), []).append((years, point.rms_dps, 0.0))
-    for (axis, what, unit), rows in series.items():
+    for (axis, figure, unit), rows in series.items():
         time, values, u = np.array(rows).T
         if (line := trend_line(time, values, u)) is not None:
-            yield axis, what, unit, line
+            yield axis, figure, unit, line
 
 
 def _drawn(points: Sequence[TrendPoint], leaves: Sequence[Leaving]) -> Array:
@@ -243,8 +243,8 @@ def _leaving(
     def at(years: float | None) -> datetime | None:
         return None if years is None else (points[0].at + years * YEAR).astimezone(UTC)
 
-    for axis, what, _, line in lines:
-        if what == "bias":
+    for axis, figure, _, line in lines:
+        if figure == "bias":
             expected, earliest, latest = map(at, line.leaves(limit, last))
             outside = abs(float(line.at(np.array([last]))[0][0])) > limit
             yield Leaving(axis=axis, outside=outside, expected=expected, earliest=earliest, latest=latest)

@@ -90,9 +90,9 @@ def figures_of(data: FitData) -> list[Figure]:
     """
     straight = np.array([Position.of(each).turned_deg == 0 for each in np.asarray(data.channels["position"]).tolist()])
     straight = straight if straight.any() else ~straight
-    seen = _columns(data.take(straight))
-    characteristics = [each for axis in data.outputs for each in (*_of_rates(seen, axis), *_at_rest(seen, axis))]
-    return [replace(each, rows=_spread(each.rows, straight)) for each in (*characteristics, *_alignment(seen))]
+    columns = _columns(data.take(straight))
+    characteristics = [each for axis in data.outputs for each in (*_of_rates(columns, axis), *_at_rest(columns, axis))]
+    return [replace(each, rows=_spread(each.rows, straight)) for each in (*characteristics, *_alignment(columns))]
 
 
 def _spread(rows: NDArray[np.bool_], among: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -34,8 +34,8 @@ def applied(store: Store, row: CalibrationRecord, measured: Measurements) -> tup
         lines = _lines(row, measured)
     except REFUSALS as error:
         return None, str(error)
-    kept = verification.model_dump(include=set(AppliedDraft.model_fields))
-    return AppliedDraft.model_validate({**kept, "lines": lines}), ""
+    applied_fields = verification.model_dump(include=set(AppliedDraft.model_fields))
+    return AppliedDraft.model_validate({**applied_fields, "lines": lines}), ""
 
 
 def _lines(row: CalibrationRecord, measured: Measurements) -> Mapping[str, RemainingLine]:
@@ -55,13 +55,13 @@ def drift_from(in_force: CalibrationRecord, draft: CalibrationRecord, measured: 
     Raises BadInput, NotEnoughData, NotConverged where one of them cannot be applied to the recording.
     """
     difference = _difference(in_force, draft, measured)
-    changes, why = _changes(in_force, draft)
+    changes, reason = _changes(in_force, draft)
     return DriftFromVersion(
         version=in_force.version,
         largest_dps={axis: float(np.max(np.abs(values))) for axis, values in difference.items()},
         rms_dps={axis: float(np.sqrt(np.mean(values**2))) for axis, values in difference.items()},
         coefficients=changes,
-        why=why,
+        why=reason,
     )
 
 
@@ -83,8 +83,8 @@ def _changes(in_force: CalibrationRecord, draft: CalibrationRecord) -> tuple[lis
     old, new = in_force.answer, draft.answer
     first, second = old["model"], new["model"]
     if (first["effects"], first["argument"]) != (second["effects"], second["argument"]):
-        why = f"version {in_force.version} has another model ({first['name']}): only corrected rates are compared"
-        return [], why
+        reason = f"version {in_force.version} has another model ({first['name']}): only corrected rates are compared"
+        return [], reason
     centres = [answer.get("reference_temperature_c") for answer in (old, new)]
     if centres[0] != centres[1]:
         return [], f"the models are centred on different temperatures, {centres[0]} and {centres[1]} deg C"

@@ -45,8 +45,8 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
 
 
 def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
-    if why := store.drafts.dropped(draft.recording):
-        fail_draft(store, draft, rules, f"the unit was excluded from the campaign: {why}", at)
+    if reason := store.drafts.dropped(draft.recording):
+        fail_draft(store, draft, rules, f"the unit was excluded from the campaign: {reason}", at)
         return
     version = draft.version  # of a draft that was kept, and not yet reported on
     if version is None:

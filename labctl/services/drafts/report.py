@@ -40,8 +40,8 @@ def _results(
     limits: FitLimits, error: CertifiedErrors, as_left: AppliedDraft | None, drift: DriftFromVersion | None
 ) -> Iterator[LimitResult]:
     if (most := limits.heldout_rms_dps) is not None:
-        why = "" if error.heldout_rms_dps is not None else "no temperature could be left out of the fit"
-        yield _result("heldout_rms_dps", None, error.heldout_rms_dps, most, why)
+        reason = "" if error.heldout_rms_dps is not None else "no temperature could be left out of the fit"
+        yield _result("heldout_rms_dps", None, error.heldout_rms_dps, most, reason)
     if (most := limits.max_error_dps) is not None:
         results = None if as_left is None else {axis: one.max_dps for axis, one in as_left.axes.items()}
         yield from _by_axis("max_error_dps", results, most, "the draft cannot be applied to the recording")
@@ -138,8 +138,8 @@ def _as_found(
         return None, "no version was in force", None
     report_stage(f"applying version {version}")
     in_force = store.calibrations.get(draft.serial, version)
-    verification, why = applied(store, in_force, measured)
+    verification, reason = applied(store, in_force, measured)
     try:
-        return verification, why, drift_from(in_force, draft, measured)
+        return verification, reason, drift_from(in_force, draft, measured)
     except REFUSALS as error:
-        return verification, why or str(error), None
+        return verification, reason or str(error), None

@@ -112,16 +112,16 @@ class UdpFeed:
 
     def open(self) -> None:
         family = socket.AF_INET6 if ":" in self._place[0] else socket.AF_INET
-        made = socket.socket(family, socket.SOCK_DGRAM)
+        udp_socket = socket.socket(family, socket.SOCK_DGRAM)
         try:
-            made.bind(self._place)
+            udp_socket.bind(self._place)
         except OSError as error:
-            made.close()
+            udp_socket.close()
             raise BadInput(
                 f"{self.name}: cannot listen there ({error}); name an address of this computer and a free port"
             ) from error
-        made.setblocking(False)
-        self._socket, self._is_known = made, False
+        udp_socket.setblocking(False)
+        self._socket, self._is_known = udp_socket, False
 
     def take(self) -> bytes | None:
         """Return the lines that have arrived, each whole: a datagram without a line end is a line. It has no end."""

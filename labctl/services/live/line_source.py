@@ -82,8 +82,8 @@ class LineSource:
         return int(np.sum(np.rint(steps[steps > GAP * self._spacing_s] / self._spacing_s) - 1))
 
     def _silence(self, silence_s: float, example: str) -> str:
-        seen = f"; what arrived is no reading: {example}" if example else ""
-        return f"{self.name} gave no reading for {silence_s:.0f} s{seen}; check the sender"
+        example_text = f"; what arrived is no reading: {example}" if example else ""
+        return f"{self.name} gave no reading for {silence_s:.0f} s{example_text}; check the sender"
 
     def ask(self, request: PoseRequest | None) -> None:
         """Leave it to the person at the unit."""

@@ -82,8 +82,8 @@ def _first(error: ValidationError) -> str:
     """Return the first error as text: its place, what is wrong there, and the value that was given."""
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
-    given = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
-    return f"{place}: {first['msg']}{given}"
+    value_text = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
+    return f"{place}: {first['msg']}{value_text}"
 
 
 def limits_of(bench: BenchFile, *, driven: bool = False) -> BenchLimits:

@@ -49,7 +49,7 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
         return None
     now = _expanded(bench, shares)
     outlooks = []
-    for what, table, wider in _wider(plan.recipe):
+    for option, table, wider in _wider(plan.recipe):
         try:
             other = make_plan(wider, limits)
         except PlanRefused:
@@ -58,7 +58,7 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
         if (expanded := _expanded(bench, then)) > WORTH_SHARE * now:
             continue
         more = FurtherMountings(
-            turned=what, expanded=expanded, mountings=len(then) - len(shares),
+            turned=option, expanded=expanded, mountings=len(then) - len(shares),
             more_s=other.expected_s - plan.expected_s, recipe_toml=table,
         )  # fmt: skip
         outlooks.append(more)
@@ -100,11 +100,11 @@ def _wider(recipe: Recipe) -> Iterator[tuple[str, str, Recipe]]:
     table: dict[str, Any] = {**points, "hold_s": 0.0}
     if recipe.indexing is not None:
         table = recipe.indexing.model_dump(exclude_defaults=True)
-    for what, key, angle in TURNS:
+    for option, key, angle in TURNS:
         there = table.get(key, ())
         if angle not in there:
             turned = Indexing.model_validate({**table, key: (*there, angle)})
-            yield what, _toml("indexing", turned), recipe.model_copy(update={"indexing": turned})
+            yield option, _toml("indexing", turned), recipe.model_copy(update={"indexing": turned})
     listed = set(recipe.positions)
     if recipe.inverted is None and not all(str(Position.of(each).upside_down) in listed for each in listed):
         inverted = Inverted.model_validate(points)
@@ -113,10 +113,10 @@ def _wider(recipe: Recipe) -> Iterator[tuple[str, str, Recipe]]:
 
 def _toml(name: str, table: Indexing | Inverted) -> str:
     """Return a table of a recipe as TOML, a line for each key."""
-    given = table.model_dump(exclude_defaults=True)
+    stated = table.model_dump(exclude_defaults=True)
     lines = [
         f"{key} = [{', '.join(f'{each:g}' for each in value)}]" if isinstance(value, tuple) else f"{key} = {value:g}"
-        for key, value in given.items()
+        for key, value in stated.items()
     ]
     return "\n".join([f"[{name}]", *lines])
 

@@ -38,8 +38,8 @@ def allan_of_unit(store: Store, serial: str, recording: int | None, column: str 
     info = RecordingInfo.model_validate(row.info)
     parts = [columns for _, columns in store.recordings.iter_datasets(row.id)]
     _refuse_unknown(f"recording {row.id}", column, parts[0] if parts else {})
-    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return _of_recording(Recording(info, whole), column, row.id)
+    joined_columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return _of_recording(Recording(info, joined_columns), column, row.id)
 
 
 def allan_of_recordings(

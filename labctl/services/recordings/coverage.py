@@ -17,11 +17,11 @@ def covered_of(inspection: RecordingInspection, points: Recording) -> Covered | 
     `points` are its means: what was measured to verify a calibration does not widen the range of one.
     """
     aside = set(np.asarray(points.columns["dataset"])[is_marked(points)].tolist()) if points.columns else set[int]()
-    kept = [place for place, number in enumerate(inspection.dataset) if number not in aside]
-    if not kept:
+    covered = [place for place, number in enumerate(inspection.dataset) if number not in aside]
+    if not covered:
         return None
-    low = [temperature_c for place in kept if (temperature_c := inspection.temperature_low_c[place]) is not None]
-    high = [temperature_c for place in kept if (temperature_c := inspection.temperature_high_c[place]) is not None]
+    low = [temperature_c for place in covered if (temperature_c := inspection.temperature_low_c[place]) is not None]
+    high = [temperature_c for place in covered if (temperature_c := inspection.temperature_high_c[place]) is not None]
     span = (min(low), max(high)) if low and high else (None, None)
-    rates = np.asarray(inspection.rate_low_dps)[kept], np.asarray(inspection.rate_high_dps)[kept]
-    return covered_by(rates, np.asarray(inspection.position)[kept], span, up_rate_dps(points.info))
+    rates = np.asarray(inspection.rate_low_dps)[covered], np.asarray(inspection.rate_high_dps)[covered]
+    return covered_by(rates, np.asarray(inspection.position)[covered], span, up_rate_dps(points.info))

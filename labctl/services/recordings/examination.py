@@ -42,9 +42,9 @@ def inspection_of_file(
     recording of, BadInput for an importer or option that there is not.
     """
     chosen = name or surest(path)
-    given = parsed_options(options)
+    given_options = parsed_options(options)
     out_of_order = OutOfOrder(also_steps=True)
-    if chosen == INTERCHANGE and not given:
+    if chosen == INTERCHANGE and not given_options:
         if column_map is not None or beside:
             raise BadInput(
                 f"{path}: a recording in labctl's own format has no column map and no further files; "
@@ -52,7 +52,7 @@ def inspection_of_file(
             )
         recording = read_recording(path)
     else:
-        recording = read_with(chosen, path, given, column_map, None, beside, out_of_order)
+        recording = read_with(chosen, path, given_options, column_map, None, beside, out_of_order)
     part = examination(recording)
     of_readings = [*out_of_order.findings, *part.findings]
     warnings = [warning_of(each) for each in findings_of(summarise(recording), recording.environment, of_readings)]

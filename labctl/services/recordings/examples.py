@@ -31,14 +31,14 @@ def example(name: str) -> Path:
 def add_simulated(store: Store, request: SimulatedRequest, at: datetime) -> SimulatedRecordingResponse:
     """Make a recording in simulation and take it in. Raises BadInput, RecipeError, PlanRefused."""
     request_made = SimulateRequest(recipe=request.recipe, hide=request.hide, seed=request.seed, clip=request.clip)
-    made = make_recording(request_made, request.serial)
-    recipe, bench, hidden = made.plan.recipe.name, made.bench.name, dict(made.hidden)
-    what = {"recipe": recipe, "bench": bench, "seed": request.seed, "hidden": hidden}
-    number = store.recordings.add_import(made.recording, at, what)
+    made_recording = make_recording(request_made, request.serial)
+    recipe, bench, hidden = made_recording.plan.recipe.name, made_recording.bench.name, dict(made_recording.hidden)
+    details = {"recipe": recipe, "bench": bench, "seed": request.seed, "hidden": hidden}
+    number = store.recordings.add_import(made_recording.recording, at, details)
     row = store.recordings.get(number)
     return SimulatedRecordingResponse(
-        serial=made.recording.info.serial, recording=number, datasets=made.plan.datasets,
-        readings=len(made.recording), suggested_model=model_for(store, row), recipe=recipe,
+        serial=made_recording.recording.info.serial, recording=number, datasets=made_recording.plan.datasets,
+        readings=len(made_recording.recording), suggested_model=model_for(store, row), recipe=recipe,
         bench=bench, seed=request.seed, hidden=hidden,
-        warnings=inspect_stored(store, row, made.recording).warnings,
+        warnings=inspect_stored(store, row, made_recording.recording).warnings,
     )  # fmt: skip

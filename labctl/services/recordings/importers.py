@@ -53,10 +53,10 @@ def as_interchange(
     readings are left out. Raises BadInput for an importer or option
     that there is not, BadRecording for what cannot be read.
     """
-    given = parsed_options(options)
+    given_options = parsed_options(options)
     refuse_unknown(leave_out)
     chosen = name or surest(path)
-    if chosen == INTERCHANGE and not given:
+    if chosen == INTERCHANGE and not given_options:
         if column_map is not None:
             raise _no_map(chosen)
         if beside:
@@ -67,7 +67,7 @@ def as_interchange(
         recording = read_recording(path)
     else:
         in_order = OutOfOrder() if leaves_out_rows(leave_out) else None
-        recording = read_with(chosen, path, given, column_map, accept, beside, in_order)
+        recording = read_with(chosen, path, given_options, column_map, accept, beside, in_order)
     if of_readings := [kind for kind in leave_out if kind != OUT_OF_ORDER]:
         recording = without(recording, of_readings, str(path))
     with staging_folder() as made:
@@ -130,7 +130,7 @@ def read_with(
 
     With `out_of_order` a log is read without the rows whose time goes back, and that says which they were.
     """
-    importer, given = _importer_and_options(name, options)
+    importer, given_options = _importer_and_options(name, options)
     plugin = IMPORTERS.plugin(name)
     if not path.exists():
         raise BadRecording(f"{path}: not found; name the file to import")
@@ -138,17 +138,17 @@ def read_with(
         raise _no_map(name)
     if isinstance(importer, Importer) and beside:
         raise _nothing_beside(name)
-    made: MappedFile | None = None
+    mapped: MappedFile | None = None
     with _failures_named(path, name):
         if isinstance(importer, TableImporter):
             tables = [_table(each, column_map) for each in beside]
-            made = mapped_file(name, importer, path, given, column_map, tables, out_of_order)
+            mapped = mapped_file(name, importer, path, given_options, column_map, tables, out_of_order)
         else:
-            recording = instance_of(Recording)(importer.read(path, given))
-    if made is not None:
+            recording = instance_of(Recording)(importer.read(path, given_options))
+    if mapped is not None:
         if accept is not None:
-            accept(made)
-        recording = made.recording
+            accept(mapped)
+        recording = mapped.recording
     read_by = f"read from {path.name} by importer {name} of {plugin.release}"
     return _checked(path, recording, read_by)
 
@@ -162,11 +162,11 @@ def log_with_map(
     With `out_of_order` the rows whose time goes back are left out.
     """
     chosen = name or surest(path)
-    importer, given = _importer_and_options(chosen, options)
+    importer, given_options = _importer_and_options(chosen, options)
     if not isinstance(importer, TableImporter):
         raise BadInput(f"{path}: importer {chosen} determines the columns itself; import it with `labctl import`")
     with _failures_named(path, chosen):
-        return mapped_file(chosen, importer, path, given, column_map, (), out_of_order)
+        return mapped_file(chosen, importer, path, given_options, column_map, (), out_of_order)
 
 
 @contextmanager
@@ -186,11 +186,11 @@ def _table(path: Path, column_map: ColumnMap | None) -> RawTable:
     if not path.exists():
         raise BadRecording(f"{path}: not found; give the path of the file whose columns are to be added")
     name = surest(path)
-    importer, given = _importer_and_options(name, {})
+    importer, given_options = _importer_and_options(name, {})
     if not isinstance(importer, TableImporter):
         raise _nothing_beside(name)
     with _failures_named(path, name):
-        return importer.table(path, given_layout(given, column_map))
+        return importer.table(path, given_layout(given_options, column_map))
 
 
 def _nothing_beside(name: str) -> BadInput:

@@ -45,11 +45,11 @@ class OutOfOrder:
 
     def rows_in_order(self, table: RawTable, column_map: ColumnMap) -> RawTable:
         """Return the log without those rows."""
-        kept, problem = in_order_of_time(table, column_map)
+        in_order, problem = in_order_of_time(table, column_map)
         if problem is None or not (problem.may_leave_out or self.also_steps):
             return table
         self.findings.append(problem)
-        return kept
+        return in_order
 
     def stated(self, recording: Recording, rows: int) -> Recording:
         """Return a recording whose head states what was left out of the log's rows."""

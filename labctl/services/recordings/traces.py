@@ -50,11 +50,11 @@ def trace(
         inside = [row for row in rows if _overlaps(row, low, high)]
         raw = _is_few(inside, low, high, points)
         trace_points = _readings(store, recording, channel, inside) if raw else envelope_of(store, recording, channel)
-    shown = _binned(trace_points, low, high, points)
+    binned = _binned(trace_points, low, high, points)
     return TraceResponse(
         recording=recording, channel=channel, unit=_unit(info, channel), from_s=low, until_s=high, raw=raw,
-        t_s=shown.t_s.tolist(), min=shown.low.tolist(), max=shown.high.tolist(), mean=shown.mean.tolist(),
-        n=shown.n.astype(np.int64).tolist(), channels=sorted(courses),
+        t_s=binned.t_s.tolist(), min=binned.low.tolist(), max=binned.high.tolist(), mean=binned.mean.tolist(),
+        n=binned.n.astype(np.int64).tolist(), channels=sorted(courses),
     )  # fmt: skip
 
 

@@ -66,8 +66,8 @@ def _of(measured: Measured, axis: str | None) -> Findings:
     if surface is not None:
         findings.values += _of_surface(surface)
         findings.add(sheet.of_recording(surface, measured.recording.info.max_rate_dps))
-        made, lacking = figures.of_surface(surface)
-        findings.figures += made
+        drawn, lacking = figures.of_surface(surface)
+        findings.figures += drawn
         findings.missing += lacking
     if measured.rest is None:
         findings.missing.append(
@@ -120,8 +120,8 @@ def _of_surface(surface: Surface) -> list[Value]:
         "turn_max_ratio": (_over(_most(before), largest_after),
                            "the largest errors are at the slowest rates, where a turn takes longest and drift counts"),
     }  # fmt: skip
-    return [Value(name, surface.name, None if value is None else float(value), why)
-            for name, (value, why) in sentences.items()]  # fmt: skip
+    return [Value(name, surface.name, None if value is None else float(value), reason)
+            for name, (value, reason) in sentences.items()]  # fmt: skip
 
 
 def _of_rest(findings: Findings, measured: Measured, rest: Rest, axis: str, surface: Surface | None) -> None:

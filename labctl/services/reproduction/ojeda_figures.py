@@ -42,7 +42,7 @@ def of_surface(surface: Surface) -> tuple[list[PaperFigure], list[Missing]]:
     fourth, missing = _over_temperature(surface)
     turning = int(np.isfinite(surface.turn_before_deg).sum())
     turned = f"{turning} of {n} data sets, those from 5 deg/s on; below, the error per turn grows without bound."
-    made = [
+    traces = [
         _pair(surface, 3, "error against rate", surface.raw_dps, f"All {n} data sets: output less table rate.",
               one=True),
         *fourth,
@@ -56,10 +56,10 @@ def of_surface(surface: Surface) -> tuple[list[PaperFigure], list[Missing]]:
         _pair(surface, 9, "error per turn, full compensation", surface.turn_after_deg,
               f"{turned} Surface and remaining static bias are taken off (eq. 16). The scale is its own.", y=TURN),
     ]  # fmt: skip
-    for figure in made:
+    for figure in traces:
         figure["title"] = f"{figure['title']}, {name}"
         figure["id"] = f"{figure['id']}-{_slug(name)}"
-    return made, missing
+    return traces, missing
 
 
 def _pair(

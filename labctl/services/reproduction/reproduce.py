@@ -80,8 +80,8 @@ def _rows(printed: Printed, findings: Findings) -> list[NumberResponse]:
             difference=(value or 0.0) - (printed.value or 0.0) if has_both else None, why=why, origin=origin,
         )  # fmt: skip
 
-    made = [row(value.of, value.value, value.why, value.origin) for value in findings.values if value.id == printed.id]
-    return made or [row("", None, "not made; see what could not be made")]
+    rows = [row(value.of, value.value, value.why, value.origin) for value in findings.values if value.id == printed.id]
+    return rows or [row("", None, "not made; see what could not be made")]
 
 
 def _answer(

@@ -86,12 +86,12 @@ def _tables(measured: Measured, axis: str) -> Findings:
     own = measured.recording.info.kind == "coefficients"
     for temperature in paper.TEMPERATURES_C:
         inside = nodes[0] - 0.5 <= temperature <= nodes[-1] + 0.5
-        for name, values, why in (
+        for name, values, reason in (
             ("scale", scale, "another unit: its hump near 23 deg C has another size"),
             ("offset", offset, "another unit: its curve is of the same shape, not of the same numbers"),
         ):
             value = float(np.interp(temperature, nodes, values)) if inside else None
-            said = "taken in as it is printed" if own else why
+            said = "taken in as it is printed" if own else reason
             findings.values.append(
                 Value(
                     f"{name}_{temperature:g}",
@@ -122,7 +122,7 @@ def _in_report_units(result: FitResult, recording: Recording, axis: str) -> tupl
 
 def _claims(name: str, nodes: Array, scale: Array, offset: Array) -> list[Value]:
     deviation = 100.0 * (scale / paper.NOMINAL_MV - 1.0)
-    made = [
+    claims = [
         Value("scale_low", name, float(deviation.min()), "of the table's values; the claim is symmetric"),
         Value("scale_high", name, float(deviation.max()), "of the table's values, which exceed the claim"),
     ]
@@ -131,9 +131,9 @@ def _claims(name: str, nodes: Array, scale: Array, offset: Array) -> list[Value]
         slope = None
         if np.count_nonzero(here) > 1:
             slope = float(np.polyfit(nodes[here], offset[here], 1)[0]) / (paper.NOMINAL_MV / 1000.0)
-        made.append(Value(which, name, slope, "least squares; one number for a curve" if slope is not None else
+        claims.append(Value(which, name, slope, "least squares; one number for a curve" if slope is not None else
                           "fewer than two temperatures there"))  # fmt: skip
-    return made
+    return claims
 
 
 def _nonlinearity(measured: Measured, result: FitResult, axis: str) -> list[Value]:

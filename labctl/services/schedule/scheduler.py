@@ -138,9 +138,11 @@ class Scheduler:
                 self._occupied_until = now
             for row in self._store.starts.due(self._bench, now):
                 due = row.due_at if row.cron is None else self._last_due(row, row.cron, now)
-                if why := self._why_missed(row, due, now):
-                    self._store.starts.take(row, due, self._next(row, now), now, "missed", why)
-                    log.warning("schedule.missed", bench=self._bench, start=row.id, recipe=row.recipe_name, reason=why)
+                if reason := self._why_missed(row, due, now):
+                    self._store.starts.take(row, due, self._next(row, now), now, "missed", reason)
+                    log.warning(
+                        "schedule.missed", bench=self._bench, start=row.id, recipe=row.recipe_name, reason=reason
+                    )
                 elif self._runner.free and self.attended():
                     self._begin(row, due, now)
             self._was_occupied = self._runner.occupied

@@ -54,12 +54,13 @@ class Made:
 
 def simulate_recording(request: SimulateRequest, out: Path, file_format: Literal["parquet", "csv"]) -> SimulateResponse:
     """Simulate a campaign and write its recording to a new folder. Raises BadInput, RecipeError, PlanRefused."""
-    made = make_recording(request)
-    write_recording(made.recording, out, file_format)
+    made_recording = make_recording(request)
+    write_recording(made_recording.recording, out, file_format)
     return SimulateResponse(
-        serial=made.recording.info.serial, datasets=len(np.unique(made.recording.columns["dataset"])),
-        readings=len(made.recording),
-        hidden=dict(made.hidden), folder=str(out),
+        serial=made_recording.recording.info.serial,
+        datasets=len(np.unique(made_recording.recording.columns["dataset"])),
+        readings=len(made_recording.recording),
+        hidden=dict(made_recording.hidden), folder=str(out),
     )  # fmt: skip
 
 

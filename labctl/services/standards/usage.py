@@ -147,9 +147,9 @@ def _text(standard: RegisteredStandard, calibrations: Sequence[AffectedCalibrati
         return
     units = len({calibration.serial for calibration in calibrations})
     issued = [number for calibration in calibrations for number in calibration.certificates]
-    what = "calibration" if len(calibrations) == 1 else "calibrations"
+    noun = "calibration" if len(calibrations) == 1 else "calibrations"
     of, was = ("unit", "was") if units == 1 == len(calibrations) else ("unit" if units == 1 else "units", "were")
-    yield f"{len(calibrations)} {what} of {units} {of} {was} measured with standard {label} on these days."
+    yield f"{len(calibrations)} {noun} of {units} {of} {was} measured with standard {label} on these days."
     if issued:
         yield f"Certificates issued of them: {', '.join(issued)}. Inform those who hold them, and measure again."
     if any(calibration.in_force for calibration in calibrations):

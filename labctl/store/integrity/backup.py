@@ -42,11 +42,11 @@ def copy_database(location: str, target: Path) -> Copy:
     if not target.absolute().parent.is_dir():
         raise BadInput(f"{target}: the folder does not exist; create it first")
     try:
-        with temporary_copy(target.absolute().parent) as made:
-            _copy(location, made)
-            digest = _synced_digest(made)
+        with temporary_copy(target.absolute().parent) as copy_folder:
+            _copy(location, copy_folder)
+            digest = _synced_digest(copy_folder)
             _refuse_existing(target)
-            made.rename(target)
+            copy_folder.rename(target)
         _sync_folder(target.absolute().parent)
     except sqlite3.Error as error:
         raise StoreError(

@@ -174,8 +174,8 @@ class _Check:
 
     def _check_readings(self, connection: sa.Connection) -> bool:
         b, d, r = tables.sample_blocks.c, tables.data_sets.c, tables.recordings.c
-        whole = r.importing.is_(None)  # what is being imported is not there yet
-        kinds = {int(number): kind for number, kind in connection.execute(sa.select(r.id, r.kind).where(whole))}
+        is_complete = r.importing.is_(None)  # what is being imported is not there yet
+        kinds = {int(number): kind for number, kind in connection.execute(sa.select(r.id, r.kind).where(is_complete))}
         total = sa.select(sa.func.count(b.id)).where(_of_whole_recordings(b.recording_id))
         valid = self._valid_readings(connection, int(connection.scalar(total) or 0))
         block_places = set()
@@ -212,8 +212,8 @@ class _Check:
                 self.find("readings", f"recording {recording} data set {number}: blocks before block {seq} are missing")
                 valid[place] = None
             expected[place] = seq + 1
-            where = f"recording {recording} data set {number}"
-            columns = self._unpacked(f"{where} block {seq}", sample_codec.Block(n, codec, crc32, data))
+            place_text = f"recording {recording} data set {number}"
+            columns = self._unpacked(f"{place_text} block {seq}", sample_codec.Block(n, codec, crc32, data))
             self._note_block(recording, number, seq, n, columns)
             before, n_valid = valid.get(place, 0), None if columns is None else _count(columns, n)
             valid[place] = None if n_valid is None or before is None else before + n_valid
@@ -285,7 +285,7 @@ class _Check:
         trail_fits = all(finding.part != "audit" for finding in self.findings)
         self._manifests.check_chain(self._chain_anchors(), trail_fits=trail_fits)
         blocks: Mapping[int, Parts | None] = {
-            recording: None if made is None else made.parts() for recording, made in self._block_parts.items()
+            recording: None if parts is None else parts.parts() for recording, parts in self._block_parts.items()
         }
         self._manifests.check_records(blocks)
         return True
@@ -299,14 +299,14 @@ class _Check:
             return anchors
         path = anchor_path(self._location)
         try:
-            kept = read_anchor(self._location)
+            anchor = read_anchor(self._location)
         except ValueError:
             self._remarks.append(f"{path}: the anchor file is damaged; the end of the chain was not compared with it")
             return anchors
-        if kept is None:
+        if anchor is None:
             self._remarks.append(f"{path}: there is no anchor file; the end of the chain was not compared with it")
             return anchors
-        return {**anchors, f"the anchor file {path.name}": kept}
+        return {**anchors, f"the anchor file {path.name}": anchor}
 
 
 def _of_whole_recordings(recording: sa.ColumnElement[int]) -> sa.ColumnElement[bool]:

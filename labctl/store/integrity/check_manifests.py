@@ -61,7 +61,7 @@ class ManifestCheck:
     def check_chain(self, anchors: Mapping[str, ChainHead], *, trail_fits: bool) -> None:
         """Read the chain; `anchors` are heads that were noted down elsewhere, by where that is."""
         trail = list(self._connection.scalars(sa.select(tables.audit.c.hash).order_by(tables.audit.c.id)))
-        name_by_head = {(head.length, head.hash): where for where, head in anchors.items()}
+        name_by_head = {(head.length, head.hash): source for source, head in anchors.items()}
         hashes: dict[int, str] = {}
         for row, document in self._rows():
             checked_chain = self.chain
@@ -98,14 +98,14 @@ class ManifestCheck:
         checked_chain.trail = max(checked_chain.trail, (document.get("audit") or {}).get("length", 0))
         if not row.kind:
             return
-        made = _Sealed(
+        sealed = _Sealed(
             int(row.sequence), str(document.get("title") or f"{row.kind} {row.record}"), str(row.act),
             str(document.get("at", "")), str(document.get("reason", "")), document.get("parts") or {},
         )  # fmt: skip
-        checked_chain.newest[(row.kind, row.record)] = made
+        checked_chain.newest[(row.kind, row.record)] = sealed
         for name in document.get("unfit", ()):
-            text = f"{name} had been changed by hand before it was changed in order on {made.at[:10]}"
-            self._find(row.kind, f"{made.title}: {text} (manifest {made.sequence}, {made.reason})")
+            text = f"{name} had been changed by hand before it was changed in order on {sealed.at[:10]}"
+            self._find(row.kind, f"{sealed.title}: {text} (manifest {sealed.sequence}, {sealed.reason})")
 
     def _verify(self, row: sa.Row[*tuple[Any, ...]]) -> None:
         if row.signature is None:
@@ -125,15 +125,17 @@ class ManifestCheck:
             self._find("manifests", f"the last {stored_head.length - computed.length} manifests are missing")
         elif stored_head != computed:
             self._find("manifests", "the last manifest is not the one that the head of the chain names")
-        for (length, digest), where in expected.items():
+        for (length, digest), source in expected.items():
             if length > computed.length:
                 self._find(
                     "manifests",
-                    f"{length - computed.length} manifests that {where} counts are missing: the end of the chain was "
+                    f"{length - computed.length} manifests that {source} counts are missing: the end of the chain was "
                     "removed, or an older copy of the database was put in its place",
                 )
             elif hashes.get(length) != digest:
-                self._find("manifests", f"manifest {length} is not the one that {where} names: the chain was rewritten")
+                self._find(
+                    "manifests", f"manifest {length} is not the one that {source} names: the chain was rewritten"
+                )
 
     def _check_signed(self) -> None:
         last, total = self.chain.signed, self.chain.head.length
@@ -164,8 +166,8 @@ class ManifestCheck:
                 for text in self._differing(kind, str(record), sealed, blocks):
                     self._find(kind.name, f"{sealed.title}: {text} (manifest {sealed.sequence}, {sealed.reason})")
             elif record in at_rest:
-                what = "was never sealed" if sealed is None else "was reopened, and has ended without being sealed"
-                self._find(kind.name, f"{kind.name} {record} {what}: it was made or changed without labctl")
+                seal_text = "was never sealed" if sealed is None else "was reopened, and has ended without being sealed"
+                self._find(kind.name, f"{kind.name} {record} {seal_text}: it was made or changed without labctl")
             else:
                 self.chain.not_sealed += 1
 

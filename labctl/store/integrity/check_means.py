@@ -48,10 +48,10 @@ class MeansCheck:
             return []
         if self._kept is None or self._kept.recording != recording:
             self._kept = KeptMeans(self._connection, recording)
-        where = f"recording {recording} data set {number}"
+        place_text = f"recording {recording} data set {number}"
         if any(part.keys() != parts[0].keys() for part in parts):
-            return [f"{where}: the blocks of this data set have different columns"]
-        return [f"{where}: {text}" for text in self._kept.complaints(number, join_blocks(parts))]
+            return [f"{place_text}: the blocks of this data set have different columns"]
+        return [f"{place_text}: {text}" for text in self._kept.complaints(number, join_blocks(parts))]
 
 
 class KeptMeans:
@@ -71,8 +71,8 @@ class KeptMeans:
 
     def complaints(self, number: int, raw: Mapping[str, NDArray[np.generic]]) -> list[str]:
         """Return what does not follow from the readings of a data set, one line a channel."""
-        kept = self._kept.get(number)
-        if not kept:
+        kept_means = self._kept.get(number)
+        if not kept_means:
             return []
         sent = (
             {"t_ns", "valid", "chamber_mc", *(channel["name"] for channel in self._channels)}
@@ -84,7 +84,7 @@ class KeptMeans:
         columns = scaled(dict(raw), self._channels, cast(DataSetHead, self._heads[number])) if self._channels else raw
         valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else slice(None)
         damages = []
-        for channel, mean, std, n in kept:
+        for channel, mean, std, n in kept_means:
             if channel not in columns:
                 damages.append(f"the readings have no column {channel}, but its mean is stored")
                 continue

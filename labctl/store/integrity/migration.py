@@ -48,9 +48,9 @@ def migrate_database(location: str, *, copy: bool) -> Migrated:
             raise StoreError(f"{named}: this is not a labctl database: it has no tables; name another with --database")
         if revision == migrate.HEAD:
             return Migrated(revision, revision, None)
-        made = _copied(location, revision) if copy else None
+        backup_path = _copied(location, revision) if copy else None
         database.upgrade()
-    return Migrated(revision, migrate.HEAD, made)
+    return Migrated(revision, migrate.HEAD, backup_path)
 
 
 def _copied(location: str, revision: str) -> Copy:

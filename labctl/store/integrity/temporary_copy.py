@@ -31,15 +31,15 @@ def temporary_copy(folder: Path) -> Iterator[Path]:
     What killed processes left in the folder is removed first. Raises OSError.
     """
     remove_abandoned(folder)
-    made, handle = _locked_folder(folder)
+    folder_made, handle = _locked_folder(folder)
     try:
-        path = made / COPY
+        path = folder_made / COPY
         file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, FILE)
         os.fchmod(file, FILE)  # whatever the umask takes away
         os.close(file)
         yield path
     finally:
-        shutil.rmtree(made, ignore_errors=True)
+        shutil.rmtree(folder_made, ignore_errors=True)
         os.close(handle)
 
 
@@ -64,18 +64,18 @@ def remove_abandoned(folder: Path) -> list[Path]:
 
 def _locked_folder(folder: Path) -> tuple[Path, int]:
     while True:
-        made = Path(tempfile.mkdtemp(dir=folder, prefix=PREFIX))
+        private_folder = Path(tempfile.mkdtemp(dir=folder, prefix=PREFIX))
         try:
-            made.chmod(stat.S_IRWXU)  # whatever the umask takes away
-            handle = os.open(made, os.O_RDONLY | os.O_DIRECTORY)
+            private_folder.chmod(stat.S_IRWXU)  # whatever the umask takes away
+            handle = os.open(private_folder, os.O_RDONLY | os.O_DIRECTORY)
         except FileNotFoundError:  # a backup that begins at this moment took it for one that was left
             continue
         try:
             free = _lock(handle)
         except OSError:  # a file system without locks: nothing is ever removed there as left
-            return made, handle
-        if free and made.exists():
-            return made, handle
+            return private_folder, handle
+        if free and private_folder.exists():
+            return private_folder, handle
         os.close(handle)
 
 

@@ -97,7 +97,7 @@ def _document(
 ) -> dict[str, object]:
     a = tables.audit_head.c
     trail = connection.execute(sa.select(a.length, a.hash)).first()
-    made: dict[str, object] = {
+    document: dict[str, object] = {
         "schema": SCHEMA,
         "sequence": sequence,
         "previous": previous,
@@ -106,13 +106,13 @@ def _document(
         "audit": None if trail is None else {"length": int(trail.length), "hash": str(trail.hash)},
     }
     if manifest.kind:
-        made |= {
+        document |= {
             "kind": manifest.kind, "record": manifest.record, "title": manifest.title, "reason": manifest.reason,
             "parts": dict(manifest.parts), "supersedes": manifest.supersedes,
         }  # fmt: skip
         if manifest.unfit:
-            made["unfit"] = list(manifest.unfit)
-    return made
+            document["unfit"] = list(manifest.unfit)
+    return document
 
 
 def hash_of(document: bytes) -> str:

@@ -172,7 +172,7 @@ def _dropped(connection: sa.Connection, numbers: Sequence[int]) -> _Found:
     r = tables.recordings.c
     query = sa.select(r.campaign_id, r.gyro, r.dropped).where(r.campaign_id.in_(numbers), r.dropped.is_not(None))
     dropped_by_campaign: dict[int, dict[str, str]] = {}
-    for number, gyro, why in connection.execute(query):
-        dropped_by_campaign.setdefault(number, {})[gyro] = why
+    for number, gyro, reason in connection.execute(query):
+        dropped_by_campaign.setdefault(number, {})[gyro] = reason
     for number, dropped in dropped_by_campaign.items():
         yield number, {"dropped": dropped}

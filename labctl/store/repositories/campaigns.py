@@ -88,13 +88,13 @@ class Campaigns:
                     for index, step in enumerate(new.steps)
                 ],
             )
-            made: dict[int, str] = {}
+            recording_ids: dict[int, str] = {}
             for unit in new.units:
                 info = RecordingInfo.model_validate(unit.info)
                 key = new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
-                made[key] = info.serial
+                recording_ids[key] = info.serial
             if new.recipe.get("fit") is not None:
-                make_due(connection, number, made)
+                make_due(connection, number, recording_ids)
             if new.bench_clear:
                 _confirmed(connection, number, new.bench_clear, at)
             append(connection, at, "campaign start", f"campaign {number}", _audited(new))
@@ -171,9 +171,11 @@ class Campaigns:
         with self._database.reading() as connection:
             rows = [dict(row) for row in connection.execute(query.where(condition).order_by(c.id.desc())).mappings()]
             chosen = sa.select(c.id).where(condition)
-            made = connection.execute(sa.select(r.campaign_id, r.serial, r.id).where(r.campaign_id.in_(chosen))).all()
+            recording_rows = connection.execute(
+                sa.select(r.campaign_id, r.serial, r.id).where(r.campaign_id.in_(chosen))
+            ).all()
         recordings: dict[int, dict[str, int]] = {}
-        for campaign, serial, recording in made:
+        for campaign, serial, recording in recording_rows:
             recordings.setdefault(campaign, {})[serial] = recording
         return [CampaignRow(**row, recordings=recordings.get(row["id"], {})) for row in rows]
 

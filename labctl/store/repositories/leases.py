@@ -59,12 +59,12 @@ class Leases:
                 if replacing is None:
                     connection.execute(sa.insert(x).values(**asdict(lease)))
                     return True
-                seen = (
+                is_unchanged = (
                     x.c.bench_name == lease.bench_name,
                     x.c.owner == replacing.owner,
                     x.c.beat == replacing.beat,
                 )
-                return connection.execute(sa.update(x).where(*seen).values(**asdict(lease))).rowcount == 1
+                return connection.execute(sa.update(x).where(*is_unchanged).values(**asdict(lease))).rowcount == 1
         except exc.IntegrityError:
             return False
 

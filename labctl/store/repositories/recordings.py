@@ -103,8 +103,8 @@ class Recordings:
         try:
             for part in import_parts(ticket.recording, recording):
                 imports.add_part(ticket, part)
-            what = {"serial": info.serial, "kind": info.kind, "rows": len(recording), **(simulated or {})}
-            return imports.finish(ticket, at, "import" if simulated is None else "simulate", what)
+            details = {"serial": info.serial, "kind": info.kind, "rows": len(recording), **(simulated or {})}
+            return imports.finish(ticket, at, "import" if simulated is None else "simulate", details)
         except BaseException:
             with suppress(LabctlError):  # what is left is discarded when the database is next opened for writing
                 imports.discard(ticket)
@@ -167,8 +167,8 @@ class Recordings:
         sets = sa.select(d.number, d.state, d.n).where(d.recording_id == recording).order_by(d.number)
         packed = sa.select(b.number, b.seq, b.n, b.crc32).where(b.recording_id == recording)
         if complete:
-            whole = sa.and_(d.recording_id == recording, d.state == "complete")
-            sets, packed = sets.where(whole), packed.where(b.number.in_(sa.select(d.number).where(whole)))
+            is_complete = sa.and_(d.recording_id == recording, d.state == "complete")
+            sets, packed = sets.where(is_complete), packed.where(b.number.in_(sa.select(d.number).where(is_complete)))
         ours = (
             sets,
             packed.order_by(b.number, b.seq),

@@ -17,8 +17,8 @@ from labctl.store.schema import tables
 
 def _measured() -> sa.ColumnElement[bool]:
     r, s = tables.recordings.c, tables.sensor_versions.c
-    whole = sa.exists().where(r.serial == tables.units.c.serial, r.importing.is_(None))
-    return sa.or_(whole, sa.exists().where(s.serial == tables.units.c.serial))
+    is_complete = sa.exists().where(r.serial == tables.units.c.serial, r.importing.is_(None))
+    return sa.or_(is_complete, sa.exists().where(s.serial == tables.units.c.serial))
 
 
 #: Serial numbers that begin or end with so many equal characters are compared whole.

@@ -20,13 +20,13 @@ def withdraw(
 ) -> None:
     """Withdraw a certificate that is not withdrawn yet, inside a transaction; `reason` is that of its manifest."""
     w = tables.certificate_withdrawals
-    made = connection.scalar(
+    withdrawal_id = connection.scalar(
         sa.insert(w).values(
             number=number, by=withdrawal.by, by_key=withdrawal.by_key, reason=withdrawal.reason, at=withdrawal.at,
             certification_id=withdrawal.act,
         ).returning(w.c.id)
     )  # fmt: skip
-    seal(connection, (WITHDRAWAL.name, str(made)), sealed_at, reason)
+    seal(connection, (WITHDRAWAL.name, str(withdrawal_id)), sealed_at, reason)
 
 
 def withdraw_of_version(connection: sa.Connection, serial: str, version: int, withdrawal: Withdrawal) -> list[str]:
@@ -58,12 +58,12 @@ def _standing(connection: sa.Connection, serial: str, version: int, issued_until
 def withdraw_of_revocations(connection: sa.Connection) -> None:
     """Withdraw the certificates of versions that were revoked when no withdrawals were kept: of migration 0019."""
     sealed_at = SystemClock().utc()
-    why = f"withdrawn by migration on {sealed_at:%Y-%m-%d}"
+    reason = f"withdrawn by migration on {sealed_at:%Y-%m-%d}"
     x = tables.certifications.c
     revoked = sa.select(x.id, x.serial, x.version, x.by, x.reason, x.at).where(x.act == "revoke").order_by(x.id)
     chain.begin(connection)
     for row in connection.execute(revoked).all():
         withdrawal = Withdrawal(row.by, None, row.reason, row.at, int(row.id))
         for number in _standing(connection, row.serial, row.version, row.at):
-            withdraw(connection, number, withdrawal, sealed_at, why)
+            withdraw(connection, number, withdrawal, sealed_at, reason)
     chain.finish(connection)

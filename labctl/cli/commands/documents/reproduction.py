@@ -62,7 +62,7 @@ def reproduce(
 
 
 def _print(answer: ReproductionResponse) -> None:
-    shown = table(
+    rows = table(
         answer.title,
         "place",
         "quantity",
@@ -75,8 +75,8 @@ def _print(answer: ReproductionResponse) -> None:
         numbers=3,
     )
     for number in answer.numbers:
-        shown.add_row(number.place, number.quantity, number.unit, number.of, number.origin, *_cells(number))
-    console.print(shown)
+        rows.add_row(number.place, number.quantity, number.unit, number.of, number.origin, *_cells(number))
+    console.print(rows)
     for line in answer.story:
         console.print(line)
     for part in answer.missing:

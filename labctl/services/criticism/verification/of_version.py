@@ -320,8 +320,8 @@ def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[n
     needed = {name: np.asarray(data.channels[name], dtype=np.float64) for name in compensator.needs}
     if not compensator.remembers:
         return needed
-    kept = {name: data.channels[name] for name in ("run", "temperature_c") if name in data.channels}
-    return {**needed, **{name: np.asarray(values, dtype=np.float64) for name, values in kept.items()}}
+    channels = {name: data.channels[name] for name in ("run", "temperature_c") if name in data.channels}
+    return {**needed, **{name: np.asarray(values, dtype=np.float64) for name, values in channels.items()}}
 
 
 def expected_dps(row: CalibrationRecord) -> float | None:
