@@ -13,7 +13,7 @@ from procedures.recipe.recipe import Recipe, parse_recipe, read_recipe, shipped_
 GOOD = 'name = "a"\ntemperatures_c = [20]\nrates_dps = [0, 10]\npositions = ["z"]\n'
 
 
-def test_what_ships() -> None:
+def test_shipped_recipes_are_listed() -> None:
     assert set(shipped_recipes()) >= {
         "table1-x-table2",
         "yang-23-rates",
