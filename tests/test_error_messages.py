@@ -36,7 +36,7 @@ ADVICE = re.compile(
 )
 
 
-#: What a campaign fails with: labctl/services/campaigns/advice.py says what to do, and its tests hold that.
+#: What a campaign fails with: labctl/services/campaigns/failure_advice.py says what to do, and its tests hold that.
 REASONS_OF_CAMPAIGNS = frozenset({"StepFailed", "SoakFailed", "BadData", "GuardTripped", "TableStopped", "Unanswered"})
 PASSED_ON = "the text that it passes on says what to do"
 #: Messages without an instruction, by module and beginning, and why.

@@ -53,7 +53,7 @@ def check(
 @app.command("ports")
 def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001  every command takes it
     """List the serial ports of this computer: name for a bench file, USB adapter, and what prevents its use."""
-    from labctl.services.benches.ports import list_ports
+    from labctl.services.benches.serial_ports import list_ports
 
     port_listing = list_ports()
     if as_json:

@@ -16,9 +16,7 @@ from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.common_turn_error import with_common_error
-from labctl.fitting.estimation.held import considered, joint_covariance
-from labctl.fitting.estimation.reference_time import TimeErrors, time_errors
-from labctl.fitting.estimation.response import (
+from labctl.fitting.estimation.delay_and_bandwidth import (
     first_response,
     next_response,
     response_at,
@@ -26,6 +24,8 @@ from labctl.fitting.estimation.response import (
     with_response,
     without_response,
 )
+from labctl.fitting.estimation.held import considered, joint_covariance
+from labctl.fitting.estimation.reference_time import TimeErrors, time_errors
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.error_part import ErrorPart
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel

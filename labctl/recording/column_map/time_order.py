@@ -13,8 +13,8 @@ from labctl.recording.column_map.stamps import spread_between
 from labctl.recording.column_map.units import find_unit
 from labctl.recording.raw_table import RawTable
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.clock import check_clock, rows_in_order
 from labctl.recording.sanity.readings.series import Series, rows_in_words
+from labctl.recording.sanity.readings.time_stamps import check_clock, rows_in_order
 
 
 def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, Finding | None]:

@@ -14,8 +14,8 @@ from labctl.acting_user import actor
 from labctl.config import default_database
 from labctl.errors import Conflict, DiskFull, Stopped, StoreError
 from labctl.log import get_logger
-from labctl.log.campaign_journal import LoggedJournal
 from labctl.log.context import for_campaign
+from labctl.log.logged_journal import LoggedJournal
 from labctl.services.benches.confirmation import SafeStateRetry, describe_safe_state
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.pace import with_pace_watch

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 from instruments.bench_config import BenchFile
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.benches.identity import reported_in
-from labctl.services.campaigns.advice import advice_of
+from labctl.services.campaigns.failure_advice import advice_of
 from labctl.services.schemas.campaigns import CampaignResponse, EventResponse
 from labctl.services.schemas.reports.campaign_parts import (
     DriverResponse,

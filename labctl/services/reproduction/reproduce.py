@@ -13,14 +13,14 @@ from labctl.papers import PAPERS, Paper, Printed
 from labctl.plots import paper_html
 from labctl.progress import report_stage
 from labctl.services.reproduction import ojeda, weiss, yang
-from labctl.services.reproduction.findings import Findings, points_in
-from labctl.services.reproduction.response import (
+from labctl.services.reproduction.answer import (
     ContradictionResponse,
     FigureResponse,
     MissingResponse,
     NumberResponse,
     ReproductionResponse,
 )
+from labctl.services.reproduction.findings import Findings, points_in
 from labctl.services.reproduction.sources import of_unit
 from labctl.store import Store
 

@@ -12,7 +12,7 @@ import pytest
 
 from instruments.clock import VirtualClock
 from labctl.errors import StoreError
-from labctl.log.campaign_journal import LoggedJournal
+from labctl.log.logged_journal import LoggedJournal
 from labctl.log.setup import running_log
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare

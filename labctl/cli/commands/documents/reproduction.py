@@ -13,7 +13,7 @@ from labctl.cli.output import console, format_number, print_json, table
 from labctl.cli.stage_line import stage_line
 
 if TYPE_CHECKING:
-    from labctl.services.reproduction.response import NumberResponse, ReproductionResponse
+    from labctl.services.reproduction.answer import NumberResponse, ReproductionResponse
 
 
 def reproduce(

@@ -14,11 +14,9 @@ from labctl.recording.points import dataset_starts
 from labctl.recording.recording import Recording
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.changes import check_noise, check_sampling
-from labctl.recording.sanity.readings.clock import check_clock, check_gaps
 from labctl.recording.sanity.readings.constant import check_frozen, check_repeated
 from labctl.recording.sanity.readings.exchanged import check_exchanged
 from labctl.recording.sanity.readings.factors import check_factors
-from labctl.recording.sanity.readings.lines import check_lines
 from labctl.recording.sanity.readings.mixture import check_copies, check_devices, check_units
 from labctl.recording.sanity.readings.series import (
     Array,
@@ -32,8 +30,10 @@ from labctl.recording.sanity.readings.series import (
     spread_of,
 )
 from labctl.recording.sanity.readings.shifted import check_shifted
+from labctl.recording.sanity.readings.spectral_lines import check_lines
 from labctl.recording.sanity.readings.sudden import check_moved, check_spikes
 from labctl.recording.sanity.readings.thermometers import check_thermometers
+from labctl.recording.sanity.readings.time_stamps import check_clock, check_gaps
 
 #: Bins of a course, at most; readings below twice as many are drawn one by one.
 BINS = 600

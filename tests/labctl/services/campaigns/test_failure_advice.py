@@ -15,8 +15,8 @@ from instruments.errors import NoReply
 from labctl.api import create_app
 from labctl.cli.printing.campaigns import print_campaign
 from labctl.services.campaigns import preparation
-from labctl.services.campaigns.advice import DID_NOTHING, DID_SAFE, DID_UNSAFE, FAILURES, LOOK, OTHER, advice_of
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.failure_advice import DID_NOTHING, DID_SAFE, DID_UNSAFE, FAILURES, LOOK, OTHER, advice_of
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import limits_of, load_bench
