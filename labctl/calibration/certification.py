@@ -99,7 +99,7 @@ def _said(at: datetime) -> str:
     return f"{at.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
 
 
-def with_certification(content: bytes, certification: Certification) -> tuple[bytes, str]:
+def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:
     """Return the bytes of a calibration file with its certification, and their hash, which covers it."""
-    full, digest = with_own_hash({**json.loads(content), "certification": certification.to_json()})
+    full, digest = with_own_hash({**json.loads(content), "certification": known.to_json()})
     return full + b"\n", digest

@@ -21,7 +21,7 @@ LARGEST_NUMBER = (1 << 31) - 1
 NUMBERS = ("dataset", "run", "mounting", "n")
 
 
-def refuse_too_many_data_sets(source: Path | str, info: RecordingInfo, columns: Columns) -> None:
+def refuse_too_many_data_sets(where: Path | str, info: RecordingInfo, columns: Columns) -> None:
     """Raise BadRecording for a recording of more data sets than are imported at once."""
     if info.kind == "coefficients":
         return
@@ -29,7 +29,7 @@ def refuse_too_many_data_sets(source: Path | str, info: RecordingInfo, columns: 
     sets = len(numbers) if info.kind == "points" else len(dataset_starts(numbers)) if len(numbers) else 0
     if sets > MOST_DATA_SETS:
         raise BadRecording(
-            f"{source}: {sets} data sets; at most {MOST_DATA_SETS} are imported at once; divide the recording, or give "
+            f"{where}: {sets} data sets; at most {MOST_DATA_SETS} are imported at once; divide the recording, or give "
             "readings at one rate and temperature one data set number (a data set is a series of readings, not a "
             "single reading)"
         )
