@@ -42,29 +42,28 @@ def readable_certificate(certificate: Certificate) -> bytes:
     return json.dumps(_pages(certificate), ensure_ascii=False, sort_keys=True).encode()
 
 
-def _pages(certificate: Certificate) -> dict[str, object]:
+def _pages(record: Certificate) -> dict[str, object]:
     return {
-        "title": certificate.title,
-        "number": certificate.number,
-        "version": certificate.calibration.version,
-        "laboratory": _address(certificate.laboratory),
-        "laboratory_name": certificate.laboratory.name,
-        "specimen": next((text for text in certificate.statements if text.startswith("SPECIMEN")), ""),
-        "facts": _facts(certificate),
-        "issued": certificate.issued_on.isoformat(),
-        "issued_by": certificate.issued_by
-        + (f" ({certificate.issued_by_identity})" if certificate.issued_by_identity else ""),
-        "authorised": f"{certificate.authorised.persons}, {certificate.authorised.at:%Y-%m-%d %H:%M} UTC",
-        "authorised_name": certificate.authorised.name,
-        "signature": _signature(certificate),
-        "method": _method(certificate),
-        "plan_hash": certificate.method.plan_hash or "",
+        "title": record.title,
+        "number": record.number,
+        "version": record.calibration.version,
+        "laboratory": _address(record.laboratory),
+        "laboratory_name": record.laboratory.name,
+        "specimen": next((text for text in record.statements if text.startswith("SPECIMEN")), ""),
+        "facts": _facts(record),
+        "issued": record.issued_on.isoformat(),
+        "issued_by": record.issued_by + (f" ({record.issued_by_identity})" if record.issued_by_identity else ""),
+        "authorised": f"{record.authorised.persons}, {record.authorised.at:%Y-%m-%d %H:%M} UTC",
+        "authorised_name": record.authorised.name,
+        "signature": _signature(record),
+        "method": _method(record),
+        "plan_hash": record.method.plan_hash or "",
         "environment": [
             [each.name, _signed(f"{each.low:.2f}"), _signed(f"{each.high:.2f}"), each.unit]
-            for each in certificate.environment
+            for each in record.environment
         ],
-        "standards": [_standard(standard) for standard in certificate.standards],
-        "uncertainty": uncertainty_text(certificate),
+        "standards": [_standard(standard) for standard in record.standards],
+        "uncertainty": uncertainty_text(record),
         "budget": [
             [
                 each.source.replace("_", " "),
@@ -72,28 +71,26 @@ def _pages(certificate: Certificate) -> dict[str, object]:
                 f"{Decimal(f'{each.contribution_dps:.2g}'):f}",
                 _freedom(each.freedom),
             ]
-            for each in certificate.uncertainty.budget
+            for each in record.uncertainty.budget
         ],
-        "results": _results(certificate.results),
-        "any_axis": [_any_axis(each) for each in certificate.any_axis],
-        "any_axis_text": _any_axis_text(certificate),
+        "results": _results(record.results),
+        "any_axis": [_any_axis(each) for each in record.any_axis],
+        "any_axis_text": _any_axis_text(record),
         "states": [
-            _state("As found, before adjustment", certificate.as_found),
-            _state("As left, after adjustment", certificate.as_left),
+            _state("As found, before adjustment", record.as_found),
+            _state("As left, after adjustment", record.as_left),
         ],
-        "adjustment": certificate.adjustment,
-        "coefficients": [_coefficient(coefficient) for coefficient in certificate.coefficients],
-        "sensors": [_sensor(sensor) for sensor in certificate.sensors],
-        "conformity": _conformity(certificate),
-        "external": certificate.external,
-        "due": certificate.due.isoformat() if certificate.due else "",
-        "statements": [text for text in certificate.statements if not text.startswith("SPECIMEN")],
-        "hash": certificate.calibration.hash,
-        "address": certificate.calibration.address,
-        "page": certificate.state_address,
-        "manifests": [
-            [f"Manifest {manifest.manifest}, {manifest.record}", manifest.hash] for manifest in certificate.manifests
-        ],
+        "adjustment": record.adjustment,
+        "coefficients": [_coefficient(coefficient) for coefficient in record.coefficients],
+        "sensors": [_sensor(sensor) for sensor in record.sensors],
+        "conformity": _conformity(record),
+        "external": record.external,
+        "due": record.due.isoformat() if record.due else "",
+        "statements": [text for text in record.statements if not text.startswith("SPECIMEN")],
+        "hash": record.calibration.hash,
+        "address": record.calibration.address,
+        "page": record.state_address,
+        "manifests": [[f"Manifest {seal.manifest}, {seal.record}", seal.hash] for seal in record.manifests],
     }
 
 

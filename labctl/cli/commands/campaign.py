@@ -157,14 +157,8 @@ def start(
     from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest
 
     with one_clear_line():
-        start_options = {
-            "at": at,
-            "cron": cron,
-            "time_zone": time_zone,
-            "late_limit_s": late_limit_s,
-            "priority": priority,
-        }
-        given: dict[str, Any] = {name: value for name, value in start_options.items() if value is not None}
+        timing = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}
+        given: dict[str, Any] = {name: value for name, value in timing.items() if value is not None}
         if clear_confirmed_by is not None:
             given |= {"confirmed_by": clear_confirmed_by, "checks": list(BENCH_CHECKS)}
         if hide:
@@ -173,11 +167,9 @@ def start(
             given["fit"] = False
         request = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **given})
         start_at = simulated_start(simulated_from)
-        campaign_start = CampaignStart(
-            request, bench=bench, speed=speed, seed=seed, simulated_start=start_at, wire_log=wire_log
-        )
+        order = CampaignStart(request, bench=bench, speed=speed, seed=seed, simulated_start=start_at, wire_log=wire_log)
         with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
-            answer = commands.execute(START_CAMPAIGN, campaign_start)
+            answer = commands.execute(START_CAMPAIGN, order)
     print_started(answer, as_json=as_json)
 
 

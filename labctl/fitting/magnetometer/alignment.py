@@ -145,37 +145,35 @@ def _start(parts: _Seen) -> NDArray[np.float64]:
 
 
 def _equations(
-    field_seen: _Seen, turn: NDArray[np.float64], dip: float
+    field: _Seen, turn: NDArray[np.float64], dip: float
 ) -> tuple[Array, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return residuals (r,), derivatives (r, 4) by turn and dip, known noise (r, r), and that by 1 rad^2 per rest.
 
     One residual of each used rest, two of each used move.
     """
-    solved, k = field_seen.solved, len(field_seen.direction)
+    solved, k = field.solved, len(field.direction)
     accelerometer, gyro, moves = solved.accelerometer, solved.gyro, solved.moves
-    body = field_seen.direction @ turn.T
-    rest_numbers = np.flatnonzero(accelerometer.used)
+    body = field.direction @ turn.T
+    at_rest = np.flatnonzero(accelerometer.used)
     up = accelerometer.up
-    size = len(rest_numbers) + 2 * int(np.count_nonzero(gyro.used))
+    size = len(at_rest) + 2 * int(np.count_nonzero(gyro.used))
     residual, jacobian = np.zeros(size), np.zeros((size, 4))
     by_seen, by_tilt = np.zeros((size, k, 3)), np.zeros((size, k, 3))
     by_bias, by_gyro, by_force = np.zeros((size, k, 3)), np.zeros((size, 9)), np.zeros((size, 9))
-    here = np.arange(len(rest_numbers))
-    residual[here] = np.sum(up[rest_numbers] * body[rest_numbers], axis=1) - dip
-    jacobian[here, :3] = -np.einsum("ka,kab->kb", up[rest_numbers], cross_matrix(body[rest_numbers]))
+    here = np.arange(len(at_rest))
+    residual[here] = np.sum(up[at_rest] * body[at_rest], axis=1) - dip
+    jacobian[here, :3] = -np.einsum("ka,kab->kb", up[at_rest], cross_matrix(body[at_rest]))
     jacobian[here, 3] = -1.0
-    by_seen[here, rest_numbers] = up[rest_numbers] @ turn
-    by_tilt[here, rest_numbers] = np.einsum(
-        "ka,kab->kb", body[rest_numbers], level_by_reading(accelerometer)[rest_numbers]
-    )
-    by_force[here] = np.einsum("ka,kab->kb", body[rest_numbers], level_by_parameters(accelerometer)[rest_numbers])
+    by_seen[here, at_rest] = up[at_rest] @ turn
+    by_tilt[here, at_rest] = np.einsum("ka,kab->kb", body[at_rest], level_by_reading(accelerometer)[at_rest])
+    by_force[here] = np.einsum("ka,kab->kb", body[at_rest], level_by_parameters(accelerometer)[at_rest])
     own = np.zeros((size, size))
     before = moves.before[gyro.used]
     parts = gyro.equations.take(gyro.used).rotations
     start, end = body[before], body[before + 1]
     across, back = tangents(end), parts.matrix.transpose(0, 2, 1)
     turned = across @ change_of_direction(start, parts.matrix)
-    pairs = len(rest_numbers) + np.arange(size - len(rest_numbers)).reshape(-1, 2)
+    pairs = len(at_rest) + np.arange(size - len(at_rest)).reshape(-1, 2)
     residual[pairs] = np.einsum("mca,ma->mc", across, seen_at_end(start, parts.matrix) - end)
     jacobian[pairs, :3] = across @ (cross_matrix(end) - back @ cross_matrix(start))
     by_seen[pairs, before[:, None]] = across @ back @ turn
@@ -183,19 +181,19 @@ def _equations(
     by_bias[pairs, before[:, None]] = turned @ parts.by_bias_before
     by_bias[pairs, before[:, None] + 1] = turned @ parts.by_bias_after
     by_gyro[pairs] = turned @ parts.by_error
-    each = of_each_move(moves.take(gyro.used), parts.white, turned, field_seen.readings_u)
-    own[len(rest_numbers) :, len(rest_numbers) :] = block_diag(*each)
+    each = of_each_move(moves.take(gyro.used), parts.white, turned, field.readings_u)
+    own[len(at_rest) :, len(at_rest) :] = block_diag(*each)
 
     flat = by_seen.reshape(size, -1)
     tilt = (by_tilt * accelerometer.u_rest_g[:, None]).reshape(size, -1)
     drift = (by_bias * np.radians(solved.bias.u_rest_dps)).reshape(size, -1)
-    iron = np.einsum("rka,kab->rb", by_seen, field_seen.by_parameters)
+    iron = np.einsum("rka,kab->rb", by_seen, field.by_parameters)
     noise = (
-        own + flat @ block_diag(*field_seen.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
-        + iron @ field_seen.parameters @ iron.T + by_gyro @ gyro.covariance @ by_gyro.T
+        own + flat @ block_diag(*field.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
+        + iron @ field.parameters @ iron.T + by_gyro @ gyro.covariance @ by_gyro.T
         + by_force @ accelerometer.covariance @ by_force.T
     )  # fmt: skip
-    return residual, jacobian, noise, flat @ block_diag(*field_seen.across) @ flat.T
+    return residual, jacobian, noise, flat @ block_diag(*field.across) @ flat.T
 
 
 def _rotation(vector: Array) -> NDArray[np.float64]:
