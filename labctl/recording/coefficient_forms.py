@@ -115,14 +115,14 @@ def check_coefficients(path: Path, info: RecordingInfo, columns: Mapping[str, ob
             "of a coefficient. A misalignment is "
             "given as k_xy (output x per rate about y) with all of K and B"
         )
-    stated = [f"u_{name}" for name in coefficients if f"u_{name}" in columns]
+    u_columns = [f"u_{name}" for name in coefficients if f"u_{name}" in columns]
     lacking = [f"u_{name}" for name in coefficients if f"u_{name}" not in columns]
-    if stated and lacking:
+    if u_columns and lacking:
         raise BadRecording(
-            f"{path}: column {lacking[0]!r} is missing, although column {stated[0]!r} is present; give the "
+            f"{path}: column {lacking[0]!r} is missing, although column {u_columns[0]!r} is present; give the "
             "standard uncertainty of every coefficient, or of none"
         )
-    for name in stated:
+    for name in u_columns:
         _check_u(path, name, columns)
 
 

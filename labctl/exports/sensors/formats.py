@@ -60,10 +60,10 @@ def format_of(parameters: Parameters, name: str) -> SensorFormat:
 
 def written(parameters: Parameters, head: Sequence[str], name: str, instance: int | None, device_id: int | None) -> str:
     """Return a sensor's calibration in a format. Raises BadInput for what the format cannot express."""
-    chosen = format_of(parameters, name)
-    if chosen.first is not None:
-        return chosen.write(parameters, head, chosen.first if instance is None else instance, device_id)
+    sensor_format = format_of(parameters, name)
+    if sensor_format.first is not None:
+        return sensor_format.write(parameters, head, sensor_format.first if instance is None else instance, device_id)
     stated_options: dict[str, Any] = {"--instance": instance, "--device-id": device_id}
     if wrong := [option for option, value in stated_options.items() if value is not None]:
         raise BadInput(f"--export {name} takes no {wrong[0]}: it is for the parameters of an autopilot; leave it out")
-    return chosen.write(parameters, head)
+    return sensor_format.write(parameters, head)

@@ -68,5 +68,5 @@ def _angles_deg(k: Matrix) -> NDArray[np.float64]:
     turned = skew / 2 * (angle / sine if sine > 1e-15 else 1.0)
     # output = K rate: a triad turned by +a sees the rate turned by -a
     rows = symmetric / np.linalg.norm(symmetric, axis=1, keepdims=True)
-    off = [float(np.arcsin(np.clip(rows[i] @ rows[j], -1.0, 1.0))) for i, j in PAIRS]
-    return np.rad2deg(np.array([*(-turned), *off]))
+    angle_errors_deg = [float(np.arcsin(np.clip(rows[i] @ rows[j], -1.0, 1.0))) for i, j in PAIRS]
+    return np.rad2deg(np.array([*(-turned), *angle_errors_deg]))

@@ -73,8 +73,8 @@ def slope_over(temperature_c: Array, estimates: list[Estimate]) -> Estimate | No
     weights = columns[:, 1] / float(columns[:, 1] @ columns[:, 1])
     own = [estimate.u for estimate in estimates if estimate.u is not None]
     carried = float(np.sqrt(np.sum((weights * np.array(own)) ** 2))) if len(own) == len(estimates) else None
-    stated = [each for each in (u[1], carried) if each is not None]
-    return Estimate(values[1], max(stated) if stated else None)
+    stated_u = [each for each in (u[1], carried) if each is not None]
+    return Estimate(values[1], max(stated_u) if stated_u else None)
 
 
 def different_rates(rate_dps: Array) -> int:

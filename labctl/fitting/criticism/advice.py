@@ -126,10 +126,12 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
     errors: tuple[list[dict[str, Array]], list[dict[str, Array]]] = ([], [])
     for data_used, left_out in parts_of(data, inner_only=presets[0].inner_only):
         try:
-            both = [_left(data_used, left_out, p, axis_errors) for p, axis_errors in zip(presets, whole, strict=True)]
+            axis_rms = [
+                _left(data_used, left_out, p, axis_errors) for p, axis_errors in zip(presets, whole, strict=True)
+            ]
         except LabctlError:  # a part that the others do not determine says nothing
             continue
-        for parts, values in zip(errors, both, strict=True):
+        for parts, values in zip(errors, axis_rms, strict=True):
             parts.append(values)
     before, after = (_pooled(parts) for parts in errors)
     least_gain = LEAST_GAIN if np.any(data.channels.table_rate_dps()) else LEAST_GAIN_AT_REST
@@ -165,9 +167,9 @@ def _left(
 ) -> dict[str, Array]:
     """Return axis -> errors of data sets left out, corrected by what would be exported of a fit to the others."""
     model, rows = preset.build(data_used)
-    used = data_used.take(rows)
-    require_enough_data(used, model)
-    solutions = solve_axes(used, model, axis_solutions)
+    training = data_used.take(rows)
+    require_enough_data(training, model)
+    solutions = solve_axes(training, model, axis_solutions)
     fitted = FittedModel(model, solutions.fits)
     for term in model.terms:
         fitted = fitted if is_carried(term) else without(fitted, term.effect)

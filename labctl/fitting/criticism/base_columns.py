@@ -43,10 +43,11 @@ def _slope_errors(data: ReducedRecording, model: ErrorModel, axis: str) -> NDArr
         return None
     nodes_c = np.asarray(model.temperature.nodes_c)
     temperature_c = data.nodes.temperature_c(axis)
-    off = temperature_c[:, None] - nodes_c[None, :]
-    nearest = np.argmin(np.abs(off), axis=1)[:, None] == np.arange(len(nodes_c))
+    from_node_k = temperature_c[:, None] - nodes_c[None, :]
+    nearest = np.argmin(np.abs(from_node_k), axis=1)[:, None] == np.arange(len(nodes_c))
     sides = np.concatenate(
-        [np.where(nearest, np.minimum(off, 0.0), 0.0), np.where(nearest, np.maximum(off, 0.0), 0.0)], axis=1
+        [np.where(nearest, np.minimum(from_node_k, 0.0), 0.0), np.where(nearest, np.maximum(from_node_k, 0.0), 0.0)],
+        axis=1,
     )
     of_node = np.repeat(slope[0], len(temperature_c) // len(data))
     return np.asarray(SLOPE_ERROR * data.rows_of(of_node[:, None] * sides))

@@ -168,5 +168,9 @@ def _smooth(data: ReducedRecording, axis: str, name: str, values: Array, number:
     scale = CandidateShape(name, None, scaled, tuple(f"{each} x rate" for each in names), ("1",) * len(names))
     if name != "temperature_c":
         return [bias, scale]
-    both = np.concatenate([bias.rows, scale.rows], axis=2)
-    return [bias, scale, CandidateShape(name, None, both, bias.names + scale.names, bias.units + scale.units)]
+    columns_of_both = np.concatenate([bias.rows, scale.rows], axis=2)
+    return [
+        bias,
+        scale,
+        CandidateShape(name, None, columns_of_both, bias.names + scale.names, bias.units + scale.units),
+    ]

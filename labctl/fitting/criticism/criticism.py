@@ -228,8 +228,8 @@ def _checked(criticism: Criticism, forward: ErrorModel, *, full: bool) -> Critic
     verdict = with_quantization(verdict, criticism.data, criticism.residuals)
     slow = slow_process(comparison, criticism.residuals)
     family = criticism.family
-    others = [group for group in verdict.groups if family is None or group[0] != LAG]
-    leaders = [term for group in others if (term := _to_check(comparison, verdict, group)) is not None]
+    other_groups = [group for group in verdict.groups if family is None or group[0] != LAG]
+    leaders = [term for group in other_groups if (term := _to_check(comparison, verdict, group)) is not None]
     beside = () if family is None else (family.response.term,)
     advice = advice_for(criticism.fit_data, forward, leaders, beside) if full or slow is not None else ()
     advice = advice if family is None else (family.advice, *advice)
@@ -255,8 +255,8 @@ def _to_check(comparison: Comparison, verdict: Verdict, group: tuple[str, ...]) 
     leader = verdict.terms.get(group[0])
     if leader is None or is_carried(leader):
         return leader
-    others = (refined_term(comparison, candidate_by_id[name]) for name in group[1:] if name in candidate_by_id)
-    return next((term for term in others if is_carried(term)), leader)
+    other_terms = (refined_term(comparison, candidate_by_id[name]) for name in group[1:] if name in candidate_by_id)
+    return next((term for term in other_terms if is_carried(term)), leader)
 
 
 def _beyond_noise(verdict: Verdict, initial: Comparison) -> Verdict:

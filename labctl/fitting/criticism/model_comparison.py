@@ -120,9 +120,9 @@ def _growing(
     residual = _base_residual(design, y - explained, white)[0]
     centred = residual.copy()
     position = np.asarray(data.nodes["position"]).reshape(len(data), -1)[:, 0]
-    for there in np.unique(position):
-        for value in np.unique(np.round(rate[position == there], 2)):
-            same = (position == there) & (np.round(rate, 2) == value)
+    for up_position in np.unique(position):
+        for value in np.unique(np.round(rate[position == up_position], 2)):
+            same = (position == up_position) & (np.round(rate, 2) == value)
             centred[same] -= np.median(residual[same])
     speed = np.abs(rate)
     fast, slow = speed > np.quantile(speed, 2 / 3), speed < np.quantile(speed, 1 / 3)

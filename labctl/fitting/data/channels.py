@@ -92,7 +92,7 @@ class Channels:
     def positions(self) -> list[tuple[str, NDArray[np.bool_]]]:
         """Return every position that occurs and which rows are in it, (n,)."""
         position = np.asarray(self.columns["position"]).astype(np.str_)
-        return [(str(there), position == there) for there in np.unique(position)]
+        return [(str(up_position), position == up_position) for up_position in np.unique(position)]
 
     def by_recording(self, rows: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
         """Return rows (n,) recording by recording, those of each; as they are for a single recording."""

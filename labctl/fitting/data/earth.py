@@ -75,13 +75,13 @@ def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array
     if info.motion == "turns" or not has_course:
         return np.zeros((len(channels), 0))
     start = np.deg2rad(np.asarray(channels["table_angle_deg"], dtype=np.float64))
-    turned = np.deg2rad(channels.table_rate_dps() * np.asarray(channels["duration_s"], dtype=np.float64))
-    middle, half = start + turned / 2, turned / 2
+    angle_rad = np.deg2rad(channels.table_rate_dps() * np.asarray(channels["duration_s"], dtype=np.float64))
+    middle, half = start + angle_rad / 2, angle_rad / 2
     shrink = np.sinc(half / np.pi)  # the mean of a cosine over what was turned
     cosine, sine = np.cos(middle) * shrink, np.sin(middle) * shrink
     turning = []
-    for there, here in channels.positions():
-        if Position.of(there).axis != axis:
+    for up_position, here in channels.positions():
+        if Position.of(up_position).axis != axis:
             for part in channels.by_recording(here):  # the table's zero may point elsewhere on another day
                 turning += [np.where(part, cosine, 0.0), np.where(part, sine, 0.0)]
     return np.column_stack(turning) if turning else np.zeros((len(channels), 0))

@@ -107,17 +107,20 @@ def recordings_in(columns: Mapping[str, NDArray[np.generic]]) -> list[int]:
 
 def joined_coverage(parts: Sequence[Covered | None]) -> Covered | None:
     """Return what several recordings cover together; None where that is not known of one of them."""
-    stated = [part for part in parts if part is not None]
-    if len(stated) < len(parts):
+    known_parts = [part for part in parts if part is not None]
+    if len(known_parts) < len(parts):
         return None
-    axes = stated[0].rate_dps
+    axes = known_parts[0].rate_dps
     low, high = (
-        [end for end in ends if end is not None] for ends in zip(*(p.temperature_c for p in stated), strict=True)
+        [end for end in ends if end is not None] for ends in zip(*(p.temperature_c for p in known_parts), strict=True)
     )
-    is_known = len(low) == len(high) == len(stated)  # a recording at rest may be without a thermometer
+    is_known = len(low) == len(high) == len(known_parts)  # a recording at rest may be without a thermometer
     return Covered(
         (min(low), max(high)) if is_known else (None, None),
-        {a: (min(part.rate_dps[a][0] for part in stated), max(part.rate_dps[a][1] for part in stated)) for a in axes},
+        {
+            a: (min(part.rate_dps[a][0] for part in known_parts), max(part.rate_dps[a][1] for part in known_parts))
+            for a in axes
+        },
     )
 
 

@@ -120,11 +120,11 @@ def stretch_of(columns: Columns) -> slice | None:
         if name in columns:
             values = np.asarray(columns[name])
             together &= values[1:] == values[:-1]
-    still = np.asarray(columns.get("table_rate_dps", np.zeros(len(t_s))), dtype=np.float64) == 0
+    is_at_rest = np.asarray(columns.get("table_rate_dps", np.zeros(len(t_s))), dtype=np.float64) == 0
     if "valid" in columns:
-        still &= np.asarray(columns["valid"]) != 0
-    begins = np.flatnonzero(still & np.concatenate([[True], ~(together & still[:-1])]))
-    ends = np.flatnonzero(still & np.concatenate([~(together & still[1:]), [True]])) + 1
+        is_at_rest &= np.asarray(columns["valid"]) != 0
+    begins = np.flatnonzero(is_at_rest & np.concatenate([[True], ~(together & is_at_rest[:-1])]))
+    ends = np.flatnonzero(is_at_rest & np.concatenate([~(together & is_at_rest[1:]), [True]])) + 1
     temperature_c = temperature_of(columns)
     if temperature_c is None:  # the noise does not depend on a known temperature
         temperature_c = np.zeros(len(t_s))

@@ -93,9 +93,9 @@ def _tested(
             return _answer(names, None, 0, f"the {names[0]} do not turn the unit about {' and '.join(lost)}")
         try:
             model, rows = preset.build(data_used)
-            used = data_used.take(rows)
-            require_enough_data(used, model)
-            solved = solve_axes(used, model, solutions)
+            training = data_used.take(rows)
+            require_enough_data(training, model)
+            solved = solve_axes(training, model, solutions)
             residuals_dps = residuals(FittedModel(model, solved.fits), data_tested, solved.nuisance)
         except LabctlError as error:
             return _answer(names, None, 0, f"the {names[0]} alone does not determine the model: {error}")
@@ -219,9 +219,9 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     Raises NotEnoughData where the data sets do not determine the model, NotConverged where it cannot be inverted.
     """
     model, rows = preset.build(data)
-    used = data.take(rows)
-    require_enough_data(used, model)
-    solved = solve_axes(used, model)
+    training = data.take(rows)
+    require_enough_data(training, model)
+    solved = solve_axes(training, model)
     fitted = FittedModel(_with_shapes(model, solved.fits, data.channels.history), solved.fits)
     residual = residuals(fitted, data, solved.nuisance)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
@@ -239,7 +239,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         _environment(data, solved.turning),
         residual,
         left_out_dps=_left_out_dps(fitted, data),
-        shapes=shapes_of(used, fitted, solved.solutions),
+        shapes=shapes_of(training, fitted, solved.solutions),
         joint=joint_findings(data, model, preset, solved),
         mountings=mountings_of(data.channels),
         angles_rad={axis: each.angles_rad for axis, each in solved.nuisance.items() if each.angles_rad},

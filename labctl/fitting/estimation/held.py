@@ -278,8 +278,8 @@ def _require_reference(channels: Channels, model: ErrorModel, axis: str, fixed: 
     """Refuse coefficients without a reference temperature beside terms in temperature, which change their meaning."""
     if fixed.reference_temperature_c is not None:
         return
-    moved = replace(model, reference=Reference(model.reference.temperature_c + STEP_K))
-    pairs = zip(model.columns(channels, axis), moved.columns(channels, axis), strict=True)
+    shifted_model = replace(model, reference=Reference(model.reference.temperature_c + STEP_K))
+    pairs = zip(model.columns(channels, axis), shifted_model.columns(channels, axis), strict=True)
     centred = [effect for (effect, here), (_, there) in pairs if not np.array_equal(here.values, there.values)]
     if centred:
         raise BadInput(

@@ -110,25 +110,25 @@ def calibrate_magnetometer(
 
 
 def _robust(subject: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDArray[np.bool_]]:
-    used = np.ones(len(readings), dtype=np.bool_)
+    is_used = np.ones(len(readings), dtype=np.bool_)
     ellipsoid: Ellipsoid | None = None
     for _ in range(ROUNDS):
-        start = quadric(readings[used]) if ellipsoid is None else (ellipsoid.centre, ellipsoid.matrix)
-        ellipsoid = None if start is None else nearest_ellipsoid(readings[used], *start)
+        start = quadric(readings[is_used]) if ellipsoid is None else (ellipsoid.centre, ellipsoid.matrix)
+        ellipsoid = None if start is None else nearest_ellipsoid(readings[is_used], *start)
         if ellipsoid is None:
             raise NotEnoughData(
                 f"{subject}: the readings lie on no ellipsoid that they determine; turn the unit slowly through all "
                 "directions (each axis up and down, and turned in each), away from iron and currents"
             )
         every = at(readings, ellipsoid.centre, ellipsoid.matrix, ellipsoid.noise).distance
-        usual = 1.4826 * float(np.median(np.abs(every[used])))
+        usual = 1.4826 * float(np.median(np.abs(every[is_used])))
         right = np.abs(every) <= WRONG * max(usual, 1e-12)
-        if np.array_equal(right, used) or np.count_nonzero(right) < LEAST_READINGS:
+        if np.array_equal(right, is_used) or np.count_nonzero(right) < LEAST_READINGS:
             break
-        used = right
+        is_used = right
     assert ellipsoid is not None
-    last = nearest_ellipsoid(readings[used], ellipsoid.centre, ellipsoid.matrix)
-    return (ellipsoid if last is None else last), used
+    last = nearest_ellipsoid(readings[is_used], ellipsoid.centre, ellipsoid.matrix)
+    return (ellipsoid if last is None else last), is_used
 
 
 def _repetition(distance: Array) -> float:

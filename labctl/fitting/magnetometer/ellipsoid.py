@@ -75,11 +75,11 @@ def nearest_ellipsoid(readings: NDArray[np.float64], centre: Array, matrix: NDAr
             return None
         step = -np.linalg.lstsq(scaled, best.distance)[0] / length
         u = best.noise * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / length
-        moved = best.parameters + step
-        matrix = _symmetric(moved[3:])
+        moved_parameters = best.parameters + step
+        matrix = _symmetric(moved_parameters[3:])
         if not np.all(np.linalg.eigvalsh(matrix) > 0):
             return None
-        best = at(readings, moved[:3], matrix, best.noise)
+        best = at(readings, moved_parameters[:3], matrix, best.noise)
         if np.all(np.abs(step) <= CONVERGED * u):
             return best
     return None
@@ -87,14 +87,16 @@ def nearest_ellipsoid(readings: NDArray[np.float64], centre: Array, matrix: NDAr
 
 def at(readings: NDArray[np.float64], centre: Array, matrix: NDArray[np.float64], noise: float) -> Ellipsoid:
     """Return an ellipsoid with the distances of readings (n, 3) that have noise, uT, in each component."""
-    off = readings - centre
-    inside = off @ matrix
+    from_centre = readings - centre
+    inside = from_centre @ matrix
     size = np.linalg.norm(inside, axis=1)
     along = inside / size[:, None]
     pull = along @ matrix
     slope = np.linalg.norm(pull, axis=1)
     longer = noise**2 * (np.sum(matrix**2) - slope**2) / 2
-    columns = [along[:, i] * off[:, j] + (along[:, j] * off[:, i] if i != j else 0.0) for i, j in PLACES]
+    columns = [
+        along[:, i] * from_centre[:, j] + (along[:, j] * from_centre[:, i] if i != j else 0.0) for i, j in PLACES
+    ]
     jacobian = np.column_stack([-pull, *columns]) / slope[:, None]
     return Ellipsoid(centre, matrix, jacobian, (size - 1 - longer) / slope)
 

@@ -111,8 +111,8 @@ def _rests_both_ways(data: FitData) -> bool:
     """Whether every body axis that is used rested pointing up, and pointing down: gravity then differs from bias."""
     still = data.channels.table_rate_dps() == 0
     position = np.asarray(data.channels["position"]).astype(np.str_)
-    used = {*data.info.axes, *np.char.lstrip(position, "-").tolist()}
-    return {sign + axis for axis in used for sign in ("", "-")} <= set(position[still].tolist())
+    used_axes = {*data.info.axes, *np.char.lstrip(position, "-").tolist()}
+    return {sign + axis for axis in used_axes for sign in ("", "-")} <= set(position[still].tolist())
 
 
 #: The model of a recording in poses; `labctl.fitting.poses` fits it, since no data set of it has a known rate.

@@ -110,15 +110,15 @@ def alignment_text(alignment: AlignmentJson) -> str:
 
 
 def _moves(all_moves: Moves, moves: Moves, gyro: Gyroscope, applied_rms_dps: float) -> MovesJson:
-    used = gyro.used
-    residual = gyro.equations.residual.reshape(-1, 2)[used]
-    variances = np.diag(gyro.noise).reshape(-1, 2)[used]
-    rows = np.repeat(used, 2)
+    is_used = gyro.used
+    residual = gyro.equations.residual.reshape(-1, 2)[is_used]
+    variances = np.diag(gyro.noise).reshape(-1, 2)[is_used]
+    rows = np.repeat(is_used, 2)
     return {
         "count": len(all_moves),
-        "used": int(np.count_nonzero(used)),
+        "used": int(np.count_nonzero(is_used)),
         "left_out": _left_out(all_moves, moves, gyro),
-        "turned_deg": {str(a): float(v) for a, v in zip(AXES, turned_deg(moves.take(used)), strict=True)},
+        "turned_deg": {str(a): float(v) for a, v in zip(AXES, turned_deg(moves.take(is_used)), strict=True)},
         "residual_deg": float(np.degrees(np.sqrt(np.mean(residual**2)))),
         "applied_rms_dps": applied_rms_dps,
         "known_deg": float(np.degrees(np.sqrt(np.mean(variances)))),

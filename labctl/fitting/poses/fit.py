@@ -133,16 +133,16 @@ def _axes(bias: Bias, gyro: Gyroscope) -> dict[str, AxisFit]:
     """
     axis_fits = {}
     for i, axis in enumerate(AXES):
-        others = [j for j in range(3) if j != i]
-        solution, order = bias.solutions[i], [0, 1 + i, *(1 + j for j in others)]
-        row, places = gyro.errors[i], [3 * i + i, *(3 * i + j for j in others)]
+        other_axes = [j for j in range(3) if j != i]
+        solution, order = bias.solutions[i], [0, 1 + i, *(1 + j for j in other_axes)]
+        row, places = gyro.errors[i], [3 * i + i, *(3 * i + j for j in other_axes)]
         covariance = solution.covariance[np.ix_(order, order)]
         matrix = gyro.covariance[np.ix_(places, places)]
-        values = _between(solution.values[order], row[[i, *others]])
+        values = _between(solution.values[order], row[[i, *other_axes]])
         whole = block_diag(covariance[:1, :1], matrix, covariance[1:, 1:])
         whole[0, 4:] = whole[4:, 0] = covariance[0, 1:]
-        matrix_names = ("scale_factor", *(f"misalignment_{AXES[j]}" for j in others))
-        names = ("bias", *matrix_names, "g_own", *(f"g_{AXES[j]}" for j in others))
+        matrix_names = ("scale_factor", *(f"misalignment_{AXES[j]}" for j in other_axes))
+        names = ("bias", *matrix_names, "g_own", *(f"g_{AXES[j]}" for j in other_axes))
         axis_fits[str(axis)] = AxisFit(EFFECTS, names, UNITS, values[:, None], whole)
     return axis_fits
 

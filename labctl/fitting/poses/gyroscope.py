@@ -59,25 +59,25 @@ def fit_gyroscope(
     """
     noises = _Noises(moves, accelerometer, bias, readings_u, white_g2)
     errors = _robust_start(moves, accelerometer, bias)
-    used = np.ones(len(moves), dtype=np.bool_)
+    is_used = np.ones(len(moves), dtype=np.bool_)
     earlier: list[bytes] = []
     for turn in range(ROUNDS):
-        equations, noise, extra, errors = _solved(noises, errors, used, first=turn == 0)
-        held_out = held_out_moves(equations, noise + extra * np.eye(len(noise)), used)
+        equations, noise, extra, errors = _solved(noises, errors, is_used, first=turn == 0)
+        held_out = held_out_moves(equations, noise + extra * np.eye(len(noise)), is_used)
         agrees = held_out.chi2 <= chdtri(2, FALSE_ALARM)
-        if turn > 0 and (np.array_equal(agrees, used) or agrees.tobytes() in earlier):
+        if turn > 0 and (np.array_equal(agrees, is_used) or agrees.tobytes() in earlier):
             break
         if np.count_nonzero(agrees) >= LEAST_MOVES:
-            earlier.append(used.tobytes())
-            used = agrees
-    rows = np.repeat(used, 2)
+            earlier.append(is_used.tobytes())
+            is_used = agrees
+    rows = np.repeat(is_used, 2)
     _, covariance = gls(
         equations.jacobian[rows], equations.residual[rows], (noise + extra * np.eye(len(noise)))[np.ix_(rows, rows)]
     )
     # the scale of the noise is itself estimated: u of a t distribution (JCGM 101:2008, 6.4.9.4)
     freedom = np.count_nonzero(accelerometer.used) - PARAMETERS + np.count_nonzero(rows) - equations.jacobian.shape[1]
     covariance *= freedom / (freedom - 2)
-    return Gyroscope(errors, covariance, equations, noise, float(np.sqrt(extra)), used, held_out)
+    return Gyroscope(errors, covariance, equations, noise, float(np.sqrt(extra)), is_used, held_out)
 
 
 @dataclass(frozen=True)

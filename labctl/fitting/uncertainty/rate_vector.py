@@ -96,10 +96,10 @@ def rate_vector_uncertainty(
     evaluated = place.evaluated(evidence)
     evaluated += place.of_time(bench)
     sensitivities = place.sensitivities(bench)
-    stated = standard_lines(bench, sensitivities)
+    stated_lines = standard_lines(bench, sensitivities)
     aligned = standard_lines(bench, replace(sensitivities, angles=place.mounting_angles(bench, aligned=True)))
     return RateVectorUncertainty(
-        place.rates_dps, temperature_c, place.outputs, (*evaluated, *stated), (*evaluated, *aligned)
+        place.rates_dps, temperature_c, place.outputs, (*evaluated, *stated_lines), (*evaluated, *aligned)
     )
 
 

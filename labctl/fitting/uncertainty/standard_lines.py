@@ -102,8 +102,10 @@ def standard_lines(bench: BenchConditions | None, s: Sensitivities) -> list[Sour
     n = len(s.angle_squared)
     if bench is None:
         return [_of_all(_unknown("standards", NOT_KEPT), n)]
-    stated = [_of_standard(standard, bench, s) for standard in bench.standards if _matters(standard.quantity, bench)]
-    return [*stated, *(_of_all(line, n) for line in _missing(bench))]
+    stated_lines = [
+        _of_standard(standard, bench, s) for standard in bench.standards if _matters(standard.quantity, bench)
+    ]
+    return [*stated_lines, *(_of_all(line, n) for line in _missing(bench))]
 
 
 def standards_u(bench: BenchConditions, s: Sensitivities) -> float:

@@ -77,10 +77,10 @@ def _data_sets(column_map: ColumnMap) -> Iterator[str]:
 
 
 def _constants(column_map: ColumnMap) -> Iterator[str]:
-    both = sorted(set(column_map.constants.constants()) & set(column_map.columns))
-    if both:
+    in_both = sorted(set(column_map.constants.constants()) & set(column_map.columns))
+    if in_both:
         yield (
-            f"[constants] {', '.join(both)}: the map also fills this from a column of the file, which would change "
+            f"[constants] {', '.join(in_both)}: the map also fills this from a column of the file, which would change "
             "nothing; leave one of the two out"
         )
     if column_map.constants.rows is not None or column_map.constants.skip:

@@ -62,9 +62,9 @@ def layout_of(path: Path, head: bytes, file_keys: FileKeys) -> tuple[FileLayout,
     cells = [split(line, separator) for line in lines]
     data = file_keys.data or _first_data(path, lines, cells)
     header = _header(lines, cells, data) if file_keys.header is None else file_keys.header
-    stated = _units_row(cells, header, data)
-    if file_keys.header is None and stated == header:
-        header = _header(lines, cells, stated) or header
+    units_row = _units_row(cells, header, data)
+    if file_keys.header is None and units_row == header:
+        header = _header(lines, cells, units_row) or header
     below = [row for line, row in zip(lines[data - 1 :], cells[data - 1 :], strict=True) if line.strip()]
     width = Counter(len(row) for row in below).most_common(1)[0][0] if below else 0
     if width == 0:
@@ -78,7 +78,7 @@ def layout_of(path: Path, head: bytes, file_keys: FileKeys) -> tuple[FileLayout,
             "file that labctl reads; correct header in [file]"
         )
     names = _names(cells[header - 1] if header else [], width)
-    units = [_bare(cell) for cell in cells[stated - 1][:width]] if 0 < stated != header else []
+    units = [_bare(cell) for cell in cells[units_row - 1][:width]] if 0 < units_row != header else []
     return FileLayout(encoding, separator, decimal, header, data), Header(names, units + [""] * (width - len(units)))
 
 

@@ -123,9 +123,9 @@ def sound_bytes(content: bytes) -> tuple[bytes, Unread | None]:
     size = int.from_bytes(body[:2], "little")
     if body[2:3] == bytes([FLAGS]):  # the places of appended data that it states are others now
         body = body[MESSAGE + size :]
-    lost = sum(gap.end - gap.start for gap in gaps)
+    lost_bytes = sum(gap.end - gap.start for gap in gaps)
     cut = gaps[-1].end == len(content)
-    return content[:HEADER] + body, Unread(lost / len(content), tuple(map(_said, gaps)), is_cut=cut)
+    return content[:HEADER] + body, Unread(lost_bytes / len(content), tuple(map(_said, gaps)), is_cut=cut)
 
 
 def _runs(content: bytes) -> Iterator[tuple[int, int, Gap | None]]:

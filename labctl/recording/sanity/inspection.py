@@ -154,11 +154,11 @@ def _of_position(sets: Summary, along: Position) -> Iterator[Finding]:
         yield wrapped
         return
     apart = rate - (output - float(np.median(output - rate)))
-    off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * fast)
-    agreeing = int((~off).sum())
-    if not off.any() or agreeing < LEAST_AGREEING or agreeing < AGREEING_SHARE * len(off):
+    is_off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * fast)
+    agreeing = int((~is_off).sum())
+    if not is_off.any() or agreeing < LEAST_AGREEING or agreeing < AGREEING_SHARE * len(is_off):
         return
-    for row in np.flatnonzero(off):
+    for row in np.flatnonzero(is_off):
         stated_dps, shown_dps = float(rate[row]), float(rate[row] - apart[row])
         yield Finding(
             "one_data_set", "likely", f"data set {int(numbers[row])}, axis {along.axis}",
@@ -176,17 +176,17 @@ def _wrapped(along: Position, numbers: Array, rate: Array, output: Array, bias_d
     `bias_dps` is that of the slow data sets: of the fast ones most may be wrapped.
     """
     apart = rate - (output - bias_dps)
-    off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * float(np.abs(rate).max()))
-    if off.sum() < 2 or (~off).sum() < LEAST_AGREEING:
+    is_off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * float(np.abs(rate).max()))
+    if is_off.sum() < 2 or (~is_off).sum() < LEAST_AGREEING:
         return None
-    jump = float(np.median(np.abs(apart[off])))
+    jump = float(np.median(np.abs(apart[is_off])))
     top = float(np.abs(output).max())
-    one_jump = bool(np.all(np.abs(np.abs(apart[off]) / jump - 1) < SAME_JUMP))
-    outward = bool(np.all(np.sign(apart[off]) == np.sign(rate[off])))
+    one_jump = bool(np.all(np.abs(np.abs(apart[is_off]) / jump - 1) < SAME_JUMP))
+    outward = bool(np.all(np.sign(apart[is_off]) == np.sign(rate[is_off])))
     if not (one_jump and outward and jump / 2 > (1 - SAME_JUMP) * top):
         return None
     return Finding(
-        "wrapped", "certain", f"axis {along.axis}, {numbers_in_words(numbers[off])}",
+        "wrapped", "certain", f"axis {along.axis}, {numbers_in_words(numbers[is_off])}",
         f"the output is {jump:.6g} deg/s from the rate, always towards the other end of its range, and never "
         f"beyond {top:.6g} deg/s: its number wraps round there",
         jump, "deg/s", "an output that follows the rate",
@@ -285,8 +285,8 @@ def findings_of(
 
 def _not_said(of_readings: Sequence[Finding], findings: Sequence[Finding]) -> Iterator[Finding]:
     """Yield findings of readings but those that the data sets' figures say too, with what they leave in the means."""
-    stated = {(finding.what, finding.channel) for finding in findings if finding.channel}
-    yield from (finding for finding in of_readings if (finding.what, finding.channel) not in stated)
+    stated_findings = {(finding.what, finding.channel) for finding in findings if finding.channel}
+    yield from (finding for finding in of_readings if (finding.what, finding.channel) not in stated_findings)
 
 
 def _with_gross(findings: Sequence[Finding], gross: Sequence[Finding]) -> list[Finding]:

@@ -27,12 +27,12 @@ def residual_maps(data: ReducedRecording, axis_residuals: Mapping[str, Residuals
         temperature_c = data.at_sets(data.nodes.temperature_c(axis))
         row = temperature_rows(temperature_c, position, column)
         temperature_level, width = level_centres(temperature_c, row), widest(temperature_c, row)
-        for there in np.unique(position):
-            rows = np.flatnonzero(position == there)
+        for up_position in np.unique(position):
+            rows = np.flatnonzero(position == up_position)
             maps.append(
                 {
                     "axis": axis,
-                    "position": str(there),
+                    "position": str(up_position),
                     "dataset": data.dataset[rows].tolist(),
                     "table_rate_dps": rate[rows].tolist(),
                     "temperature_c": temperature_c[rows].tolist(),

@@ -125,11 +125,11 @@ def channel_lines(view: AxisView) -> Iterator[ChannelLine]:
         if name not in {"t_s", "table_rate_dps"}:
             yield _channel_line(view, name, running_mean(view, view.channel(name), everywhere))
     position, rate = view.position(), view.channel("table_rate_dps")
-    for there in np.unique(position):
-        here = position == there
+    for up_position in np.unique(position):
+        here = position == up_position
         if np.ptp(rate[here]) > 0:
             line = _channel_line(view, "table_rate_dps", running_mean(view, rate, here))
-            line["position"] = str(there)
+            line["position"] = str(up_position)
             yield line
 
 

@@ -68,9 +68,9 @@ class Within:
         earth_dps = np.zeros_like(values)
         if self.angle is None or self.recording.info.latitude_deg is None:
             return earth_dps
-        for there in np.unique(self.position):
-            rows = np.flatnonzero(self.position == there)
-            if Position.of(there).axis == axis:
+        for up_position in np.unique(self.position):
+            rows = np.flatnonzero(self.position == up_position)
+            if Position.of(up_position).axis == axis:
                 continue
             waves = np.stack([np.cos(2 * np.pi * self.angle[rows]), np.sin(2 * np.pi * self.angle[rows])])
             waves = waves * self.there[rows]

@@ -72,9 +72,11 @@ def is_shape_error(before: Comparison, named_step: Step, after: Comparison, step
 
 def _are_one(comparison: Comparison, named_step: Step) -> bool:
     """Return whether a group is one effect, or several that each reproduce the leader's signal."""
-    others = [c for c in comparison.candidates if not c.smooth and c.id in named_step.group[1:]]
+    other_candidates = [c for c in comparison.candidates if not c.smooth and c.id in named_step.group[1:]]
     return (
-        all(overlap(comparison, named_step.leader, other) > ALIKE for other in others) if named_step.leader else False
+        all(overlap(comparison, named_step.leader, other) > ALIKE for other in other_candidates)
+        if named_step.leader
+        else False
     )
 
 

@@ -104,20 +104,20 @@ def fit_sizes(law: Law, gravity: float, white: Array, least: int) -> tuple[Array
     mean by its noise, g^2.
     """
     k = len(white)
-    used = np.ones(k, dtype=np.bool_)
+    is_used = np.ones(k, dtype=np.bool_)
     theta = _fitted(law, gravity, np.ones(k), robust=True)
     for turn in range(ROUNDS):
         residual, jacobian = law.sizes(theta) - gravity, law.jacobian(theta)
-        extra = between_variance(jacobian[used], residual[used], np.diag(white[used]))
+        extra = between_variance(jacobian[is_used], residual[is_used], np.diag(white[is_used]))
         sigma = np.sqrt(white + extra)
         # at first a wrong rest would hide in the scatter that it makes itself
         usual = 1.4826 * float(np.median(np.abs(residual))) * np.sqrt(k / max(k - law.parameters, 1))
         wrong = np.abs(residual) > WRONG * (np.hypot(usual, np.sqrt(white)) if turn == 0 else sigma)
-        if (turn > 0 and np.array_equal(wrong, ~used)) or np.count_nonzero(~wrong) < least:
+        if (turn > 0 and np.array_equal(wrong, ~is_used)) or np.count_nonzero(~wrong) < least:
             break
-        used = ~wrong
-        theta = _fitted(law.take(used), gravity, sigma[used], robust=False, start=theta)
-    return _fitted(law.take(used), gravity, sigma[used], robust=False, start=theta), sigma, used
+        is_used = ~wrong
+        theta = _fitted(law.take(is_used), gravity, sigma[is_used], robust=False, start=theta)
+    return _fitted(law.take(is_used), gravity, sigma[is_used], robust=False, start=theta), sigma, is_used
 
 
 def matrices(theta: Array) -> tuple[NDArray[np.float64], Array]:

@@ -61,12 +61,12 @@ def step_of_one_code(series: Series, name: str) -> float | None:
     if series.rate_dps is None or np.ptp(series.rate_dps):
         return None  # a table that turns would move an output of any step
     value = float(series.outputs[name][0])
-    others = {other: values for other, values in series.outputs.items() if other != name}
-    if not any(np.ptp(values) for values in others.values()):
+    other_outputs = {other: values for other, values in series.outputs.items() if other != name}
+    if not any(np.ptp(values) for values in other_outputs.values()):
         return 0.0
     coarse = [
         series.code_steps[other]
-        for other, readings in others.items()
+        for other, readings in other_outputs.items()
         if series.code_steps[other] > COARSE_LATTICE * spread_of(readings)
     ]
     return next((step for step in coarse if abs(value / step - round(value / step)) < ON_LATTICE), None)

@@ -24,17 +24,17 @@ def without(recording: Recording, kinds: Sequence[str], name: str) -> Recording:
     Raises BadInput for readings that cannot be left out, and where no reading would stay.
     """
     faults = [each for each in examine(recording) if ALL in kinds or each.finding.what in kinds]
-    chosen = [fault for fault in faults if fault.finding.may_leave_out]
+    chosen_faults = [fault for fault in faults if fault.finding.may_leave_out]
     if refused := [
         fault.finding for fault in faults if not fault.finding.may_leave_out and fault.finding.what in kinds
     ]:
         raise BadInput(f"{name}: {refused[0].where}: cannot be left out: {refused[0].said}; {refused[0].do}")
-    if not chosen:
+    if not chosen_faults:
         return recording
     n = len(recording)
     valid = np.asarray(recording.columns["valid"]) != 0 if "valid" in recording.columns else np.ones(n, dtype=bool)
     left_out: list[LeftOut] = []
-    for each in chosen:
+    for each in chosen_faults:
         rows = each.rows & valid
         valid &= ~each.rows
         left_out.append(
