@@ -37,7 +37,9 @@ def read_description(source: str) -> Described:
         document = read_toml(path)
     except FileNotFoundError:
         names = ", ".join(shipped_descriptions())
-        raise BadInput(f"{source!r} is neither a file nor a description that ships with labctl ({names})") from None
+        raise BadInput(
+            f"{source!r} is neither a file nor a description that ships with labctl; name a file, or one of {names}"
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
         raise BadInput(f"description {source}: not TOML: {error}; correct it") from error
     kind = document.get("kind")
