@@ -37,7 +37,7 @@ class Bench:
     def close(self) -> None:
         """Close every link, also after one cannot be closed; raises the first InstrumentError or OSError at the end."""
         closers: list[Callable[[], None]] = [each.close for each in (self.table, self.chamber) if each is not None]
-        closers += [each.close for each in self.references.values()]
+        closers += [reference.close for reference in self.references.values()]
         failures: list[Exception] = []
         for close in [*(gyro.stop for gyro in self.gyros.values()), *closers]:
             try:
@@ -69,7 +69,7 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
         {gyro.name: driver_of(gyro).make(gyro, ports, clock) for gyro in bench.gyros},
         _unit_handler(bench, simulation, clock, wire),
         simulation,
-        {each.name: driver_of(each).make(each, ports, clock) for each in bench.references},
+        {reference.name: driver_of(reference).make(reference, ports, clock) for reference in bench.references},
         {gyro.name: gyro.configuration for gyro in bench.gyros},
     )
 

@@ -143,8 +143,8 @@ def part_of(section: DeviceSettings, model: type[SettingsT]) -> SettingsT:
 
     A simulated instrument reads its own settings so: the section may be of another driver for the same wire.
     """
-    given = section.model_dump(exclude_unset=True)
-    return model.model_validate({name: given[name] for name in model.model_fields if name in given})
+    stated = section.model_dump(exclude_unset=True)
+    return model.model_validate({name: stated[name] for name in model.model_fields if name in stated})
 
 
 class SimulationSettings(Strict):
@@ -197,10 +197,10 @@ class BenchFile(Strict):
     @model_validator(mode="after")
     def _every_unit_is_one(self) -> BenchFile:
         """Reject two units with one name, serial number or port: their readings would be mixed."""
-        for what in ("name", "serial", "port"):
-            given = [value for unit in self.gyros if (value := getattr(unit, what)) is not None]
-            if twice := next((value for value in given if given.count(value) > 1), None):
-                raise ValueError(f"two gyros have the {what} {twice!r}; give each gyro a different one")
+        for key in ("name", "serial", "port"):
+            values = [value for unit in self.gyros if (value := getattr(unit, key)) is not None]
+            if twice := next((value for value in values if values.count(value) > 1), None):
+                raise ValueError(f"two gyros have the {key} {twice!r}; give each gyro a different one")
         return self
 
     @model_validator(mode="after")
@@ -223,7 +223,7 @@ class BenchFile(Strict):
     @model_validator(mode="after")
     def _standards_are_distinct(self) -> BenchFile:
         """Reject one quantity stated twice under one name: its uncertainty would count twice."""
-        stated = [(each.quantity, each.name) for each in self.standards]
+        stated = [(standard.quantity, standard.name) for standard in self.standards]
         if twice := next((one for one in stated if stated.count(one) > 1), None):
             raise ValueError(
                 f"two [[standards]] have the quantity {twice[0]!r} and the name {twice[1]!r}; remove one, or "
@@ -270,14 +270,14 @@ class BenchFile(Strict):
     @property
     def sections(self) -> dict[str, DeviceSettings]:
         """Every device, by its name: table, chamber, references, gyros."""
-        references = {each.name: each for each in self.references}
+        references = {reference.name: reference for reference in self.references}
         return {**self.instruments, **references, **{gyro.name: gyro for gyro in self.gyros}}
 
     @property
     def instruments(self) -> dict[str, DeviceSettings]:
         """The table and the chamber, those that the bench has."""
-        found = {"table": self.table, "chamber": self.chamber}
-        return {name: section for name, section in found.items() if section is not None}
+        sections = {"table": self.table, "chamber": self.chamber}
+        return {name: section for name, section in sections.items() if section is not None}
 
 
 def shipped_benches() -> dict[str, Path]:
@@ -307,15 +307,15 @@ def _with_formats(document: dict[str, object], folder: Path) -> dict[str, object
     for section in sections:
         if not isinstance(section, dict):
             continue
-        given = section.get("format")
-        if isinstance(given, str) and given.endswith(".toml") and (folder / given).is_file():
+        described = section.get("format")
+        if isinstance(described, str) and described.endswith(".toml") and (folder / described).is_file():
             try:
-                section["format"] = read_toml(folder / given)
+                section["format"] = read_toml(folder / described)
             except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-                raise tomllib.TOMLDecodeError(f"format {folder / given}: {error}") from error
-        given = section.get("dbc")
-        if isinstance(given, str) and given.endswith(".dbc") and (folder / given).is_file():
-            section["dbc"] = _dbc_text(folder / given)
+                raise tomllib.TOMLDecodeError(f"format {folder / described}: {error}") from error
+        described = section.get("dbc")
+        if isinstance(described, str) and described.endswith(".dbc") and (folder / described).is_file():
+            section["dbc"] = _dbc_text(folder / described)
     return document
 
 

@@ -63,7 +63,7 @@ class AttendedClock(Protocol):
         ...
 
     def attending(self) -> AbstractContextManager[Callable[[], None]]:
-        """Have the clock wait for this thread: it calls what is given at least every `LOOK_EVERY_S`."""
+        """Make the clock wait for this thread: it calls what is given at least every `LOOK_EVERY_S`."""
         ...
 
 
@@ -157,12 +157,12 @@ class ScaledClock:
         return max(duration_s / self.speed, self.MIN_WALL_TIMEOUT_S)
 
     def attending(self) -> AbstractContextManager[Callable[[], None]]:
-        """Have the clock wait for this thread, if it is one that waits: call what is given every `LOOK_EVERY_S`."""
+        """Make the clock wait for this thread, if it is one that waits: call what is given every `LOOK_EVERY_S`."""
         return nullcontext(_nothing)
 
 
 def attending(clock: Clock) -> AbstractContextManager[Callable[[], None]]:
-    """Have a clock wait for this thread as `ScaledClock.attending` does; virtual time waits for every thread."""
+    """Make a clock wait for this thread as `ScaledClock.attending` does; virtual time waits for every thread."""
     return clock.attending() if isinstance(clock, AttendedClock) else nullcontext(_nothing)
 
 
@@ -242,7 +242,7 @@ class RealWall:
 
 
 def _nothing() -> None:
-    """Let a sleep go on."""
+    """Do nothing: a sleep goes on."""
 
 
 class PacedClock:

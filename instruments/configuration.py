@@ -13,17 +13,23 @@ def configuration_of(reported: Mapping[str, str]) -> dict[str, str]:
     return {name: value for name, value in reported.items() if name not in IDENTITY}
 
 
-def not_as_stated(stated: Mapping[str, str], reported: Mapping[str, str]) -> list[str]:
+def not_as_stated(stated_settings: Mapping[str, str], reported: Mapping[str, str]) -> list[str]:
     """Return where a unit is not set as it is stated to be, one phrase each; what it does not say counts."""
-    found = configuration_of(reported)
+    configuration = configuration_of(reported)
     return [
-        f"{name} is {found[name]} instead of {value}" if name in found else f"it does not report {name} ({value})"
-        for name, value in stated.items()
-        if found.get(name) != value
+        f"{name} is {configuration[name]} instead of {value}"
+        if name in configuration
+        else f"it does not report {name} ({value})"
+        for name, value in stated_settings.items()
+        if configuration.get(name) != value
     ]
 
 
 def changed(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, tuple[str, str]]:
     """Return name -> setting before and now, of those that were reported both times and differ."""
-    then, found = configuration_of(before), configuration_of(now)
-    return {name: (then[name], found[name]) for name in then if name in found and found[name] != then[name]}
+    then, configuration_now = configuration_of(before), configuration_of(now)
+    return {
+        name: (then[name], configuration_now[name])
+        for name in then
+        if name in configuration_now and configuration_now[name] != then[name]
+    }

@@ -88,6 +88,10 @@ def datasheet_figure(
 
 
 def undeclared(figures: Mapping[str, float], conventions: Mapping[str, str]) -> str:
-    """Say which conventions have no figure; empty where each has one."""
-    left = sorted(set(conventions) - set(figures))
-    return f"{', '.join(left)}: the data sheet has no such figure; state it in datasheet, or remove it" if left else ""
+    """Return which conventions have no figure; empty where each has one."""
+    without_figure = sorted(set(conventions) - set(figures))
+    return (
+        f"{', '.join(without_figure)}: the data sheet has no such figure; state it in datasheet, or remove it"
+        if without_figure
+        else ""
+    )

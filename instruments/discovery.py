@@ -46,7 +46,7 @@ def port_info(path: str, product: str = "") -> PortInfo:
 
 def serial_ports() -> list[PortInfo]:
     """Return the serial ports that there are, in the order of their numbers."""
-    return [port_info(found.device, found.product or "") for found in sorted(list_ports.comports())]
+    return [port_info(port.device, port.product or "") for port in sorted(list_ports.comports())]
 
 
 #: A port is read this often, s.
@@ -78,8 +78,8 @@ def find_on_port(port: str, clock: Clock) -> Found:
             data = _exchange(ports, port, baudrate, b"", max(probe.wait_s for _, probe in listening), clock)
             heard += len(data)
             for name, probe in listening:
-                if (found := probe.recognise(data, baudrate)) is not None:
-                    return Found(port, name, _kind(name), found)
+                if (identification := probe.recognise(data, baudrate)) is not None:
+                    return Found(port, name, _kind(name), identification)
         if heard:
             return Found(
                 port, why_not=f"{heard} bytes arrived that no driver recognises, so labctl sent nothing to this port"
@@ -87,8 +87,8 @@ def find_on_port(port: str, clock: Clock) -> Found:
         for name, probe in _probes(asking=True):
             for baudrate in probe.baudrates:
                 data = _exchange(ports, port, baudrate, probe.asks, probe.wait_s, clock)
-                if (found := probe.recognise(data, baudrate)) is not None:
-                    return Found(port, name, _kind(name), found)
+                if (identification := probe.recognise(data, baudrate)) is not None:
+                    return Found(port, name, _kind(name), identification)
     except InstrumentError as error:
         return Found(port, why_not=str(error).removeprefix(f"{error.device}: "))
     return Found(
@@ -105,8 +105,8 @@ def find_on_host(host: str, tcp_port: int, clock: Clock) -> Found:
         return Found(address, why_not=str(error).removeprefix(f"{error.device}: "))
     try:
         for name, driver in _all().items():
-            if isinstance(driver.probe, HostProbe) and (found := driver.probe.recognise(client)) is not None:
-                return Found(address, name, _kind(name), found)
+            if isinstance(driver.probe, HostProbe) and (identification := driver.probe.recognise(client)) is not None:
+                return Found(address, name, _kind(name), identification)
     except LOST as error:
         return Found(address, why_not=f"the link broke ({error}); check the address")
     finally:
@@ -124,8 +124,8 @@ def ask_itself(name: str, values: Mapping[str, object], clock: Clock) -> dict[st
         if isinstance(driver, ChamberDriver):
             return _limits(driver.make(driver.settings.model_validate(values), Ports(clock), clock))
         if isinstance(driver, GyroDriver):
-            given = {**values, "name": name, "serial": UNKNOWN}
-            return _own_serial(driver.make(driver.settings.model_validate(given), Ports(clock), clock))
+            section = {**values, "name": name, "serial": UNKNOWN}
+            return _own_serial(driver.make(driver.settings.model_validate(section), Ports(clock), clock))
     except InstrumentError:
         return {}
     return {}
@@ -157,13 +157,13 @@ def _all() -> dict[str, Driver]:
 
 
 def _kind(name: str) -> str:
-    what, _ = KINDS[type(_all()[name])]
-    return what
+    kind_name, _ = KINDS[type(_all()[name])]
+    return kind_name
 
 
 def _probes(*, asking: bool) -> list[tuple[str, Probe]]:
-    found = [(name, driver.probe) for name, driver in _all().items()]
-    return [(name, probe) for name, probe in found if isinstance(probe, Probe) and bool(probe.asks) == asking]
+    probes = [(name, driver.probe) for name, driver in _all().items()]
+    return [(name, probe) for name, probe in probes if isinstance(probe, Probe) and bool(probe.asks) == asking]
 
 
 def _by_rate(probes: list[tuple[str, Probe]]) -> Iterator[tuple[int, list[tuple[str, Probe]]]]:

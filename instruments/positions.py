@@ -32,7 +32,7 @@ class Position:
     def of(text: str) -> Position:
         """Return the position that a text names; raises ValueError where it names none."""
         match = _FORM.fullmatch(text)
-        turned = tuple(int(each or 0) for each in match.groups()[2:]) if match else (0, 0)
+        turned = tuple(int(group or 0) for group in match.groups()[2:]) if match else (0, 0)
         if match is None or max(turned) >= 360:
             raise ValueError(f"{text!r} is not a position (expected {EXPECTED})")
         return Position(match[2], -1.0 if match[1] else 1.0, *turned)
@@ -56,8 +56,8 @@ class Position:
     def in_words(self) -> str:
         """The position in words: which axis points up, and what is turned by how much."""
         turned = [
-            f"the {what} turned by {angle} deg"
-            for what, angle in (("unit", self.unit_deg), ("fixture", self.fixture_deg))
+            f"the {role} turned by {angle} deg"
+            for role, angle in (("unit", self.unit_deg), ("fixture", self.fixture_deg))
             if angle
         ]
         return ", ".join([f"{self.end} up", *turned])

@@ -211,7 +211,7 @@ class SharedClock(ScaledClock):
 
     @contextmanager
     def attending(self) -> Iterator[Callable[[], None]]:
-        """Have the clock wait for this thread, which reads it, sleeps on it or calls what it is given all the time.
+        """Make the clock wait for this thread, which reads it, sleeps on it or calls what it is given all the time.
 
         Whatever else it does, it takes at most `late_s` of real time from the clock.
         """
@@ -248,7 +248,7 @@ class SharedClock(ScaledClock):
 
 @contextmanager
 def served_clock(speed: float) -> Iterator[Clock]:
-    """Give the clock of simulated instruments that this process serves to others; at speed 1 it is this computer's.
+    """Yield the clock of simulated instruments that this process serves to others; at speed 1 it is this computer's.
 
     Raises OSError where its file cannot be made.
     """

@@ -60,7 +60,7 @@ def simulated_unit_handler(simulation: Simulation, clock: Clock) -> UnitHandler:
 
 
 def lay_simulated(simulation: Simulation, clock: Clock, up: Sequence[float]) -> None:
-    """Have the person at a simulated bench turn its units until direction `up` (3,) of the body points up.
+    """Make the person at a simulated bench turn its units until direction `up` (3,) of the body points up.
 
     Returns at once; a person who is at it does nothing else.
     """

@@ -38,9 +38,9 @@ def shown(value: object) -> str:
 
 def listed(complaints: Iterable[str], most: int = 5) -> str:
     """Return complaints as one line: the first few, and how many more there are."""
-    found = list(complaints)
-    more = len(found) - most
-    return "; ".join(found[:most]) + (f"; and {more} more" if more > 0 else "")
+    problems = list(complaints)
+    more = len(problems) - most
+    return "; ".join(problems[:most]) + (f"; and {more} more" if more > 0 else "")
 
 
 def read_toml_text(path: Path) -> str:

@@ -30,8 +30,8 @@ def canonical_and_hash(document: JsonObject) -> tuple[bytes, str]:
 def with_own_hash(document: JsonObject) -> tuple[bytes, str]:
     """Return a document with the hash of itself in canonical form, and the hash; one that it has is replaced."""
     before, after = _around_hash(document)
-    found = hashlib.sha256(_joined(before, after)).hexdigest()
-    return _joined(before, canonical({"hash": found})[1:-1], after), found
+    digest = hashlib.sha256(_joined(before, after)).hexdigest()
+    return _joined(before, canonical({"hash": digest})[1:-1], after), digest
 
 
 def _around_hash(document: JsonObject) -> tuple[bytes, bytes]:

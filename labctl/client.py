@@ -160,8 +160,8 @@ class Client:
         path = f"/api/units/{_part(serial)}/calibration"
         response = self._connection.request("GET", path, params=query, headers=headers)
         due, warning = response.headers.get("x-labctl-due"), _warning(response.headers.get("warning", ""))
-        given = response.headers.get(HEADER)
-        notice = None if given is None else read_withdrawn(given)
+        header = response.headers.get(HEADER)
+        notice = None if header is None else read_withdrawn(header)
         if notice is not None and not accept_withdrawn:
             known = held is not None and response.status_code == httpx.codes.NOT_MODIFIED
             content = held.content if known and held is not None else response.content
@@ -296,8 +296,8 @@ def _update(event: ServerSentEvent) -> EventResponse | CampaignResponse:
 
 def _warning(field: str) -> str:
     """Return the text of a `Warning` field as the service writes it (RFC 7234, 5.5): 299 agent "text"."""
-    found = re.fullmatch(r'299 \S+ "((?:[^"\\]|\\.)*)"', field)
-    return re.sub(r"\\(.)", r"\1", found[1]) if found else field
+    match = re.fullmatch(r'299 \S+ "((?:[^"\\]|\\.)*)"', field)
+    return re.sub(r"\\(.)", r"\1", match[1]) if match else field
 
 
 def _withdrawn(what: str, notice: Withdrawn, content: bytes | None = None) -> CalibrationWithdrawn:

@@ -125,7 +125,7 @@ class Compensator:
         return self._memory is not None
 
     def reset(self) -> None:
-        """Forget the temperatures that were seen, as after the unit was switched off."""
+        """Clear the temperature history, as after the unit was switched off."""
         if self._running is not None:
             self._running.reset()
 
@@ -186,10 +186,10 @@ class Compensator:
         for name in self.needs:
             if name not in known:
                 raise BadInput(f"{self.calibration.serial}: its model needs channel {name!r}; give it with `channels`")
-        given = np.asarray(raw_dps, dtype=np.float64)
-        raw = given.reshape(len(given), -1) if given.size and given.ndim else given.reshape(-1, 1)
+        raw_rows = np.asarray(raw_dps, dtype=np.float64)
+        raw = raw_rows.reshape(len(raw_rows), -1) if raw_rows.size and raw_rows.ndim else raw_rows.reshape(-1, 1)
         if raw.size == 0:
-            return Compensated(given, np.zeros(len(raw), dtype=bool))
+            return Compensated(raw_rows, np.zeros(len(raw), dtype=bool))
         if raw.shape[1] != len(self.axes):
             raise BadInput(
                 f"rates of {raw.shape[1]} axes given; the calibration has axes {', '.join(self.axes)}; give one rate "
@@ -202,37 +202,40 @@ class Compensator:
             if self._memory is not None and history is not None:
                 remembered = self._memory.of_history(history, known)
                 beside = remembered if beside is None else remembered.with_bias(beside.bias_dps)
-            found = self._beside(beside, raw, warm, known, correct)
+            compensated = self._beside(beside, raw, warm, known, correct)
         else:
             running = self._running if continued and self._running is not None else RunningMemory(self._memory)
-            found = self._followed(running, beside, raw, warm, known, correct, len(raw) if cross_rates_dps else BLOCK)
+            compensated = self._followed(
+                running, beside, raw, warm, known, correct, len(raw) if cross_rates_dps else BLOCK
+            )
         left_out = self._left_out_dps if specific_force_g is None else None
-        return Compensated(found.rate_dps.reshape(given.shape), found.outside, left_out)
+        return Compensated(compensated.rate_dps.reshape(raw_rows.shape), compensated.outside, left_out)
 
     def _followed(
-        self, running: RunningMemory, by_force: Remembered | None, raw: Array, warm: Array,
-        known: Mapping[str, Array], correct: Correct, at_once: int,
+        self, running: RunningMemory, by_force: Remembered | None, raw: Array, temperature_c: Array,
+        of_channels: Mapping[str, Array], correct: Correct, at_once: int,
     ) -> Compensated:  # fmt: skip
         """Correct a course of outputs (n, axes), so many samples `at_once`, that they stay in the processor's cache."""
         n = len(raw)
-        channels = {name: np.asarray(values) for name, values in known.items()}
+        channels = {name: np.asarray(values) for name, values in of_channels.items()}
         t_s = channels["t_s"].astype(np.float64, copy=False)
         check_order(running, t_s)
         rate, outside = np.empty_like(raw), np.empty(n, dtype=bool)
         for first in range(0, n, at_once):
             rows = slice(first, first + at_once)
             of_rows = {name: values[rows] if values.shape[:1] == (n,) else values for name, values in channels.items()}
-            warm_rows = warm[rows] if warm.ndim else warm
-            one_c = warm_rows.mean(axis=1) if warm.ndim == 2 else np.broadcast_to(warm_rows, t_s[rows].shape)
+            warm_rows = temperature_c[rows] if temperature_c.ndim else temperature_c
+            one_c = warm_rows.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(warm_rows, t_s[rows].shape)
             beside = running.errors(t_s[rows], one_c)
             if by_force is not None:
                 beside = beside.with_bias(by_force.bias_dps[rows])
-            found = self._beside(beside, raw[rows], warm_rows, of_rows, correct, first)
-            rate[rows], outside[rows] = found.rate_dps, found.outside
+            block = self._beside(beside, raw[rows], warm_rows, of_rows, correct, first)
+            rate[rows], outside[rows] = block.rate_dps, block.outside
         return Compensated(rate, outside)
 
     def _beside(
-        self, beside: Remembered | None, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct,
+        self, beside: Remembered | None, raw: Array, temperature_c: Array, channels: Mapping[str, Array],
+        correct: Correct,
         first: int = 0,
     ) -> Compensated:  # fmt: skip
         """Correct outputs (n, axes) of which errors of bias and scale factor, (n, axes), are known; None: none.
@@ -240,20 +243,22 @@ class Compensator:
         `first` is the number of samples before them.
         """
         if beside is None:
-            return self._held(raw, warm, known, correct, first)
+            return self._held(raw, temperature_c, channels, correct, first)
         if self._is_direct:
-            found = self._held(np.where(np.isnan(beside.bias_dps), np.nan, raw), warm, known, correct, first)
-            rate = found.rate_dps - beside.bias_dps
+            compensated = self._held(
+                np.where(np.isnan(beside.bias_dps), np.nan, raw), temperature_c, channels, correct, first
+            )
+            rate = compensated.rate_dps - beside.bias_dps
             if beside.scale is not None:
                 rate = rate - beside.scale * np.clip(raw, self._slow, self._fast)
-            return Compensated(rate, found.outside)
+            return Compensated(rate, compensated.outside)
         less = raw - beside.bias_dps
-        found = self._held(less, warm, known, correct, first)
-        rate = found.rate_dps
+        compensated = self._held(less, temperature_c, channels, correct, first)
+        rate = compensated.rate_dps
         if beside.scale is not None:
-            held = partial(self._at_edge, warm=warm, known=known, correct=correct)
+            held = partial(self._at_edge, temperature_c=temperature_c, channels=channels, correct=correct)
             rate = with_scale(held, less, beside.scale, self._slow, self._fast)
-        return Compensated(rate, found.outside)
+        return Compensated(rate, compensated.outside)
 
     def _by_force(self, specific_force_g: ArrayLike | None, n: int) -> Remembered | None:
         """Return what specific force adds to the bias; it remembers nothing."""
@@ -278,22 +283,28 @@ class Compensator:
         across = {axis: np.broadcast_to(np.asarray(r, np.float64), (n,)) for axis, r in cross_rates_dps.items()}
         return partial(correct_across, self._model, self.axes, across)
 
-    def _held(self, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct, first: int) -> Compensated:
+    def _held(
+        self, raw: Array, temperature_c: Array, channels: Mapping[str, Array], correct: Correct, first: int
+    ) -> Compensated:
         """Correct outputs (n, axes) by what does not remember, at the edge of the range where they are outside."""
-        lowest, highest = (float(np.min(warm)), float(np.max(warm))) if warm.size else (self._low_c, self._high_c)
+        lowest, highest = (
+            (float(np.min(temperature_c)), float(np.max(temperature_c)))
+            if temperature_c.size
+            else (self._low_c, self._high_c)
+        )
         least, most = (float(np.min(raw)), float(np.max(raw))) if raw.size else (0.0, 0.0)
         calm = lowest >= self._low_c and highest <= self._high_c and least >= self._slow and most <= self._fast
         if calm:  # also false when there is a NaN
             flags = np.zeros(len(raw), dtype=bool)
         else:
-            flags = self._judge(raw, warm, first)
-            return Compensated(self._at_edge(raw, warm, known, correct), flags)
-        return Compensated(correct(raw, warm, known), flags)
+            flags = self._judge(raw, temperature_c, first)
+            return Compensated(self._at_edge(raw, temperature_c, channels, correct), flags)
+        return Compensated(correct(raw, temperature_c, channels), flags)
 
-    def _at_edge(self, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct) -> Array:
+    def _at_edge(self, raw: Array, temperature_c: Array, channels: Mapping[str, Array], correct: Correct) -> Array:
         """Return corrected rates, (n, axes); of what is outside the range the error at its edge is taken off."""
         held = np.clip(raw, self._slow, self._fast)
-        return correct(held, np.clip(warm, self._low_c, self._high_c), known) + (raw - held)
+        return correct(held, np.clip(temperature_c, self._low_c, self._high_c), channels) + (raw - held)
 
     @property
     def needs_temperature(self) -> bool:
@@ -310,21 +321,23 @@ class Compensator:
             )
         return STAND_IN_C
 
-    def _judge(self, raw: Array, warm: Array, first: int) -> NDArray[np.bool_]:
+    def _judge(self, raw: Array, temperature_c: Array, first: int) -> NDArray[np.bool_]:
         """Return which samples are outside the range or no numbers, (n,); raises BadInput when that is refused."""
-        spread = warm.reshape(len(raw), -1) if warm.ndim else np.full((len(raw), 1), float(warm))
+        spread = (
+            temperature_c.reshape(len(raw), -1) if temperature_c.ndim else np.full((len(raw), 1), float(temperature_c))
+        )
         within_c = (spread >= self._low_c - MARGIN_C) & (spread <= self._high_c + MARGIN_C)
         cold: NDArray[np.bool_] = ~np.all(within_c, axis=1)
         fast: NDArray[np.bool_] = ~np.all((raw >= self._slow) & (raw <= self._fast), axis=1)
         if self._outside == "refuse" and (cold.any() or fast.any()):
             row = int(np.argmax(cold | fast))
-            what = (
+            sentence = (
                 f"temperature {spread[row].tolist()} deg C outside {self._low_c:g} to {self._high_c:g} deg C"
                 if cold[row]
                 else f"rate {raw[row].tolist()} deg/s outside {self._slow:g} to {self._fast:g} deg/s"
             )
             raise BadInput(
-                f"sample {first + row + 1}: {what} (the range calibrated for {self.calibration.serial} version "
+                f"sample {first + row + 1}: {sentence} (the range calibrated for {self.calibration.serial} version "
                 f"{self.calibration.version}); set outside = 'clamp' to correct such a sample as at the "
                 "edge of the range and flag it"
             )
@@ -348,8 +361,8 @@ class Compensator:
             self._has_warned = True
             warn(f"{self.calibration.serial}: {self.force_sensitivity.sentence()}", LeftOutWarning)
         if self._running is None:
-            found = self.compensate(raw, temperature_c, specific_force_g=specific_force_g)
-            return found.rate_dps[0], bool(found.outside[0])
+            compensated = self.compensate(raw, temperature_c, specific_force_g=specific_force_g)
+            return compensated.rate_dps[0], bool(compensated.outside[0])
         if t_s is None or temperature_c is None:
             raise BadInput(
                 f"{self.calibration.serial}: its model depends on earlier temperatures; give t_s and temperature_c"
@@ -361,8 +374,8 @@ class Compensator:
             )
         by_force = self._by_force(specific_force_g, 1)
         beside = self._running.errors(np.array([t_s]), np.array([temperature_c]))
-        found = self._beside(
+        compensated = self._beside(
             beside if by_force is None else beside.with_bias(by_force.bias_dps), raw, np.array([temperature_c]),
             {"t_s": np.array([t_s])}, self._correct,
         )  # fmt: skip
-        return found.rate_dps[0], bool(found.outside[0])
+        return compensated.rate_dps[0], bool(compensated.outside[0])

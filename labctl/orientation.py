@@ -178,6 +178,6 @@ class Orientation:
         self._rest = []
 
 
-def _refuse_no_number(what: str, value: float) -> None:
+def _refuse_no_number(quantity: str, value: float) -> None:
     if not np.isfinite(value):
-        raise BadInput(f"{what} {value} is not a finite number; give a finite number")
+        raise BadInput(f"{quantity} {value} is not a finite number; give a finite number")

@@ -59,15 +59,15 @@ def token_uri(text: str, use: KeyUse) -> TokenUri:
     """Read `pkcs11:token=T;object=O?module-path=FILE&pin-source=FILE`. Raises BadInput; no message shows a PIN."""
     path, _, query = text.removeprefix(SCHEME).partition("?")
     try:
-        given = dict(_attribute(part) for part in [*path.split(";"), *query.split("&")] if part)
+        parts = dict(_attribute(part) for part in [*path.split(";"), *query.split("&")] if part)
     except ValueError as error:
         raise BadInput(f"{use.variable}: an attribute of the PKCS#11 URI has no '='; write token=NAME") from error
-    if missing := [name for name in ("token", "object", "module-path") if not given.get(name)]:
+    if missing := [name for name in ("token", "object", "module-path") if not parts.get(name)]:
         raise BadInput(
             f"{use.variable}: the PKCS#11 URI has no {', '.join(missing)}; write "
             "pkcs11:token=NAME;object=NAME?module-path=FILE&pin-source=FILE"
         )
-    return TokenUri(given["token"], given["object"], given["module-path"], _pin(given, use))
+    return TokenUri(parts["token"], parts["object"], parts["module-path"], _pin(parts, use))
 
 
 def _attribute(part: str) -> tuple[str, str]:
@@ -75,12 +75,12 @@ def _attribute(part: str) -> tuple[str, str]:
     return name, unquote(value)
 
 
-def _pin(given: dict[str, str], use: KeyUse) -> str:
-    if "pin-value" in given:
-        return given["pin-value"]
-    if "pin-source" not in given:
+def _pin(options: dict[str, str], use: KeyUse) -> str:
+    if "pin-value" in options:
+        return options["pin-value"]
+    if "pin-source" not in options:
         return ""
-    return read_secret(Path(given["pin-source"].removeprefix("file:")), use)
+    return read_secret(Path(options["pin-source"].removeprefix("file:")), use)
 
 
 def read_secret(path: Path, use: KeyUse) -> str:

@@ -47,9 +47,9 @@ class ServiceConnection:
         transport: httpx.BaseTransport | None = None,
     ) -> None:
         self.url = url
-        shown = api_key or key()
+        sent_key = api_key or key()
         # without a key, the name only says who claims to ask; a service that wants a key does not read it
-        identity = {"Authorization": f"Bearer {shown}"} if shown else {USER_HEADER: quote(os_user())}
+        identity = {"Authorization": f"Bearer {sent_key}"} if sent_key else {USER_HEADER: quote(os_user())}
         # the service is on this machine or in the laboratory: a proxy is not used and gets no key
         self.http = httpx.Client(
             base_url=url, timeout=timeout_s, headers=identity, trust_env=False, transport=transport, verify=_trust(url)

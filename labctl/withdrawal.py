@@ -23,8 +23,8 @@ class Withdrawn:
     @property
     def text(self) -> str:
         """The notice in words."""
-        what = f"certificate {self.certificate} was withdrawn" if self.certificate else "the version was revoked"
-        return f"{what} at {self.at.astimezone(UTC):%Y-%m-%d %H:%M} UTC by {self.by} ({self.reason})"
+        subject = f"certificate {self.certificate} was withdrawn" if self.certificate else "the version was revoked"
+        return f"{subject} at {self.at.astimezone(UTC):%Y-%m-%d %H:%M} UTC by {self.by} ({self.reason})"
 
     def header(self) -> str:
         """Return the value of `HEADER`: members with strings (RFC 8941, 3.2), in visible ASCII."""
@@ -35,11 +35,14 @@ class Withdrawn:
 
 def read_withdrawn(field: str) -> Withdrawn:
     """Read the value of `HEADER`. Raises ValueError for one that names no date."""
-    found = {name: re.sub(r"\\(.)", r"\1", value) for name, value in _MEMBER.findall(field)}
-    if "at" not in found:
+    members = {name: re.sub(r"\\(.)", r"\1", value) for name, value in _MEMBER.findall(field)}
+    if "at" not in members:
         raise ValueError(f"{HEADER}: {field[:200]!r} names no date `at`")
     return Withdrawn(
-        datetime.fromisoformat(found["at"]), found.get("by", ""), found.get("reason", ""), found.get("certificate", "")
+        datetime.fromisoformat(members["at"]),
+        members.get("by", ""),
+        members.get("reason", ""),
+        members.get("certificate", ""),
     )
 
 

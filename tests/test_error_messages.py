@@ -36,7 +36,7 @@ ADVICE = re.compile(
 )
 
 
-#: What a campaign fails with: labctl/services/campaigns/advice.py says what to do, and its tests hold that.
+#: What a campaign fails with: labctl/services/campaigns/failure_advice.py says what to do, and its tests hold that.
 REASONS_OF_CAMPAIGNS = frozenset({"StepFailed", "SoakFailed", "BadData", "GuardTripped", "TableStopped", "Unanswered"})
 PASSED_ON = "the text that it passes on says what to do"
 #: Messages without an instruction, by module and beginning, and why.
@@ -51,7 +51,7 @@ EXCEPTIONS = {
     ("labctl/services/benches/lease.py", "this process may not drive bench"): (
         "the campaign ends, and its advice says it"
     ),
-    ("labctl/services/benches/lease.py", "{described(holder)}. {taken}"): PASSED_ON,
+    ("labctl/services/benches/lease.py", "{described(holder)}. {lease}"): PASSED_ON,
     ("labctl/services/planning/loading.py", "bench"): "the message of the schema says what is expected",
     ("labctl/services/recordings/importers.py", "{path}: {failure("): PASSED_ON,
     ("labctl/services/certificates/verification.py", "{path}: {error}"): PASSED_ON,
@@ -59,7 +59,10 @@ EXCEPTIONS = {
     ("labctl/store/connection/sqlite_file.py", "{self._location}: {text}"): PASSED_ON,
     ("labctl/store/connection/writer_lock.py", "{location}: {_describe("): PASSED_ON,
     ("labctl/store/repositories/keys.py", "key {name} was already revoked"): "nothing is left to do",
-    ("procedures/recipe/recipe.py", "{where}: {_complaints(error)}"): "the messages of the schema say what is expected",
+    (
+        "procedures/recipe/recipe.py",
+        "{source}: {_complaints(error)}",
+    ): "the messages of the schema say what is expected",
 }
 
 

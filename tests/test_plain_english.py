@@ -74,7 +74,7 @@ KEPT = {
     ("labctl/answers/service.py", "look at the bench"),
 }
 #: Recognises reasons that older versions wrote into the database.
-OLD_REASONS = "labctl/services/campaigns/advice.py"
+OLD_REASONS = "labctl/services/campaigns/failure_advice.py"
 
 
 def hits(texts: list[Written]) -> list[str]:

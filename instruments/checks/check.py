@@ -100,9 +100,9 @@ def ask_reference(reference: Reference, report: DeviceReport) -> None:
 def ask_gyro(gyro: Gyro, report: DeviceReport) -> None:
     """Check the identity of the unit, how its readings arrive, and its output at rest."""
     try:
-        found = gyro.identify()
-        report.reported |= dict(found.reported)
-        report.add([Finding("identity", _identity(found))])
+        identity = gyro.identify()
+        report.reported |= dict(identity.reported)
+        report.add([Finding("identity", _identity(identity))])
         gyro.start()
         gyro.read_latest()
         readings = _listen(gyro)
@@ -138,19 +138,23 @@ def _ask_shortcomings(device: object, report: DeviceReport, otherwise: str = "")
     if not isinstance(device, SelfChecking):
         return
     try:
-        found = device.shortcomings()
+        shortcomings = device.shortcomings()
     except InstrumentError as error:
         report.failed("control", error)
         return
-    report.add(Finding("control", text, "bad") for text in found)
-    if otherwise and not found:
+    report.add(Finding("control", text, "bad") for text in shortcomings)
+    if otherwise and not shortcomings:
         report.add([Finding("control", otherwise)])
 
 
-def _identity(found: GyroIdentity) -> str:
-    said = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in found.reported.items())
-    text = f"{found.model}, serial {found.serial}"
-    return f"{text}; the instrument reported: {said}" if said else f"{text}; the instrument reported no identification"
+def _identity(identity: GyroIdentity) -> str:
+    reported = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in identity.reported.items())
+    text = f"{identity.model}, serial {identity.serial}"
+    return (
+        f"{text}; the instrument reported: {reported}"
+        if reported
+        else f"{text}; the instrument reported no identification"
+    )
 
 
 def _judge_readings(gyro: Gyro, readings: Readings, report: DeviceReport) -> None:
@@ -179,27 +183,27 @@ def _judge_stream(gyro: StreamingGyro, report: DeviceReport) -> None:
         )
         report.add([Finding("clock", text, value=off_ppm, unit="ppm")])
     if (steps := gyro.counter_step) is not None:
-        found, meant = steps
-        text = f"counter step {found}"
-        if found != meant:
+        measured_step, meant = steps
+        text = f"counter step {measured_step}"
+        if measured_step != meant:
             text += (
                 f", but by the bench file it is {meant}: correct sample_rate_hz, datagram or the step of the counter "
                 "there, or configure the unit"
             )
-        report.add([Finding("counter", text, "good" if found == meant else "bad", value=float(found))])
+        report.add([Finding("counter", text, "good" if measured_step == meant else "bad", value=float(measured_step))])
 
 
 def _at_rest(gyro: Gyro, readings: Readings) -> list[Finding]:
     """Return mean and scatter of what the unit sends besides its status."""
-    found = []
+    findings = []
     for channel in gyro.channels:
         if not channel.unit or len(readings) < 2:
             continue
         values = channel.value(readings.raw[channel.name])
         mean, scatter = float(np.mean(values)), float(np.std(values, ddof=1))
         text = f"{channel.name} {mean:+.4g} {channel.unit} (scatter {scatter:.2g})"
-        found.append(Finding(channel.name, text, value=mean, unit=channel.unit))
-    return found
+        findings.append(Finding(channel.name, text, value=mean, unit=channel.unit))
+    return findings
 
 
 def check(
@@ -234,7 +238,7 @@ def check(
 
 def _sections(bench: BenchFile) -> Iterator[tuple[str, DeviceSettings, Kind]]:
     kinds: dict[str, Kind] = {"table": "table", "chamber": "chamber"}
-    kinds |= dict.fromkeys((each.name for each in bench.references), "reference")
+    kinds |= dict.fromkeys((reference.name for reference in bench.references), "reference")
     kinds |= dict.fromkeys((gyro.name for gyro in bench.gyros), "gyro")
     for name, section in bench.sections.items():
         yield name, section, kinds.get(name, "other")
@@ -248,7 +252,7 @@ def _address(section: DeviceSettings) -> str:
     return section.host if "://" in section.host else f"{section.host}:{section.tcp_port}"
 
 
-def _ask(opened: Bench, report: DeviceReport, stated: Mapping[str, str]) -> None:
+def _ask(opened: Bench, report: DeviceReport, stated_reply: Mapping[str, str]) -> None:
     if report.kind == "table" and opened.table is not None:
         ask_table(opened.table, report)
     elif report.kind == "chamber" and opened.chamber is not None:
@@ -257,8 +261,8 @@ def _ask(opened: Bench, report: DeviceReport, stated: Mapping[str, str]) -> None
         ask_reference(opened.references[report.device], report)
     elif report.kind == "gyro":
         ask_gyro(opened.gyros[report.device], report)
-        if (said := not_as_stated(stated, report.reported)) and report.reported:
-            report.add([Finding("configuration", f"not set as the bench file states: {'; '.join(said)}", "bad")])
+        if (differences := not_as_stated(stated_reply, report.reported)) and report.reported:
+            report.add([Finding("configuration", f"not set as the bench file states: {'; '.join(differences)}", "bad")])
 
 
 def _about_port(port: str, report: DeviceReport) -> list[Finding]:

@@ -38,10 +38,10 @@ class DeviceReport:
     @property
     def state(self) -> State:
         """The worst state of a finding."""
-        found = {each.state for each in self.findings}
+        states = {finding.state for finding in self.findings}
         worst: State = "good"
         for state in STATES:
-            worst = state if state in found else worst
+            worst = state if state in states else worst
         return worst
 
     @property
@@ -52,8 +52,8 @@ class DeviceReport:
     @property
     def text(self) -> str:
         """What is bad or, where nothing is, everything in one line."""
-        bad = [each.text for each in self.findings if each.state == "bad"]
-        return "; ".join(bad or [each.text for each in self.findings])
+        bad = [finding.text for finding in self.findings if finding.state == "bad"]
+        return "; ".join(bad or [finding.text for finding in self.findings])
 
     def add(self, findings: Iterable[Finding]) -> None:
         """Add findings."""

@@ -46,11 +46,11 @@ def of_open_port(port: str, *, wants_quick: bool) -> list[Finding]:
     if os.path.realpath(port) != port:
         about += f" ({name})"
     about += f" on USB adapter {adapter}" if adapter else ""
-    found = [Finding("port", about)]
+    findings = [Finding("port", about)]
     stable = stable_name(port)
     if Path(port).name.startswith(NUMBERED):
         advice = f"set port = '{stable}'" if stable else "use the path of the port in /dev/serial/by-id or by-path"
-        found.append(
+        findings.append(
             Finding(
                 "port name",
                 f"the number of {name} depends on the order in which adapters are plugged in: {advice}",
@@ -58,7 +58,7 @@ def of_open_port(port: str, *, wants_quick: bool) -> list[Finding]:
             )
         )
     if users := users_of(port):
-        found.append(
+        findings.append(
             Finding(
                 "port users",
                 f"{', '.join(users)} also has {port} open and takes bytes from it: end that process",
@@ -71,20 +71,20 @@ def of_open_port(port: str, *, wants_quick: bool) -> list[Finding]:
         text = f"the adapter delays received bytes by up to {latency_ms} ms"
         file = latency.SYS_TTY / name / "device" / "latency_timer"
         advice = f": run `echo {QUICK_MS} | sudo tee {file}`"
-        found.append(
+        findings.append(
             Finding("latency timer", text + advice if slow else text, "doubtful" if slow else "good", latency_ms, "ms")
         )
-    return found
+    return findings
 
 
 def shared(ports: Mapping[str, str]) -> dict[str, Finding]:
     """Return a finding for each device whose port is that of an earlier device, also under another name."""
-    found: dict[str, Finding] = {}
+    findings: dict[str, Finding] = {}
     first: dict[str, str] = {}
     for device, port in ports.items():
         real = os.path.realpath(port)
         other = first.setdefault(real, device)
         if other != device:
             text = f"port {port} is also given for {other} ({ports[other]}): give each instrument a different port"
-            found[device] = Finding("port", text, "bad")
-    return found
+            findings[device] = Finding("port", text, "bad")
+    return findings

@@ -44,19 +44,19 @@ class Tried(NamedTuple):
 
 def requests_of(description: Described) -> list[tuple[str, str]]:
     """Return the key and the text of every request that a description can send."""
-    found: list[tuple[str, str]] = []
+    requests: list[tuple[str, str]] = []
     for key in type(description).model_fields:
-        given = getattr(description, key)
-        if isinstance(given, Ask):
-            found.append((key, given.send))
-        elif isinstance(given, tuple):
-            found += [(key, each) for each in given]
+        ask = getattr(description, key)
+        if isinstance(ask, Ask):
+            requests.append((key, ask.send))
+        elif isinstance(ask, tuple):
+            requests += [(key, each) for each in ask]
     if isinstance(description, ReferenceDescription):
-        found += [("identity", description.identity)] if description.identity else []
-        found += [(f"quantities.{name}", each.ask) for name, each in description.quantities.items()]
+        requests += [("identity", description.identity)] if description.identity else []
+        requests += [(f"quantities.{name}", quantity.ask) for name, quantity in description.quantities.items()]
     if description.line.check is not None:
-        found.append(("line.check", description.line.check.send))
-    return found
+        requests.append(("line.check", description.line.check.send))
+    return requests
 
 
 def try_description(
@@ -71,11 +71,11 @@ def try_description(
     section: dict[str, object] = {"driver": "described", "format": description, **address}
     steps, close = _steps(description, section, clock, Ports(clock, wire=wire), move=move)
     try:
-        for what, act in steps:
+        for step_name, act in steps:
             try:
-                yield Tried(what, act(), "")
+                yield Tried(step_name, act(), "")
             except InstrumentError as error:
-                yield Tried(what, "", str(error))
+                yield Tried(step_name, "", str(error))
     finally:
         close()
 
@@ -115,27 +115,27 @@ def _steps(
 
 
 def _questions(description: Described, dialogue: Dialogue) -> list[Step]:
-    found: list[Step] = []
+    questions: list[Step] = []
     for key in type(description).model_fields:
         ask = getattr(description, key)
         if isinstance(ask, Ask):
-            found.append((key, _answer(dialogue, key, ask)))
+            questions.append((key, _answer(dialogue, key, ask)))
     if description.line.check is not None:
-        found.append(("line.check", _answer(dialogue, "line.check", description.line.check)))
-    return found
+        questions.append(("line.check", _answer(dialogue, "line.check", description.line.check)))
+    return questions
 
 
 def _answer(dialogue: Dialogue, key: str, ask: Ask) -> Callable[[], str]:
-    what = f"answer [{key}]"
+    answer_name = f"answer [{key}]"
     if isinstance(ask, AskState):
-        return lambda: "yes" if dialogue.holds(ask, what) else "no"
+        return lambda: "yes" if dialogue.holds(ask, answer_name) else "no"
     if isinstance(ask, AskNumber):
-        return lambda: f"{dialogue.number(ask, what):g}"
+        return lambda: f"{dialogue.number(ask, answer_name):g}"
     if isinstance(ask, AskAlarms):
         return lambda: ", ".join(dialogue.alarms(ask)) or "none"
     if isinstance(ask, AskText) and key == "identity":
         return lambda: dialogue.identity(ask)
-    return lambda: dialogue.text(ask, what)
+    return lambda: dialogue.text(ask, answer_name)
 
 
 def _turns(table: DescribedTable, clock: Clock) -> list[Step]:
@@ -191,5 +191,6 @@ def _moved_set_point(chamber: DescribedChamber) -> str:
 def _quantities(readout: LineReference) -> str:
     state = readout.read()
     return ", ".join(
-        f"{each.name} {each.value(np.array([state.raw[each.name]]))[0]:g} {each.unit}" for each in readout.channels
+        f"{channel.name} {channel.value(np.array([state.raw[channel.name]]))[0]:g} {channel.unit}"
+        for channel in readout.channels
     )

@@ -41,9 +41,12 @@ def has_every_method(stand: Stand) -> None:
             continue
         require(hasattr(stand.driver, name), f"{driver.__name__} has no {name}; {protocol.__name__} says what it does")
         if inspect.isfunction(member):
-            wanted = list(inspect.signature(member).parameters)[1:]
-            given = list(inspect.signature(getattr(stand.driver, name)).parameters)
-            require(given == wanted, f"{driver.__name__}.{name} takes {given}; {protocol.__name__} says {wanted}")
+            parameters = list(inspect.signature(member).parameters)[1:]
+            own_parameters = list(inspect.signature(getattr(stand.driver, name)).parameters)
+            require(
+                own_parameters == parameters,
+                f"{driver.__name__}.{name} takes {own_parameters}; {protocol.__name__} says {parameters}",
+            )
 
 
 def sends_nothing_when_it_is_made(stand: Stand) -> None:
@@ -53,16 +56,16 @@ def sends_nothing_when_it_is_made(stand: Stand) -> None:
 
 def says_who_it_is(stand: Stand) -> None:
     """Check the identity."""
-    found = stand.driver.identify()
+    identity = stand.driver.identify()
     if stand.kind == "gyro":
-        given = next(each.serial for each in stand.file.gyros if each.name == stand.driver.name)
+        stated_serial = next(gyro.serial for gyro in stand.file.gyros if gyro.name == stand.driver.name)
         require(
-            found.serial == given,
-            f"identify() returns the serial number {found.serial!r}, but the bench file gives {given!r}",
+            identity.serial == stated_serial,
+            f"identify() returns the serial number {identity.serial!r}, but the bench file gives {stated_serial!r}",
         )
-        require(found.technology in ("fog", "mems", "piezo"), f"technology {found.technology!r} is not known")
+        require(identity.technology in ("fog", "mems", "piezo"), f"technology {identity.technology!r} is not known")
     else:
-        require(isinstance(found, str) and found, f"identify gives {found!r}; return a text")
+        require(isinstance(identity, str) and identity, f"identify gives {identity!r}; return a text")
 
 
 def reports_silence(stand: Stand) -> None:
@@ -238,8 +241,10 @@ def gives_whole_numbers_at_rising_times(stand: Stand) -> None:
     parts = [gyro.read(1.0) for _ in range(4)]
     times = np.concatenate([part.t_s for part in parts])
     require(np.all(np.diff(times) > 0), "the times of the readings do not increase")
-    wanted = 4 * gyro.sample_rate_hz
-    require(abs(len(times) - wanted) <= 3, f"{len(times)} readings arrived in 4 s; at least {wanted:g} are expected")
+    expected = 4 * gyro.sample_rate_hz
+    require(
+        abs(len(times) - expected) <= 3, f"{len(times)} readings arrived in 4 s; at least {expected:g} are expected"
+    )
     names = {channel.name for channel in gyro.channels}
     for part in parts:
         require(set(part.raw) == names, f"readings have {sorted(part.raw)}, the channels are {sorted(names)}")

@@ -67,7 +67,7 @@ def place_of(name: str) -> BenchFile:
         return _with_trial(name, kind, trial)
     for path in shipped_benches().values():
         bench = read_bench(path)
-        if bench.is_simulated and name in [each.driver for each in bench.sections.values()]:
+        if bench.is_simulated and name in [section.driver for section in bench.sections.values()]:
             return resolve(bench)
     raise ValueError(
         f"driver {name!r} has no simulated bench to be checked on; give the driver a Trial "
@@ -78,17 +78,17 @@ def place_of(name: str) -> BenchFile:
 
 def _with_trial(name: str, kind: Kind, trial: Trial) -> BenchFile:
     record = read_bench(trial.bench).model_dump()
-    wanted: dict[str, object] = {"driver": name, **trial.section}
+    section: dict[str, object] = {"driver": name, **trial.section}
     if kind == "gyro":
         gyro = record["gyros"][0]
-        kept = ("name", "serial", "axes", "max_rate_dps", "min_c", "max_c", "technology")
-        record["gyros"] = [{key: gyro[key] for key in kept} | wanted]
+        general_keys = ("name", "serial", "axes", "max_rate_dps", "min_c", "max_c", "technology")
+        record["gyros"] = [{key: gyro[key] for key in general_keys} | section]
         if trial.unit:
             record["simulation"]["units"] |= {record["gyros"][0]["name"]: dict(trial.unit)}
     elif kind == "reference":
-        record["references"] = [{"name": "reference"} | wanted]
+        record["references"] = [{"name": "reference"} | section]
     else:
-        record[kind] = record[kind] | wanted
+        record[kind] = record[kind] | section
         record["simulation"]["table"] |= dict(trial.table)
     try:
         return resolve(BenchFile.model_validate(record))
@@ -106,10 +106,10 @@ def open_stand(name: str, file: BenchFile) -> Stand:
     Raises ValueError for a bench that does not have the driver, or has it on a real address, and what open_bench does.
     """
     kind = kind_of(name)
-    found = next(((key, each) for key, each in file.sections.items() if each.driver == name), None)
-    if found is None:
+    entry = next(((key, section) for key, section in file.sections.items() if section.driver == name), None)
+    if entry is None:
         raise ValueError(f"bench {file.name!r} has no {kind} with driver {name!r}; name a bench that has one")
-    url = found[1].port or found[1].host or ""
+    url = entry[1].port or entry[1].host or ""
     if not is_simulated_address(url):
         raise ValueError(
             f"driver {name!r} is at {url or 'no address'} on bench {file.name!r}, but a driver is checked on a "
@@ -118,4 +118,4 @@ def open_stand(name: str, file: BenchFile) -> Stand:
     clock = VirtualClock()
     bench = open_bench(file, clock)
     drivers: dict[str, Any] = {"table": bench.table, "chamber": bench.chamber, **bench.references, **bench.gyros}
-    return Stand(kind, file, clock, bench, drivers[found[0]], url)
+    return Stand(kind, file, clock, bench, drivers[entry[0]], url)

@@ -94,7 +94,7 @@ class ArrickC4:
         return math.copysign(move.step_hz * self._step_deg, rate_dps)
 
     def home(self) -> None:
-        """Control the table to its home switch (`!1h1`, one `o`); the angle is 0 deg there.
+        """Turn the table to its home switch (`!1h1`, one `o`); the angle is 0 deg there.
 
         Raises RequestRejected, NoReply, LinkError.
         """
@@ -105,7 +105,7 @@ class ArrickC4:
         self._steps, self._active, self._counted = 0.0, None, True
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
-        """Control the table to a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
+        """Turn the table at a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
 
         Raises LimitError (nothing was sent), RequestRejected, NoReply, LinkError.
         """
@@ -121,7 +121,7 @@ class ArrickC4:
         return Spin(rate_dps, achieved_dps, steady_from_s, steady_from_s + move.steady_s, from_deg, self._step_deg)
 
     def settle(self, spin: Spin) -> None:
-        """Control the end of a run: wait for the `o` that confirms every step, at the time it must come.
+        """Wait for the `o` that confirms every step, at the time it must come.
 
         Raises MalformedReply for an `o` that comes too early, NoReply, LinkError.
         """
@@ -143,7 +143,7 @@ class ArrickC4:
         self._steps += move.steps
 
     def stop(self) -> None:
-        """Control the table to rest (`!1a`) and wait until it stands. Until the next homing the angle is computed.
+        """Stop the table (`!1a`) and wait until it stands. Until the next homing the angle is computed.
 
         A new process does not know what an earlier one left: it ends the line that may be half sent, and aborts
         without asking first. Raises NoReply, LinkError.
@@ -169,9 +169,9 @@ class ArrickC4:
         Raises WrongInstrument, RequestRejected, NoReply, LinkError.
         """
         move = plan_move(self.settings, rate_dps, steady_s)
-        found = self._timed_run(move, wait)
-        checks.require_plausible(self.name, found, move)
-        return found
+        run = self._timed_run(move, wait)
+        checks.require_plausible(self.name, run, move)
+        return run
 
     def use_step_clock(self, ratio: float) -> None:
         """Set the step clock that every later rate is computed by, as a share of the nominal one; nothing is sent."""
@@ -190,9 +190,9 @@ class ArrickC4:
         self._turn_by(round(self._steps / turn) * turn - round(self._steps), wait)
         took_s = self._timed_home()
         if self._homing is not None:
-            found = self._homing.check(took_s, self.settings)
-            if found.missed_steps >= -(found.limit_steps + COVERAGE * found.u_steps):
-                return found
+            home_check = self._homing.check(took_s, self.settings)
+            if home_check.missed_steps >= -(home_check.limit_steps + COVERAGE * home_check.u_steps):
+                return home_check
             self._homing = None  # it was learned while replies were late
         return self._learn_homing(took_s, wait)
 
@@ -202,11 +202,11 @@ class ArrickC4:
         Returns the check of a homing that took `took_s`, or that of the turns that it was learned from.
         """
         for _ in range(checks.LEARNING_ATTEMPTS):
-            found = self._learned(wait)
-            if found is None or isinstance(found, HomeCheck):
-                return found
-            if self._homing is None or found.u_steps < self._homing.u_steps:
-                self._homing = found
+            home_check = self._learned(wait)
+            if home_check is None or isinstance(home_check, HomeCheck):
+                return home_check
+            if self._homing is None or home_check.u_steps < self._homing.u_steps:
+                self._homing = home_check
             if self._homing.u_steps <= self.settings.home_limit_steps:
                 break
         return None if self._homing is None else self._homing.check(took_s, self.settings)
@@ -246,7 +246,7 @@ class ArrickC4:
         return (checks.NO_SPEED,) if self.settings.speed_template is None else ()
 
     def close(self) -> None:
-        """Control the link: close it; safe to call twice."""
+        """Close the link; safe to call twice."""
         self._link.close()
 
     def _begin(self, move: Move) -> float:
@@ -267,10 +267,10 @@ class ArrickC4:
         def await_end(within_s: float) -> None:
             self._link.expect(lines.FINISHED, "finish a move", within_s)
 
-        found = checks.timed(self._clock, move, await_end, wait, start_s)
+        run = checks.timed(self._clock, move, await_end, wait, start_s)
         self._active = None
         self._steps += move.steps
-        return found
+        return run
 
     def _turn_by(self, steps: int, wait: Wait) -> None:
         """Turn by whole steps, slowly."""

@@ -90,8 +90,8 @@ class Homing:
     def check_learning(self, took_s: Sequence[float], settings: ArrickC4Settings) -> HomeCheck:
         """Return how many steps were missed in the turns, of equal spacing, that the homing was learned from."""
         beside = np.abs(np.diff(np.asarray(took_s) / self.step_s, 2))
-        found = self._check(float(beside.max()) / 2, settings)  # a place in the middle counts twice
-        return HomeCheck(found.missed_steps, found.u_steps, found.limit_steps, found.step_deg, found.step_s, True)
+        spread = self._check(float(beside.max()) / 2, settings)  # a place in the middle counts twice
+        return HomeCheck(spread.missed_steps, spread.u_steps, spread.limit_steps, spread.step_deg, spread.step_s, True)
 
     def _check(self, steps: float, settings: ArrickC4Settings) -> HomeCheck:
         return HomeCheck(
@@ -99,12 +99,12 @@ class Homing:
         )
 
 
-def learned_homing(at_home_s: Sequence[float], away: Sequence[int], took_s: Sequence[float], u_s: float) -> Homing:
-    """Return the homing by its durations from home, (m,) s, and from places `away` steps from there, (n,) s each.
+def learned_homing(at_home_s: Sequence[float], offsets: Sequence[int], took_s: Sequence[float], u_s: float) -> Homing:
+    """Return the homing by its durations from home, (m,) s, and from places `offsets` steps from there, (n,) s each.
 
     `u_s` is the least standard uncertainty of a duration. A slope that is none means that the homing does not begin
     where the table is.
     """
-    slope, _ = np.polyfit(away, took_s, 1)
+    slope, _ = np.polyfit(offsets, took_s, 1)
     scatter = float(np.std(at_home_s, ddof=1)) if len(at_home_s) > 1 else 0.0
     return Homing(float(np.mean(at_home_s)), float(slope), max(scatter, u_s))

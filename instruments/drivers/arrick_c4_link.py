@@ -81,11 +81,11 @@ class C4Link:
         try:
             while True:
                 port.timeout = self._port_timeout_s(deadline_s)
-                found = bytes(port.read(1))
-                if found and found not in LINE_END and found.decode("latin-1") not in skip:
-                    return found.decode("latin-1")
-                skipped += len(found)
-                if self._clock.now_s() >= deadline_s - 1e-9 and (not found or skipped > MOST_LATE_LETTERS):
+                letter = bytes(port.read(1))
+                if letter and letter not in LINE_END and letter.decode("latin-1") not in skip:
+                    return letter.decode("latin-1")
+                skipped += len(letter)
+                if self._clock.now_s() >= deadline_s - 1e-9 and (not letter or skipped > MOST_LATE_LETTERS):
                     advice = LINE_IS_BUSY if skipped > MOST_LATE_LETTERS else "check power, cable and baud rate"
                     raise NoReply(self._device, f"{self._settings.port} gave no answer in {timeout_s:.1f} s; {advice}")
         except BROKEN as error:
@@ -104,10 +104,10 @@ class C4Link:
             if command.expect is None:
                 self._clock.sleep(REPLY_S)  # it may answer nevertheless, which is no reply to what follows
                 self.discard_input()
-            elif (found := self.read_line(skip="")) != command.expect:
+            elif (line := self.read_line(skip="")) != command.expect:
                 raise RequestRejected(
                     self._device,
-                    f"answered {found!r} to {command.send}, but init_commands in the bench file expects "
+                    f"answered {line!r} to {command.send}, but init_commands in the bench file expects "
                     f"{command.expect!r}; correct init_commands by the manual of the controller",
                 )
         self._initialised = True
@@ -116,16 +116,16 @@ class C4Link:
         """Return the next line of text, from its first letter that is none of `skip`; raises NoReply or LinkError."""
         text = self.read_letter(skip=skip)
         port = self.open()
-        while (found := bytes(port.read(1))) and found not in LINE_END:
-            text += found.decode("latin-1")
+        while (character := bytes(port.read(1))) and character not in LINE_END:
+            text += character.decode("latin-1")
         return text
 
-    def expect(self, letter: str, what: str, timeout_s: float = REPLY_S) -> None:
-        """Read one letter; raises RequestRejected for another one, NoReply or LinkError. `what` is for the message."""
-        found = self.read_letter(timeout_s)
-        if found != letter:
+    def expect(self, letter: str, purpose: str, timeout_s: float = REPLY_S) -> None:
+        """Read one letter; raises RequestRejected for another one (`purpose` is named), NoReply or LinkError.."""
+        received = self.read_letter(timeout_s)
+        if received != letter:
             raise RequestRejected(
-                self._device, f"answered {found!r} instead of {letter!r}, so it did not {what}; home the table"
+                self._device, f"answered {received!r} instead of {letter!r}, so it did not {purpose}; home the table"
             )
 
     def _port_timeout_s(self, deadline_s: float) -> float:

@@ -79,11 +79,11 @@ class Gyrostar:
                 "address of the host"
             )
             raise WrongInstrument(self.name, text)
-        for channel, wanted in self.options.range_codes.items():
-            found = self._get(RANGE_CODE.nth(channel, 1, first=0))
-            if found != wanted:
+        for channel, expected in self.options.range_codes.items():
+            range_code = self._get(RANGE_CODE.nth(channel, 1, first=0))
+            if range_code != expected:
                 text = (
-                    f"input {channel} has range code 0x{found:04X}, but the bench file says 0x{wanted:04X}; "
+                    f"input {channel} has range code 0x{range_code:04X}, but the bench file says 0x{expected:04X}; "
                     "change one of the two"
                 )
                 raise WrongInstrument(self.name, text)
@@ -97,7 +97,7 @@ class Gyrostar:
         )
 
     def start(self) -> None:
-        """Control the stream: readings are polled from now on."""
+        """Start the readings, which are polled from now on."""
         self._start_s, self._index = self._clock.now_s(), 0
 
     def read(self, duration_s: float) -> Readings:
@@ -133,7 +133,7 @@ class Gyrostar:
         return self._readings([self._poll()], [self._start_s])
 
     def stop(self) -> None:
-        """Control the link: close it; safe to call twice."""
+        """Close the link; safe to call twice."""
         self._registers.close()
 
     def _due_s(self) -> float:

@@ -94,7 +94,7 @@ class KvhGyro:
         return identify_stream(self, self.settings, self._stream, usual, adapter=adapter)
 
     def start(self) -> None:
-        """Control the stream: open the port, ask for rates, and drop stale or partial lines; raises LinkError."""
+        """Open the port, ask for rates, and drop stale or partial lines; raises LinkError."""
         self._stream.open()
         if command := self._model.format.start_command:
             self._stream.write(command.encode() * START_REPEATS)
@@ -125,7 +125,7 @@ class KvhGyro:
         raise self._no_line(SILENCE_S)
 
     def stop(self) -> None:
-        """Control the stream: close the port; safe to call twice."""
+        """Close the port; safe to call twice."""
         self._stream.close()
 
     def kept_back(self) -> Readings | None:

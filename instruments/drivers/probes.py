@@ -29,20 +29,20 @@ def _stim300(data: bytes, baudrate: int) -> Recognised | None:
             continue
         for crlf in (False, True):
             options = DatagramOptions.model_validate({"datagram": datagram, "crlf": crlf, "baudrate": baudrate})
-            found = scan(data, layout_of(options))
-            score = len(found.frames) - found.damaged
-            if len(found.frames) >= LEAST_FRAMES and (best is None or score > best[0]):
-                best = score, found, options
+            frames = scan(data, layout_of(options))
+            score = len(frames.frames) - frames.damaged
+            if len(frames.frames) >= LEAST_FRAMES and (best is None or score > best[0]):
+                best = score, frames, options
     if best is None:
         return None
-    _, found, options = best
-    counter = found.frames[:, layout_of(options).counter].astype(np.int64)
+    _, frames, options = best
+    counter = frames.frames[:, layout_of(options).counter].astype(np.int64)
     step = int(np.median(np.diff(counter) % 256)) or 1
     rate_hz = COUNTS_PER_S / step
     settings: dict[str, object] = {"technology": "mems", "axes": ["x", "y", "z"], "max_rate_dps": 400.0}
     settings["sample_rate_hz"] = rate_hz
-    if given := options.model_dump(exclude_defaults=True):
-        settings["options"] = given
+    if options_stated := options.model_dump(exclude_defaults=True):
+        settings["options"] = options_stated
     text = f"Sensonor STIM300, datagram 0x{options.datagram:02X} at {rate_hz:g} readings/s (usual {DEFAULT_RATE_HZ:g})"
     return Recognised(text, settings, {"serial": SERIAL})
 

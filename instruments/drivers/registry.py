@@ -18,19 +18,19 @@ KINDS: dict[type[Driver], tuple[str, type[DeviceSettings]]] = {
 }
 
 
-def _checked(found: Any) -> Driver:
-    if not isinstance(found, TableDriver | ChamberDriver | GyroDriver | ReferenceDriver):
+def _checked(driver: Any) -> Driver:
+    if not isinstance(driver, TableDriver | ChamberDriver | GyroDriver | ReferenceDriver):
         raise TypeError(
-            f"{found!r} is not a TableDriver, ChamberDriver, GyroDriver or ReferenceDriver of "
+            f"{driver!r} is not a TableDriver, ChamberDriver, GyroDriver or ReferenceDriver of "
             "instruments.drivers.driver; make it one of these"
         )
-    _, base = KINDS[type(found)]
-    if not (isinstance(found.settings, type) and issubclass(found.settings, base)):
+    _, base = KINDS[type(driver)]
+    if not (isinstance(driver.settings, type) and issubclass(driver.settings, base)):
         raise TypeError(
-            f"its settings class {found.settings!r} is not a subclass of "
+            f"its settings class {driver.settings!r} is not a subclass of "
             f"instruments.bench_config.{base.__name__}; derive it from that class"
         )
-    return found
+    return driver
 
 
 DRIVERS: PluginGroup[Driver] = PluginGroup("labctl.drivers", "driver", _checked)

@@ -27,11 +27,16 @@ def resolve(bench: BenchFile) -> BenchFile:
     fixed = {name: _section(section, (name,), kinds[name], wrong) for name, section in bench.instruments.items()}
     gyros = [_section(gyro, ("gyros", number), GyroDriver, wrong) for number, gyro in enumerate(bench.gyros)]
     references = [
-        _section(each, ("references", number), ReferenceDriver, wrong) for number, each in enumerate(bench.references)
+        _section(reference, ("references", number), ReferenceDriver, wrong)
+        for number, reference in enumerate(bench.references)
     ]
     if wrong:
         raise ValidationError.from_exception_data(type(bench).__name__, wrong)
-    used = {**fixed, **{each.name: each for each in bench.gyros}, **{each.name: each for each in bench.references}}
+    used = {
+        **fixed,
+        **{each.name: each for each in bench.gyros},
+        **{reference.name: reference for reference in bench.references},
+    }
     drivers = {device: _release(section.driver) for device, section in used.items()}
     return bench.model_copy(
         update={**fixed, "gyros": tuple(gyros), "references": tuple(references), "drivers": drivers}
@@ -60,36 +65,36 @@ def _section(
     if type(section) is driver.settings:
         return section
     try:
-        found: DeviceSettings = driver.settings.model_validate(section.model_dump(exclude_unset=True))
+        settings: DeviceSettings = driver.settings.model_validate(section.model_dump(exclude_unset=True))
     except ValidationError as error:
         wrong += [_detail(each["type"], each["msg"], (*place, *each["loc"]), each["input"]) for each in error.errors()]
         return section
-    for name, value in (found.model_extra or {}).items():
+    for name, value in (settings.model_extra or {}).items():
         text = f"driver {section.driver} has no such setting; choose one of {_settings_of(driver)}"
         wrong.append(_detail("extra_forbidden", text, (*place, name), value))
-    return found
+    return settings
 
 
 def _driver(name: str, kind: type[Driver]) -> Driver:
     """Return an installed driver of one kind; raises PluginError saying what is installed and what to do."""
-    what, _ = KINDS[kind]
+    kind_name, _ = KINDS[kind]
     try:
-        found = DRIVERS.get(name)
+        driver = DRIVERS.get(name)
     except UnknownPlugin as error:
         raise UnknownPlugin(DRIVERS.unknown(name, names_of(kind))) from error
-    if not isinstance(found, kind):
-        drives, _ = KINDS[type(found)]
-        known: Sequence[str] = names_of(kind)
-        choice = f"choose {', '.join(known)}" if known else f"no driver of a {what} is installed"
-        raise PluginError(f"driver {name!r} is for a {drives}, not for a {what}; {choice}")
-    return found
+    if not isinstance(driver, kind):
+        drives, _ = KINDS[type(driver)]
+        driver_names: Sequence[str] = names_of(kind)
+        choice = f"choose {', '.join(driver_names)}" if driver_names else f"no driver of a {kind_name} is installed"
+        raise PluginError(f"driver {name!r} is for a {drives}, not for a {kind_name}; {choice}")
+    return driver
 
 
 def _settings_of(driver: Driver) -> str:
     return ", ".join(driver.settings.model_fields)
 
 
-def _detail(kind: str, text: str, place: Place, given: Any) -> InitErrorDetails:
+def _detail(kind: str, text: str, place: Place, detail: Any) -> InitErrorDetails:
     # pydantic asks for a literal, and repeats here a kind that it has given itself
     error = PydanticCustomError(kind, "{text}", {"text": text})  # pyright: ignore[reportArgumentType]
-    return {"type": error, "loc": place, "input": given}
+    return {"type": error, "loc": place, "input": detail}

@@ -97,8 +97,12 @@ class Stim300:
     def channels(self) -> tuple[Channel, ...]:
         """What a datagram holds: rates in deg/s, temperatures in deg C where it has them, and the status byte."""
         rates = [Channel(f"gyro_{axis}", "deg/s", RATE_PER_LSB) for axis in self.axes]
-        warm = [Channel(f"temperature_{axis}_c", "deg C", TEMPERATURE_PER_LSB) for axis in self.axes]
-        return (*rates, *(warm if self.layout.temperature is not None else ()), Channel("status", "", 1.0))
+        temperature_channels = [Channel(f"temperature_{axis}_c", "deg C", TEMPERATURE_PER_LSB) for axis in self.axes]
+        return (
+            *rates,
+            *(temperature_channels if self.layout.temperature is not None else ()),
+            Channel("status", "", 1.0),
+        )
 
     def identify(self) -> GyroIdentity:
         """Get the unit's identity: the name of the bench file, and what the unit and its adapter say.
@@ -109,7 +113,7 @@ class Stim300:
         return identify_stream(self, self.settings, self._stream, usual, adapter=adapter, reported=self._reported)
 
     def start(self) -> None:
-        """Control the stream: open the port and drop stale bytes; raises LinkError."""
+        """Open the port and drop stale bytes; raises LinkError."""
         self._stream.open()
         self._set = self._serial = self._trim_dps = None
         self._questions = 0
@@ -151,7 +155,7 @@ class Stim300:
         raise self._no_datagram(f"within {START_WITHIN_S:g} s") if newest is None else self._no_answer()
 
     def stop(self) -> None:
-        """Control the stream: close the port; safe to call twice."""
+        """Close the port; safe to call twice."""
         self._stream.close()
 
     def kept_back(self) -> Readings | None:
@@ -208,15 +212,15 @@ class Stim300:
 
     def _hear(self, special: bytes) -> None:
         """Take in what the unit says of itself; raises WrongInstrument where its bench file says otherwise."""
-        if (found := parse_configuration(special)) is not None:
-            if said := differences(found, self.settings):
+        if (configuration := parse_configuration(special)) is not None:
+            if differing := differences(configuration, self.settings):
                 raise WrongInstrument(
                     self.name,
                     f"the unit on {self.settings.port} is not configured as the bench file requires: "
-                    f"{'; '.join(said)}; configure the unit in its service mode (commands u, m, d), or correct "
+                    f"{'; '.join(differing)}; configure the unit in its service mode (commands u, m, d), or correct "
                     "the bench file",
                 )
-            self._set = found
+            self._set = configuration
         elif (serial := parse_serial_number(special)) is not None:
             self._refuse_other_unit(serial)
             self._serial = serial
@@ -226,15 +230,15 @@ class Stim300:
     def _refuse_other_unit(self, serial: str) -> None:
         settings = self.settings
         if settings.own_serial not in {None, serial}:
-            wanted = settings.own_serial
+            expected_serial = settings.own_serial
         elif is_other_serial(serial, settings.serial):
-            wanted = settings.serial
+            expected_serial = settings.serial
         else:
             return
         raise WrongInstrument(
             self.name,
             f"the unit on {settings.port} has serial number {serial}, but the bench file or the "
-            f"campaign names {wanted}; connect "
+            f"campaign names {expected_serial}; connect "
             "the "
             "right unit, or correct port, serial or own_serial",
         )
@@ -255,13 +259,13 @@ class Stim300:
         return reported
 
     def _decode(self, data: bytes) -> Readings:
-        found = scan(self._unfinished + data, self.layout)
-        self._unfinished = found.rest
-        for special in found.specials:
+        scanned = scan(self._unfinished + data, self.layout)
+        self._unfinished = scanned.rest
+        for special in scanned.specials:
             self._stream.answered(SPECIALS[special[0]].stride)
             self._hear(special)
-        frames, layout, behind = found.frames, self.layout, found.behind
-        damaged = found.damaged
+        frames, layout, behind = scanned.frames, self.layout, scanned.behind
+        damaged = scanned.damaged
         if len(frames):
             new = self._counter.is_new(frames[:, layout.counter].astype(np.int64), frames)
             if not new.all():
@@ -277,8 +281,8 @@ class Stim300:
         valid &= np.all(np.abs(rates) < SATURATION_DPS / RATE_PER_LSB, axis=1)
         raw: dict[str, NDArray[np.int64]] = {f"gyro_{axis}": rates[:, AXES.index(axis)] for axis in self.axes}
         if layout.temperature is not None and layout.temperature_status is not None:
-            warm = int16(frames, layout.temperature).astype(np.int64)
-            raw |= {f"temperature_{axis}_c": warm[:, AXES.index(axis)] for axis in self.axes}
+            temperature_codes = int16(frames, layout.temperature).astype(np.int64)
+            raw |= {f"temperature_{axis}_c": temperature_codes[:, AXES.index(axis)] for axis in self.axes}
             valid &= (frames[:, layout.temperature_status] & BAD_STATUS) == 0
         raw["status"] = status
         counter = frames[:, layout.counter].astype(np.int64)

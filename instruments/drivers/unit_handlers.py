@@ -15,11 +15,11 @@ class ManualUnitHandler:
     """A bench on which only a person can turn and switch the units: every request is rejected with that advice."""
 
     def mount(self, position: str) -> None:
-        """Control nothing: a person has to turn the units. Raises RequestRejected."""
+        """Raise RequestRejected: a person has to turn the units."""
         raise RequestRejected(DEVICE, f"only a person can turn the units to {position} up; confirm when it is done")
 
     def turn(self, position: str, turn_deg: float) -> None:
-        """Control nothing: a person has to turn the units. Raises RequestRejected."""
+        """Raise RequestRejected: a person has to turn the units."""
         raise RequestRejected(
             DEVICE, f"only a person can turn the units by {turn_deg:g} deg about {position}; confirm when it is done"
         )
@@ -29,7 +29,7 @@ class ManualUnitHandler:
         return False
 
     def power(self, on: bool) -> None:
-        """Control nothing: a person has to switch the units. Raises RequestRejected."""
+        """Raise RequestRejected: a person has to switch the units."""
         raise RequestRejected(
             DEVICE, f"only a person can switch the units {'on' if on else 'off'}; confirm when it is done"
         )
@@ -45,11 +45,11 @@ class RemoteUnitHandler:
         self._address = (host, int(port))
 
     def mount(self, position: str) -> None:
-        """Control the simulator: turn its units. Raises LinkError, RequestRejected."""
+        """Turn the units of the simulator. Raises LinkError, RequestRejected."""
         self._request(mount_line(position))
 
     def turn(self, position: str, turn_deg: float) -> None:
-        """Control the simulator: have its units turned by hand. Raises LinkError, RequestRejected."""
+        """Turn the units of the simulator by hand. Raises LinkError, RequestRejected."""
         self._request(turn_line(position, turn_deg))
 
     def is_turning(self) -> bool:
@@ -57,7 +57,7 @@ class RemoteUnitHandler:
         return self._request(IS_TURNING, OK, BUSY) == BUSY
 
     def power(self, on: bool) -> None:
-        """Control the simulator: switch its units. Raises LinkError, RequestRejected."""
+        """Switch the units of the simulator on or off. Raises LinkError, RequestRejected."""
         self._request(power_line(on))
 
     def _request(self, line: str, *known: str) -> str:

@@ -44,7 +44,7 @@ class Chamber(Protocol):
         ...
 
     def set_temperature_c(self, temperature_c: float) -> float:
-        """Control the set point: limited, rounded, written on change only. Returns the value read back."""
+        """Write the set point: limited, rounded, written on change only. Returns the value read back."""
         ...
 
     def read(self) -> ChamberState:
@@ -52,9 +52,9 @@ class Chamber(Protocol):
         ...
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe set point; returns the value read back."""
+        """Set the chamber to its safe set point; returns the value read back."""
         ...
 
     def close(self) -> None:
-        """Control the link: close it. The controller keeps its set point."""
+        """Close the link. The controller keeps its set point."""
         ...

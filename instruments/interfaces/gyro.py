@@ -111,7 +111,7 @@ class Gyro(Protocol):
         ...
 
     def start(self) -> None:
-        """Control the stream: open it and drop stale or partial data."""
+        """Open the stream and drop stale or partial data."""
         ...
 
     def read(self, duration_s: float) -> Readings:
@@ -123,5 +123,5 @@ class Gyro(Protocol):
         ...
 
     def stop(self) -> None:
-        """Control the stream: stop and close it. Safe to call at any time, also twice."""
+        """Stop and close the stream. Safe to call at any time, also twice."""
         ...

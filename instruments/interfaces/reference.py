@@ -36,5 +36,5 @@ class Reference(Protocol):
         ...
 
     def close(self) -> None:
-        """Control the link: close it."""
+        """Close the link."""
         ...

@@ -158,22 +158,22 @@ class RateTable(Protocol):
         ...
 
     def home(self) -> None:
-        """Control the table to its home switch; the angle is 0 deg there."""
+        """Turn the table to its home switch; the angle is 0 deg there."""
         ...
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
-        """Control the table to a constant rate that stays steady for at least `steady_s`; returns when it is steady.
+        """Turn the table at a constant rate that stays steady for at least `steady_s`; returns when it is steady.
 
         The table comes to rest by itself at the end of the run. Rate 0 is a run at rest.
         """
         ...
 
     def settle(self, spin: Spin) -> None:
-        """Control the end of a run: return when the table confirms that it is at rest."""
+        """Return when the table confirms that it is at rest."""
         ...
 
     def stop(self) -> None:
-        """Control the table to rest. Safe to call at any time, also twice."""
+        """Stop the table. Safe to call at any time, also twice."""
         ...
 
     def is_moving(self) -> bool:
@@ -185,7 +185,7 @@ class RateTable(Protocol):
         ...
 
     def close(self) -> None:
-        """Control the link: close it. This does not stop the table."""
+        """Close the link. This does not stop the table."""
         ...
 
 
@@ -243,7 +243,7 @@ class CourseTable(Protocol):
     """A table with an encoder that follows a rate which changes; its limits say so by `follows_courses`."""
 
     def begin_course(self, course: RateCourse) -> CourseRun:
-        """Bring the table to the rate from which a course begins, then begin it.
+        """Turn the table at the rate from which a course begins, then begin it.
 
         Raises LimitError (nothing was sent), RequestRejected, NoReply, MalformedReply, LinkError.
         """
@@ -258,5 +258,5 @@ class CourseTable(Protocol):
         ...
 
     def end_course(self, run: CourseRun) -> None:
-        """Control the table to rest at the end of a course; raises RequestRejected where it stopped before."""
+        """Stop the table at the end of a course; raises RequestRejected where it stopped before."""
         ...

@@ -9,11 +9,11 @@ class UnitHandler(Protocol):
     """A person or a device that turns the units and switches their power. Every failure is an InstrumentError."""
 
     def mount(self, position: str) -> None:
-        """Control the units: turn them so that body axis `position` (x, -x, y ...) points up along the table axis."""
+        """Turn the units so that body axis `position` (x, -x, y ...) points up along the table axis."""
         ...
 
     def turn(self, position: str, turn_deg: float) -> None:
-        """Control the units: have them turned by hand by `turn_deg` about body axis `position`, which points up.
+        """Have the units turned by hand, by `turn_deg` about body axis `position`, which points up.
 
         Positive is counter-clockwise seen from above. Returns at once, while the units turn.
         """
@@ -24,5 +24,5 @@ class UnitHandler(Protocol):
         ...
 
     def power(self, on: bool) -> None:
-        """Control the units: switch their power on or off."""
+        """Switch the power of the units on or off."""
         ...

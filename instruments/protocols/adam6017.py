@@ -55,9 +55,9 @@ class WiringOptions(Strict):
     @classmethod
     def _is_known(cls, code: int) -> int:
         if code not in RANGES_V:
-            known = ", ".join(f"0x{known:04X}" for known in RANGES_V)
+            codes = ", ".join(f"0x{codes:04X}" for codes in RANGES_V)
             raise ValueError(
-                f"input range code 0x{code:04X} is not a voltage range of the ADAM-6017; choose one of {known}"
+                f"input range code 0x{code:04X} is not a voltage range of the ADAM-6017; choose one of {codes}"
             )
         return code
 
@@ -73,10 +73,10 @@ class WiringOptions(Strict):
     @property
     def range_codes(self) -> dict[int, int]:
         """Input number -> range code of the inputs in use; the input of the rate comes first."""
-        found = {self.channel: self.range_code}
+        codes = {self.channel: self.range_code}
         if self.thermometer_channel is not None:
-            found[self.thermometer_channel] = self.thermometer_range_code
-        return found
+            codes[self.thermometer_channel] = self.thermometer_range_code
+        return codes
 
 
 class GyrostarSettings(GyroSettings):

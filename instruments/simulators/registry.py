@@ -15,13 +15,13 @@ from instruments.simulators.setup import InstrumentSetup
 MakeDevice = Callable[[InstrumentSetup], SimulatedDevice]
 
 
-def _checked(found: object) -> MakeDevice:
-    if not callable(found):
+def _checked(device: object) -> MakeDevice:
+    if not callable(device):
         raise TypeError(
-            f"{found!r} is not a class or function that makes a simulated instrument from an "
+            f"{device!r} is not a class or function that makes a simulated instrument from an "
             "InstrumentSetup; correct the entry point"
         )
-    return cast(MakeDevice, found)
+    return cast(MakeDevice, device)
 
 
 SIMULATORS: PluginGroup[MakeDevice] = PluginGroup("labctl.simulators", "simulated instrument", _checked)

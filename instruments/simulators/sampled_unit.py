@@ -35,7 +35,7 @@ class SampledUnit:
         return self._sent / self._rate_hz
 
     def skip(self, t_s: float) -> None:
-        """Lose the samples up to `t_s`."""
+        """Drop the samples up to `t_s`."""
         self._sent = max(self._sent, self._newest(t_s))
 
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the unit never waits
@@ -58,10 +58,10 @@ class SampledUnit:
         force = self._world.gravity(index / self._rate_hz)
         if self._unit.truth.accel_noise_g > 0:
             force = force + self._unit.truth.accel_noise_g * self._rng.standard_normal(force.shape)
-        found = {"temperature_c": sample.temperature_c[:, 0], "supply_v": sample.supply_v}
+        values = {"temperature_c": sample.temperature_c[:, 0], "supply_v": sample.supply_v}
         for column, axis in enumerate(self._axes):
-            found[f"gyro_{axis}"] = sample.rate_dps[:, column]
-            found[f"temperature_{axis}_c"] = sample.temperature_c[:, column]
+            values[f"gyro_{axis}"] = sample.rate_dps[:, column]
+            values[f"temperature_{axis}_c"] = sample.temperature_c[:, column]
         for column, body_axis in enumerate("xyz"):
-            found[f"accel_{body_axis}_g"] = force[:, column]
-        return found
+            values[f"accel_{body_axis}_g"] = force[:, column]
+        return values

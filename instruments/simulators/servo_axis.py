@@ -19,15 +19,17 @@ class ServoAxis:
 
     def __init__(self, setup: InstrumentSetup, seed: int) -> None:
         settings = part_of(setup.instrument("table"), DescribedTableSettings)
-        said = setup.world.settings.table
+        table_section = setup.world.settings.table
         self.sign = settings.direction
         self.parameters = {**settings.format.parameters, **settings.parameters}
         self.motion = setup.world.servo = setup.world.servo or ServoMotion()
-        self._ratio = number(said, "rate_ratio", 1.0)
-        self._noise_deg = number(said, "encoder_noise_deg", 0.0)
-        self.reply_s = number(said, "reply_s", 0.002)
-        self.home_s = number(said, "home_s", 8.0)  #: how long a home search takes at least
-        self._zero_deg = number(said, "off_home_deg", 25.0)  #: its encoder counts from where it was switched on
+        self._ratio = number(table_section, "rate_ratio", 1.0)
+        self._noise_deg = number(table_section, "encoder_noise_deg", 0.0)
+        self.reply_s = number(table_section, "reply_s", 0.002)
+        self.home_s = number(table_section, "home_s", 8.0)  #: how long a home search takes at least
+        self._zero_deg = number(
+            table_section, "off_home_deg", 25.0
+        )  #: its encoder counts from where it was switched on
         self._rng = np.random.default_rng([setup.world.settings.seed, setup.world.settings.noise_seed, seed])
 
     def run(self, t_s: float, rate_dps: float, acceleration_dps2: float) -> float:

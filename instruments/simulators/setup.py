@@ -22,9 +22,9 @@ class InstrumentSetup:
 
     def instrument(self, name: str) -> DeviceSettings:
         """Return the bench file's section "table" or "chamber"; raises LinkError where the bench has none."""
-        if (found := self.bench.instruments.get(name)) is None:
+        if (device := self.bench.instruments.get(name)) is None:
             raise LinkError(name, f"bench {self.bench.name} has no [{name}]; add the section, or correct the address")
-        return found
+        return device
 
     @property
     def gyro(self) -> GyroSettings:
@@ -34,14 +34,14 @@ class InstrumentSetup:
     @property
     def reference(self) -> ReferenceSettings:
         """Settings of the reference instrument that the address names, else of the first; raises LinkError."""
-        found = {each.name: each for each in self.bench.references}
-        if not found:
+        by_name = {each.name: each for each in self.bench.references}
+        if not by_name:
             raise LinkError(
                 "reference",
                 f"bench {self.bench.name} has no reference instrument; add a [[references]] section "
                 "to the bench file, or correct the port's address",
             )
-        return found.get(self.gyro_name, next(iter(found.values())))
+        return by_name.get(self.gyro_name, next(iter(by_name.values())))
 
     @property
     def unit(self) -> SimulatedGyro:

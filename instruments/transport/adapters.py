@@ -21,28 +21,28 @@ def adapter_of(port: str | None) -> str:
     if not port or "://" in port:
         return ""
     real = os.path.realpath(port)
-    for found in list_ports.comports():
-        if os.path.realpath(found.device) == real:
-            _, several, interface = (found.location or "").partition(":")
-            return f"{found.serial_number}{several}{interface}" if found.serial_number else ""
+    for port_info in list_ports.comports():
+        if os.path.realpath(port_info.device) == real:
+            _, several, interface = (port_info.location or "").partition(":")
+            return f"{port_info.serial_number}{several}{interface}" if port_info.serial_number else ""
     return ""
 
 
-def is_adapter(wanted: str, found: str) -> bool:
+def is_adapter(wanted_serial: str, serial: str) -> bool:
     """Return whether an adapter is the wanted one, named with or without the number of its port."""
-    return wanted in (found, found.partition(":")[0])
+    return wanted_serial in (serial, serial.partition(":")[0])
 
 
-def require_adapter(device: str, port: str | None, wanted: str | None) -> dict[str, str]:
+def require_adapter(device: str, port: str | None, serial: str | None) -> dict[str, str]:
     """Return the adapter of a port as something that a device reports; empty where it has none.
 
     Raises WrongInstrument where the bench file names another adapter.
     """
-    found = adapter_of(port)
-    if wanted is not None and not is_adapter(wanted, found):
+    adapter = adapter_of(port)
+    if serial is not None and not is_adapter(serial, adapter):
         raise WrongInstrument(
             device,
-            f"port {port} is on USB adapter {found or 'without a serial number'}, but the bench file or the "
-            f"campaign names {wanted}; two adapters may be exchanged: give the path of the port in /dev/serial/by-id",
+            f"port {port} is on USB adapter {adapter or 'without a serial number'}, but the bench file or the "
+            f"campaign names {serial}; two adapters may be exchanged: give the path of the port in /dev/serial/by-id",
         )
-    return {"adapter": found} if found else {}
+    return {"adapter": adapter} if adapter else {}

@@ -78,9 +78,9 @@ class CanPort:
         """Read `size` bytes, or those of the frames that arrive before the time-out."""
         while len(self._unread) < size and self._receive(self._timeout_s):
             pass
-        found = bytes(self._unread[:size])
+        data = bytes(self._unread[:size])
         del self._unread[:size]
-        return found
+        return data
 
     def write(self, data: bytes, /) -> int:
         """Send whole frames; raises ValueError for other bytes."""

@@ -45,12 +45,12 @@ class LineLink:
         self.openings = 0  #: how often the port was opened: what was set over an earlier one may be forgotten
 
     def ask(
-        self, request: str, reply: str, what: str, *, tries: int = TRIES, timeout_s: float | None = None
+        self, request: str, reply: str, purpose: str, *, tries: int = TRIES, timeout_s: float | None = None
     ) -> re.Match[str]:
         """Return the reply to a request as the match of the pattern `reply` with the whole line; tried three times.
 
-        A request that must not be executed twice gets one try, one that takes long a time-out of its own. `what` names
-        the request in messages. Raises the failure
+        A request that must not be executed twice gets one try, one that takes long a time-out of its own. `purpose`
+        names the request in messages. Raises the failure
         of the last try: NoReply, MalformedReply or LinkError; RequestRejected at once where the device refuses.
         """
         begun_s = self._clock.now_s()
@@ -61,9 +61,9 @@ class LineLink:
             self._clock.sleep(pause_s)
             try:
                 self.awaits_slow = timeout_s is not None  # for good where what waits is ended
-                found = self._ask_once(request, reply, what, timeout_s or self._timeout_s)
+                match = self._ask_once(request, reply, purpose, timeout_s or self._timeout_s)
                 self.awaits_slow = False
-                return found
+                return match
             except RequestRejected:
                 self.awaits_slow = False
                 raise
@@ -77,16 +77,16 @@ class LineLink:
         count = "1 try" if tries == 1 else f"{tries} tries"
         raise type(failure)(self.device, f"{text} ({count} in {spent_s:.2g} s)") from failure
 
-    def tell(self, request: str, what: str) -> None:
+    def tell(self, request: str, purpose: str) -> None:
         """Send a request that has no reply; raises LinkError."""
         try:
             self._send(request)
         except BROKEN as error:
-            raise self._broken(what, error) from error
+            raise self._broken(purpose, error) from error
         finally:
             self._earliest_s = self._clock.now_s() + self._syntax.pause_s
 
-    def send_at_once(self, requests: Sequence[str], what: str) -> None:
+    def send_at_once(self, requests: Sequence[str], purpose: str) -> None:
         """Send requests without waiting for anything, whatever is under way; their replies are dropped later.
 
         Each is sent twice: the first may end a line that another process left half sent. Without a line end there is
@@ -103,7 +103,7 @@ class LineLink:
                 self._line.send(data)
                 port.write(data)
         except BROKEN as error:
-            raise self._broken(what, error) from error
+            raise self._broken(purpose, error) from error
         finally:
             self._line.doubt(self._clock.now_s())
             self._earliest_s = self._clock.now_s() + self._syntax.pause_s
@@ -114,21 +114,21 @@ class LineLink:
             self._port.close()
             self._port = None
 
-    def _ask_once(self, request: str, reply: str, what: str, timeout_s: float) -> re.Match[str]:
+    def _ask_once(self, request: str, reply: str, purpose: str, timeout_s: float) -> re.Match[str]:
         try:
-            found = self._receive(self._send(request), what, timeout_s)
+            line = self._receive(self._send(request), purpose, timeout_s)
         except BROKEN as error:
-            raise self._broken(what, error) from error
+            raise self._broken(purpose, error) from error
         finally:
             self._earliest_s = self._clock.now_s() + self._syntax.pause_s
-        if (match := re.fullmatch(reply, found)) is not None:
+        if (match := re.fullmatch(reply, line)) is not None:
             return match
-        if self._syntax.refusal and (refused := re.fullmatch(self._syntax.refusal, found)):
+        if self._syntax.refusal and (refused := re.fullmatch(self._syntax.refusal, line)):
             why = self._syntax.reason(refused["why"])
-            raise RequestRejected(self.device, f"refused to {what}: {why}; check its mode at its panel")
+            raise RequestRejected(self.device, f"refused to {purpose}: {why}; check its mode at its panel")
         raise MalformedReply(
             self.device,
-            f"answered {found[:SHOWN_BYTES]!r} to the request to {what}; check driver, line settings and cable",
+            f"answered {line[:SHOWN_BYTES]!r} to the request to {purpose}; check driver, line settings and cable",
         )
 
     def _send(self, request: str) -> SerialPort:
@@ -157,7 +157,7 @@ class LineLink:
     def _encoded(self, request: str) -> bytes:
         return (request + self._syntax.end).encode(self._syntax.encoding)
 
-    def _receive(self, port: SerialPort, what: str, timeout_s: float) -> str:
+    def _receive(self, port: SerialPort, purpose: str, timeout_s: float) -> str:
         """Return the next line that is not empty, without its end; raises NoReply, MalformedReply, one of BROKEN."""
         deadline_s = self._clock.now_s() + timeout_s
         data, end = b"", self._reply_end
@@ -169,24 +169,26 @@ class LineLink:
             if len(data) > LONGEST_REPLY_BYTES:
                 raise MalformedReply(
                     self.device,
-                    f"sent {len(data)} bytes without a line end when asked to {what}; check the baud rate and that "
+                    f"sent {len(data)} bytes without a line end when asked to {purpose}; check the baud rate and that "
                     f"{self.url} is this device",
                 )
             if timeout_s > self._timeout_s:
                 self._clock.sleep(0.0)  # a stop ends a long wait
             if self._clock.now_s() >= deadline_s - 1e-9:
-                raise self._silent(data, what)
+                raise self._silent(data, purpose)
 
-    def _silent(self, data: bytes, what: str) -> LinkError:
+    def _silent(self, data: bytes, purpose: str) -> LinkError:
         if data.strip():
             text = data.decode(self._syntax.encoding, errors="replace")[:SHOWN_BYTES]
             return MalformedReply(
-                self.device, f"sent {text!r} without a line end when asked to {what}; check baud rate and cable"
+                self.device, f"sent {text!r} without a line end when asked to {purpose}; check baud rate and cable"
             )
         return NoReply(
-            self.device, f"no answer to the request to {what} on {self.url}; check power, cable and line settings"
+            self.device, f"no answer to the request to {purpose} on {self.url}; check power, cable and line settings"
         )
 
-    def _broken(self, what: str, error: Exception) -> InstrumentError:
+    def _broken(self, purpose: str, error: Exception) -> InstrumentError:
         self.close()
-        return LinkError(self.device, f"cannot {what}, the link {self.url} was lost ({error}); check cable and power")
+        return LinkError(
+            self.device, f"cannot {purpose}, the link {self.url} was lost ({error}); check cable and power"
+        )

@@ -119,7 +119,7 @@ class Registers:
             self._write(register, words, self._write_function)
 
     def close(self) -> None:
-        """Control the link: close it; safe to call twice. The next request opens it again."""
+        """Close the link; safe to call twice. The next request opens it again."""
         self._link.close()
 
     def _value(self, register: Register, words: list[int]) -> float:

@@ -45,9 +45,9 @@ def explain_tcp(received: bytes, sent: bytes, address: int) -> str:
     if protocol := int.from_bytes(received[2:4], "big"):
         return f"the reply has protocol number {protocol} instead of 0 (Modbus TCP); {ADDRESS}"
     if received[:2] != sent[:2]:
-        number, asked = (int.from_bytes(each[:2], "big") for each in (received, sent))
+        number, requested = (int.from_bytes(each[:2], "big") for each in (received, sent))
         return (
-            f"the reply to request {number} arrived instead of that to request {asked}; find the second "
+            f"the reply to request {number} arrived instead of that to request {requested}; find the second "
             "Modbus master on this link"
         )
     if received[TCP_PREFIX_BYTES] != address:
@@ -71,8 +71,10 @@ def _is_frame(data: bytes) -> bool:
     return FramerRTU.check_CRC(data[:-2], int.from_bytes(data[-2:], "big"))
 
 
-def _other_unit(found: int, address: int) -> str:
-    return f"unit {found} answered instead of unit {address}; set address in the bench file, or find the second device"
+def _other_unit(answered: int, address: int) -> str:
+    return (
+        f"unit {answered} answered instead of unit {address}; set address in the bench file, or find the second device"
+    )
 
 
 def _bytes(received: bytes, advice: str) -> str:
@@ -100,9 +102,9 @@ LONGEST_REPLY_S = 5.0
 class RefusedRegister(RequestRejected):
     """A Modbus exception reply; `code` is its number."""
 
-    def __init__(self, device: str, what: str, code: int) -> None:
+    def __init__(self, device: str, register: str, code: int) -> None:
         reason = EXCEPTIONS.get(code, "without giving a reason")
-        super().__init__(device, f"refused to {what}: Modbus exception {code}, {reason}")
+        super().__init__(device, f"refused to {register}: Modbus exception {code}, {reason}")
         self.code = code
 
 
@@ -133,11 +135,11 @@ class ModbusLink:
         """Faults of the line that requests survived and that need a repair."""
         return tuple(self._line.remarks)
 
-    def exchange(self, what: str, ask: Request, fits: Check) -> ModbusPDU:
+    def exchange(self, purpose: str, ask: Request, fits: Check) -> ModbusPDU:
         """Return the reply to a request, tried up to three times.
 
-        `what` names the request in messages; `fits` tells whether a reply belongs to it. Raises the failure of the last
-        try: NoReply, MalformedReply, LinkError or RefusedRegister. Only the exceptions "needs time" and "busy" are
+        `purpose` names the request in messages; `fits` tells whether a reply belongs to it. Raises the failure of the
+        last try: NoReply, MalformedReply, LinkError or RefusedRegister. Only the exceptions "needs time" and "busy" are
         tried again.
         """
         start_s = self._clock.now_s()
@@ -148,7 +150,7 @@ class ModbusLink:
             if not self._line.is_doubtful:
                 self._clock.sleep(pause_s)
             try:
-                reply = self._exchange_once(what, ask, fits)
+                reply = self._exchange_once(purpose, ask, fits)
             except RefusedRegister as refused:
                 if refused.code not in {ACKNOWLEDGED, BUSY}:
                     raise
@@ -172,7 +174,7 @@ class ModbusLink:
         if self._client is not None:
             self._client.close()
 
-    def _exchange_once(self, what: str, ask: Request, fits: Check) -> ModbusPDU:
+    def _exchange_once(self, purpose: str, ask: Request, fits: Check) -> ModbusPDU:
         """Return the reply to one try; raises NoReply, MalformedReply, LinkError or RefusedRegister."""
         sleep_until(self._clock, self._earliest_request_s)
         self._sent = self._received = b""
@@ -181,23 +183,23 @@ class ModbusLink:
             reply = ask(client)
         except DISCONNECTED as error:
             if not self._is_serial and (advice := other_server(self._received)):  # it is no Modbus server
-                raise MalformedReply(self.device, f"cannot {what}, {advice}") from error
+                raise MalformedReply(self.device, f"cannot {purpose}, {advice}") from error
             # pymodbus's own text is the client's address in memory
             detail = "" if isinstance(error, ConnectionException) else f" ({one_line(error)})"
-            text = f"cannot {what}, the link was lost{detail}; check cable and power"
+            text = f"cannot {purpose}, the link was lost{detail}; check cable and power"
             raise LinkError(self.device, text) from error
         except (ModbusException, *UNDECODABLE) as error:
             if self._received:
                 advice = self._explain()
-                raise MalformedReply(self.device, f"cannot {what}, {advice}") from error
-            raise NoReply(self.device, f"no answer to {what}; {CHECK} {self.address}") from error
+                raise MalformedReply(self.device, f"cannot {purpose}, {advice}") from error
+            raise NoReply(self.device, f"no answer to {purpose}; {CHECK} {self.address}") from error
         finally:
             self._earliest_request_s = self._clock.now_s() + self._pause_s
         if reply.isError():
-            raise RefusedRegister(self.device, what, reply.exception_code)
+            raise RefusedRegister(self.device, purpose, reply.exception_code)
         if not fits(reply) or (isinstance(client, ModbusTcpClient) and not ends_at_a_frame_end(self._received)):
             raise MalformedReply(
-                self.device, f"cannot {what}, the reply belongs to another request; {CHECK} {self.address}"
+                self.device, f"cannot {purpose}, the reply belongs to another request; {CHECK} {self.address}"
             )
         return reply
 

@@ -99,9 +99,9 @@ class EchoFreePort:
             if not data:
                 break
             self._take(data)
-        found = bytes(self._kept[:size])
+        chunk = bytes(self._kept[:size])
         del self._kept[:size]
-        return found
+        return chunk
 
     def write(self, data: bytes, /) -> int | None:
         """Send bytes, and expect them back."""

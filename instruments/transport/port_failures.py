@@ -30,8 +30,8 @@ def remedy(url: str, error: Exception) -> str:
     if number == errno.EACCES:
         return f"that this user has access to the port: {permission_command(url)}"
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
-        if found := users_of(url):
-            return f"which other process has it open: {', '.join(found)}; end that process"
+        if users := users_of(url):
+            return f"which other process has it open: {', '.join(users)}; end that process"
         return f"which other process has it open: run `fuser -v {url}`, and end that process"
     if number == errno.ENOENT:
         there = sorted(str(path) for path in BY_ID.glob("*")) if BY_ID.is_dir() else []
@@ -55,7 +55,7 @@ def users_of(url: str) -> list[str]:
     The process that made a pseudo-terminal has both of its ends open: it is the device, and no other user of the port.
     """
     real, own = os.path.realpath(url), str(os.getpid())
-    found = []
+    users = []
     for process in PROCESSES.glob("[0-9]*"):
         if process.name == own:
             continue
@@ -66,8 +66,8 @@ def users_of(url: str) -> list[str]:
         except OSError:  # another user's, or over
             continue
         if has_open:
-            found.append(f"process {process.name} ({name})")
-    return sorted(found)
+            users.append(f"process {process.name} ({name})")
+    return sorted(users)
 
 
 def stable_name(url: str) -> str:

@@ -20,7 +20,7 @@ class ScanMeans:
         self.drop()
 
     def drop(self) -> None:
-        """Forget what waits."""
+        """Drop what waits."""
         self._numbers: Counts = np.zeros(0, dtype=np.int64)
         self._codes: Counts = np.zeros((0, self._inputs), dtype=np.int64)
         self._good: NDArray[np.bool_] = np.zeros(0, dtype=bool)
@@ -37,9 +37,9 @@ class ScanMeans:
         waits = (groups == last) & (numbers[-1:] != (last + 1) * self.average - 1)
         self._numbers, self._codes, self._good = numbers[waits], codes[waits], good[waits]
         groups, codes, good = groups[~waits], codes[~waits], good[~waits]
-        found, starts, counts = np.unique(groups, return_index=True, return_counts=True)
+        group_numbers, starts, counts = np.unique(groups, return_index=True, return_counts=True)
         whole = counts == self.average
         if not len(starts):
-            return found, codes, good
+            return group_numbers, codes, good
         sums = np.add.reduceat(codes, starts, axis=0)
-        return found[whole], sums[whole], np.logical_and.reduceat(good, starts)[whole]
+        return group_numbers[whole], sums[whole], np.logical_and.reduceat(good, starts)[whole]

@@ -76,10 +76,10 @@ class StampingPort(Protocol):
 def _terminal_error() -> type[Exception]:
     """Return the error of the system's terminals; OSError on a system without terminals."""
     try:
-        found: type[Exception] = importlib.import_module("termios").error
+        error_class: type[Exception] = importlib.import_module("termios").error
     except ImportError:
         return OSError
-    return found
+    return error_class
 
 
 #: Emptying the buffers of a port that went away raises the terminal's own error, which is not an OSError.

@@ -21,7 +21,7 @@ class Undecided:
         self._kept: list[tuple[Readings, Ticks | None]] = []
 
     def drop(self) -> None:
-        """Forget what is kept."""
+        """Drop what is kept."""
         self._kept.clear()
 
     def take(self, device_time: DeviceClock | None = None) -> Readings | None:

@@ -100,8 +100,8 @@ def _response(
     result: FitResult, use: Mapping[str, AxisEvidenceJson], bench: BenchConditions
 ) -> dict[str, dict[str, BudgetJson]]:
     """Return axis -> budgets of delay and time constant, which a document leaves out of its model."""
-    found = response_budgets(result.fitted, evidence=_evidence(use), bench=bench)
-    return {axis: {name: budget.to_json() for name, budget in named.items()} for axis, named in found.items()}
+    budgets = response_budgets(result.fitted, evidence=_evidence(use), bench=bench)
+    return {axis: {name: budget.to_json() for name, budget in named.items()} for axis, named in budgets.items()}
 
 
 def _evidence(use: Mapping[str, AxisEvidenceJson]) -> dict[str, AxisEvidence]:

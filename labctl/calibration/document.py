@@ -84,8 +84,8 @@ class Calibration:
         accelerometer.
         """
         with _reading("specific_force"):
-            given = self.document.get("specific_force")
-            return None if given is None else ForceSensitivity.from_json(given, self.axes)
+            force_json = self.document.get("specific_force")
+            return None if force_json is None else ForceSensitivity.from_json(force_json, self.axes)
 
     @cached_property
     def bench(self) -> BenchConditions | None:
@@ -93,8 +93,8 @@ class Calibration:
         from labctl.fitting.uncertainty.conditions import BenchConditions  # noqa: PLC0415  needs pydantic
 
         with _reading("standards"):
-            given = self.document.get("standards")
-            return None if given is None else BenchConditions.from_json(given)
+            bench_json = self.document.get("standards")
+            return None if bench_json is None else BenchConditions.from_json(bench_json)
 
     @property
     def output(self) -> dict[str, OutputUnit]:
@@ -128,8 +128,8 @@ class Calibration:
 
         `reported` is what it says of itself, by the same names; what only one of the two has is not compared.
         """
-        if found := changed(self.configuration, reported):
-            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in found.items())
+        if changes := changed(self.configuration, reported):
+            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
             raise OtherConfiguration(
                 f"calibration of {self.serial} version {self.version}: the unit is set otherwise than when it was "
                 f"measured: {said}; set it as it was, or calibrate it as it is"
@@ -139,8 +139,8 @@ class Calibration:
     def certification(self) -> Certification | None:
         """The certification at the time when the file was fetched; None: it was not certified then."""
         with _reading("certification"):
-            given = self.document.get("certification")
-            return None if given is None else read_certification(given)
+            certification_json = self.document.get("certification")
+            return None if certification_json is None else read_certification(certification_json)
 
     def warning(self, now: datetime) -> str:
         """Return the warning for a user at an aware time: overdue, or revoked. Empty where there is nothing."""
@@ -173,8 +173,8 @@ def read_calibration(source: Path | bytes) -> Calibration:
                 f"{name}: the file has schema {repr(schema)[:80]}, but this version of labctl reads {SCHEMA!r}; "
                 "use the version that wrote the file"
             )
-        whole, found = canonical_and_hash(document)
-        if whole != content.strip():
+        canonical_document, digest = canonical_and_hash(document)
+        if canonical_document != content.strip():
             json.loads(content, object_pairs_hook=_object)
     except OSError as error:
         raise BadCalibrationFile(f"{name}: cannot be read ({error.strerror}); check path and permissions") from error
@@ -187,9 +187,9 @@ def read_calibration(source: Path | bytes) -> Calibration:
             f"{name}: not JSON, or truncated ({error}); fetch it again with `labctl calibration`"
         ) from error
     written = document.get("hash")
-    if found != written:
+    if digest != written:
         raise BadCalibrationFile(
-            f"{name}: was edited or damaged: the hash of its content is {found[:16]}…, but the file gives "
+            f"{name}: was edited or damaged: the hash of its content is {digest[:16]}…, but the file gives "
             f"{str(written)[:16]}…; fetch it again with `labctl calibration`"
         )
     return Calibration(cast(CalibrationJson, document))
@@ -204,12 +204,12 @@ def _content(path: Path) -> bytes:
 
 
 def _object(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    made = dict(pairs)
-    if len(made) != len(pairs):
+    members = dict(pairs)
+    if len(members) != len(pairs):
         keys = [key for key, _ in pairs]
         double = next(key for key in keys if keys.count(key) > 1)
         raise ValueError(f"key {double[:80]!r} is repeated in one object; remove one of the two")
-    return made
+    return members
 
 
 @contextmanager

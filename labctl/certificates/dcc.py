@@ -23,180 +23,185 @@ CONDITIONS = {
 }
 
 
-def dcc_of(given: Certificate) -> bytes:
+def dcc_of(certificate: Certificate) -> bytes:
     """Return the XML of a certificate."""
     for prefix, space in (("dcc", DCC), ("si", SI), ("xsi", XSI)):
         ET.register_namespace(prefix, space)
     root = ET.Element(f"{{{DCC}}}digitalCalibrationCertificate", {"schemaVersion": VERSION})
     root.set(f"{{{XSI}}}schemaLocation", f"{STATED} {STATED}/v{VERSION}/dcc.xsd")
-    _administrative(child(root, "administrativeData"), given)
-    _measured(child(root, "measurementResults"), given)
+    _administrative(child(root, "administrativeData"), certificate)
+    _measured(child(root, "measurementResults"), certificate)
     ET.indent(root, " ")
     return ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
 
-def _administrative(parent: ET.Element, given: Certificate) -> None:
-    _software(child(parent, "dccSoftware"), given.method.software)
+def _administrative(parent: ET.Element, certificate: Certificate) -> None:
+    _software(child(parent, "dccSoftware"), certificate.method.software)
     defined = child(child(parent, "refTypeDefinitions"), "refTypeDefinition")
     texts(defined, "name", "Namespace of refTypes that several communities share")
     child(defined, "namespace", "basic")
     child(defined, "link", REF_TYPES)
-    _core(child(parent, "coreData"), given)
-    _item(child(parent, "items"), given)
+    _core(child(parent, "coreData"), certificate)
+    _item(child(parent, "items"), certificate)
     laboratory = child(parent, "calibrationLaboratory")
-    optional(laboratory, "calibrationLaboratoryCode", given.laboratory.accreditation)
-    contact(laboratory, "contact", given.laboratory)
+    optional(laboratory, "calibrationLaboratoryCode", certificate.laboratory.accreditation)
+    contact(laboratory, "contact", certificate.laboratory)
     people = child(parent, "respPersons")
-    _person(people, given.authorised.name, "authorised the results", signs=True)
-    if given.issued_by != given.authorised.name:
-        _person(people, given.issued_by, "issued the certificate", signs=False)
-    reached = f"Contact: {given.customer.contact}" if given.customer.contact else ""
-    contact(parent, "customer", given.customer, reached)
-    _statements(child(parent, "statements"), given)
+    _person(people, certificate.authorised.name, "authorised the results", signs=True)
+    if certificate.issued_by != certificate.authorised.name:
+        _person(people, certificate.issued_by, "issued the certificate", signs=False)
+    reached = f"Contact: {certificate.customer.contact}" if certificate.customer.contact else ""
+    contact(parent, "customer", certificate.customer, reached)
+    _statements(child(parent, "statements"), certificate)
 
 
 def _software(parent: ET.Element, software: str) -> None:
     name, _, release = software.rpartition(" ")
-    made = child(parent, "software")
-    texts(made, "name", name)
-    child(made, "release", f"v{release}")
-    child(made, "type", "application")
+    element = child(parent, "software")
+    texts(element, "name", name)
+    child(element, "release", f"v{release}")
+    child(element, "type", "application")
 
 
-def _core(parent: ET.Element, given: Certificate) -> None:
-    child(parent, "countryCodeISO3166_1", given.laboratory.country)
+def _core(parent: ET.Element, certificate: Certificate) -> None:
+    child(parent, "countryCodeISO3166_1", certificate.laboratory.country)
     child(parent, "usedLangCodeISO639_1", ENGLISH)
     child(parent, "mandatoryLangCodeISO639_1", ENGLISH)
-    child(parent, "uniqueIdentifier", given.number)
+    child(parent, "uniqueIdentifier", certificate.number)
     identifications = child(parent, "identifications")
-    _identification(identifications, "calibrationLaboratory", given.calibration.hash, "SHA-256 of the calibration")
-    _identification(identifications, "calibrationLaboratory", given.calibration.address, "Address of the calibration")
-    if given.state_address:
+    _identification(
+        identifications, "calibrationLaboratory", certificate.calibration.hash, "SHA-256 of the calibration"
+    )
+    _identification(
+        identifications, "calibrationLaboratory", certificate.calibration.address, "Address of the calibration"
+    )
+    if certificate.state_address:
         name = "Address of the state of this certificate"
-        _identification(identifications, "calibrationLaboratory", given.state_address, name)
-    for each in given.manifests:
-        name = f"SHA-256 of manifest {each.manifest}: {each.record}"
-        _identification(identifications, "calibrationLaboratory", each.hash, name)
-    if given.customer.order:
-        _identification(identifications, "customer", given.customer.order, "Order")
-    if given.item.received is not None:
-        child(parent, "receiptDate", given.item.received.isoformat())
-    child(parent, "beginPerformanceDate", given.performed_from.isoformat())
-    child(parent, "endPerformanceDate", given.performed_until.isoformat())
-    child(parent, "performanceLocation", given.laboratory.place)
-    child(parent, "issueDate", given.issued_on.isoformat())
-    if given.replaces is not None:
+        _identification(identifications, "calibrationLaboratory", certificate.state_address, name)
+    for manifest in certificate.manifests:
+        name = f"SHA-256 of manifest {manifest.manifest}: {manifest.record}"
+        _identification(identifications, "calibrationLaboratory", manifest.hash, name)
+    if certificate.customer.order:
+        _identification(identifications, "customer", certificate.customer.order, "Order")
+    if certificate.item.received is not None:
+        child(parent, "receiptDate", certificate.item.received.isoformat())
+    child(parent, "beginPerformanceDate", certificate.performed_from.isoformat())
+    child(parent, "endPerformanceDate", certificate.performed_until.isoformat())
+    child(parent, "performanceLocation", certificate.laboratory.place)
+    child(parent, "issueDate", certificate.issued_on.isoformat())
+    if certificate.replaces is not None:
         changed = child(parent, "reportAmendedSubstituted")
         child(changed, "typeOfChange", "amended")
-        child(changed, "replacedUniqueIdentifier", given.replaces.number)
+        child(changed, "replacedUniqueIdentifier", certificate.replaces.number)
         before = child(parent, "previousReport")
         texts(before, "referral", "Certificate that this one replaces")
-        child(before, "referralID", given.replaces.number)
+        child(before, "referralID", certificate.replaces.number)
         child(before, "procedure", "SHA-256 of its JSON")
-        child(before, "value", given.replaces.hash)
-        texts(before, "description", f"Reason: {given.replaces.reason}")
+        child(before, "value", certificate.replaces.hash)
+        texts(before, "description", f"Reason: {certificate.replaces.reason}")
 
 
 def _identification(parent: ET.Element, issuer: str, value: str, name: str) -> None:
-    made = child(parent, "identification")
-    child(made, "issuer", issuer)
-    child(made, "value", value)
-    texts(made, "name", name)
+    element = child(parent, "identification")
+    child(element, "issuer", issuer)
+    child(element, "value", value)
+    texts(element, "name", name)
 
 
-def _item(parent: ET.Element, given: Certificate) -> None:
-    made = child(parent, "item")
-    item = given.item
-    texts(made, "name", item.description)
-    texts(made, "description", f"Axes: {', '.join(item.axes)}.", f"Condition on receipt: {item.condition}")
-    texts(child(made, "manufacturer"), "name", item.manufacturer)
-    child(made, "model", item.model)
-    identifications = child(made, "identifications")
+def _item(parent: ET.Element, certificate: Certificate) -> None:
+    element = child(parent, "item")
+    item = certificate.item
+    texts(element, "name", item.description)
+    texts(element, "description", f"Axes: {', '.join(item.axes)}.", f"Condition on receipt: {item.condition}")
+    texts(child(element, "manufacturer"), "name", item.manufacturer)
+    child(element, "model", item.model)
+    identifications = child(element, "identifications")
     _identification(identifications, "manufacturer", item.serial, "Serial number")
     if item.identification:
         _identification(identifications, "customer", item.identification, "Customer's number")
 
 
 def _person(parent: ET.Element, name: str, role: str, *, signs: bool) -> None:
-    made = child(parent, "respPerson")
-    texts(child(made, "person"), "name", name)
-    child(made, "role", role)
-    child(made, "mainSigner", "true" if signs else "false")
+    element = child(parent, "respPerson")
+    texts(child(element, "person"), "name", name)
+    child(element, "role", role)
+    child(element, "mainSigner", "true" if signs else "false")
 
 
-def _statements(parent: ET.Element, given: Certificate) -> None:
-    for text in given.statements:
+def _statements(parent: ET.Element, certificate: Certificate) -> None:
+    for text in certificate.statements:
         _statement(parent, "Statement", text)
-    _statement(parent, "Adjustment", given.adjustment)
-    _statement(parent, "Results of external providers", given.external)
-    _statement(parent, "Authorisation", f"{given.authorised.persons}, {given.authorised.at:%Y-%m-%d %H:%M} UTC: "
-               f"{given.authorised.reason}")  # fmt: skip
-    if given.due is not None:
-        made = _statement(parent, "Next calibration", "Agreed with the customer.", ref_type="basic_recalibration")
-        child(made, "date", given.due.isoformat())
-    if given.conformity is not None:
-        _conformity(parent, given.conformity, max(each.k for each in given.results))
+    _statement(parent, "Adjustment", certificate.adjustment)
+    _statement(parent, "Results of external providers", certificate.external)
+    authorised = certificate.authorised
+    _statement(parent, "Authorisation", f"{authorised.persons}, {authorised.at:%Y-%m-%d %H:%M} UTC: "
+               f"{authorised.reason}")  # fmt: skip
+    if certificate.due is not None:
+        element = _statement(parent, "Next calibration", "Agreed with the customer.", ref_type="basic_recalibration")
+        child(element, "date", certificate.due.isoformat())
+    if certificate.conformity is not None:
+        _conformity(parent, certificate.conformity, max(result.k for result in certificate.results))
 
 
-def _conformity(parent: ET.Element, found: Conformity, k: float) -> None:
-    made = _statement(parent, "Conformity", found.statement, norm=("ILAC-G8:09/2019",), reference=found.specification,
+def _conformity(parent: ET.Element, judged: Conformity, k: float) -> None:
+    node = _statement(parent, "Conformity", judged.statement, norm=("ILAC-G8:09/2019",), reference=judged.specification,
                       ref_type="basic_conformity")  # fmt: skip
-    child(made, "conformity", "pass" if found.passed else "fail")
-    data = child(made, "data")
+    child(node, "conformity", "pass" if judged.passed else "fail")
+    data = child(node, "data")
     for name, limit, ref_type in (
-        ("Limit of the error", found.limit_dps, "basic_toleranceLimit"),
-        ("Acceptance limit of the error", found.acceptance_dps, "basic_acceptanceLimit"),
+        ("Limit of the error", judged.limit_dps, "basic_toleranceLimit"),
+        ("Acceptance limit of the error", judged.acceptance_dps, "basic_acceptanceLimit"),
     ):
         quantity(data, f"{name}, lower", [-limit], "deg/s", ref_type=f"{ref_type}Lower")
         quantity(data, f"{name}, upper", [limit], "deg/s", ref_type=f"{ref_type}Upper")
-    quantity(data, "Guard band", [found.guard_band_dps], "deg/s")
-    quantity(data, "Largest error of the corrected rate", [found.largest_error_dps], "deg/s",
-             expanded=[found.expanded_dps], k=[k], ref_type="basic_measurementError")  # fmt: skip
+    quantity(data, "Guard band", [judged.guard_band_dps], "deg/s")
+    quantity(data, "Largest error of the corrected rate", [judged.largest_error_dps], "deg/s",
+             expanded=[judged.expanded_dps], k=[k], ref_type="basic_measurementError")  # fmt: skip
 
 
 def _statement(
     parent: ET.Element, name: str, text: str, *, norm: tuple[str, ...] = (), reference: str = "", ref_type: str = ""
 ) -> ET.Element:
-    made = child(parent, "statement", **referred(ref_type))
-    texts(made, "name", name)
+    element = child(parent, "statement", **referred(ref_type))
+    texts(element, "name", name)
     for each in norm:
-        child(made, "norm", each)
-    optional(made, "reference", reference)
-    texts(made, "declaration", text)
-    return made
+        child(element, "norm", each)
+    optional(element, "reference", reference)
+    texts(element, "declaration", text)
+    return element
 
 
-def _measured(parent: ET.Element, given: Certificate) -> None:
-    made = child(parent, "measurementResult")
-    texts(made, "name", f"Calibration of {given.item.serial}, version {given.calibration.version}")
-    methods = child(made, "usedMethods")
-    _method(child(methods, "usedMethod"), given)
+def _measured(parent: ET.Element, certificate: Certificate) -> None:
+    element = child(parent, "measurementResult")
+    texts(element, "name", f"Calibration of {certificate.item.serial}, version {certificate.calibration.version}")
+    methods = child(element, "usedMethods")
+    _method(child(methods, "usedMethod"), certificate)
     stated = child(methods, "usedMethod", **referred("basic_uncertainty"))
     texts(stated, "name", "Uncertainty of measurement")
-    texts(stated, "description", uncertainty_text(given))
+    texts(stated, "description", uncertainty_text(certificate))
     child(stated, "norm", "JCGM 100:2008")
-    _software(child(made, "usedSoftware"), given.method.software)
-    equipment = child(made, "measuringEquipments")
-    for each in given.standards:
-        _standard(equipment, each)
-    conditions = child(made, "influenceConditions")
-    for condition in given.environment:
+    _software(child(element, "usedSoftware"), certificate.method.software)
+    equipment = child(element, "measuringEquipments")
+    for standard in certificate.standards:
+        _standard(equipment, standard)
+    conditions = child(element, "influenceConditions")
+    for condition in certificate.environment:
         _condition(conditions, condition)
-    _results(child(made, "results"), given)
+    _results(child(element, "results"), certificate)
 
 
-def _condition(parent: ET.Element, given: Condition) -> None:
-    ref_type = CONDITIONS.get(given.name, "")
-    made = child(parent, "influenceCondition", **referred(ref_type))
-    texts(made, "name", given.name)
-    data = child(made, "data")
-    for name, value, suffix in (("Least", given.low, "Min"), ("Largest", given.high, "Max")):
+def _condition(parent: ET.Element, condition: Condition) -> None:
+    ref_type = CONDITIONS.get(condition.name, "")
+    element = child(parent, "influenceCondition", **referred(ref_type))
+    texts(element, "name", condition.name)
+    data = child(element, "data")
+    for name, value, suffix in (("Least", condition.low, "Min"), ("Largest", condition.high, "Max")):
         said = f"{name} value during the calibration"
-        quantity(data, said, [value], given.unit, ref_type=ref_type and f"{ref_type}{suffix}")
+        quantity(data, said, [value], condition.unit, ref_type=ref_type and f"{ref_type}{suffix}")
 
 
-def _method(made: ET.Element, given: Certificate) -> None:
-    method = given.method
+def _method(made: ET.Element, certificate: Certificate) -> None:
+    method = certificate.method
     texts(made, "name", method.name)
     texts(
         made,
@@ -210,28 +215,28 @@ def _method(made: ET.Element, given: Certificate) -> None:
         child(made, "reference", f"plan SHA-256 {method.plan_hash}")
 
 
-def _standard(parent: ET.Element, given: StandardUsed) -> None:
-    made = child(parent, "measuringEquipment", **referred("basic_standardUsed"))
-    texts(made, "name", given.name or given.quantity)
-    said = [f"Reference standard of {given.quantity}."]
-    said += [f"Calibrated {given.calibrated}."] if given.calibrated else []
-    said += [f"Due {given.due}."] if given.due else []
-    said += [f"Traceability: {given.traceability}."] if given.traceability else []
-    texts(made, "description", *said)
-    if given.certificate:
-        identification = child(made, "identifications")
-        _identification(identification, "calibrationLaboratory", given.certificate,
-                        f"Certificate of {given.issued_by or 'its calibration'}")  # fmt: skip
-    stated = child(made, "measuringEquipmentQuantities")
-    quantity(stated, "Standard uncertainty", [given.u], given.unit, element="measuringEquipmentQuantity")
+def _standard(parent: ET.Element, standard: StandardUsed) -> None:
+    element = child(parent, "measuringEquipment", **referred("basic_standardUsed"))
+    texts(element, "name", standard.name or standard.quantity)
+    said = [f"Reference standard of {standard.quantity}."]
+    said += [f"Calibrated {standard.calibrated}."] if standard.calibrated else []
+    said += [f"Due {standard.due}."] if standard.due else []
+    said += [f"Traceability: {standard.traceability}."] if standard.traceability else []
+    texts(element, "description", *said)
+    if standard.certificate:
+        identification = child(element, "identifications")
+        _identification(identification, "calibrationLaboratory", standard.certificate,
+                        f"Certificate of {standard.issued_by or 'its calibration'}")  # fmt: skip
+    stated = child(element, "measuringEquipmentQuantities")
+    quantity(stated, "Standard uncertainty", [standard.u], standard.unit, element="measuringEquipmentQuantity")
 
 
-def _results(parent: ET.Element, given: Certificate) -> None:
-    probability = given.uncertainty.coverage_probability
-    for axis, of_axis in groupby(given.results, key=lambda point: point.axis):
+def _results(parent: ET.Element, certificate: Certificate) -> None:
+    probability = certificate.uncertainty.coverage_probability
+    for axis, of_axis in groupby(certificate.results, key=lambda point: point.axis):
         points = list(of_axis)
-        made = _result(parent, f"Error of indication of axis {axis}", "Output by its nominal scale minus true rate.")
-        table = child(made, "list")
+        element = _result(parent, f"Error of indication of axis {axis}", "Output by its nominal scale minus true rate.")
+        table = child(element, "list")
         rates = [each.rate_dps for each in points]
         quantity(table, "True rate", rates, "deg/s", ref_type="basic_referenceValue")
         warm = [each.temperature_c for each in points if each.temperature_c is not None]
@@ -242,49 +247,55 @@ def _results(parent: ET.Element, given: Certificate) -> None:
             expanded=[each.expanded_dps for each in points], k=[each.k for each in points], probability=probability,
             ref_type="basic_measurementError",
         )  # fmt: skip
-    _any_axis(parent, given)
-    _state(parent, "Errors as found, before adjustment", given.as_found)
-    _state(parent, "Errors as left, after adjustment", given.as_left)
-    made = _result(
+    _any_axis(parent, certificate)
+    _state(parent, "Errors as found, before adjustment", certificate.as_found)
+    _state(parent, "Errors as left, after adjustment", certificate.as_left)
+    element = _result(
         parent,
         "Coefficients of the correction",
         "Of the error model that the method names; standard uncertainties contain the standards of the bench, or are "
         "those of the fit alone where the name says so.",
     )
-    for each in given.coefficients:
-        where = "" if each.temperature_c is None else f" at {each.temperature_c:g} °C"
-        alone = "" if each.has_standards or each.u is None else ", u of the fit alone"
-        own = each.name_text if each.unit == "s" else each.name
-        name = f"Axis {each.axis}: {own}{where}{alone}"
-        quantity(made, name, [each.value], each.unit, u=each.u)
-    _budget(parent, given)
-    for sensor in given.sensors:
+    for coefficient in certificate.coefficients:
+        place_text = "" if coefficient.temperature_c is None else f" at {coefficient.temperature_c:g} °C"
+        alone = "" if coefficient.has_standards or coefficient.u is None else ", u of the fit alone"
+        own = coefficient.name_text if coefficient.unit == "s" else coefficient.name
+        name = f"Axis {coefficient.axis}: {own}{place_text}{alone}"
+        quantity(element, name, [coefficient.value], coefficient.unit, u=coefficient.u)
+    _budget(parent, certificate)
+    for sensor in certificate.sensors:
         _sensor(parent, sensor, probability)
 
 
-def _sensor(parent: ET.Element, given: SensorResult, probability: float) -> None:
+def _sensor(parent: ET.Element, result: SensorResult, probability: float) -> None:
     """Add the result of an accelerometer or magnetometer."""
-    made = _result(
+    element = _result(
         parent,
-        f"{given.sensor.capitalize()}, version {given.version}",
-        f"{given.formula}. Verdict: {given.verdict}. {' '.join(given.found)} Holds for: {given.holds_for} "
-        f"{given.not_stated} Measured {given.performed_from} to {given.performed_until}. Reference: "
-        f"{reference_text(given.reference)}. Files, SHA-256: {'; '.join(given.files)}. SHA-256 of the result: "
-        f"{given.hash}.",
+        f"{result.sensor.capitalize()}, version {result.version}",
+        f"{result.formula}. Verdict: {result.verdict}. {' '.join(result.found)} Holds for: {result.holds_for} "
+        f"{result.not_stated} Measured {result.performed_from} to {result.performed_until}. Reference: "
+        f"{reference_text(result.reference)}. Files, SHA-256: {'; '.join(result.files)}. SHA-256 of the result: "
+        f"{result.hash}.",
     )
-    reference = given.reference
-    quantity(made, f"Reference: {reference.quantity}", [reference.value], reference.unit, u=reference.u)
-    for each in given.coefficients:
+    reference = result.reference
+    quantity(element, f"Reference: {reference.quantity}", [reference.value], reference.unit, u=reference.u)
+    for coefficient in result.coefficients:
         quantity(
-            made, each.name, [each.value], each.unit, expanded=[each.expanded], k=[each.k], probability=probability
+            element,
+            coefficient.name,
+            [coefficient.value],
+            coefficient.unit,
+            expanded=[coefficient.expanded],
+            k=[coefficient.k],
+            probability=probability,
         )
 
 
-def _any_axis(parent: ET.Element, given: Certificate) -> None:
-    known = [each for each in given.any_axis if each.expanded_dps is not None]
+def _any_axis(parent: ET.Element, certificate: Certificate) -> None:
+    known = [each for each in certificate.any_axis if each.expanded_dps is not None]
     if not known:
         return
-    made = _result(
+    element = _result(
         parent,
         "Largest expanded uncertainty of a corrected rate about any axis",
         f"Rate vectors of any direction up to {max(each.reach_dps for each in known):.6g} °/s.",
@@ -295,30 +306,30 @@ def _any_axis(parent: ET.Element, given: Certificate) -> None:
             ("up to a rotation of the frame", each.aligned_expanded_dps),
         ):
             if value is not None:
-                quantity(made, f"Output {each.output}, {frame}", [value], "deg/s")
+                quantity(element, f"Output {each.output}, {frame}", [value], "deg/s")
         if each.per_dps_across is not None:
             name = f"Output {each.output}, error per deg/s about {' and '.join(each.across)}"
-            quantity(made, name, [each.per_dps_across], "1")
+            quantity(element, name, [each.per_dps_across], "1")
 
 
-def _budget(parent: ET.Element, given: Certificate) -> None:
-    found = given.uncertainty
-    warm = "" if found.temperature_c is None else f" and {found.temperature_c:g} °C"
-    where = f"Of axis {found.axis} at {found.rate_dps:g} °/s{warm}, where U is largest."
-    made = _result(parent, "Contributions to the standard uncertainty", where)
-    for each in found.budget:
-        quantity(made, f"{each.source}, type {each.type}", [each.contribution_dps], "deg/s")
+def _budget(parent: ET.Element, certificate: Certificate) -> None:
+    uncertainty = certificate.uncertainty
+    warm = "" if uncertainty.temperature_c is None else f" and {uncertainty.temperature_c:g} °C"
+    place_text = f"Of axis {uncertainty.axis} at {uncertainty.rate_dps:g} °/s{warm}, where U is largest."
+    element = _result(parent, "Contributions to the standard uncertainty", place_text)
+    for each in uncertainty.budget:
+        quantity(element, f"{each.source}, type {each.type}", [each.contribution_dps], "deg/s")
 
 
 def _result(parent: ET.Element, name: str, description: str) -> ET.Element:
-    made = child(parent, "result")
-    texts(made, "name", name)
-    texts(made, "description", description)
-    return child(made, "data")
+    element = child(parent, "result")
+    texts(element, "name", name)
+    texts(element, "description", description)
+    return child(element, "data")
 
 
 def _state(parent: ET.Element, name: str, state: StateOfItem) -> None:
-    made = _result(parent, name, f"Corrected by {state.basis}; over {state.datasets} data sets.")
+    element = _result(parent, name, f"Corrected by {state.basis}; over {state.datasets} data sets.")
     for each in state.axes:
         for what, value in (("RMS error", each.rms_dps), ("Largest error", each.max_dps)):
-            quantity(made, f"{what} of axis {each.axis}, {readable('deg/s')}", [value], "deg/s")
+            quantity(element, f"{what} of axis {each.axis}, {readable('deg/s')}", [value], "deg/s")

@@ -20,7 +20,7 @@ STANDARD = "a-3a"
 CORRECTION = "q"
 
 
-def pdf_of(given: Certificate, xml: bytes) -> bytes:
+def pdf_of(certificate: Certificate, xml: bytes) -> bytes:
     """Return the PDF with `xml` attached. Raises BadInput for a text that the fonts cannot show."""
     import typst  # noqa: PLC0415  both libraries take a tenth of a second, which only this function needs
 
@@ -29,21 +29,22 @@ def pdf_of(given: Certificate, xml: bytes) -> bytes:
     template = resources.files("labctl.certificates").joinpath("template.typ").read_bytes()
     files = {
         "main.typ": template,
-        "certificate.json": readable_certificate(given),
+        "certificate.json": readable_certificate(certificate),
         "dcc.xml": xml,
-        "qr.svg": _qr(given.state_address or given.calibration.address),
+        "qr.svg": _qr(certificate.state_address or certificate.calibration.address),
     }
-    issued = datetime.combine(given.issued_on, time(), UTC)
+    issued = datetime.combine(certificate.issued_on, time(), UTC)
     try:
-        made = compiled(files, ignore_system_fonts=True, pdf_standards=[STANDARD], timestamp=issued)
+        content = compiled(files, ignore_system_fonts=True, pdf_standards=[STANDARD], timestamp=issued)
     except typst.TypstError as error:
         raise BadInput(
-            f"certificate {given.number} cannot be printed: {error.message}; use Latin, Greek or Cyrillic letters "
+            f"certificate {certificate.number} cannot be printed: {error.message}; use Latin, Greek or Cyrillic "
+            "letters "
             "in the names and texts of the order"
         ) from error
-    if not isinstance(made, bytes):
-        raise TypeError(f"typst answered {type(made).__name__} instead of the bytes of one PDF")
-    return made
+    if not isinstance(content, bytes):
+        raise TypeError(f"typst answered {type(content).__name__} instead of the bytes of one PDF")
+    return content
 
 
 def _qr(address: str) -> bytes:

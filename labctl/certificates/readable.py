@@ -37,33 +37,33 @@ LEAST_RISK = 1e-4
 FIT_ALONE = " *"
 
 
-def readable_certificate(given: Certificate) -> bytes:
+def readable_certificate(certificate: Certificate) -> bytes:
     """Return what the template prints, as JSON."""
-    return json.dumps(_pages(given), ensure_ascii=False, sort_keys=True).encode()
+    return json.dumps(_pages(certificate), ensure_ascii=False, sort_keys=True).encode()
 
 
-def _pages(given: Certificate) -> dict[str, object]:
+def _pages(record: Certificate) -> dict[str, object]:
     return {
-        "title": given.title,
-        "number": given.number,
-        "version": given.calibration.version,
-        "laboratory": _address(given.laboratory),
-        "laboratory_name": given.laboratory.name,
-        "specimen": next((text for text in given.statements if text.startswith("SPECIMEN")), ""),
-        "facts": _facts(given),
-        "issued": given.issued_on.isoformat(),
-        "issued_by": given.issued_by + (f" ({given.issued_by_identity})" if given.issued_by_identity else ""),
-        "authorised": f"{given.authorised.persons}, {given.authorised.at:%Y-%m-%d %H:%M} UTC",
-        "authorised_name": given.authorised.name,
-        "signature": _signature(given),
-        "method": _method(given),
-        "plan_hash": given.method.plan_hash or "",
+        "title": record.title,
+        "number": record.number,
+        "version": record.calibration.version,
+        "laboratory": _address(record.laboratory),
+        "laboratory_name": record.laboratory.name,
+        "specimen": next((text for text in record.statements if text.startswith("SPECIMEN")), ""),
+        "facts": _facts(record),
+        "issued": record.issued_on.isoformat(),
+        "issued_by": record.issued_by + (f" ({record.issued_by_identity})" if record.issued_by_identity else ""),
+        "authorised": f"{record.authorised.persons}, {record.authorised.at:%Y-%m-%d %H:%M} UTC",
+        "authorised_name": record.authorised.name,
+        "signature": _signature(record),
+        "method": _method(record),
+        "plan_hash": record.method.plan_hash or "",
         "environment": [
             [each.name, _signed(f"{each.low:.2f}"), _signed(f"{each.high:.2f}"), each.unit]
-            for each in given.environment
+            for each in record.environment
         ],
-        "standards": [_standard(each) for each in given.standards],
-        "uncertainty": uncertainty_text(given),
+        "standards": [_standard(standard) for standard in record.standards],
+        "uncertainty": uncertainty_text(record),
         "budget": [
             [
                 each.source.replace("_", " "),
@@ -71,33 +71,33 @@ def _pages(given: Certificate) -> dict[str, object]:
                 f"{Decimal(f'{each.contribution_dps:.2g}'):f}",
                 _freedom(each.freedom),
             ]
-            for each in given.uncertainty.budget
+            for each in record.uncertainty.budget
         ],
-        "results": _results(given.results),
-        "any_axis": [_any_axis(each) for each in given.any_axis],
-        "any_axis_text": _any_axis_text(given),
+        "results": _results(record.results),
+        "any_axis": [_any_axis(each) for each in record.any_axis],
+        "any_axis_text": _any_axis_text(record),
         "states": [
-            _state("As found, before adjustment", given.as_found),
-            _state("As left, after adjustment", given.as_left),
+            _state("As found, before adjustment", record.as_found),
+            _state("As left, after adjustment", record.as_left),
         ],
-        "adjustment": given.adjustment,
-        "coefficients": [_coefficient(each) for each in given.coefficients],
-        "sensors": [_sensor(each) for each in given.sensors],
-        "conformity": _conformity(given),
-        "external": given.external,
-        "due": given.due.isoformat() if given.due else "",
-        "statements": [text for text in given.statements if not text.startswith("SPECIMEN")],
-        "hash": given.calibration.hash,
-        "address": given.calibration.address,
-        "page": given.state_address,
-        "manifests": [[f"Manifest {each.manifest}, {each.record}", each.hash] for each in given.manifests],
+        "adjustment": record.adjustment,
+        "coefficients": [_coefficient(coefficient) for coefficient in record.coefficients],
+        "sensors": [_sensor(sensor) for sensor in record.sensors],
+        "conformity": _conformity(record),
+        "external": record.external,
+        "due": record.due.isoformat() if record.due else "",
+        "statements": [text for text in record.statements if not text.startswith("SPECIMEN")],
+        "hash": record.calibration.hash,
+        "address": record.calibration.address,
+        "page": record.state_address,
+        "manifests": [[f"Manifest {seal.manifest}, {seal.record}", seal.hash] for seal in record.manifests],
     }
 
 
-def _signature(given: Certificate) -> str:
+def _signature(certificate: Certificate) -> str:
     """Return the note below the names: how the certificate is valid, and who signed the file."""
     recorded = "The authorisation is recorded electronically in the audit trail of the laboratory;"
-    signer = given.signed_by
+    signer = certificate.signed_by
     if signer is None:
         return f"{recorded} the certificate is valid without a signature by hand."
     return (
@@ -110,15 +110,21 @@ def _with_unit(value: float, unit: str) -> str:
     return f"{value:.2g}{'' if unit == 'deg' else ' '}{readable(unit)}"
 
 
-def _standard(given: StandardUsed) -> list[str]:
-    dates = [each.isoformat() if each else "–" for each in (given.calibrated, given.due)]
-    said = [each or "–" for each in (given.certificate, given.issued_by)]
-    return [_standard_name(given), _with_unit(given.u, given.unit), *said, *dates, given.traceability or "–"]
+def _standard(standard: StandardUsed) -> list[str]:
+    dates = [each.isoformat() if each else "–" for each in (standard.calibrated, standard.due)]
+    said = [each or "–" for each in (standard.certificate, standard.issued_by)]
+    return [
+        _standard_name(standard),
+        _with_unit(standard.u, standard.unit),
+        *said,
+        *dates,
+        standard.traceability or "–",
+    ]
 
 
-def _standard_name(given: StandardUsed) -> str:
-    quantity = given.quantity.replace("_", " ")
-    return f"{quantity}: {given.name}" if given.name else quantity
+def _standard_name(standard: StandardUsed) -> str:
+    quantity = standard.quantity.replace("_", " ")
+    return f"{quantity}: {standard.name}" if standard.name else quantity
 
 
 def rounded(value: float, expanded: float) -> tuple[str, str]:
@@ -140,15 +146,15 @@ def _signed(text: str) -> str:
     return text.lstrip("-") if zero else text.replace("-", MINUS)
 
 
-def _address(given: Contact) -> list[str]:
-    lines = [given.name, given.street, f"{given.post_code} {given.city}, {given.country}"]
-    return [line for line in (*lines, given.email, given.phone) if line.strip()]
+def _address(person: Contact) -> list[str]:
+    lines = [person.name, person.street, f"{person.post_code} {person.city}, {person.country}"]
+    return [line for line in (*lines, person.email, person.phone) if line.strip()]
 
 
-def _facts(given: Certificate) -> list[list[object]]:
-    customer, item = given.customer, given.item
-    first, last = given.performed_from.isoformat(), given.performed_until.isoformat()
-    found: list[list[object]] = [
+def _facts(certificate: Certificate) -> list[list[object]]:
+    customer, item = certificate.customer, certificate.item
+    first, last = certificate.performed_from.isoformat(), certificate.performed_until.isoformat()
+    rows: list[list[object]] = [
         ["Customer", [*_address(customer), f"Contact: {customer.contact}" if customer.contact else ""]],
         ["Order", [customer.order]],
         ["Item", [f"{item.description}, axes {', '.join(item.axes)}"]],
@@ -158,46 +164,50 @@ def _facts(given: Certificate) -> list[list[object]]:
         ["Condition on receipt", [item.condition]],
         ["Date of receipt", [item.received.isoformat() if item.received else "not critical to the results"]],
         ["Calibrated", [first if first == last else f"{first} to {last}"]],
-        ["Place of calibration", [_place(given)]],
-        ["Date of issue", [given.issued_on.isoformat()]],
+        ["Place of calibration", [_place(certificate)]],
+        ["Date of issue", [certificate.issued_on.isoformat()]],
     ]
-    if given.laboratory.accreditation:
-        found.insert(0, ["Accreditation", [given.laboratory.accreditation]])
-    if given.replaces is not None:
-        found.insert(0, ["Replaces", [f"certificate {given.replaces.number}. Reason: {given.replaces.reason}"]])
-    kept = [[name, [line for line in lines if line]] for name, lines in found if isinstance(lines, list)]
+    if certificate.laboratory.accreditation:
+        rows.insert(0, ["Accreditation", [certificate.laboratory.accreditation]])
+    if certificate.replaces is not None:
+        rows.insert(
+            0, ["Replaces", [f"certificate {certificate.replaces.number}. Reason: {certificate.replaces.reason}"]]
+        )
+    kept = [[name, [line for line in lines if line]] for name, lines in rows if isinstance(lines, list)]
     return [[name, lines] for name, lines in kept if lines]
 
 
-def _place(given: Certificate) -> str:
-    where = PLACES[given.laboratory.place]
-    return f"{where}, {given.laboratory.city}" if given.laboratory.place == "laboratory" else where
+def _place(certificate: Certificate) -> str:
+    place_name = PLACES[certificate.laboratory.place]
+    return (
+        f"{place_name}, {certificate.laboratory.city}" if certificate.laboratory.place == "laboratory" else place_name
+    )
 
 
-def _method(given: Certificate) -> list[list[str]]:
-    method = given.method
+def _method(certificate: Certificate) -> list[list[str]]:
+    method = certificate.method
     several = "s" if len(method.recordings) > 1 else ""
-    found = [
+    rows = [
         ["Method", method.name],
         ["Procedure", method.procedure],
         ["Error model", f"{method.model}: {', '.join(method.effects)}"],
         [f"Recording{several}", ", ".join(map(str, method.recordings))],
         ["Software", method.software],
         ["Additions to, deviations or exclusions from the method", method.deviations],
-        ["Results of external providers", given.external],
+        ["Results of external providers", certificate.external],
     ]
-    return [each for each in found if each[1]]
+    return [row for row in rows if row[1]]
 
 
-def uncertainty_text(given: Certificate) -> str:
+def uncertainty_text(certificate: Certificate) -> str:
     """Return how the expanded uncertainties are to be read."""
-    found = given.uncertainty
-    warm = "" if found.temperature_c is None else f" and {_number(found.temperature_c)} °C"
+    uncertainty = certificate.uncertainty
+    warm = "" if uncertainty.temperature_c is None else f" and {_number(uncertainty.temperature_c)} °C"
     return (
         "The expanded uncertainty U is that of a corrected rate: the standard uncertainty times the coverage factor k "
-        f"that is stated with each result, for a coverage of about {found.coverage_probability * 100:.0f} % "
+        f"that is stated with each result, for a coverage of about {uncertainty.coverage_probability * 100:.0f} % "
         "(JCGM 100:2008). The standard uncertainty is made of the contributions below, here at the place where U is "
-        f"largest: axis {found.axis}, {_number(found.rate_dps)} °/s{warm}."
+        f"largest: axis {uncertainty.axis}, {_number(uncertainty.rate_dps)} °/s{warm}."
     )
 
 
@@ -225,9 +235,9 @@ def _results(points: Sequence[ResultPoint]) -> list[Mapping[str, object]]:
     ]
 
 
-def _any_axis(given: AnyAxisResult) -> list[str]:
-    across = f"about {' and '.join(given.across)}: {_expanded(given.per_dps_across)}" if given.across else MINUS
-    return [given.output, _expanded(given.expanded_dps), _expanded(given.aligned_expanded_dps), across]
+def _any_axis(result: AnyAxisResult) -> list[str]:
+    across = f"about {' and '.join(result.across)}: {_expanded(result.per_dps_across)}" if result.across else MINUS
+    return [result.output, _expanded(result.expanded_dps), _expanded(result.aligned_expanded_dps), across]
 
 
 def _expanded(value: float | None) -> str:
@@ -235,11 +245,11 @@ def _expanded(value: float | None) -> str:
     return "not known" if value is None else rounded(0.0, value)[1]
 
 
-def _any_axis_text(given: Certificate) -> str:
-    if not given.any_axis:
+def _any_axis_text(certificate: Certificate) -> str:
+    if not certificate.any_axis:
         return ""
-    reach = max(each.reach_dps for each in given.any_axis)
-    unknown = "; ".join(dict.fromkeys(each.why for each in given.any_axis if each.why))
+    reach = max(each.reach_dps for each in certificate.any_axis)
+    unknown = "; ".join(dict.fromkeys(each.why for each in certificate.any_axis if each.why))
     return (
         "U in the results is that of a rotation about the axis of one output, the others at rest. Where the item turns "
         f"about any axis, at up to {_number(reach)} °/s, the angles of the mountings count as well: the largest U is "
@@ -248,32 +258,37 @@ def _any_axis_text(given: Certificate) -> str:
     )
 
 
-def _coefficient(given: CoefficientResult) -> list[str]:
-    value, u = rounded(given.value, given.u or 0.0)
-    warm = "" if given.temperature_c is None else _number(given.temperature_c)
-    of_fit = "" if given.has_standards or u == "–" else FIT_ALONE
-    return [given.axis, given.name_text, warm, value, u + of_fit, readable(given.unit)]
+def _coefficient(coefficient: CoefficientResult) -> list[str]:
+    value, u = rounded(coefficient.value, coefficient.u or 0.0)
+    warm = "" if coefficient.temperature_c is None else _number(coefficient.temperature_c)
+    of_fit = "" if coefficient.has_standards or u == "–" else FIT_ALONE
+    return [coefficient.axis, coefficient.name_text, warm, value, u + of_fit, readable(coefficient.unit)]
 
 
-def _sensor(given: SensorResult) -> Mapping[str, object]:
+def _sensor(result: SensorResult) -> Mapping[str, object]:
     """Return the section of an accelerometer or magnetometer."""
-    first, last = given.performed_from.isoformat(), given.performed_until.isoformat()
+    first, last = result.performed_from.isoformat(), result.performed_until.isoformat()
     return {
-        "title": f"{given.sensor.capitalize()}, version {given.version}",
+        "title": f"{result.sensor.capitalize()}, version {result.version}",
         "facts": [
-            ["Verdict", given.verdict],
-            ["Findings", " ".join(given.found)],
-            ["Reference", reference_text(given.reference)],
-            ["Holds for", f"{given.holds_for} {given.not_stated}"],
+            ["Verdict", result.verdict],
+            ["Findings", " ".join(result.found)],
+            ["Reference", reference_text(result.reference)],
+            ["Holds for", f"{result.holds_for} {result.not_stated}"],
             ["Measured", first if first == last else f"{first} to {last}"],
-            ["Included by", given.included_by],
-            ["Files, SHA-256", "; ".join(given.files)],
-            ["SHA-256 of the result", given.hash],
+            ["Included by", result.included_by],
+            ["Files, SHA-256", "; ".join(result.files)],
+            ["SHA-256 of the result", result.hash],
         ],
-        "formula": given.formula,
+        "formula": result.formula,
         "rows": [
-            [each.name, *rounded(each.value, each.expanded), f"{each.k:.2f}", readable(each.unit)]
-            for each in given.coefficients
+            [
+                coefficient.name,
+                *rounded(coefficient.value, coefficient.expanded),
+                f"{coefficient.k:.2f}",
+                readable(coefficient.unit),
+            ]
+            for coefficient in result.coefficients
         ],
     }
 
@@ -284,17 +299,17 @@ def reference_text(given: SensorReference) -> str:
     return f"{given.quantity} {given.value:.7g} {readable(given.unit)}{u}. Traceability: {given.traceability}"
 
 
-def _state(title: str, given: StateOfItem) -> Mapping[str, object]:
-    rows = [[each.axis, f"{each.rms_dps:#.3g}", f"{each.max_dps:#.3g}"] for each in given.axes]
-    return {"title": title, "basis": given.basis, "datasets": given.datasets, "rows": rows}
+def _state(title: str, state: StateOfItem) -> Mapping[str, object]:
+    rows = [[each.axis, f"{each.rms_dps:#.3g}", f"{each.max_dps:#.3g}"] for each in state.axes]
+    return {"title": title, "basis": state.basis, "datasets": state.datasets, "rows": rows}
 
 
-def _conformity(given: Certificate) -> Mapping[str, object] | None:
-    found = given.conformity
-    if found is None:
+def _conformity(certificate: Certificate) -> Mapping[str, object] | None:
+    judged = certificate.conformity
+    if judged is None:
         return None
-    return {"specification": found.specification, "statement": found.statement, "outcome": _outcome(found.passed),
-            "results": [_verified(each) for each in found.results]}  # fmt: skip
+    return {"specification": judged.specification, "statement": judged.statement, "outcome": _outcome(judged.passed),
+            "results": [_verified(result) for result in judged.results]}  # fmt: skip
 
 
 def percent(probability: float) -> str:
@@ -308,8 +323,8 @@ def _outcome(passed: bool) -> str:
     return "PASS" if passed else "FAIL"
 
 
-def _verified(given: ConformityResult) -> list[str]:
-    error, expanded = rounded(given.error_dps, given.expanded_dps)
-    warm = "–" if given.temperature_c is None else _number(given.temperature_c)
-    rates = [_number(rate) for rate in given.rates_dps]
-    return [given.output, warm, *rates, error, expanded, percent(given.risk), _outcome(given.passed)]
+def _verified(result: ConformityResult) -> list[str]:
+    error, expanded = rounded(result.error_dps, result.expanded_dps)
+    warm = "–" if result.temperature_c is None else _number(result.temperature_c)
+    rates = [_number(rate) for rate in result.rates_dps]
+    return [result.output, warm, *rates, error, expanded, percent(result.risk), _outcome(result.passed)]

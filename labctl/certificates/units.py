@@ -23,7 +23,7 @@ def readable(unit: str) -> str:
 def dsi(unit: str) -> str | None:
     """Return a unit in D-SI form; None where D-SI has no word for it, such as a share of standard gravity."""
     above, *below = re.sub(r"/\(([^()/]+)/([^()/]+)\)", r"/\1*\2", unit).split("/")
-    found = ""
+    dsi_symbol = ""
     for text, sign in [(above, 1), *((part, -1) for part in below)]:
         first, *inverted = text.split("*")
         for name, side in [(first, sign), *((each, -sign) for each in inverted)]:
@@ -33,5 +33,5 @@ def dsi(unit: str) -> str | None:
                 return None
             power = side * int(parts[2] or 1)
             if symbol != r"\one" or unit == "1":
-                found += symbol + ("" if power == 1 else rf"\tothe{{{power}}}")
-    return found
+                dsi_symbol += symbol + ("" if power == 1 else rf"\tothe{{{power}}}")
+    return dsi_symbol

@@ -16,10 +16,10 @@ DIGITS = 9
 
 def child(parent: ET.Element, name: str, text: str | None = None, **attributes: str) -> ET.Element:
     """Add an element of the DCC; each run of white space in its text becomes one space, as the schema asks."""
-    made = ET.SubElement(parent, f"{{{DCC}}}{name}", attributes)
+    element = ET.SubElement(parent, f"{{{DCC}}}{name}", attributes)
     if text is not None:
-        made.text = " ".join(text.split())
-    return made
+        element.text = " ".join(text.split())
+    return element
 
 
 def referred(ref_type: str) -> dict[str, str]:
@@ -29,9 +29,9 @@ def referred(ref_type: str) -> dict[str, str]:
 
 def texts(parent: ET.Element, name: str, *said: str, **attributes: str) -> ET.Element:
     """Add an element with its text in English; `said` is joined, as PTB's rules allow one text per language."""
-    made = child(parent, name, **attributes)
-    child(made, "content", " ".join(said), lang=ENGLISH)
-    return made
+    element = child(parent, name, **attributes)
+    child(element, "content", " ".join(said), lang=ENGLISH)
+    return element
 
 
 def optional(parent: ET.Element, name: str, text: str) -> None:
@@ -40,15 +40,16 @@ def optional(parent: ET.Element, name: str, text: str) -> None:
         child(parent, name, text)
 
 
-def contact(parent: ET.Element, name: str, given: Contact, further: str = "") -> None:
+def contact(parent: ET.Element, name: str, person: Contact, further: str = "") -> None:
     """Add the address of an organisation."""
-    made = child(parent, name)
-    texts(made, "name", given.name)
-    optional(made, "eMail", given.email)
-    optional(made, "phone", given.phone)
-    place = child(made, "location")
+    element = child(parent, name)
+    texts(element, "name", person.name)
+    optional(element, "eMail", person.email)
+    optional(element, "phone", person.phone)
+    place = child(element, "location")
     for tag, text in (
-        ("city", given.city), ("countryCode", given.country), ("postCode", given.post_code), ("street", given.street),
+        ("city", person.city), ("countryCode", person.country), ("postCode", person.post_code),
+        ("street", person.street),
     ):  # fmt: skip
         optional(place, tag, text)
     if further:
@@ -72,16 +73,16 @@ def quantity(
 
     Where D-SI has no word for the unit the numbers are a text.
     """
-    made = child(parent, element, **referred(ref_type))
-    texts(made, "name", name)
+    element_made = child(parent, element, **referred(ref_type))
+    texts(element_made, "name", name)
     symbol = dsi(unit)
     if symbol is None:
         said = "; ".join(f"{value:.{DIGITS}g}" for value in values) + ("" if u is None else f", u = {u:.{DIGITS}g}")
-        texts(made, "noQuantity", f"{said} {readable(unit)}")
-        return made
+        texts(element_made, "noQuantity", f"{said} {readable(unit)}")
+        return element_made
     several = len(values) > 1
     tail = "XMLList" if several else ""
-    real = ET.SubElement(made, f"{{{SI}}}{'realListXMLList' if several else 'real'}")
+    real = ET.SubElement(element_made, f"{{{SI}}}{'realListXMLList' if several else 'real'}")
     _si(real, f"value{tail}", _listed(values))
     _si(real, f"unit{tail}", symbol)
     if u is not None:
@@ -92,13 +93,13 @@ def quantity(
         _si(uncertainty, f"valueExpandedMU{tail}", _listed(expanded))
         _si(uncertainty, f"coverageFactor{tail}", _listed(k))
         _si(uncertainty, f"coverageProbability{tail}", _listed([probability]))
-    return made
+    return element_made
 
 
 def _si(parent: ET.Element, name: str, text: str | None = None) -> ET.Element:
-    made = ET.SubElement(parent, f"{{{SI}}}{name}")
-    made.text = text
-    return made
+    element = ET.SubElement(parent, f"{{{SI}}}{name}")
+    element.text = text
+    return element
 
 
 def _listed(values: Sequence[float]) -> str:

@@ -107,8 +107,8 @@ for name, command in COMMANDS.items():
     app.command(name)(command)
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(is_wanted: bool) -> None:
+    if is_wanted:
         typer.echo(f"labctl {version('labctl')}")
         raise typer.Exit
 
@@ -129,7 +129,7 @@ def everywhere(
 
 
 def open_missing_streams() -> None:
-    """Give a process that was started without standard streams empty ones, as its next files would get their numbers.
+    """Open empty standard streams where the process has none, as its next files would get their numbers.
 
     What is written to standard error would go into these files, and a child process would take them for its own.
     """

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from labctl.answers.benches import FoundResponse
 
 
-def asking(section: str, key: str, what: str, proposal: object) -> object:
+def asking(section: str, key: str, question: str, proposal: object) -> object:
     """Ask a person at the terminal; an empty answer keeps the proposal, or leaves the key out."""
-    answer = typer.prompt(f"{section}.{key}: {what}", default="" if proposal is None else str(proposal))
+    answer = typer.prompt(f"{section}.{key}: {question}", default="" if proposal is None else str(proposal))
     if not str(answer).strip():
         return None
     if key == "serial":
@@ -24,7 +24,7 @@ def asking(section: str, key: str, what: str, proposal: object) -> object:
     return parse_setting(f"{key}={answer}")[1]
 
 
-def not_asking(section: str, key: str, what: str, proposal: object) -> object:  # noqa: ARG001  the proposal is enough
+def not_asking(section: str, key: str, question: str, proposal: object) -> object:  # noqa: ARG001  the proposal is enough
     """Ask nothing and keep the proposal."""
     return proposal
 

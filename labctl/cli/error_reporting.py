@@ -68,10 +68,10 @@ def _errors_as_lines() -> Iterator[None]:
 def _exit_with_all(error: BadFile) -> typer.Exit:
     if len(error.problems) == 1:
         return _exit(str(error), error.exit_status)
-    found = _exit(f"{error.path}: {len(error.problems)} problems; nothing was imported:", error.exit_status)
+    typer_exit = _exit(f"{error.path}: {len(error.problems)} problems; nothing was imported:", error.exit_status)
     for problem in error.problems:
         stderr.print(f"  - {' '.join(problem.split())}")
-    return found
+    return typer_exit
 
 
 def _exit(text: str, status: int) -> typer.Exit:

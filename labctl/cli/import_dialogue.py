@@ -53,38 +53,38 @@ class Acceptance:
     def __init__(self, path: Path, *, given: bool, accepted: bool, out: Path | None, quiet: bool) -> None:
         self.path, self.given, self.accepted, self.out, self.quiet = path, given, accepted, out, quiet
 
-    def ask(self, found: MappedFile) -> None:
+    def ask(self, mapped: MappedFile) -> None:
         """Show a log with its map and get the decision; raises BadInput, typer.Exit where nothing is to be imported."""
         if self.out is not None:
-            self._write(found)
-        if found.problems:
-            self._refuse(found)
+            self._write(mapped)
+        if mapped.problems:
+            self._refuse(mapped)
         if not self.quiet:
-            show(found)
+            show(mapped)
         if self.given or self.accepted:
             return
         self._decide()
 
-    def _write(self, found: MappedFile) -> None:
+    def _write(self, mapped: MappedFile) -> None:
         from labctl.errors import BadInput
         from labctl.recording.column_map import map_text
 
         assert self.out is not None
         if self.out.exists():
             raise BadInput(f"--write-map {self.out}: exists already; name a new file")
-        self.out.write_text(map_text(found.column_map), encoding="utf-8")
-        if not self.accepted and not found.problems:
+        self.out.write_text(map_text(mapped.column_map), encoding="utf-8")
+        if not self.accepted and not mapped.problems:
             if not self.quiet:
-                show(found)
+                show(mapped)
             stderr.print(
                 f"map -> {self.out}; nothing was imported: labctl import {self.path} --map {self.out}", style="dim"
             )
             raise typer.Exit(0)
 
-    def _refuse(self, found: MappedFile) -> None:
+    def _refuse(self, mapped: MappedFile) -> None:
         from labctl.errors import BadFile
 
-        lines = list(found.problems)
+        lines = list(mapped.problems)
         if self.out is not None:
             hint = f"the map was written to {self.out}: correct that file and import with --map {self.out}"
         elif not self.given and any("[" in line or "sample_rate_hz" in line for line in lines):
@@ -110,31 +110,31 @@ class Acceptance:
             raise typer.Exit(1)
 
 
-def show(found: MappedFile) -> None:
+def show(mapped_file: MappedFile) -> None:
     """Print what a log would become: its map, what was guessed, its first rows, and columns without use."""
-    log = found.log
-    word = "proposed map" if found.proposed else "map"
-    console.print(f"{found.table.path.name}: {found.title}, {found.table.rows} rows; {word}:")
+    log = mapped_file.log
+    word = "proposed map" if mapped_file.proposed else "map"
+    console.print(f"{mapped_file.table.path.name}: {mapped_file.title}, {mapped_file.table.rows} rows; {word}:")
     mapped = table("", "column of the recording", "from", "unit", "scale")
-    for target, column in found.column_map.columns.items():
-        raw = found.table.columns.get(str(column.source))
+    for target, column in mapped_file.column_map.columns.items():
+        raw = mapped_file.table.columns.get(str(column.source))
         unit = column.unit or (raw.unit if raw is not None else "")
         mapped.add_row(target, str(column.source), unit or "–", "" if column.scale is None else f"{column.scale:g}")
     console.print(mapped)
-    for guess in found.guesses:
+    for guess in mapped_file.guesses:
         console.print(f"guessed: {guess}", style="yellow")
-    names = list(found.table.columns)[:SHOWN_COLUMNS]
+    names = list(mapped_file.table.columns)[:SHOWN_COLUMNS]
     rows = table("first rows", *(name for name in names))
-    for row in found.table.shown_rows()[:SHOWN_ROWS]:
+    for row in mapped_file.table.shown_rows()[:SHOWN_ROWS]:
         rows.add_row(*(cell for cell in row[: len(names)]))
     console.print(rows)
     if log is not None:
         info = log.recording.info
         sets = len(set(log.recording.columns["dataset"].tolist()))
-        known = info.measured_at
+        measured_at = info.measured_at
         console.print(
-            f"serial {info.serial}; motion {log.motion}; data sets by {found.column_map.datasets.by}: {sets}; "
-            + (f"began {known:%Y-%m-%d %H:%M:%S} UTC" if known else "date of the measurement not known")
+            f"serial {info.serial}; motion {log.motion}; data sets by {mapped_file.column_map.datasets.by}: {sets}; "
+            + (f"began {measured_at:%Y-%m-%d %H:%M:%S} UTC" if measured_at else "date of the measurement not known")
         )  # fmt: skip
         if log.unused:
             console.print(f"not used: {', '.join(log.unused)}")

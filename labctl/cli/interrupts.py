@@ -49,7 +49,7 @@ def signals_restored() -> Iterator[None]:
 
 @contextmanager
 def ending_is_an_interrupt() -> Iterator[None]:
-    """Let a request to end (SIGTERM) and a lost terminal (SIGHUP) do what Ctrl-C does: the bench is left safe.
+    """Treat a request to end (SIGTERM) and a lost terminal (SIGHUP) as Ctrl-C: the bench is left safe.
 
     For use within `signals_restored`: once a signal came, all are ignored from the end of this block on.
     """

@@ -77,46 +77,46 @@ SimulatedStart = Annotated[
 ]
 
 
-def simulated_start(given: str | None) -> datetime | None:
+def simulated_start(text: str | None) -> datetime | None:
     """Return the instant at which simulated time begins, UTC; None where none was given. Raises BadInput."""
     try:
-        moment = None if given is None else datetime.fromisoformat(given)
+        moment = None if text is None else datetime.fromisoformat(text)
         if moment is None:
             return None
         return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
     except (ValueError, OverflowError) as error:
         raise BadInput(
-            f"--simulated-start {given!r} cannot be read; write 2027-11-23T08:00Z, or a date such as 2027-11-23"
+            f"--simulated-start {text!r} cannot be read; write 2027-11-23T08:00Z, or a date such as 2027-11-23"
         ) from error
 
 
 def recording_numbers(given: str | None) -> list[int]:
     """Return the numbers of recordings in "3" or "1,2,3", none where nothing was given. Raises BadInput."""
-    found: list[int] = []
+    numbers: list[int] = []
     for text in (given or "").split(",") if given is not None else ():
         if not text.strip().isdecimal() or not text.isascii():
             raise BadInput(
                 f"--recording {given!r}: {text!r} is not a recording number; write one number such as 3, "
                 "or several as 1,2,3"
             )
-        found.append(int(text))
-    return found
+        numbers.append(int(text))
+    return numbers
 
 
-def day(given: str | None, option: str) -> date | None:
+def day(text: str | None, option: str) -> date | None:
     """Return the day that an option states; None where it states none. Raises BadInput."""
     try:
-        return None if not given else date.fromisoformat(given)
+        return None if not text else date.fromisoformat(text)
     except ValueError as error:
-        raise BadInput(f"{option} {given!r} is not a day; write it as 2027-11-23") from error
+        raise BadInput(f"{option} {text!r} is not a day; write it as 2027-11-23") from error
 
 
-def instant(given: str | None, option: str) -> datetime | None:
+def instant(text: str | None, option: str) -> datetime | None:
     """Return the instant that an option states, without an offset UTC; None where it states none. Raises BadInput."""
     try:
-        moment = None if not given else datetime.fromisoformat(given)
+        moment = None if not text else datetime.fromisoformat(text)
     except ValueError as error:
-        raise BadInput(f"{option} {given!r} is not a time; write it as 2027-11-23T08:00Z") from error
+        raise BadInput(f"{option} {text!r} is not a time; write it as 2027-11-23T08:00Z") from error
     return moment.replace(tzinfo=UTC) if moment is not None and moment.tzinfo is None else moment
 
 
@@ -130,9 +130,9 @@ ImporterName = Annotated[
 ]
 
 
-def _key_values(what: str) -> Any:
+def _key_values(option: str) -> Any:
     """Return the option --option of what it is for."""
-    return typer.Option("--option", metavar="KEY=VALUE", help=f"{what}, as KEY=VALUE; may be repeated.")
+    return typer.Option("--option", metavar="KEY=VALUE", help=f"{option}, as KEY=VALUE; may be repeated.")
 
 
 ImporterOptions = Annotated[list[str] | None, _key_values("Option of the importer")]

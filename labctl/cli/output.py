@@ -27,7 +27,7 @@ STDERR = 2
 
 
 def give_up_blocked_stderr() -> None:
-    """Let standard error go nowhere when its reader stands still: the end of this process does not wait for it."""
+    """Discard standard error when its reader is blocked: the end of this process does not wait for it."""
     from labctl.log.writer import takes_text
 
     if not takes_text(STDERR, TAKES_WITHIN_S):
@@ -36,9 +36,9 @@ def give_up_blocked_stderr() -> None:
         os.close(nothing)
 
 
-def print_heading(name: str, rest: str = "") -> None:
+def print_heading(name: str, row_text: str = "") -> None:
     """Print a line that begins with a name in bold."""
-    console.print(Text.assemble((name, "bold"), rest))
+    console.print(Text.assemble((name, "bold"), row_text))
 
 
 def print_warnings(warnings: Iterable[DataWarning]) -> None:
@@ -69,12 +69,12 @@ def print_json(answer: BaseModel | Sequence[BaseModel] | Mapping[str, JsonValue]
 
 def table(title: str, *columns: str, numbers: int = 0) -> Table:
     """Make a table whose last `numbers` columns are numbers, right-aligned."""
-    made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim")
+    rows = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim")
     for index, column in enumerate(columns):
-        made.add_column(
+        rows.add_column(
             column, justify="right" if index >= len(columns) - numbers else "left", no_wrap=index == 0, overflow="fold"
         )
-    return made
+    return rows
 
 
 def format_number(value: float | None, digits: int = 4) -> str:

@@ -39,11 +39,11 @@ class TerminalOperator:
             threading.Thread(target=here.run, args=(self._serve, operator, note), daemon=True).start()
 
     def _serve(self, operator: HumanOperator, note: Callable[[str], None]) -> None:
-        asked = ""
+        asked_prompt = ""
         while not self._closed.wait(LOOK_S):
             prompt = operator.pending
-            if prompt is not None and prompt.id != asked:
-                asked = prompt.id
+            if prompt is not None and prompt.id != asked_prompt:
+                asked_prompt = prompt.id
                 self._put(operator, prompt, note)
 
     def close(self) -> None:
@@ -64,22 +64,22 @@ class TerminalOperator:
             )
             return
         try:
-            why = line.strip()
-            again = prompt.kind == "turn" and why.lower() == AGAIN
+            reason = line.strip()
+            again = prompt.kind == "turn" and reason.lower() == AGAIN
             if again:
                 operator.repeat(prompt.id, os_user(), "")
-            elif why:
-                operator.decline(prompt.id, os_user(), why)
+            elif reason:
+                operator.decline(prompt.id, os_user(), reason)
             else:
                 operator.confirm(prompt.id, os_user())
-            said = "to be asked again" if again else f"cannot be done; {why}" if why else "done"
-            note(f"{prompt.id}: {said}; {prompt.text}")
+            outcome = "to be asked again" if again else f"cannot be done; {reason}" if reason else "done"
+            note(f"{prompt.id}: {outcome}; {prompt.text}")
         except (StalePrompt, StoreError) as error:
             stderr.print(f"labctl: {error}")
 
 
 def _how_to_answer(prompt: Prompt) -> str:
-    """Say what to type, and by when."""
+    """Return what to type, and by when."""
     again = f", {AGAIN} to be asked for the turn again" if prompt.kind == "turn" else ""
     limit = "" if prompt.within_s is None else f" Time limit: {prompt.within_s:g} s."
     return f"Press Enter when this is done{again}, or type the reason why it cannot be done.{limit}"

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def turn_text(answer: CampaignResponse) -> str:
-    """Say how far a turn by hand has come; empty where none is under way."""
+    """Return how far a turn by hand has come; empty where none is under way."""
     turn = answer.turn
     if turn is None:
         return ""

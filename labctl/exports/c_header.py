@@ -11,7 +11,7 @@ from labctl.errors import BadInput
 from labctl.exports.c_code.memory import memory_body
 from labctl.exports.c_code.nodes import temperature_nodes
 from labctl.exports.c_code.orientation import orientation_body
-from labctl.exports.c_code.rounding import rounding_line
+from labctl.exports.c_code.rounding_error import rounding_line
 from labctl.exports.c_code.sine import sine_body
 from labctl.exports.c_code.tables import c_table
 from labctl.exports.comments import configuration_lines

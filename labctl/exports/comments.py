@@ -40,8 +40,8 @@ def head_lines(
 
 def configuration_lines(calibration: Calibration) -> list[str]:
     """Return the line that says how the unit was set when it was measured; none where it does not say that."""
-    said = "; ".join(f"{name} = {value}" for name, value in calibration.configuration.items())
-    return [plain(f"The unit was set to: {said}.")] if said else []
+    settings_text = "; ".join(f"{name} = {value}" for name, value in calibration.configuration.items())
+    return [plain(f"The unit was set to: {settings_text}.")] if settings_text else []
 
 
 def commented(lines: Iterable[str], sign: str = "# ") -> str:

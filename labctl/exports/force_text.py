@@ -16,8 +16,8 @@ def size_line(force: ForceSensitivity, function: str) -> str:
 
 def unmeasured_line(force: ForceSensitivity) -> str:
     """Return what the fit saw no force along, and so is not corrected; empty where there is nothing."""
-    found = "; ".join(f"axis {axis}: along {', '.join(bodies)}" for axis, bodies in force.not_measured.items())
-    return f"Sensitivity that was not measured and is not corrected, {found}" if found else ""
+    unmeasured = "; ".join(f"axis {axis}: along {', '.join(bodies)}" for axis, bodies in force.not_measured.items())
+    return f"Sensitivity that was not measured and is not corrected, {unmeasured}" if unmeasured else ""
 
 
 def force_losses(calibration: Calibration) -> tuple[Loss, ...]:

@@ -36,24 +36,24 @@ class Table:
 
     def error_dps(self, raw: Array, temperature_c: Array) -> Array:
         """Return the error, (n, axes), of outputs (n, axes) at temperatures (n,)."""
-        found = np.zeros_like(raw)
+        error = np.zeros_like(raw)
         for axis, by in np.ndindex(self.errors.shape[:2]):
-            found[:, axis] += _bilinear(
+            error[:, axis] += _bilinear(
                 self.errors[axis, by], self.outputs, self.temperatures_c, raw[:, by], temperature_c
             )
-        return found
+        return error
 
 
 def table_of(part: StaticPart, outputs: Array, temperatures_c: Array) -> Table:
     """Return what each axis' output adds to each axis' error; the error at outputs of 0 is in the axis' own."""
     m, n, axes = len(outputs), len(temperatures_c), len(part.axes)
-    warm = np.tile(temperatures_c, m)
+    temperature_c = np.tile(temperatures_c, m)
     still = -part.rate(np.zeros((n, axes)), temperatures_c)
     errors = np.zeros((axes, axes, m, n))
     for by in range(axes):
         raw = np.zeros((m * n, axes))
         raw[:, by] = np.repeat(outputs, n)
-        error = (raw - part.rate(raw, warm)).reshape(m, n, axes)
+        error = (raw - part.rate(raw, temperature_c)).reshape(m, n, axes)
         for axis in range(axes):
             errors[axis, by] = error[:, :, axis] - (0.0 if axis == by else still[:, axis])
     return Table(outputs, temperatures_c, errors)
@@ -63,16 +63,16 @@ def largest_difference(part: StaticPart, table: Table) -> float:
     """Return how far the table is from the calibration at most, deg/s: between its points, and where all axes turn."""
     fine = [_refined(table.outputs), part.with_kinks(_refined(table.temperatures_c))]
     exact = table_of(part, *fine)
-    raw, warm = (grid.ravel() for grid in np.meshgrid(*fine, indexing="ij"))
+    raw, temperature_c = (grid.ravel() for grid in np.meshgrid(*fine, indexing="ij"))
     axes = len(part.axes)
     apart = np.zeros((axes, axes))
     for axis, by in np.ndindex(axes, axes):
-        seen = _bilinear(table.errors[axis, by], table.outputs, table.temperatures_c, raw, warm)
-        apart[axis, by] = np.abs(seen - exact.errors[axis, by].ravel()).max()
-    found = apart.sum(axis=1)
+        interpolated = _bilinear(table.errors[axis, by], table.outputs, table.temperatures_c, raw, temperature_c)
+        apart[axis, by] = np.abs(interpolated - exact.errors[axis, by].ravel()).max()
+    difference = apart.sum(axis=1)
     raw_all, warm_all = all_turning(part)
     together = np.abs(raw_all - table.error_dps(raw_all, warm_all) - part.rate(raw_all, warm_all)).max(axis=0)
-    return float((found + (together if axes > 1 else 0.0)).max())
+    return float((difference + (together if axes > 1 else 0.0)).max())
 
 
 def write(calibration: Calibration, options: Mapping[str, str]) -> Written:

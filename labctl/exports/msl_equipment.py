@@ -107,7 +107,7 @@ def _report(
 ) -> None:
     """Add the report of one axis: dates, laboratory, conditions, and its table."""
     entered = {"id": f"{options['report']} {calibration.axes[index]}", "enteredBy": options["entered_by"]}
-    made = ET.SubElement(component, "report", entered)
+    report = ET.SubElement(component, "report", entered)
     for name, text in (
         ("reportIssueDate", calibration.document["issued_at"][:10]),
         ("measurementStartDate", _day(options, "started")),
@@ -115,12 +115,12 @@ def _report(
         ("issuingLaboratory", options["laboratory"]),
         ("technicalProcedure", options.get("procedure", "")),
     ):
-        ET.SubElement(made, name).text = text or None
+        ET.SubElement(report, name).text = text or None
     low, high = calibration.temperature_c
-    conditions = ET.SubElement(made, "conditions")
+    conditions = ET.SubElement(report, "conditions")
     ET.SubElement(conditions, "temperature", {"unit": "deg C"}).text = f"{low:g} to {high:g}"
-    ET.SubElement(made, "acceptanceCriteria")
-    listed = ET.SubElement(made, "table", {"comment": f"labctl calibration {calibration.calibration_hash}"})
+    ET.SubElement(report, "acceptanceCriteria")
+    listed = ET.SubElement(report, "table", {"comment": f"labctl calibration {calibration.calibration_hash}"})
     for name, words in (("type", TYPES), ("unit", UNITS), ("header", HEADER)):
         ET.SubElement(listed, name).text = ",".join(words)
     ET.SubElement(listed, "data").text = "\n".join(_rows(calibration.axes, table, index))
@@ -128,10 +128,10 @@ def _report(
 
 def _rows(axes: tuple[str, ...], table: Table, index: int) -> list[str]:
     return [
-        f"{axes[by]},{output:.12g},{warm:.12g},{table.errors[index, by, i, j]:.9g}"
+        f"{axes[by]},{output:.12g},{temperature_c:.12g},{table.errors[index, by, i, j]:.9g}"
         for by in range(len(axes))
         for i, output in enumerate(table.outputs)
-        for j, warm in enumerate(table.temperatures_c)
+        for j, temperature_c in enumerate(table.temperatures_c)
     ]
 
 

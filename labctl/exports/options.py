@@ -14,12 +14,12 @@ def number(options: Mapping[str, str], name: str, format_name: str) -> float | N
     if name not in options:
         return None
     try:
-        found = float(options[name])
+        value = float(options[name])
     except ValueError:
-        found = np.nan
-    if not np.isfinite(found):
+        value = np.nan
+    if not np.isfinite(value):
         raise BadInput(f"format {format_name}: option {name} = {options[name]!r} is not a number; give a number")
-    return found
+    return value
 
 
 def whole_number(options: Mapping[str, str], name: str, limits: tuple[int, int], default: int, format_name: str) -> int:

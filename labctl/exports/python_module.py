@@ -70,7 +70,7 @@ def write(calibration: Calibration) -> Written:
     around = AFTER_CORRECTION if is_direct else BEFORE_CORRECTION
     force, notes = calibration.force_sensitivity, []
     if memory is not None:
-        content["state"] = [each.to_json() for each in memory.followers]
+        content["state"] = [follower.to_json() for follower in memory.followers]
         scaled = SCALED_AFTER_CORRECTION if is_direct else SCALED_BEFORE_CORRECTION.format(steps=SCALE_STEPS)
         body += STATE_CORRECTION + (scaled if memory.has_scale else around)
         notes.append("correct_with_state corrects the thermal lag or hysteresis; correct alone leaves it.")

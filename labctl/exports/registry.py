@@ -34,17 +34,23 @@ def export_calibration(document: bytes, format_name: str) -> tuple[bytes, str]:
 
 def written_calibration(document: bytes, format_name: str, options: Mapping[str, str] | None = None) -> Written:
     """Return a calibration in a format with what was lost; raises BadInput for a format or option that is not known."""
-    chosen = format_named(format_name)
-    given = dict(options or {})
-    unknown = sorted(set(given) - set(chosen.options))
+    export_format = format_named(format_name)
+    stated_options = dict(options or {})
+    unknown = sorted(set(stated_options) - set(export_format.options))
     if unknown:
-        known = ", ".join(chosen.options) or "none"
-        raise BadInput(f"format {format_name}: option {unknown[0]!r} is not known; options of this format: {known}")
+        option_names = ", ".join(export_format.options) or "none"
+        raise BadInput(
+            f"format {format_name}: option {unknown[0]!r} is not known; options of this format: {option_names}"
+        )
     calibration = read_calibration(document)
     try:
-        found = chosen.write(calibration, given) if chosen.options else chosen.write(calibration)
+        file_bytes = (
+            export_format.write(calibration, stated_options)
+            if export_format.options
+            else export_format.write(calibration)
+        )
     except LabctlError:
         raise
     except Exception as error:
         raise BadInput(failure(FORMATS.plugin(format_name), "write this calibration", error)) from error
-    return found if isinstance(found, Written) else Written(found)
+    return file_bytes if isinstance(file_bytes, Written) else Written(file_bytes)

@@ -61,16 +61,16 @@ class StaticPart:
     def bias_dps(self, temperature_c: Array) -> Array:
         """Return the output at true rate 0, (n, axes) deg/s, by Newton's method on the correction."""
         n, axes = len(temperature_c), len(self.axes)
-        found = np.zeros((n, axes))
+        bias = np.zeros((n, axes))
         for _ in range(NEWTON_STEPS):
-            left = self.rate(found, temperature_c)
+            residual_rate = self.rate(bias, temperature_c)
             slope = np.empty((n, axes, axes))
             for column in range(axes):
-                moved = found.copy()
+                moved = bias.copy()
                 moved[:, column] += SLOPE_STEP_DPS
-                slope[:, :, column] = (self.rate(moved, temperature_c) - left) / SLOPE_STEP_DPS
-            found = found - np.linalg.solve(slope, left[:, :, None])[:, :, 0]
-        return found
+                slope[:, :, column] = (self.rate(moved, temperature_c) - residual_rate) / SLOPE_STEP_DPS
+            bias = bias - np.linalg.solve(slope, residual_rate[:, :, None])[:, :, 0]
+        return bias
 
     def memory_losses(self) -> tuple[Loss, ...]:
         """Return what is lost where a format carries neither lag nor hysteresis."""
@@ -86,22 +86,22 @@ def follower_losses(memory: Memory | None, fastest_dps: float) -> tuple[Loss, ..
 
     That of a lag of the scale factor is stated at the fastest calibrated rate.
     """
-    found: dict[str, float] = {}
+    losses: dict[str, float] = {}
     for each in memory.followers if memory is not None else ():
         of, size = "bias", float(np.abs(each.size).max())
         if each.scale is not None:
             of, size = f"scale factor at {fastest_dps:g} deg/s", float(np.abs(each.scale).max()) * fastest_dps
         if each.kind == "play":
-            what = "hysteresis of the bias"
+            subject = "hysteresis of the bias"
         elif each.part == "curved":
             about = f"for each K from {each.reference_c:g} deg C"
-            what = f"curved thermal lag of the {of}, at {WARMING_K_MIN:g} K/min, {about}"
+            subject = f"curved thermal lag of the {of}, at {WARMING_K_MIN:g} K/min, {about}"
             size *= 2 * max(each.parameter, each.cooling_s or 0.0) / 60 * WARMING_K_MIN
         else:
-            what = f"thermal lag of the {of}, at {WARMING_K_MIN:g} K/min"
+            subject = f"thermal lag of the {of}, at {WARMING_K_MIN:g} K/min"
             size *= max(each.parameter, each.cooling_s or 0.0) / 60 * WARMING_K_MIN
-        found[what] = found.get(what, 0.0) + size
-    return tuple(Loss(what, size) for what, size in found.items())
+        losses[subject] = losses.get(subject, 0.0) + size
+    return tuple(Loss(subject, size) for subject, size in losses.items())
 
 
 def static_part(calibration: Calibration, format_name: str, *, carries: str) -> StaticPart:
@@ -109,14 +109,15 @@ def static_part(calibration: Calibration, format_name: str, *, carries: str) -> 
 
     `carries` is what the format has, and ends the message.
     """
-    rest, memory = split_memory(calibration.fitted, calibration.axes)
-    if rest.model.needs:
+    static_fit, memory = split_memory(calibration.fitted, calibration.axes)
+    if static_fit.model.needs:
         raise BadInput(
-            f"format {format_name}: model {rest.model.name} needs {', '.join(rest.model.needs)} beside output and "
+            f"format {format_name}: model {static_fit.model.name} needs {', '.join(static_fit.model.needs)} beside "
+            "output and "
             f"temperature; {carries}; use the JSON file with labctl's Compensator"
         )
-    law = correction(rest, calibration.axes)
-    return StaticPart(calibration, lambda raw, warm: law(raw, warm, {}), memory)
+    law = correction(static_fit, calibration.axes)
+    return StaticPart(calibration, lambda raw, temperature_c: law(raw, temperature_c, {}), memory)
 
 
 def needs_thermometer(calibration: Calibration, format_name: str, advice: str) -> None:
@@ -151,16 +152,16 @@ def differences(part: StaticPart, formula: Callable[[Array, Array], Array]) -> D
     still = part.bias_dps(dense_c)
     at_rest = np.abs(formula(still, dense_c) - part.rate(still, dense_c)).max(axis=0)
     coarse_c = part.with_kinks(part.temperatures())
-    warm = np.repeat(coarse_c, len(part.outputs()))
+    temperature_c = np.repeat(coarse_c, len(part.outputs()))
     base = np.repeat(part.bias_dps(coarse_c), len(part.outputs()), axis=0)
     apart = np.zeros((axes, axes))
     for turning in range(axes):
         raw = base.copy()
         raw[:, turning] = np.tile(part.outputs(), len(coarse_c))
-        apart[:, turning] = np.abs(formula(raw, warm) - part.rate(raw, warm)).max(axis=0)
+        apart[:, turning] = np.abs(formula(raw, temperature_c) - part.rate(raw, temperature_c)).max(axis=0)
     own = np.maximum(np.diag(apart), at_rest)
-    raw, warm = all_turning(part)
-    corners = np.abs(formula(raw, warm) - part.rate(raw, warm)).max(axis=0)
+    raw, temperature_c = all_turning(part)
+    corners = np.abs(formula(raw, temperature_c) - part.rate(raw, temperature_c)).max(axis=0)
     return Differences(at_rest, own, apart.sum(axis=1) - np.diag(apart), corners)
 
 

@@ -14,8 +14,8 @@ def bounds_dps(calibration: Calibration) -> dict[str, float | None]:
 
     It is that of a rotation about the axis itself, the others at rest.
     """
-    found = _of(calibration)
-    return {axis: None if found is None else found["axes"][axis]["bound_dps"] for axis in calibration.axes}
+    use_bounds = _of(calibration)
+    return {axis: None if use_bounds is None else use_bounds["axes"][axis]["bound_dps"] for axis in calibration.axes}
 
 
 def any_axis_bounds_dps(calibration: Calibration) -> dict[str, float | None]:
@@ -23,31 +23,31 @@ def any_axis_bounds_dps(calibration: Calibration) -> dict[str, float | None]:
 
     It holds in the frame of the case.
     """
-    return {axis: None if one is None else one["bound_dps"] for axis, one in _vectors(calibration).items()}
+    return {axis: None if vector is None else vector["bound_dps"] for axis, vector in _vectors(calibration).items()}
 
 
 def _vectors(calibration: Calibration) -> dict[str, VectorBoundJson | None]:
-    found = _of(calibration)
-    return {axis: None if found is None else found["axes"][axis].get("vector") for axis in calibration.axes}
+    use_bounds = _of(calibration)
+    return {axis: None if use_bounds is None else use_bounds["axes"][axis].get("vector") for axis in calibration.axes}
 
 
 def bound_lines(calibration: Calibration) -> list[str]:
     """Return the lines of a comment: U of each axis, alone and turned about any axis, and standards not in it."""
-    found, bounds = _of(calibration), bounds_dps(calibration)
-    known = _listed(bounds)
+    use_bounds, bounds = _of(calibration), bounds_dps(calibration)
+    bound_list = _listed(bounds)
     lines = []
-    if known:
+    if bound_list:
         lines.append(
             "Expanded uncertainty U (95.45 %) of a corrected rate on later days, about its own axis alone, at most: "
-            f"{known}."
+            f"{bound_list}."
         )
     if unknown := [axis for axis, bound in bounds.items() if bound is None]:
         lines.append(f"Uncertainty of a corrected rate: unknown for {', '.join(unknown)}.")
     lines += _any_axis_lines(calibration)
-    if known and found is not None and found["not_stated"]:
+    if bound_list and use_bounds is not None and use_bounds["not_stated"]:
         lines.append(
             f"Uncertainties that the bench does not state, and that U does not contain: "
-            f"{', '.join(found['not_stated'])}."
+            f"{', '.join(use_bounds['not_stated'])}."
         )
     return lines
 
@@ -55,18 +55,19 @@ def bound_lines(calibration: Calibration) -> list[str]:
 def _any_axis_lines(calibration: Calibration) -> list[str]:
     vectors, bounds = _vectors(calibration), any_axis_bounds_dps(calibration)
     lines = []
-    if known := _listed(bounds):
-        reach = max(one["reach_dps"] for one in vectors.values() if one is not None)
-        aligned = _listed({axis: one and one["aligned_bound_dps"] for axis, one in vectors.items()})
+    if bound_list := _listed(bounds):
+        reach = max(vector["reach_dps"] for vector in vectors.values() if vector is not None)
+        aligned = _listed({axis: vector and vector["aligned_bound_dps"] for axis, vector in vectors.items()})
         lines.append(
-            f"U turned about any axis at up to {reach:.4g} deg/s, in the frame of the case, at most: {known}; up to a "
+            f"U turned about any axis at up to {reach:.4g} deg/s, in the frame of the case, at most: {bound_list}; up "
+            "to a "
             f"rotation of the frame: {aligned}."
         )
     if unknown := [axis for axis, bound in bounds.items() if bound is None]:
         lines.append(f"U turned about any axis: unknown for {', '.join(unknown)}.")
     for axis in calibration.axes:
-        found = _of(calibration)
-        cross = None if found is None else found["axes"][axis].get("cross_rates")
+        use_bounds = _of(calibration)
+        cross = None if use_bounds is None else use_bounds["axes"][axis].get("cross_rates")
         if cross is not None and cross["per_dps"] is not None:
             about = " and ".join(cross["about"])
             lines.append(f"A rate about {about} adds up to {_at_least(cross['per_dps']):g} of it to {axis}.")
@@ -82,10 +83,11 @@ def bound_constant(name: str, calibration: Calibration) -> str:
 
     `<name>_u_dps` is that of a rotation about the axis itself, `<name>_u_any_axis_dps` about any axis.
     """
-    given = {"u": bounds_dps(calibration), "u_any_axis": any_axis_bounds_dps(calibration)}
+    bounds_by_name = {"u": bounds_dps(calibration), "u_any_axis": any_axis_bounds_dps(calibration)}
     return "".join(
-        f"static const double {name}_{what}_dps[{len(bounds)}] = {{{', '.join(map(_c_number, bounds.values()))}}};\n"
-        for what, bounds in given.items()
+        f"static const double {name}_{bound_name}_dps[{len(bounds)}] = "
+        f"{{{', '.join(map(_c_number, bounds.values()))}}};\n"
+        for bound_name, bounds in bounds_by_name.items()
     )
 
 

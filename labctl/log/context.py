@@ -13,9 +13,9 @@ from structlog.contextvars import bind_contextvars, bound_contextvars, clear_con
 _GIVEN = re.compile(r"[A-Za-z0-9._-]{1,64}")
 
 
-def new_request_id(given: str = "") -> str:
+def new_request_id(requested: str = "") -> str:
     """Return the number of a request: the one that it came with, else a new one."""
-    return given if _GIVEN.fullmatch(given) else secrets.token_hex(8)
+    return requested if _GIVEN.fullmatch(requested) else secrets.token_hex(8)
 
 
 def request_id() -> str:
@@ -24,7 +24,7 @@ def request_id() -> str:
 
 
 def begin_request(number: str) -> None:
-    """Let this task work for a request, and nothing else, to its end."""
+    """Bind the log context of this task to a request, until the task ends."""
     clear_contextvars()
     bind_contextvars(request_id=number)
 
@@ -41,6 +41,6 @@ def for_request(number: str) -> Iterator[None]:
 
 @contextmanager
 def for_campaign(campaign: int, bench: str) -> Iterator[None]:
-    """Let every record of this thread name a campaign and its bench while the block runs."""
+    """Add a campaign and its bench to every log record of this thread while the block runs."""
     with bound_contextvars(campaign=campaign, bench=bench):
         yield

@@ -30,14 +30,14 @@ _IN_TEXT = (
 
 def secrets_of(environment: Mapping[str, str] = os.environ, locations: Iterable[str] = ()) -> frozenset[str]:
     """Return the secrets that this process was given: its key, and the passwords in addresses of databases."""
-    found = {environment.get(KEY_VARIABLE, ""), environment.get("PGPASSWORD", "")}
+    secrets = {environment.get(KEY_VARIABLE, ""), environment.get("PGPASSWORD", "")}
     for location in (*locations, environment.get(DATABASE_VARIABLE, "")):
         try:
             password = urlsplit(location).password or ""
         except ValueError:  # a path that looks like an address
             continue
-        found |= {password, unquote(password)}
-    return frozenset(each for each in found if len(each) >= SHORTEST_SECRET)
+        secrets |= {password, unquote(password)}
+    return frozenset(secret for secret in secrets if len(secret) >= SHORTEST_SECRET)
 
 
 class Redaction:
@@ -48,12 +48,12 @@ class Redaction:
 
     def text(self, text: str, longest: int = LONGEST) -> str:
         """Return a text without secrets, at most so long."""
-        whole, text = len(text), text[: 4 * longest]  # what is cut off later has been searched
+        full_length, text = len(text), text[: 4 * longest]  # what is cut off later has been searched
         for secret in self._known:
             text = text.replace(secret, REMOVED)
         for pattern, instead in _IN_TEXT:
             text = pattern.sub(instead, text)
-        return text if len(text) <= longest else f"{text[:longest]}... ({whole} characters)"
+        return text if len(text) <= longest else f"{text[:longest]}... ({full_length} characters)"
 
     def traceback(self, text: str) -> str:
         """Return a traceback without secrets; of a long one the end is kept, which names the error."""

@@ -116,28 +116,28 @@ class Rendering:
             structlog.contextvars.merge_contextvars, structlog.processors.add_log_level, self._time,
             structlog.processors.format_exc_info,
         )  # fmt: skip
-        found: Any = {**self._process, **fields}
+        line: Any = {**self._process, **fields}
         for each in chain:
-            found = each(logger, method, found)
-        if found["level"] == "warn":
-            found["level"] = "warning"
-        clean = self._redaction.fields(found)
+            line = each(logger, method, line)
+        if line["level"] == "warn":
+            line["level"] = "warning"
+        clean = self._redaction.fields(line)
         ordered = {name: clean.pop(name) for name in FIRST if name in clean} | clean
         if not self._for_a_person:
             return str(self._last(logger, method, ordered))
-        shown = self._shown(ordered)
-        text = sentence(shown) if self._brief else None
+        shown_fields = self._shown(ordered)
+        text = sentence(shown_fields) if self._brief else None
         if text == "":
             raise structlog.DropEvent
-        return str(self._last(logger, method, shown)) if text is None else f"{shown['timestamp']} {text}"
+        return str(self._last(logger, method, shown_fields)) if text is None else f"{shown_fields['timestamp']} {text}"
 
     def _shown(self, fields: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields for a terminal: the time of day alone, and nothing that it obeys."""
-        shown = {
+        shown_fields = {
             name: value.translate(_CONTROLS) if isinstance(value, str) and name != "exception" else value
             for name, value in fields.items()
         }
-        return {**shown, "timestamp": str(shown["timestamp"])[11:19]}
+        return {**shown_fields, "timestamp": str(shown_fields["timestamp"])[11:19]}
 
 
 def error_fields(error: BaseException) -> dict[str, Any]:

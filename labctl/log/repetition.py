@@ -34,31 +34,31 @@ class RepetitionLimit:
         """Return whether a record with this key is written; count it where it is not."""
         now_s = self._clock.now_s()
         with self._guard:
-            found = self._counted.setdefault(key, _Counted(now_s))
-            if now_s - found.since_s >= self._per_s:
-                found.since_s, found.admitted = now_s, 0
-            if found.admitted < self._most:
-                found.admitted += 1
+            counted = self._counted.setdefault(key, _Counted(now_s))
+            if now_s - counted.since_s >= self._per_s:
+                counted.since_s, counted.admitted = now_s, 0
+            if counted.admitted < self._most:
+                counted.admitted += 1
                 return True
-            found.held_back += 1
+            counted.held_back += 1
             self.held_back += 1
             return False
 
     def take_count(self, key: Hashable) -> int:
         """Return how many with this key were held back since the last call."""
         with self._guard:
-            found = self._counted.get(key)
-            count = 0 if found is None else found.held_back
-            if found is not None:
-                found.held_back = 0
+            counted = self._counted.get(key)
+            count = 0 if counted is None else counted.held_back
+            if counted is not None:
+                counted.held_back = 0
         return count
 
     def take_counts(self) -> dict[str, int]:
         """Return how many were held back since the last call, by key as text."""
         with self._guard:
-            taken = {str(key): found.held_back for key, found in self._counted.items() if found.held_back}
-            for found in self._counted.values():
-                found.held_back = 0
+            taken = {str(key): counted.held_back for key, counted in self._counted.items() if counted.held_back}
+            for counted in self._counted.values():
+                counted.held_back = 0
         return taken
 
 

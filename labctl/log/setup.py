@@ -33,22 +33,22 @@ def _of_the_process(kind: type[BaseException], error: BaseException, trace: Trac
     log.critical("process.failed", error_type=kind.__name__, exc_info=(kind, error, trace))
 
 
-def _of_a_thread(found: threading.ExceptHookArgs) -> None:
-    if issubclass(found.exc_type, SystemExit):
+def _of_a_thread(hook_args: threading.ExceptHookArgs) -> None:
+    if issubclass(hook_args.exc_type, SystemExit):
         return
-    error = found.exc_value or found.exc_type()
-    name = found.thread.name if found.thread is not None else ""
-    info = (found.exc_type, error, found.exc_traceback)
-    log.error("thread.failed", thread=name, error_type=found.exc_type.__name__, exc_info=info)
+    error = hook_args.exc_value or hook_args.exc_type()
+    name = hook_args.thread.name if hook_args.thread is not None else ""
+    info = (hook_args.exc_type, error, hook_args.exc_traceback)
+    log.error("thread.failed", thread=name, error_type=hook_args.exc_type.__name__, exc_info=info)
 
 
-def _of_a_finalizer(found: sys.UnraisableHookArgs) -> None:
-    error = found.exc_value or found.exc_type()
-    info = (found.exc_type, error, found.exc_traceback)
-    where = found.err_msg or "ignored"
+def _of_a_finalizer(hook_args: sys.UnraisableHookArgs) -> None:
+    error = hook_args.exc_value or hook_args.exc_type()
+    info = (hook_args.exc_type, error, hook_args.exc_traceback)
+    place_text = hook_args.err_msg or "ignored"
     with suppress(Exception):  # an object that is half gone may not have a text any more
-        where = f"{where}: {found.object!r:.100}"
-    log.error("error.ignored", where=where, error_type=found.exc_type.__name__, exc_info=info)
+        place_text = f"{place_text}: {hook_args.object!r:.100}"
+    log.error("error.ignored", where=place_text, error_type=hook_args.exc_type.__name__, exc_info=info)
 
 
 @contextmanager

@@ -49,7 +49,7 @@ class LogWriter:
         self._thread.start()
 
     def put(self, line: str) -> None:
-        """Hand a line over, without its end; it is dropped where too many wait."""
+        """Queue a line, without its end; it is dropped where too many wait."""
         if self._queue.qsize() >= self._capacity:
             self.lost += 1
         else:

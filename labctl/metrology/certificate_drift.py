@@ -61,7 +61,7 @@ def predicted(certificates: Sequence[CertifiedValue], on: date) -> Prediction:
     """
     if not certificates:
         raise BadInput(f"no certificate to predict from on {on}; add one with `labctl standards certificate`")
-    ordered = sorted(certificates, key=lambda each: each.on)
+    ordered = sorted(certificates, key=lambda certificate: certificate.on)
     for each in ordered:
         if not (math.isfinite(each.u) and each.u > 0):
             raise BadInput(f"certificate of {each.on}: u = {each.u:g} is no uncertainty; give a number above 0")
@@ -81,10 +81,10 @@ def _since_adjustment(ordered: Sequence[CertifiedValue], before: CertifiedValue)
     return list(ordered[first:last])
 
 
-def _why(same: Sequence[CertifiedValue], valued: Sequence[CertifiedValue]) -> str:
-    if len(valued) < len(same):
+def _why(repeats: Sequence[CertifiedValue], valued: Sequence[CertifiedValue]) -> str:
+    if len(valued) < len(repeats):
         return "drift unknown: the certificates state no value, only an uncertainty"
-    since = " since the last adjustment" if same[0].after_adjustment else ""
+    since = " since the last adjustment" if repeats[0].after_adjustment else ""
     return f"drift unknown: one certificate{since}; u holds no contribution of a drift"
 
 
@@ -95,10 +95,10 @@ def _on_line(valued: Sequence[CertifiedValue], before: CertifiedValue, on: date)
     root = 1.0 / np.array([each.u for each in valued])
     columns = np.column_stack([root, root * time])
     covariance = np.linalg.inv(columns.T @ columns)
-    found = covariance @ (columns.T @ (root * values))
-    left = root * values - columns @ found
+    coefficients = covariance @ (columns.T @ (root * values))
+    residual = root * values - columns @ coefficients
     freedom = len(valued) - 2
-    birge = max(1.0, math.sqrt(float(left @ left) / freedom)) if freedom > 0 else 1.0
+    birge = max(1.0, math.sqrt(float(residual @ residual) / freedom)) if freedom > 0 else 1.0
     u_value, u_slope = birge * np.sqrt(np.diag(covariance))
-    drift = Drift(float(found[1]), float(u_slope), len(valued), birge)
-    return Prediction(on, float(found[0]), max(float(u_value), before.u), drift)
+    drift = Drift(float(coefficients[1]), float(u_slope), len(valued), birge)
+    return Prediction(on, float(coefficients[0]), max(float(u_value), before.u), drift)

@@ -76,10 +76,10 @@ class Judged:
     @property
     def state(self) -> State:
         """The worst state by any of the limits."""
-        found = {limits.state_of(self.point.value) for limits in self.limits}
+        states = {limits.state_of(self.point.value) for limits in self.limits}
         order: tuple[State, ...] = ("out", "warning", "in")
         for state in order:
-            if state in found:
+            if state in states:
                 return state
         return "unknown"
 
@@ -94,23 +94,23 @@ def limits_from_history(values: Sequence[float]) -> Limits:
 
 def judged(points: Sequence[ChartPoint]) -> list[Judged]:
     """Return each value of a chart, in order of time, with its limits from those before it and from what is stated."""
-    found: list[Judged] = []
+    judged_points: list[Judged] = []
     history: list[ChartPoint] = []
     for point in points:
         one = Judged(point, tuple(_limits(point, history)))
-        found.append(one)
+        judged_points.append(one)
         if one.state != "out":
             history.append(point)
-    return found
+    return judged_points
 
 
 def _limits(point: ChartPoint, history: Sequence[ChartPoint]) -> Iterator[Limits]:
-    known = [each.u for each in history if each.u is not None]
+    u_values = [each.u for each in history if each.u is not None]
     if point.u is not None and point.expected is not None:
         yield Limits("stated u", point.expected, math.hypot(point.u, point.u_expected), 0)
-    elif point.u is not None and history and len(known) == len(history):
+    elif point.u is not None and history and len(u_values) == len(history):
         centre = float(np.mean([each.value for each in history]))
-        u_centre = math.sqrt(sum(u**2 for u in known)) / len(history)
+        u_centre = math.sqrt(sum(u**2 for u in u_values)) / len(history)
         yield Limits("stated u", centre, math.hypot(point.u, u_centre), len(history))
     values = [each.value for each in history]
     if len(history) >= LEAST_HISTORY and len(set(values)) > 1:  # equal values, as coarse steps give, say nothing of it

@@ -41,7 +41,7 @@ class Paper:
 
     def value(self, name: str) -> float:
         """Return a printed number. Raises KeyError where there is none of this name."""
-        found = {each.id: each.value for each in self.printed}[name]
-        if found is None:
+        value_by_id = {each.id: each.value for each in self.printed}[name]
+        if value_by_id is None:
             raise KeyError(name)
-        return found
+        return value_by_id

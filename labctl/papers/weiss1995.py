@@ -27,9 +27,9 @@ def scale_deviation_pct(of: float = NOMINAL_MV) -> tuple[float, float]:
 
 def offset_slope(low_c: float, high_c: float) -> float:
     """Return the least-squares slope of the printed offsets between two temperatures, deg/s per K."""
-    warm = np.asarray(TEMPERATURES_C)
-    here = (warm >= low_c) & (warm <= high_c)
-    slope, _ = np.polyfit(warm[here], np.asarray(OFFSET_V)[here], 1)
+    temperature_c = np.asarray(TEMPERATURES_C)
+    here = (temperature_c >= low_c) & (temperature_c <= high_c)
+    slope, _ = np.polyfit(temperature_c[here], np.asarray(OFFSET_V)[here], 1)
     return float(slope) / (NOMINAL_MV / 1000.0)
 
 

@@ -95,9 +95,10 @@ def _printed() -> Iterator[Printed]:
                 )  # fmt: skip
     for axis in AXES:
         after = TABLE_3[axis][axis][3] if axis == MEANS else TABLE_4[axis][axis][2]
-        where = "Table 3" if axis == MEANS else "Table 4"
+        table_name = "Table 3" if axis == MEANS else "Table 4"
         yield Printed(
-            f"curve_{axis}", "Own-axis remainder", f"{axis}: RMS after ({where}), beside what K and B do not explain "
+            f"curve_{axis}", "Own-axis remainder",
+            f"{axis}: RMS after ({table_name}), beside what K and B do not explain "
             "of the RMS before", "deg/s", after,
         )  # fmt: skip
     yield Printed("stalled", "The missing effect", "yang2018: RMS error, all axes and positions", "deg/s", None)
@@ -165,14 +166,14 @@ def _of_the_tables() -> Iterator[Contradiction]:
 
 
 def _of_the_coefficients() -> Iterator[Contradiction]:
-    rest = {axis: unexplained_dps(axis) for axis in "xy"}
+    unexplained = {axis: unexplained_dps(axis) for axis in "xy"}
     yield Contradiction(
         "K_g against Tables 3 and 4",
         "K and B do not explain the own-axis error: "
         + "; ".join(
-            f"{axis}: {left:.3f} deg/s RMS remain ({low:.3f} to {high:.3f} by the rounding of K), "
+            f"{axis}: {axis_unexplained:.3f} deg/s RMS remain ({low:.3f} to {high:.3f} by the rounding of K), "
             f"{TABLE_4[axis][axis][2]:g} printed after compensation"
-            for axis, (left, low, high) in rest.items()
+            for axis, (axis_unexplained, low, high) in unexplained.items()
         )
         + ". The model has no nonlinearity, which the authors name as missing.",
         "The simulated unit has a soft limit of that size; criticism is asked what is missing.",

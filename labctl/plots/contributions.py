@@ -49,7 +49,7 @@ def contributions(over: Mapping[str, ContributionsOverJson]) -> go.Figure:
 
 
 def _draw(
-    figure: go.Figure, lines: ContributionLinesJson, names: Sequence[str], drawn: set[str], where: dict[str, int]
+    figure: go.Figure, lines: ContributionLinesJson, names: Sequence[str], drawn: set[str], placement: dict[str, int]
 ) -> None:
     sums = {"combined u": lines["combined"], "expanded U": lines["expanded"]}
     dashes = {"combined u": "solid", "expanded U": "dash"}
@@ -64,7 +64,7 @@ def _draw(
                 line={"color": colour, "dash": dashes.get(name, "solid"), "width": 2.5 if name in sums else 1.5},
                 hovertemplate=f"{escape(name)}<br>%{{x:.5g}}: %{{y:.3g}} deg/s<extra></extra>",
             ),
-            **where,
+            **placement,
         )  # fmt: skip
         drawn.add(name)
 
@@ -72,8 +72,8 @@ def _draw(
 def contributions_html(title: str, over: Mapping[str, ContributionsOverJson], not_stated: Sequence[str]) -> str:
     """Return a page that needs no server: the figure, and which standards are not in it."""
     figure = contributions(over).to_html(full_html=False, include_plotlyjs=True, config={"displaylogo": False})
-    left = f"<p>Not stated, and in no line: {escape(', '.join(not_stated))}.</p>" if not_stated else ""
+    note = f"<p>Not stated, and in no line: {escape(', '.join(not_stated))}.</p>" if not_stated else ""
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{escape(title)}</title>\n'
-        f"<style>{STYLE}</style></head>\n<body>\n<h1>{escape(title)}</h1>\n{left}\n{figure}\n</body>\n</html>\n"
+        f"<style>{STYLE}</style></head>\n<body>\n<h1>{escape(title)}</h1>\n{note}\n{figure}\n</body>\n</html>\n"
     )

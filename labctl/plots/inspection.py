@@ -28,15 +28,15 @@ def inspection_picture(courses: Sequence[CourseJson], marks: Sequence[MarkJson])
     if not courses:
         return None
     kinds = list(dict.fromkeys(mark["what"] for mark in marks))
-    colours = {what: COLOURS[k % len(COLOURS)] for k, what in enumerate(kinds)}
+    colours = {kind: COLOURS[k % len(COLOURS)] for k, kind in enumerate(kinds)}
     figure = grid_of([_heading(course, _marks_of(course, marks)) for course in courses], 1, shared_xaxes=True)
     height = ROW_PX * len(courses) + GAP_PX
     figure.update_layout(template=TEMPLATE, height=height)
     bands: list[dict[str, object]] = []
     for panel, course in enumerate(courses):
-        where = place(panel, 1)
-        figure.add_trace(_envelope(course), **where)
-        figure.update_yaxes(title=course["unit"], **where)
+        placement = place(panel, 1)
+        figure.add_trace(_envelope(course), **placement)
+        figure.update_yaxes(title=course["unit"], **placement)
         bands += [band for mark in _marks_of(course, marks) for band in _bands(mark, colours[mark["what"]], panel)]
     figure.update_layout(shapes=bands)  # all at once: plotly copies its figure for each that is added by itself
     figure.update_xaxes(title="t_s, s", row=len(courses), col=1)
@@ -48,8 +48,8 @@ def inspection_html(
 ) -> str:
     """Return an HTML document of an inspection: its sentences, and the picture."""
     picture = inspection_picture(courses, marks)
-    said = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences) or "<li>nothing was found</li>"
-    parts = [f"<h1>Inspection of {escape(source)}</h1>", f"<ul>{said}</ul>"]
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences) or "<li>nothing was found</li>"
+    parts = [f"<h1>Inspection of {escape(source)}</h1>", f"<ul>{items}</ul>"]
     if picture is not None:
         parts.append(figure_part(picture))
     return whole_page(f"Inspection of {source}", parts, drawn=picture is not None)
@@ -73,15 +73,15 @@ def _bands(mark: MarkJson, colour: str, panel: int) -> list[dict[str, object]]:
 
 def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:
     drawn = "reading by reading" if course["bins"] >= course["readings"] else f"in {course['bins']} bins"
-    said = [f"{course['channel']}: all {course['readings']} readings, {drawn}"]
+    parts = [f"{course['channel']}: all {course['readings']} readings, {drawn}"]
     for mark in marks:
         if mark["whole"]:
-            said.append(f"{mark['what']} (all of it)")
+            parts.append(f"{mark['what']} (all of it)")
         elif len(mark["from_s"]) < mark["places"]:
-            said.append(f"{mark['what']} ({len(mark['from_s'])} of {mark['places']} places drawn)")
+            parts.append(f"{mark['what']} ({len(mark['from_s'])} of {mark['places']} places drawn)")
         else:
-            said.append(f"{mark['what']} ({mark['places']} places)")
-    return "; ".join(said)
+            parts.append(f"{mark['what']} ({mark['places']} places)")
+    return "; ".join(parts)
 
 
 def _envelope(course: CourseJson) -> go.Scatter:

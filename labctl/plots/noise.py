@@ -19,7 +19,7 @@ def allan(answer: CriticismResponse) -> go.Figure | None:
     axes = static["axes"]
     figure = grid_of([_figures_text(axis, line) for axis, line in axes.items()], min(len(axes), 3))
     for panel, (axis, line) in enumerate(axes.items()):
-        where, colour = place(panel, min(len(axes), 3)), colour_of(axis)
+        placement, colour = place(panel, min(len(axes), 3)), colour_of(axis)
         sigma = line["deviation_dps"]
         figure.add_trace(
             go.Scatter(
@@ -30,13 +30,13 @@ def allan(answer: CriticismResponse) -> go.Figure | None:
                     "arrayminus": _apart(sigma, line["low_dps"]),
                 },
             ),
-            **where,
+            **placement,
         )  # fmt: skip
         figure.add_trace(
             go.Scatter(
                 x=line["tau_s"], y=line["model_dps"], mode="lines", line={"color": INK, "dash": "dash"}, name="terms"
             ),
-            **where,
+            **placement,
         )
     figure.update_xaxes(type="log", title="averaging time, s")
     figure.update_yaxes(type="log", title="Allan deviation, deg/s", col=1)
@@ -50,12 +50,12 @@ def _apart(high: Numbers, low: Numbers) -> Numbers:
 
 
 def _figures_text(axis: str, line: AllanJson) -> str:
-    said = [
+    parts = [
         f"{letter} = {figure['value']:.3g} {figure['unit']}"
         for letter, figure in (("N", line["N"]), ("B", line["B"]), ("K", line["K"]))
         if figure["value"] is not None
     ]
-    return f"{axis}: {', '.join(said) or 'no slope shows'}"
+    return f"{axis}: {', '.join(parts) or 'no slope shows'}"
 
 
 def repeats(answer: CriticismResponse) -> go.Figure | None:
@@ -67,7 +67,7 @@ def repeats(answer: CriticismResponse) -> go.Figure | None:
     figure = grid_of([_repeats_text(line) for line in lines], min(len(lines), 3))
     timed = all("apart_s" in line for line in lines)
     for panel, line in enumerate(lines):
-        where = place(panel, min(len(lines), 3))
+        placement = place(panel, min(len(lines), 3))
         figure.add_trace(
             go.Scatter(
                 x=_minutes(line.get("apart_s", [])) if timed else line["apart_sets"],
@@ -76,12 +76,12 @@ def repeats(answer: CriticismResponse) -> go.Figure | None:
                 text=[f"data sets {a} and {b}" for a, b in line["datasets"]],
                 hovertemplate="%{text}<br>%{y:.3g} deg/s<extra></extra>",
             ),
-            **where,
+            **placement,
         )  # fmt: skip
         floor_dps = line["floor_dps"]
         levels = () if floor_dps is None else (-2 * 2**0.5 * floor_dps, 2 * 2**0.5 * floor_dps)
         for level in levels:
-            figure.add_hline(y=level, line={"color": INK, "dash": "dash", "width": 1}, **where)
+            figure.add_hline(y=level, line={"color": INK, "dash": "dash", "width": 1}, **placement)
     figure.update_xaxes(title="apart, min" if timed else "apart, data sets")
     figure.update_yaxes(title="difference, deg/s", col=1)
     return figure
@@ -92,8 +92,8 @@ def _minutes(seconds: Numbers) -> Numbers:
 
 
 def _repeats_text(line: Repeats) -> str:
-    shown = len(line["difference_dps"])
-    drawn = f"; {shown} of {line['pairs']} pairs drawn" if shown < line["pairs"] else ""
+    n_shown = len(line["difference_dps"])
+    drawn = f"; {n_shown} of {line['pairs']} pairs drawn" if n_shown < line["pairs"] else ""
     return f"{line['axis']}: {line['over_floor'] or 0.0:.2f} of the floor{drawn}"
 
 

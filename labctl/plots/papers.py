@@ -67,21 +67,21 @@ def paper_figure(figure: PaperFigure) -> go.Figure:
     """Return a figure as a plot: every point of its numbers is drawn."""
     panels, columns = figure["panels"], figure["columns"]
     drawn = grid_of([panel["title"] for panel in panels], columns, horizontal_spacing=0.27 / columns)
-    shown: set[str] = set()
+    shown_names: set[str] = set()
     one_scale = len({panel["colour_title"] for panel in panels}) == 1
     for index, panel in enumerate(panels):
-        where, scale = place(index, columns), "coloraxis" if one_scale else f"coloraxis{index + 1}"
+        placement, scale = place(index, columns), "coloraxis" if one_scale else f"coloraxis{index + 1}"
         for number, trace in enumerate(panel["traces"]):
-            made = _trace(panel, trace, COLOURS[number % len(COLOURS)], scale)
-            made.showlegend = _named(panel) and trace["name"] not in shown
-            shown.add(trace["name"])
-            drawn.add_trace(made, **where)
+            drawn_trace = _trace(panel, trace, COLOURS[number % len(COLOURS)], scale)
+            drawn_trace.showlegend = _named(panel) and trace["name"] not in shown_names
+            shown_names.add(trace["name"])
+            drawn.add_trace(drawn_trace, **placement)
         below = panels[index + columns : index + columns + 1]
         if not below or below[0]["x_title"] != panel["x_title"]:
-            drawn.update_xaxes(title=panel["x_title"], **where)
-        drawn.update_yaxes(title=panel["y_title"], **where)
+            drawn.update_xaxes(title=panel["x_title"], **placement)
+        drawn.update_yaxes(title=panel["y_title"], **placement)
         if panel["colour_title"] and not one_scale:
-            subplot = drawn.get_subplot(**where)
+            subplot = drawn.get_subplot(**placement)
             drawn.update_layout({scale: _scale([panel], subplot.xaxis.domain[1], subplot.yaxis.domain)})
     if one_scale and panels[0]["colour_title"]:
         drawn.update_layout(coloraxis=_scale(panels, 1.0, (0.0, 1.0)))

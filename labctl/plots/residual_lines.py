@@ -43,27 +43,36 @@ def channels(answer: CriticismResponse) -> go.Figure | None:
     titles = [_title(line["axis"], line["z"], line.get("position")) + drawn for line in lines]
     figure = grid_of(titles, columns, horizontal_spacing=0.09)
     for panel, line in enumerate(lines):
-        where, colour = place(panel, columns), colour_of(line["axis"])
-        _dots(figure, views.get("sets") or DataSetColumns(), line["axis"], line["channel"], line.get("position"), where)
-        banded(figure, line["at"], line["mean_dps"], line["low_dps"], line["high_dps"], colour, line["axis"], **where)
-        figure.update_xaxes(title=label_of(line["channel"]), **where)
+        placement, colour = place(panel, columns), colour_of(line["axis"])
+        _dots(
+            figure,
+            views.get("sets") or DataSetColumns(),
+            line["axis"],
+            line["channel"],
+            line.get("position"),
+            placement,
+        )
+        banded(
+            figure, line["at"], line["mean_dps"], line["low_dps"], line["high_dps"], colour, line["axis"], **placement
+        )
+        figure.update_xaxes(title=label_of(line["channel"]), **placement)
     figure.update_yaxes(title="deg/s", col=1)
     return figure
 
 
 def _title(axis: str, z: float | None, position: str | None = None) -> str:
-    where = axis if position is None else f"{axis}, {position} up"
-    return where if z is None else f"{where}: z = {z:.1f}"
+    place_text = axis if position is None else f"{axis}, {position} up"
+    return place_text if z is None else f"{place_text}: z = {z:.1f}"
 
 
 def shown_text(sets: DataSetColumns) -> str:
     """Return "; n of N data sets drawn" where not every data set is drawn, else nothing."""
-    shown, of = len(sets.get("dataset") or ()), sets.get("of", 0)
-    return f"; {shown} of {of} data sets drawn" if shown < of else ""
+    n_shown, of = len(sets.get("dataset") or ()), sets.get("of", 0)
+    return f"; {n_shown} of {of} data sets drawn" if n_shown < of else ""
 
 
 def _dots(
-    figure: go.Figure, sets: DataSetColumns, axis: str, channel: str, position: str | None, where: Mapping[str, int]
+    figure: go.Figure, sets: DataSetColumns, axis: str, channel: str, position: str | None, placement: Mapping[str, int]
 ) -> None:
     values = (sets.get("channels") or {}).get(channel)
     residual = (sets.get("residual_dps") or {}).get(axis)
@@ -73,7 +82,7 @@ def _dots(
     numbers = sets.get("dataset", [])
     dots(
         figure, [values[k] for k in rows], [residual[k] for k in rows], colour_of(axis),
-        [f"data set {numbers[k]}" for k in rows], **where,
+        [f"data set {numbers[k]}" for k in rows], **placement,
     )  # fmt: skip
 
 
@@ -94,25 +103,25 @@ def time(answer: CriticismResponse) -> go.Figure | None:
     titles = [_time_title(line) + shown_text(sets) for line in lines]
     figure = grid_of([*titles, "temperature"], 1, shared_xaxes=True)
     for panel, line in enumerate(lines):
-        where, colour = place(panel, 1), colour_of(line["axis"])
-        dots(figure, along, residuals[line["axis"]], colour, numbers, **where)
+        placement, colour = place(panel, 1), colour_of(line["axis"])
+        dots(figure, along, residuals[line["axis"]], colour, numbers, **placement)
         at, begins = (
             (line.get("t_s", []), line.get("power_on_t_s", []))
             if timed
             else (line.get("order", []), line.get("power_on_order", []))
         )
         mean, low, high = line["mean_dps"], line["low_dps"], line["high_dps"]
-        banded(figure, _over(at, unit), mean, low, high, colour, line["axis"], **where)
+        banded(figure, _over(at, unit), mean, low, high, colour, line["axis"], **placement)
         for begin in _over(begins, unit):
-            figure.add_vline(x=begin, line={"color": WARM, "width": 1, "dash": "dot"}, **where)
-        figure.update_yaxes(title="deg/s", **where)
-    where = place(len(lines), 1)
+            figure.add_vline(x=begin, line={"color": WARM, "width": 1, "dash": "dot"}, **placement)
+        figure.update_yaxes(title="deg/s", **placement)
+    placement = place(len(lines), 1)
     figure.add_trace(
         go.Scatter(x=along, y=channels["temperature_c"], mode="lines", line={"color": WARM}, name="temperature"),
-        **where,
+        **placement,
     )
-    figure.update_yaxes(title="deg C", **where)
-    figure.update_xaxes(title=label_of(name), **where)
+    figure.update_yaxes(title="deg C", **placement)
+    figure.update_xaxes(title=label_of(name), **placement)
     return figure
 
 
@@ -122,8 +131,8 @@ def _over(values: Numbers, unit: float) -> Numbers:
 
 def _time_title(line: TimeLine) -> str:
     figures = (("lag-1", line["lag1_whitened"]), ("runs p", line["runs_p"]))
-    said = [f"{word} {figure:.2g}" for word, figure in figures if figure is not None]
-    return f"{line['axis']}: {', '.join(said)} (drift taken out)" if said else line["axis"]
+    parts = [f"{word} {figure:.2g}" for word, figure in figures if figure is not None]
+    return f"{line['axis']}: {', '.join(parts)} (drift taken out)" if parts else line["axis"]
 
 
 def previous_rate(answer: CriticismResponse) -> go.Figure | None:
@@ -136,9 +145,11 @@ def previous_rate(answer: CriticismResponse) -> go.Figure | None:
     drawn = shown_text(views.get("sets") or DataSetColumns())
     figure = grid_of([_title(line["axis"], line["z"]) + drawn for line in lines], columns)
     for panel, line in enumerate(lines):
-        where, colour = place(panel, columns), colour_of(line["axis"])
-        _dots(figure, views.get("sets") or DataSetColumns(), line["axis"], "previous_rate_dps", None, where)
-        banded(figure, line["at"], line["mean_dps"], line["low_dps"], line["high_dps"], colour, line["axis"], **where)
+        placement, colour = place(panel, columns), colour_of(line["axis"])
+        _dots(figure, views.get("sets") or DataSetColumns(), line["axis"], "previous_rate_dps", None, placement)
+        banded(
+            figure, line["at"], line["mean_dps"], line["low_dps"], line["high_dps"], colour, line["axis"], **placement
+        )
     figure.update_xaxes(title=label_of("previous_rate_dps"))
     figure.update_yaxes(title="deg/s", col=1)
     return figure
@@ -151,9 +162,11 @@ def legs(answer: CriticismResponse) -> go.Figure | None:
         return None
     figure = grid_of([_title(line["axis"], line["z"]) for line in lines], 2)
     for panel, line in enumerate(lines):
-        where, colour = place(panel, 2), colour_of(line["axis"])
-        banded(figure, line["at"], line["mean_dps"], line["low_dps"], line["high_dps"], colour, line["axis"], **where)
-        figure.update_xaxes(title=label_of(line["channel"]), **where)
+        placement, colour = place(panel, 2), colour_of(line["axis"])
+        banded(
+            figure, line["at"], line["mean_dps"], line["low_dps"], line["high_dps"], colour, line["axis"], **placement
+        )
+        figure.update_xaxes(title=label_of(line["channel"]), **placement)
     figure.update_yaxes(title="up - down, deg/s", col=1)
     return figure
 

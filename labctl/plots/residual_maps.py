@@ -42,7 +42,7 @@ def maps(answer: CriticismResponse) -> go.Figure | None:
     return figure
 
 
-def _panel(figure: go.Figure, picture: ResidualMap, where: Mapping[str, int]) -> None:
+def _panel(figure: go.Figure, picture: ResidualMap, placement: Mapping[str, int]) -> None:
     columns, rows = (sorted(set(levels)) for levels in (picture["rate_level_dps"], picture["temperature_level_c"]))
     cells: dict[tuple[float, float], list[int]] = {}
     for k, cell in enumerate(zip(picture["temperature_level_c"], picture["rate_level_dps"], strict=True)):
@@ -51,7 +51,7 @@ def _panel(figure: go.Figure, picture: ResidualMap, where: Mapping[str, int]) ->
     named = {cell: ", ".join(str(picture["dataset"][k]) for k in sets) for cell, sets in cells.items()}
     dim = {cell: 1 for cell, sets in cells.items() if abs(mean[cell]) * sqrt(len(sets)) < DIMMED_BELOW}
     if len(cells) < LEAST_FILLED * len(columns) * len(rows):
-        _scattered(figure, cells, mean, named, dim, where)
+        _scattered(figure, cells, mean, named, dim, placement)
         return
 
     def grid(values: Mapping[tuple[float, float], T]) -> list[list[T | None]]:
@@ -63,34 +63,36 @@ def _panel(figure: go.Figure, picture: ResidualMap, where: Mapping[str, int]) ->
             x=x, y=y, z=grid(mean), customdata=grid(named), coloraxis="coloraxis", xgap=1, ygap=1,
             name=picture["axis"], hovertemplate=HOVER, hoverongaps=False,
         ),
-        **where,
+        **placement,
     )  # fmt: skip
     figure.add_trace(
         go.Heatmap(
             x=x, y=y, z=grid(dim), colorscale=[[0, DIM], [1, DIM]], showscale=False, hoverinfo="skip", xgap=1, ygap=1,
             name="not significant",
         ),
-        **where,
+        **placement,
     )  # fmt: skip
-    figure.update_xaxes(type="category", **where)
-    figure.update_yaxes(type="category", **where)
+    figure.update_xaxes(type="category", **placement)
+    figure.update_yaxes(type="category", **placement)
 
 
 def _scattered(
     figure: go.Figure, cells: Mapping[tuple[float, float], list[int]], mean: Mapping[tuple[float, float], float],
-    named: Mapping[tuple[float, float], str], dim: Mapping[tuple[float, float], int], where: Mapping[str, int],
+    label_by_place: Mapping[tuple[float, float], str], dim: Mapping[tuple[float, float], int],
+    placement: Mapping[str, int],
 ) -> None:  # fmt: skip
     """Draw cells that share few rates or temperatures as squares at their own rate and temperature."""
     figure.add_trace(
         go.Scatter(
-            x=[rate for _, rate in cells], y=[warm for warm, _ in cells], mode="markers", name="cells",
-            customdata=list(named.values()), hovertemplate=HOVER.replace("%{z", "%{marker.color"),
+            x=[rate for _, rate in cells], y=[temperature_c for temperature_c, _ in cells], mode="markers",
+            name="cells",
+            customdata=list(label_by_place.values()), hovertemplate=HOVER.replace("%{z", "%{marker.color"),
             marker={
                 "symbol": "square", "size": 8, "color": list(mean.values()), "coloraxis": "coloraxis",
                 "opacity": [0.35 if cell in dim else 1.0 for cell in cells],
             },
         ),
-        **where,
+        **placement,
     )  # fmt: skip
 
 

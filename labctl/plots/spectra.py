@@ -18,9 +18,9 @@ def angle(answer: CriticismResponse) -> go.Figure | None:
         return None
     figure = grid_of([_lines_text(line) for line in lines], 1)
     for panel, line in enumerate(lines):
-        where = place(panel, 1)
-        _stems(figure, line["cycles_per_turn"], line["over_white"], line, where)
-        figure.update_yaxes(title="over white noise", rangemode="tozero", **where)
+        placement = place(panel, 1)
+        _stems(figure, line["cycles_per_turn"], line["over_white"], line, placement)
+        figure.update_yaxes(title="over white noise", rangemode="tozero", **placement)
     figure.update_xaxes(title="cycles per turn of the table")
     return figure
 
@@ -30,18 +30,18 @@ def _lines_text(line: AngleSpectrum) -> str:
     return f"{line['axis']}: {above or 'no line above the limit'}"
 
 
-def _stems(figure: go.Figure, x: list[int], y: Numbers, line: AngleSpectrum, where: Mapping[str, int]) -> None:
+def _stems(figure: go.Figure, x: list[int], y: Numbers, line: AngleSpectrum, placement: Mapping[str, int]) -> None:
     figure.add_trace(
         go.Bar(x=x, y=y, marker={"color": colour_of(line["axis"])}, name=line["axis"],
                hovertemplate="%{x} per turn: %{y:.2f}<extra></extra>"),
-        **where,
+        **placement,
     )  # fmt: skip
-    _limit(figure, x, line["limit"], where)
+    _limit(figure, x, line["limit"], placement)
 
 
-def _limit(figure: go.Figure, x: Sequence[float | None], y: Numbers, where: Mapping[str, int]) -> None:
+def _limit(figure: go.Figure, x: Sequence[float | None], y: Numbers, placement: Mapping[str, int]) -> None:
     figure.add_trace(
-        go.Scatter(x=x, y=y, mode="lines", line={"color": INK, "dash": "dash", "width": 1}, name="limit"), **where
+        go.Scatter(x=x, y=y, mode="lines", line={"color": INK, "dash": "dash", "width": 1}, name="limit"), **placement
     )
 
 
@@ -53,26 +53,27 @@ def frequency(answer: CriticismResponse) -> go.Figure | None:
         return None
     figure = grid_of(["between data sets", "within data sets"], 2, horizontal_spacing=0.12)
     for line in between:
-        colour, where = colour_of(line["axis"]), place(0, 2)
+        colour, placement = colour_of(line["axis"]), place(0, 2)
         x = line["per_hour"]
         figure.add_trace(
-            go.Scatter(x=x, y=line["amplitude_dps"], mode="lines", line={"color": colour}, name=line["axis"]), **where
+            go.Scatter(x=x, y=line["amplitude_dps"], mode="lines", line={"color": colour}, name=line["axis"]),
+            **placement,
         )
         figure.add_trace(
             go.Scatter(x=x, y=line["noise_dps"], mode="lines", line={"color": colour, "dash": "dash", "width": 1},
                        name=f"{line['axis']}: noise"),
-            **where,
+            **placement,
         )  # fmt: skip
     for spectrum in within:
-        where = place(1, 2)
+        placement = place(1, 2)
         colour = colour_of(spectrum["axis"])
         figure.add_trace(
             go.Scatter(
                 x=spectrum["hz"], y=spectrum["over_white"], mode="lines", line={"color": colour}, name=spectrum["axis"]
             ),
-            **where,
+            **placement,
         )
-        _limit(figure, spectrum["hz"], spectrum["limit"], where)
+        _limit(figure, spectrum["hz"], spectrum["limit"], placement)
     figure.update_xaxes(type="log", title="cycles per hour", col=1)
     figure.update_xaxes(title="Hz", col=2)
     figure.update_yaxes(type="log", title="amplitude, deg/s", col=1)

@@ -179,8 +179,8 @@ def _texts(path: Path, info: RecordingInfo) -> None:
         ("model", info.model), ("active_calibration", info.active_calibration), ("notes", info.notes),
         ("thermometer", info.thermometer),
     ):  # fmt: skip
-        if found := control_character(text, lines=name == "notes"):
-            raise BadRecording(f"{path}: {name} has a control character ({found}); write it without")
+        if control := control_character(text, lines=name == "notes"):
+            raise BadRecording(f"{path}: {name} has a control character ({control}); write it without")
 
 
 def _datasheet(path: Path, info: RecordingInfo) -> None:
@@ -206,9 +206,9 @@ def _one_mark(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> No
     if not (wrong | changes).any():
         return
     row = int(np.argmax(wrong | changes))
-    said = "is not 0 or 1" if wrong[row] else f"differs from {marks[row - 1]} in the row before, of the same data set"
+    fault = "is not 0 or 1" if wrong[row] else f"differs from {marks[row - 1]} in the row before, of the same data set"
     raise BadRecording(
-        f"{path}: column {VERIFICATION!r}, row {row + 1}: {marks[row]} {said}; give every row of a data set 1 if it "
+        f"{path}: column {VERIFICATION!r}, row {row + 1}: {marks[row]} {fault}; give every row of a data set 1 if it "
         "was measured to verify a calibration, else 0"
     )
 
@@ -243,13 +243,13 @@ def _refuse_unknown_up(path: Path, info: RecordingInfo, columns: dict[str, Colum
 def _positions(path: Path, position: Column) -> Column:
     """Return positions as they are written here: `x@0` is x."""
     words, of = np.unique(position, return_inverse=True)
-    found = []
+    unknown = []
     for word in words:
         try:
-            found.append(str(Position.of(str(word))))
+            unknown.append(str(Position.of(str(word))))
         except ValueError:
             row = int(np.argmax(position == word))
             raise BadRecording(
                 f"{path}: column 'position', row {row + 1}: {str(word)!r} is not a position (expected {EXPECTED})"
             ) from None
-    return np.array(found, dtype=np.str_)[of]
+    return np.array(unknown, dtype=np.str_)[of]

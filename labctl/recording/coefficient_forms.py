@@ -47,7 +47,7 @@ def _matrix(info: RecordingInfo, _: Collection[str]) -> list[str]:
 
 def _surface(info: RecordingInfo, columns: Collection[str]) -> list[str]:
     """Powers i of the output and j of the temperature less `reference_c`; deg/s per (deg/s)^i K^j."""
-    powers = [int(found[1]) for found in (_CELL.fullmatch(name) for name in columns) if found is not None]
+    powers = [int(matches[1]) for matches in (_CELL.fullmatch(name) for name in columns) if matches is not None]
     highest = min(max(powers, default=0), MOST_RATE_POWER)
     cells = [f"c_r{i}_t{j}" for i in range(highest + 1) for j in range(TEMPERATURE_POWER + 1)]
     axis = ["axis"] if len(info.axes) > 1 else []
@@ -63,7 +63,11 @@ def _scale_offset(info: RecordingInfo, _: Collection[str]) -> list[str]:
 def _polynomials(info: RecordingInfo, columns: Collection[str]) -> list[str]:
     """Powers of the temperature less `reference_c`: b in output units, k in output units per deg/s, each per K^j."""
     powers = {
-        letter: [int(found[2]) for found in map(_POWER.fullmatch, columns) if found is not None and found[1] == letter]
+        letter: [
+            int(matches[2])
+            for matches in map(_POWER.fullmatch, columns)
+            if matches is not None and matches[1] == letter
+        ]
         for letter in "bk"
     }
     cells = [f"b_t{j}" for j in range(min(max(powers["b"], default=0), TEMPERATURE_POWER) + 1)]
@@ -102,8 +106,8 @@ def check_coefficients(path: Path, info: RecordingInfo, columns: Mapping[str, ob
             f"{', '.join(info.axes)} has columns {', '.join(needed)}: add it"
         )
     coefficients = form.coefficients(info, columns)
-    known = {*needed, *form.also, *(f"u_{name}" for name in coefficients)}
-    unknown = sorted(set(columns) - known)
+    allowed = {*needed, *form.also, *(f"u_{name}" for name in coefficients)}
+    unknown = sorted(set(columns) - allowed)
     if unknown:
         raise BadRecording(
             f"{path}: column {unknown[0][:80]!r} is not known in a table of the form {form.name!r}; remove or "
@@ -111,14 +115,14 @@ def check_coefficients(path: Path, info: RecordingInfo, columns: Mapping[str, ob
             "of a coefficient. A misalignment is "
             "given as k_xy (output x per rate about y) with all of K and B"
         )
-    stated = [f"u_{name}" for name in coefficients if f"u_{name}" in columns]
+    u_columns = [f"u_{name}" for name in coefficients if f"u_{name}" in columns]
     lacking = [f"u_{name}" for name in coefficients if f"u_{name}" not in columns]
-    if stated and lacking:
+    if u_columns and lacking:
         raise BadRecording(
-            f"{path}: column {lacking[0]!r} is missing, although column {stated[0]!r} is present; give the "
+            f"{path}: column {lacking[0]!r} is missing, although column {u_columns[0]!r} is present; give the "
             "standard uncertainty of every coefficient, or of none"
         )
-    for name in stated:
+    for name in u_columns:
         _check_u(path, name, columns)
 
 

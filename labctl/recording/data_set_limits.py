@@ -26,10 +26,10 @@ def refuse_too_many_data_sets(where: Path | str, info: RecordingInfo, columns: C
     if info.kind == "coefficients":
         return
     numbers = np.asarray(columns["dataset"], dtype=np.int64)
-    found = len(numbers) if info.kind == "points" else len(dataset_starts(numbers)) if len(numbers) else 0
-    if found > MOST_DATA_SETS:
+    sets = len(numbers) if info.kind == "points" else len(dataset_starts(numbers)) if len(numbers) else 0
+    if sets > MOST_DATA_SETS:
         raise BadRecording(
-            f"{where}: {found} data sets; at most {MOST_DATA_SETS} are imported at once; divide the recording, or give "
+            f"{where}: {sets} data sets; at most {MOST_DATA_SETS} are imported at once; divide the recording, or give "
             "readings at one rate and temperature one data set number (a data set is a series of readings, not a "
             "single reading)"
         )

@@ -63,19 +63,19 @@ def read_head(path: Path) -> RecordingInfo:
         # a misspelt key is both unknown and missing: the unknown one is what a person looks for
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
-        given = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
-        raise BadRecording(f"{path}: {place}: {first['msg']}{given}") from error
+        value_text = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
+        raise BadRecording(f"{path}: {place}: {first['msg']}{value_text}") from error
 
 
 def _data_file(folder: Path, kind: str) -> Path:
-    found = [folder / f"{kind}.{suffix}" for suffix in FORMATS if (folder / f"{kind}.{suffix}").exists()]
-    if not found:
+    candidates = [folder / f"{kind}.{suffix}" for suffix in FORMATS if (folder / f"{kind}.{suffix}").exists()]
+    if not candidates:
         raise BadRecording(
             f"{folder}: kind = {kind!r} needs a file {kind}.parquet or {kind}.csv; there is none; add it"
         )
-    if len(found) > 1:
-        raise BadRecording(f"{folder}: both {found[0].name} and {found[1].name} exist; remove one of them")
-    return found[0]
+    if len(candidates) > 1:
+        raise BadRecording(f"{folder}: both {candidates[0].name} and {candidates[1].name} exist; remove one of them")
+    return candidates[0]
 
 
 def write_recording(recording: Recording, folder: Path, file_format: FileFormat = "parquet") -> list[str]:
@@ -89,8 +89,8 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BadRecording(f"{folder}: exists already and is not empty; name a new folder")
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
-        whole = Path(made) / "recording"
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as new_folder:
+        whole = Path(new_folder) / "recording"
         whole.mkdir()
         (whole / HEAD).write_bytes(head_of(recording.info))
         write_table(recording.columns, whole / f"{recording.info.kind}.{file_format}")
@@ -130,7 +130,7 @@ def recording_parts(opened: ExitStack, folder: Path) -> list[tuple[str, tuple[st
 
     Raises BadRecording for a folder without any.
     """
-    found = [path for path in sorted(folder.glob("*")) if path.name in FILE_NAMES]
-    if not found:
+    part_paths = [path for path in sorted(folder.glob("*")) if path.name in FILE_NAMES]
+    if not part_paths:
         raise BadRecording(f"{folder}: no recording there (expected {HEAD} and a data file)")
-    return [("files", (path.name, opened.enter_context(path.open("rb")))) for path in found]
+    return [("files", (path.name, opened.enter_context(path.open("rb")))) for path in part_paths]

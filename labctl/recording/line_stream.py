@@ -62,15 +62,15 @@ def layout_of(names: Sequence[str]) -> LineLayout:
     """
     fields: dict[str, LineField] = {}
     for name in names:
-        found = _field(name)
-        if found is None:
+        field = _field(name)
+        if field is None:
             continue
-        if found.target in fields:
+        if field.target in fields:
             raise BadInput(
-                f"two values of a line are {found.target}: {fields[found.target].name!r} and {name!r}; name the "
+                f"two values of a line are {field.target}: {fields[field.target].name!r} and {name!r}; name the "
                 "columns with --columns, and the one to leave out '-'"
             )
-        fields[found.target] = found
+        fields[field.target] = field
     if absent := [target for target in (*_GYROS, *_FORCES) if target not in fields]:
         raise BadInput(
             f"the lines have no {', '.join(absent)} (their values: {', '.join(names)[:200] or 'none'}); name the "
@@ -246,12 +246,12 @@ class LineDecoder:
     def _time(self, layout: LineLayout, values: Mapping[str, float]) -> float:
         if not layout.time:
             return self._count / (self._rate_hz or 1.0)
-        given = {name: values.get(name, math.nan) for name in layout.time}
-        if not all(map(math.isfinite, given.values())):
+        stamps = {name: values.get(name, math.nan) for name in layout.time}
+        if not all(map(math.isfinite, stamps.values())):
             raise _Damaged("the time is missing")
         if not self._first:
-            self._first = given
-        t_s = sum((value - self._first[name]) * layout.time[name] for name, value in given.items())
+            self._first = stamps
+        t_s = sum((value - self._first[name]) * layout.time[name] for name, value in stamps.items())
         if t_s > self._last_s:
             self._backwards = 0
             return t_s

@@ -25,14 +25,14 @@ def with_quantisation(recording: Recording) -> Recording:
     columns = recording.columns
     dataset = np.asarray(columns["dataset"], dtype=np.int64)
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
-    known, starts = dataset[valid], dataset_starts(dataset[valid])
-    found: dict[str, NDArray[np.generic]] = {}
+    valid_sets, starts = dataset[valid], dataset_starts(dataset[valid])
+    quantised: dict[str, NDArray[np.generic]] = {}
     for name in (f"gyro_{axis}" for axis in recording.info.axes):
-        if name + QUANTISATION not in columns and len(known):
+        if name + QUANTISATION not in columns and len(valid_sets):
             sets = np.split(np.asarray(columns[name], dtype=np.float64)[valid], starts[1:])
             for column, values in steps_columns(name, sets).items():
-                found[column] = per_reading(dataset, known[starts], values)
-    return replace(recording, columns={**columns, **found}) if found else recording
+                quantised[column] = per_reading(dataset, valid_sets[starts], values)
+    return replace(recording, columns={**columns, **quantised}) if quantised else recording
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ def output_steps(recording: Recording) -> dict[str, OutputStep]:
 
     Of means the lattice cannot be seen: nothing is said of them.
     """
-    columns, found = recording.columns, dict[str, OutputStep]()
+    columns, steps = recording.columns, dict[str, OutputStep]()
     if recording.info.kind != "samples" or len(recording) == 0:
-        return found
+        return steps
     dataset = np.asarray(columns["dataset"], dtype=np.int64)
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     starts = dataset_starts(dataset[valid])
@@ -61,16 +61,16 @@ def output_steps(recording: Recording) -> dict[str, OutputStep]:
         if step is not None:
             output = recording.info.output.get(axis)
             scale = abs(output.scale) if output else 1.0
-            found[axis] = OutputStep(step / scale, float(np.sqrt(np.mean(deviation**2))) / scale)
-    return found
+            steps[axis] = OutputStep(step / scale, float(np.sqrt(np.mean(deviation**2))) / scale)
+    return steps
 
 
 def _pieces(values: NDArray[np.float64], starts: NDArray[np.int64]) -> list[NDArray[np.float64]]:
     """Return the readings of each data set, a long one in pieces: over hours an output passes many codes."""
-    found = []
+    pieces = []
     for part in np.split(values, starts[1:]):
-        found += np.array_split(part, max(len(part) // PIECE, 1))
-    return found
+        pieces += np.array_split(part, max(len(part) // PIECE, 1))
+    return pieces
 
 
 def quantisation_of(points: Recording) -> Mapping[str, NDArray[np.float64]]:

@@ -53,15 +53,15 @@ def probe(path: Path) -> float:
 def read(path: Path, options: ParameterOptions) -> Recording:
     """Return the table of the first gyro with a thermal calibration. Raises BadRecording naming file and parameter."""
     text = _text(path)
-    found = _kind(text)
-    if found is None:
+    kind = _kind(text)
+    if kind is None:
         raise BadRecording(
             f"{path}: no parameter TC_G*_X3_0 (PX4) or INS_TCAL*_GYR1_X (ArduPilot), so it has no thermal calibration "
             "of a gyro; run the thermal calibration on the flight controller, then save its parameters again"
         )
     try:
         values = {name: float(number) for name, number in _LINE.findall(text)}
-        warm, bias_rad_s = _px4(values, found[1]) if found[0] == "PX4" else _ardupilot(values, found[1])
+        temperatures_c, bias_rad_s = _px4(values, kind[1]) if kind[0] == "PX4" else _ardupilot(values, kind[1])
     except KeyError as error:
         raise BadRecording(
             f"{path}: parameter {error.args[0]} is missing; export the complete set of parameters"
@@ -69,14 +69,14 @@ def read(path: Path, options: ParameterOptions) -> Recording:
     except ValueError as error:
         raise BadRecording(f"{path}: {error}; correct the file") from error
     _refuse_cut(path, text)
-    notes = f"bias over temperature of {found[0]}, gyro {found[1]}; scale factor and misalignment are not in its file"
+    notes = f"bias over temperature of {kind[0]}, gyro {kind[1]}; scale factor and misalignment are not in its file"
     info = RecordingInfo(
         serial=options.serial, axes=AXES, kind="coefficients", started_at=options.started_at,
         max_rate_dps=options.max_rate_dps, notes=notes,
     )  # fmt: skip
-    gains = {f"k_{out}{turned}": np.full(len(warm), float(out == turned)) for out in AXES for turned in AXES}
+    gains = {f"k_{out}{turned}": np.full(len(temperatures_c), float(out == turned)) for out in AXES for turned in AXES}
     biases = {f"b_{axis}": np.rad2deg(bias_rad_s[:, column]) for column, axis in enumerate(AXES)}
-    columns: dict[str, Column] = {**gains, **biases, "temperature_c": warm}
+    columns: dict[str, Column] = {**gains, **biases, "temperature_c": temperatures_c}
     return Recording(info, columns)
 
 
@@ -97,10 +97,10 @@ def _text(path: Path) -> str:
 
 def _kind(text: str) -> tuple[str, int] | None:
     """Return the firmware and the number of its gyro."""
-    if found := _PX4.search(text):
-        return "PX4", int(found[1])
-    if found := _ARDUPILOT.search(text):
-        return "ArduPilot", int(found[1] or found[2])
+    if match := _PX4.search(text):
+        return "PX4", int(match[1])
+    if match := _ARDUPILOT.search(text):
+        return "ArduPilot", int(match[1] or match[2])
     return None
 
 
@@ -113,10 +113,10 @@ def _temperatures(low: float, high: float) -> Array:
 def _px4(values: Mapping[str, float], gyro: int) -> tuple[Array, Array]:
     """Return temperatures (n,) deg C and offsets (n, 3) rad/s."""
     prefix = f"TC_G{gyro}_"
-    warm = _temperatures(values[f"{prefix}TMIN"], values[f"{prefix}TMAX"])
-    d = warm - values[f"{prefix}TREF"]
+    temperatures_c = _temperatures(values[f"{prefix}TMIN"], values[f"{prefix}TMAX"])
+    d = temperatures_c - values[f"{prefix}TREF"]
     terms = [[values[f"{prefix}X{power}_{axis}"] * d**power for power in range(4)] for axis in range(3)]
-    return warm, np.column_stack([np.sum(each, axis=0) for each in terms])
+    return temperatures_c, np.column_stack([np.sum(term, axis=0) for term in terms])
 
 
 def _ardupilot(values: Mapping[str, float], imu: int) -> tuple[Array, Array]:
@@ -125,15 +125,15 @@ def _ardupilot(values: Mapping[str, float], imu: int) -> tuple[Array, Array]:
     prefix = f"INS{imu}_TCAL_" if late else f"INS_TCAL{imu}_"
     offset = f"INS{imu}_GYROFFS_" if late else f"INS_GYR{'' if imu == 1 else imu}OFFS_"
     low, high = values[f"{prefix}TMIN"], values[f"{prefix}TMAX"]
-    warm = _temperatures(low, high)
+    temperatures_c = _temperatures(low, high)
     at = float(np.clip(values[f"INS{imu}_GYR_CALTEMP" if late else f"INS_GYR{imu}_CALTEMP"], low, high))
 
     def cubic(temperature_c: Array, axis: str) -> Array:
         d = temperature_c - REFERENCE_C
         return np.sum([values[f"{prefix}GYR{power}_{axis}"] * SCALE * d**power for power in (1, 2, 3)], axis=0)
 
-    found = [cubic(warm, axis) - cubic(np.array([at]), axis) + values[f"{offset}{axis}"] for axis in "XYZ"]
-    return warm, np.column_stack(found)
+    bias = [cubic(temperatures_c, axis) - cubic(np.array([at]), axis) + values[f"{offset}{axis}"] for axis in "XYZ"]
+    return temperatures_c, np.column_stack(bias)
 
 
 IMPORTER = Importer("parameters of PX4 or ArduPilot with a gyro's thermal calibration", probe, read, ParameterOptions)

@@ -16,8 +16,8 @@ def up_in(position: NDArray[np.generic], axis: str) -> NDArray[np.float64]:
     Raises ValueError for a text that is no position.
     """
     texts, of = np.unique(position.astype(np.str_), return_inverse=True)
-    found = [Position.of(text) for text in texts.tolist()]
-    return np.array([each.sign if each.axis == axis else 0.0 for each in found])[of]
+    positions = [Position.of(text) for text in texts.tolist()]
+    return np.array([each.sign if each.axis == axis else 0.0 for each in positions])[of]
 
 
 def axis_in(position: NDArray[np.generic]) -> NDArray[np.str_]:

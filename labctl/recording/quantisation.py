@@ -60,9 +60,9 @@ def quantisation_std(
     coarse = np.isfinite(steps)
     if not len(steps) or coarse.mean() < COARSE_SHARE:
         return None, nothing
-    seen = steps[coarse & (steps > 0)]
-    enough = len(seen) > STEP_SHARE * coarse.sum()
-    step = float(np.quantile(seen, 0.25)) if enough else _common_step(codes[coarse])
+    coarse_steps = steps[coarse & (steps > 0)]
+    enough = len(coarse_steps) > STEP_SHARE * coarse.sum()
+    step = float(np.quantile(coarse_steps, 0.25)) if enough else _common_step(codes[coarse])
     if step is None:
         return None, nothing
     variance = [quantisation_variance(step, w, s) if c else 0.0 for c, s, w in zip(coarse, std, white, strict=True)]
@@ -104,8 +104,8 @@ def _common_step(codes: NDArray[np.float64]) -> float | None:
         return None
     step = float(apart.min())
     for distance in apart:
-        rest = float(distance) % step
-        while min(rest, step - rest) > 20 * tolerance:
-            step, rest = rest, step % rest
+        remainder = float(distance) % step
+        while min(remainder, step - remainder) > 20 * tolerance:
+            step, remainder = remainder, step % remainder
     off = np.abs(apart / step - np.round(apart / step))
     return step if step > 1000 * tolerance and float(np.mean(off < 0.02)) > 0.9 else None

@@ -26,10 +26,10 @@ class Unread:
     @property
     def text(self) -> str:
         """In words."""
-        shown = ", ".join(self.places[:SHOWN_PLACES])
+        places_text = ", ".join(self.places[:SHOWN_PLACES])
         more = f" and {len(self.places) - SHOWN_PLACES} more places" if len(self.places) > SHOWN_PLACES else ""
         cut = "; its end is cut off, and what followed is lost" if self.is_cut else ""
-        return f"{share_text(self.share)} of the file could not be read: {shown}{more}{cut}"
+        return f"{share_text(self.share)} of the file could not be read: {places_text}{more}{cut}"
 
 
 def share_text(share: float) -> str:
@@ -47,8 +47,8 @@ def refuse_unread(path: Path, unread: Unread | None, advice: str = TAKE_AGAIN) -
 
 def of_several(parts: Sequence[Unread | None]) -> Unread | None:
     """Return what could not be read of several files together, its share that of the worst."""
-    found = [part for part in parts if part is not None]
-    if not found:
+    present = [part for part in parts if part is not None]
+    if not present:
         return None
-    places = tuple(place for part in found for place in part.places)
-    return Unread(max(part.share for part in found), places, any(part.is_cut for part in found))
+    places = tuple(place for part in present for place in part.places)
+    return Unread(max(part.share for part in present), places, any(part.is_cut for part in present))

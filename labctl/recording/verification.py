@@ -41,6 +41,6 @@ def verification_part(recording: Recording) -> Recording | None:
     return _rows(recording, marked) if marked.any() else None
 
 
-def _rows(recording: Recording, kept: NDArray[np.bool_]) -> Recording:
-    columns = {name: values[kept] for name, values in recording.columns.items() if name != VERIFICATION}
+def _rows(recording: Recording, is_used: NDArray[np.bool_]) -> Recording:
+    columns = {name: values[is_used] for name, values in recording.columns.items() if name != VERIFICATION}
     return replace(recording, columns=columns)

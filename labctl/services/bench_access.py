@@ -23,7 +23,7 @@ class BenchAccess(Protocol):
 
     @property
     def control(self) -> CampaignControl:
-        """Control over the campaigns of the bench."""
+        """Return the control of the bench's campaigns."""
         ...
 
     @property

@@ -62,7 +62,7 @@ def cached_only() -> Iterator[None]:
 
 
 def compute(question: str) -> None:
-    """Say that what follows takes long. Raises NotCached where only cached results are wanted."""
+    """Announce a long computation. Raises NotCached where only cached results are wanted."""
     if _cached_only.get():
         raise NotCached(question)
 
@@ -75,16 +75,16 @@ class FileCache:
 
     def file(self, question: Mapping[str, object]) -> Path:
         """Return the file of the result of a question (JSON values), as the present code answers it."""
-        asked = json.dumps({"by": code_digest(), **question}, sort_keys=True)
-        name = hashlib.sha256(asked.encode()).hexdigest()
+        question_json = json.dumps({"by": code_digest(), **question}, sort_keys=True)
+        name = hashlib.sha256(question_json.encode()).hexdigest()
         return user_cache_path("labctl") / self._folder / f"{name}{self._suffix}"
 
     def load(self, file: Path, decode: Callable[[bytes], ResultT]) -> ResultT | None:
         """Return what a file holds; None where it is missing or damaged."""
         with suppress(*DAMAGED):
-            found = decode(file.read_bytes())
+            decoded = decode(file.read_bytes())
             file.touch()
-            return found
+            return decoded
         return None
 
     def save(self, file: Path, content: bytes) -> None:
@@ -104,12 +104,12 @@ class FileCache:
     ) -> ResultT:
         """Return the result of a question, made only when it is not cached yet; other threads wait for it."""
         file = self.file(question)
-        if (found := self.load(file, decode)) is not None:
-            return found
+        if (stored := self.load(file, decode)) is not None:
+            return stored
         compute(str(file))
         with single_flight(str(file)):
-            if (found := self.load(file, decode)) is not None:
-                return found
+            if (stored := self.load(file, decode)) is not None:
+                return stored
             content = make()
             self.save(file, content)
         return decode(content)
@@ -137,16 +137,16 @@ def cached_group(
 
     if (response := RESPONSES.load(file(kind), kind.model_validate_json)) is not None:
         return response
-    asked = json.dumps(question, sort_keys=True)
-    compute(asked)
-    with single_flight(asked):
+    question_json = json.dumps(question, sort_keys=True)
+    compute(question_json)
+    with single_flight(question_json):
         if (response := RESPONSES.load(file(kind), kind.model_validate_json)) is not None:
             return response
         # A fresh response takes the same way through JSON as a cached one, so both are equal.
-        made = {type(each): each.model_dump_json() for each in work()}
-        for each, text in made.items():
+        content_by_type = {type(each): each.model_dump_json() for each in work()}
+        for each, text in content_by_type.items():
             RESPONSES.save(file(each), text.encode())
-        return kind.model_validate_json(made[kind])
+        return kind.model_validate_json(content_by_type[kind])
 
 
 class RecentResults(Generic[ResultT]):
@@ -161,14 +161,14 @@ class RecentResults(Generic[ResultT]):
         """Return the result of a question, computed once also when several threads ask at the same time."""
         with single_flight(f"{id(self)} {question}"):  # a cached response may be computed from it: another flight
             with self._guard:
-                found = self._found.pop(question, None)
-            if found is None:
-                found = work()
+                result = self._found.pop(question, None)
+            if result is None:
+                result = work()
             with self._guard:
-                self._found[question] = found
+                self._found[question] = result
                 for old in list(self._found)[: -self._most]:
                     del self._found[old]
-        return found
+        return result
 
 
 @lru_cache(maxsize=1)

@@ -65,14 +65,16 @@ def check_gyro(store: Store, serial: str, temperature_c: float | None = None) ->
     chosen = temperature_c if temperature_c is not None else mark.temperature_c if mark else None
     at_c = _temperature(store, unit, chosen)
     first = mark.chart_from if mark else None
-    found, left_out = _results(store, unit, at_c, first)
-    charts = list(_charts(found))
-    newest = [(chart, judgements[-1]) for chart, judgements in charts if chart.points[-1].recording == found[-1].row.id]
+    results, left_out = _results(store, unit, at_c, first)
+    charts = list(_charts(results))
+    newest = [
+        (chart, judgements[-1]) for chart, judgements in charts if chart.points[-1].recording == results[-1].row.id
+    ]
     out = [(chart, one) for chart, one in newest if one.state == "out"]
     return CheckGyroResponse(
         serial=unit, marked=mark is not None, temperature_c=at_c, chart_from=first, alarm=bool(out),
         charts=[chart for chart, _ in charts], left_out=left_out,
-        text=list(_text(unit, at_c, found, newest)),
+        text=list(_text(unit, at_c, results, newest)),
     )  # fmt: skip
 
 
@@ -103,7 +105,7 @@ def _temperature(store: Store, serial: str, given: float | None) -> float:
 def _results(store: Store, serial: str, at_c: float, first: date | None) -> tuple[list[_Found], dict[int, str]]:
     """Return the results of the recordings in order of time, and why others have none."""
     versions = store.calibrations.of_unit(serial)
-    found, left_out = list[_Found](), dict[int, str]()
+    results, left_out = list[_Found](), dict[int, str]()
     measured = [
         row
         for row in store.recordings.of_unit(serial)
@@ -113,7 +115,7 @@ def _results(store: Store, serial: str, at_c: float, first: date | None) -> tupl
         if measured_at(row.info) is None:
             left_out[row.id] = f"the date of the measurement is not known; {GIVE_DATE}"
             continue
-        own = next((each for each in versions if each.recordings == (row.id,)), None)
+        own = next((version for version in versions if version.recordings == (row.id,)), None)
         if own is None:
             left_out[row.id] = f"no version is fitted to it alone: `labctl fit {serial} --recording {row.id}`"
             continue
@@ -122,8 +124,8 @@ def _results(store: Store, serial: str, at_c: float, first: date | None) -> tupl
         except (BadInput, NotEnoughData) as error:
             left_out[row.id] = f"version {own.version}: {error}"
             continue
-        found.append(_Found(row, own.version, dict(values)))
-    return found, left_out
+        results.append(_Found(row, own.version, dict(values)))
+    return results, left_out
 
 
 @lru_cache(maxsize=MOST_RESULTS)
@@ -139,40 +141,40 @@ def _values(
     )
 
 
-def _charts(found: Sequence[_Found]) -> Iterator[tuple[CheckGyroChart, list[Judged]]]:
-    for key in dict.fromkeys(key for each in found for key in each.values):
-        those = [each for each in found if key in each.values]
+def _charts(results: Sequence[_Found]) -> Iterator[tuple[CheckGyroChart, list[Judged]]]:
+    for key in dict.fromkeys(key for each in results for key in each.values):
+        those = [each for each in results if key in each.values]
         judgements = judged([ChartPoint(*each.values[key]) for each in those])
-        points = [_point(each, one) for each, one in zip(those, judgements, strict=True)]
+        points = [_point(each, judgement) for each, judgement in zip(those, judgements, strict=True)]
         axis, result = key
         yield CheckGyroChart(axis=axis, result=result, unit=UNITS[result], points=points), judgements
 
 
-def _point(found: _Found, one: Judged) -> CheckGyroPoint:
+def _point(result: _Found, one: Judged) -> CheckGyroPoint:
     return CheckGyroPoint(
-        recording=found.row.id, campaign=found.row.campaign, at=ordered_at(found.row.info), version=found.version,
-        value=one.point.value, u=one.point.u, state=one.state, limits=[limits_answer(each) for each in one.limits],
+        recording=result.row.id, campaign=result.row.campaign, at=ordered_at(result.row.info), version=result.version,
+        value=one.point.value, u=one.point.u, state=one.state, limits=[limits_answer(limit) for limit in one.limits],
     )  # fmt: skip
 
 
 def _text(
-    serial: str, at_c: float, found: Sequence[_Found], judgements: Sequence[tuple[CheckGyroChart, Judged]]
+    serial: str, at_c: float, results: Sequence[_Found], judgements: Sequence[tuple[CheckGyroChart, Judged]]
 ) -> Iterator[str]:
-    if not found:
+    if not results:
         yield f"Check gyro {serial}: no recording has a version of its own; there is nothing to judge."
         return
-    newest = found[-1]
-    where = f"campaign {newest.row.campaign}" if newest.row.campaign is not None else f"recording {newest.row.id}"
+    newest = results[-1]
+    place_text = f"campaign {newest.row.campaign}" if newest.row.campaign is not None else f"recording {newest.row.id}"
     states = {one.state for _, one in judgements}
     for chart, one in judgements:
         if one.state == "out":
             at = f" at {at_c:g} deg C" if chart.result == "bias" else ""
             yield (
-                f"ALARM, check gyro {serial}, {where}, {chart.result} of axis {chart.axis}{at}: "
+                f"ALARM, check gyro {serial}, {place_text}, {chart.result} of axis {chart.axis}{at}: "
                 f"{out_text(one.point.value, chart.unit, one)}. Check the bench and its standards before the results "
                 "of this campaign are used."
             )
     if states == {"unknown"}:
-        yield f"Check gyro {serial}, {where}: the first result; control limits need a second one."
+        yield f"Check gyro {serial}, {place_text}: the first result; control limits need a second one."
     elif "out" not in states:
-        yield f"Check gyro {serial}, {where}: every result is within the control limits."
+        yield f"Check gyro {serial}, {place_text}: every result is within the control limits."

@@ -43,26 +43,30 @@ def read_fixed(path: Path) -> FixedCoefficients:
 def checked_fixed(document: JsonObject, name: str) -> FixedCoefficients:
     """Return the coefficients of a document; its name stands for a source that it does not state. Raises BadInput."""
     try:
-        found = FixedCoefficients.model_validate({**document, "file": name[-LONGEST:]})
+        coefficient_document = FixedCoefficients.model_validate({**document, "file": name[-LONGEST:]})
     except ValidationError as error:
         raise BadInput(f"{name}: {_complaints(error)}; correct it (docs/how-to/known-coefficients.md)") from error
-    return found if found.source else found.model_copy(update={"source": Path(name).name[:LONGEST]})
+    return (
+        coefficient_document
+        if coefficient_document.source
+        else coefficient_document.model_copy(update={"source": Path(name).name[:LONGEST]})
+    )
 
 
 def _complaints(error: ValidationError) -> str:
     """Return what is wrong, once for each coefficient or key."""
-    found: dict[tuple[int | str, ...], str] = {}
+    complaints: dict[tuple[int | str, ...], str] = {}
     for each in error.errors():
         loc = each["loc"]
         place = loc[:2] if loc[:1] and loc[0] in AXES else loc[:1]
         text = each["msg"].removeprefix("Value error, ")
         if each["type"] == "extra_forbidden" and len(loc) == 1:
             text = "is neither an axis (x, y, z) nor one of source, reference_temperature_c"
-        what = f"axis {place[0]}: {place[1]}" if len(place) == 2 else str(place[0])
+        coefficient_name = f"axis {place[0]}: {place[1]}" if len(place) == 2 else str(place[0])
         if len(loc) > 2 and loc[2] != "value":
-            what += f", {loc[2]}"
-        found.setdefault(place, f"{what} = {shown(each['input'])}: {text}")
-    return listed(found.values())
+            coefficient_name += f", {loc[2]}"
+        complaints.setdefault(place, f"{coefficient_name} = {shown(each['input'])}: {text}")
+    return listed(complaints.values())
 
 
 def _of_calibration(path: Path, calibration: Calibration) -> FixedCoefficients:
@@ -81,15 +85,15 @@ def _of_calibration(path: Path, calibration: Calibration) -> FixedCoefficients:
 
 def _coefficients(fitted: FittedModel, fit: AxisFit) -> dict[str, JsonObject]:
     table = fitted.model.temperature
-    found: dict[str, JsonObject] = {}
+    coefficients: dict[str, JsonObject] = {}
     for effect, name, unit, values, us in zip(
         fit.effects, fit.names, fit.units, fit.values.tolist(), none_for_nan(fit.u), strict=True
     ):
         entry: dict[str, object] = {"effect": effect, "unit": unit, "value": values[0], "u": us[0]}
         if isinstance(table, LagrangeTable) and effect not in fitted.model.steady:
             entry |= {"value": values, "u": us, "temperature_c": list(table.nodes_c)}
-        found[name] = entry
-    return found
+        coefficients[name] = entry
+    return coefficients
 
 
 def fixed_of(request: FixedCoefficients | None) -> Fixed | None:

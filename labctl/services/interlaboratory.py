@@ -52,13 +52,13 @@ def compare(
             "was measured twice; compare versions of two recordings"
         )
     at_c = _temperature(sides, temperature_c)
-    shared_standards = [each for each in sides[0].standards if _is_shared(each, sides)]
+    shared_standards = [standard for standard in sides[0].standards if _is_shared(standard, sides)]
     results, not_compared = _results(sides, at_c, shared_standards)
     labels = [each.label for each in shared_standards]
     return LaboratoryComparison(
         first=sides[0].described, second=sides[1].described, temperature_c=at_c, results=results, shared=labels,
         not_compared=not_compared,
-        satisfactory=bool(results) and all(each.en_performance == "satisfactory" for each in results),
+        satisfactory=bool(results) and all(result.en_performance == "satisfactory" for result in results),
         text=list(_text(results, labels)),
     )  # fmt: skip
 
@@ -80,8 +80,11 @@ def _side(store: Store, serial: str, version: int) -> _Side:
 
 def _temperature(sides: tuple[_Side, _Side], given: float | None) -> float:
     ranges = [side.calibration.temperature_c for side in sides]
-    known = [each for each in ranges if all(math.isfinite(end) for end in each)]
-    low, high = max((each[0] for each in known), default=-math.inf), min((each[1] for each in known), default=math.inf)
+    ranges_known = [each for each in ranges if all(math.isfinite(end) for end in each)]
+    low, high = (
+        max((each[0] for each in ranges_known), default=-math.inf),
+        min((each[1] for each in ranges_known), default=math.inf),
+    )
     if low > high:
         raise BadInput(
             f"the versions have no temperature in common: {ranges[0][0]:g} to {ranges[0][1]:g} and {ranges[1][0]:g} to "
@@ -115,10 +118,10 @@ def _results(
 ) -> tuple[list[ComparedResult], dict[str, str]]:
     """Return what is compared, and why other results are not."""
     budgets = [coefficients_at(side.calibration, at_c) for side in sides]
-    found, left_out = list[ComparedResult](), dict[str, str]()
-    keys = dict.fromkeys((own, name) for each in budgets for own, named in each.items() for name in named)
+    results, left_out = list[ComparedResult](), dict[str, str]()
+    keys = dict.fromkeys((own, name) for budget in budgets for own, named in budget.items() for name in named)
     for axis, name in keys:
-        pair = [each.get(axis, {}).get(name) for each in budgets]
+        pair = [budget.get(axis, {}).get(name) for budget in budgets]
         if pair[0] is None or pair[1] is None:
             side = sides[pair[0] is not None].row
             left_out[f"{name} of axis {axis}"] = f"version {side.version} does not have it"
@@ -126,8 +129,8 @@ def _results(
             side = sides[pair[0].combined is not None].row
             left_out[f"{name} of axis {axis}"] = f"its uncertainty in version {side.version} is not known"
         else:
-            found.append(_compared(axis, name, pair[0], pair[1], shared))
-    return found, left_out
+            results.append(_compared(axis, name, pair[0], pair[1], shared))
+    return results, left_out
 
 
 def _compared(axis: str, name: str, first: Budget, second: Budget, shared: Sequence[Standard]) -> ComparedResult:
@@ -162,7 +165,7 @@ def _covariance(first: Budget, second: Budget, standard: Standard) -> float:
 
 
 def _text(results: Sequence[ComparedResult], shared: Sequence[str]) -> Iterator[str]:
-    bad = [each for each in results if each.en_performance != "satisfactory"]
+    bad = [result for result in results if result.en_performance != "satisfactory"]
     for each in bad:
         yield (
             f"{each.result} of axis {each.axis}: En = {each.en:.2f}, zeta = {each.zeta:.2f}: the difference "

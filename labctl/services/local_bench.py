@@ -136,7 +136,7 @@ class LocalBench:
             self.runner.note_unsupervised()
 
     def describe_running(self) -> BenchNow:
-        """Say in one sentence what runs, from memory."""
+        """Return one sentence on what runs, from memory."""
         if self.runner is None:
             return BenchNow("This service drives no bench.")
         bench, campaign, late = self.runner.bench.name, self.runner.running, self.runner.not_stopped

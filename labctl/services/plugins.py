@@ -50,7 +50,7 @@ def check_driver(
         raise BadInput(str(error)) from error
     return DriverTestResponse(
         driver=name, distribution=plugin.distribution, version=plugin.version,
-        ok=not any(each.problem for each in checks), checks=checks,
+        ok=not any(check.problem for check in checks), checks=checks,
     )  # fmt: skip
 
 

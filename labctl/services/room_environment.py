@@ -79,16 +79,16 @@ def environment(store: Store, first: datetime, last: datetime, bench: str = "") 
     return RoomEnvironmentResponse(
         spans=[
             RoomSpanResponse(
-                quantity=each.quantity, unit=each.unit, low=each.low, high=each.high, readings=each.readings
+                quantity=span.quantity, unit=span.unit, low=span.low, high=span.high, readings=span.readings
             )
-            for each in store.room_environment.spans(first, last, bench)
+            for span in store.room_environment.spans(first, last, bench)
         ],
         readings=[
             RoomReadingResponse(
-                measured_at=each.measured_at, bench=each.bench_name, quantity=each.quantity, unit=each.unit,
-                value=each.value, source=each.source,
+                measured_at=reading.measured_at, bench=reading.bench_name, quantity=reading.quantity, unit=reading.unit,
+                value=reading.value, source=reading.source,
             )
-            for each in store.room_environment.readings(first, last, bench, MOST_READINGS)
+            for reading in store.room_environment.readings(first, last, bench, MOST_READINGS)
         ],
     )  # fmt: skip
 

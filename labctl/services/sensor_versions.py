@@ -132,11 +132,11 @@ def version_file(
     device_id: int | None = None,
 ) -> VersionFile:
     """Return a version in a format: the bytes that its fit exported. Raises NotFound, BadInput."""
-    found = one_version(store, serial, sensor, version)
-    content = export_of(found.result, format_name, instance, device_id)
-    chosen = SENSOR_FORMATS[found.sensor][format_name]
+    version_row = one_version(store, serial, sensor, version)
+    content = export_of(version_row.result, format_name, instance, device_id)
+    chosen = SENSOR_FORMATS[version_row.sensor][format_name]
     etag = hashlib.sha256(content.encode()).hexdigest()
-    return VersionFile(f"{found.sensor}-{found.version}.{chosen.suffix}", content, chosen.media_type, etag)
+    return VersionFile(f"{version_row.sensor}-{version_row.version}.{chosen.suffix}", content, chosen.media_type, etag)
 
 
 def _estimates(result: AccelerometerResponse | MagnetometerResponse) -> list[Estimate | None]:
@@ -155,11 +155,13 @@ def _estimates(result: AccelerometerResponse | MagnetometerResponse) -> list[Est
 
 def _over_temperature(result: AccelerometerResponse, warm: AccelerometerTemperature) -> list[Estimate | None]:
     """Return the nine estimates and those of temperature, by power and axis, in the order of the covariance."""
-    found = _estimates(result)
+    sensor_estimates = _estimates(result)
     for terms in (warm.bias_g, warm.scale_factor):
-        powers = max((len(each) for each in terms.values()), default=0)
-        found += [dict(enumerate(terms.get(axis, []))).get(power) for power in range(powers) for axis in AXES]
-    return found
+        powers = max((len(term) for term in terms.values()), default=0)
+        sensor_estimates += [
+            dict(enumerate(terms.get(axis, []))).get(power) for power in range(powers) for axis in AXES
+        ]
+    return sensor_estimates
 
 
 def _not_json(result: JsonDocument) -> str | None:
@@ -173,9 +175,9 @@ def _not_json(result: JsonDocument) -> str | None:
 
 def _problem(estimates: Sequence[Estimate | None], covariance: Sequence[Sequence[float]]) -> str | None:
     """Return in words why a result does not come from a fit; None: it may."""
-    found, size = [each for each in estimates if each is not None], len(estimates)
-    if len(found) != size:
-        return f"{size - len(found)} of {size} parameters are missing"
+    sensor_estimates, size = [estimate for estimate in estimates if estimate is not None], len(estimates)
+    if len(sensor_estimates) != size:
+        return f"{size - len(sensor_estimates)} of {size} parameters are missing"
     if len(covariance) != size or any(len(row) != size for row in covariance):
         return f"the covariance is not {size} by {size}"
     matrix = np.array(covariance, dtype=np.float64)
@@ -184,9 +186,9 @@ def _problem(estimates: Sequence[Estimate | None], covariance: Sequence[Sequence
             return "the covariance is not finite and symmetric"
     if np.diag(matrix).min() < 0:
         return "a variance is negative"
-    for each, u in zip(found, np.sqrt(np.diag(matrix)), strict=True):
-        if each.u is not None and not abs(each.u - u) <= ROUNDING * u:
-            return f"u = {each.u:.3g} where the covariance says {u:.3g}"
+    for sensor_estimate, u in zip(sensor_estimates, np.sqrt(np.diag(matrix)), strict=True):
+        if sensor_estimate.u is not None and not abs(sensor_estimate.u - u) <= ROUNDING * u:
+            return f"u = {sensor_estimate.u:.3g} where the covariance says {u:.3g}"
     return None
 
 

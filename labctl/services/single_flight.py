@@ -68,7 +68,7 @@ _flights_guard = threading.Lock()
 
 @contextmanager
 def single_flight(asked: str) -> Iterator[None]:
-    """Let one thread of this process at a time work at the same question. Raises Cancelled."""
+    """Allow one thread of this process at a time to work at the same question. Raises Cancelled."""
     with _flights_guard:
         flight = _flights.setdefault(asked, _Flight())
     with flight.turn():

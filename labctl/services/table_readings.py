@@ -18,7 +18,7 @@ def numbers_of(
 
     Raises BadRecording for a column that is not there or holds text, and for a row without a number in each.
     """
-    found = []
+    numbers = []
     for name in columns:
         if name not in table:
             raise BadRecording(
@@ -28,8 +28,8 @@ def numbers_of(
         values = np.asarray(table[name])
         if values.dtype.kind not in "fiu":
             raise BadRecording(f"{path}: column {name!r} holds text, not numbers; name another column")
-        found.append(np.asarray(values, dtype=np.float64))
-    rows = np.column_stack(found)
+        numbers.append(np.asarray(values, dtype=np.float64))
+    rows = np.column_stack(numbers)
     wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(wrong):
         raise BadRecording(f"{path}: row {int(wrong[0]) + 1} has no number in every column; leave the row out")

@@ -65,10 +65,11 @@ def _opened(path: Path) -> Session:
     record = WireRecord(path)
     header = record.header
     try:
-        what = RecordedSession.model_validate(header["session"])
-        if not what.can_be_replayed:
+        recorded_session = RecordedSession.model_validate(header["session"])
+        if not recorded_session.can_be_replayed:
             raise BadInput(
-                f"{path} is the log of a session of kind {what.kind!r}, which depends on more than its bytes, so it "
+                f"{path} is the log of a session of kind {recorded_session.kind!r}, which depends on more than its "
+                "bytes, so it "
                 f"cannot be replayed; read it with `zcat {path}`"
             )
         bench = with_drivers(BenchFile.model_validate(header["bench"]))
@@ -79,7 +80,7 @@ def _opened(path: Path) -> Session:
             f"{path}: its header is not one of labctl {version('labctl')} ({one_line(error)}); install labctl "
             f"{header.get('labctl', 'of that time')} to replay it"
         ) from error
-    return Session(bench, what, Replay(record, clock))
+    return Session(bench, recorded_session, Replay(record, clock))
 
 
 @contextmanager
@@ -96,7 +97,7 @@ def _store(database: str | None) -> Iterator[Store]:
 
 
 def _run_campaign(store: Store, session: Session) -> None:
-    control, what, wire = Control(), session.what, ReplayedWire(session.replay)
+    control, recorded_session, wire = Control(), session.what, ReplayedWire(session.replay)
 
     def end(difference: Difference) -> None:
         control.abort(difference.text)
@@ -104,7 +105,8 @@ def _run_campaign(store: Store, session: Session) -> None:
     session.replay.on_over = end
     try:
         prepared = prepare(
-            store, what.recipe, session.bench, session.replay.clock, clip=what.clip, fit=what.fit, wire=wire
+            store, recorded_session.recipe, session.bench, session.replay.clock, clip=recorded_session.clip,
+            fit=recorded_session.fit, wire=wire
         )  # fmt: skip
         if session.bench.needs_person:
             prepared = replace(prepared, operator=ReplayedOperator(session.replay))
@@ -140,17 +142,17 @@ def _response(path: Path, session: Session, begun_s: float) -> ReplayResponse:
 
 
 def _different(session: Session, recorded: SessionResult) -> list[str]:
-    """Say what of the result is not that of the session."""
-    found, said = session.result, []
+    """Return what of the result differs from the session."""
+    result, said = session.result, []
     if left := session.replay.not_sent():
         said.append("requests that the session made and this replay did not: " + ", ".join(left))
     pairs = {
-        "state of the campaign": (recorded.state, found.state),
-        "end": (recorded.ended_by, found.ended_by),
-        "readings": (_readings(recorded.readings), _readings(found.readings)),
+        "state of the campaign": (recorded.state, result.state),
+        "end": (recorded.ended_by, result.ended_by),
+        "readings": (_readings(recorded.readings), _readings(result.readings)),
     }
     said += [f"{name}: {was} in the session, {now} in this replay" for name, (was, now) in pairs.items() if was != now]
-    return said + [f"said only by this replay: {line}" for line in found.said if line not in recorded.said]
+    return said + [f"said only by this replay: {line}" for line in result.said if line not in recorded.said]
 
 
 def _readings(digest: ReadingsDigest | None) -> str:

@@ -79,15 +79,15 @@ class StopAttempt:
         latching.join(LATCH_S)
         note = self._place.note() or DriverNote(self._place.name)
         try:
-            found = self._stopped(note)
+            result = self._stopped(note)
         except Exception as error:  # noqa: BLE001  it is the result, whatever it is
-            found = StopResult(note.bench, False, str(error) or type(error).__name__)
+            result = StopResult(note.bench, False, str(error) or type(error).__name__)
         latching.join(LATCH_S)
-        if found.stands:
+        if result.stands:
             with contextlib.suppress(OSError):
-                self._place.latch.at_rest([self._stop.id], found.text)
-        self._result = StopResult(found.bench, found.stands, found.text, found.campaign, self._latched)
-        self.text = found.text
+                self._place.latch.at_rest([self._stop.id], result.text)
+        self._result = StopResult(result.bench, result.stands, result.text, result.campaign, self._latched)
+        self.text = result.text
         self._heard.set()
         self._over.set()
 
@@ -161,8 +161,8 @@ class AttemptedStop:
     @property
     def stands(self) -> bool:
         """Whether the table is confirmed to stand."""
-        found = self._attempt.result(0.0)
-        return found is not None and found.stands
+        result = self._attempt.result(0.0)
+        return result is not None and result.stands
 
     @property
     def text(self) -> str:
@@ -179,11 +179,11 @@ def stop_bench(
     busy computer a command needs seconds to begin.
     """
     attempt = StopAttempt(place, stop)
-    if (found := attempt.result(max(LATE_S - begun_s, LEAST_S))) is None:
+    if (result := attempt.result(max(LATE_S - begun_s, LEAST_S))) is None:
         say(f"{NOT_STOPPED} yet: bench {place.name}: {attempt.text}. {SWITCH}.")
-    found = found or attempt.result()
-    assert found is not None
-    return found
+    result = result or attempt.result()
+    assert result is not None
+    return result
 
 
 def at_instruments(note: DriverNote, say: Callable[[str], None]) -> StopResult:

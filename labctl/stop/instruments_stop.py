@@ -35,8 +35,8 @@ def stop_instruments(
     table is at rest.
     """
     try:
-        found = BenchFile.model_validate(document)
-        return _stopped(found.model_copy(update={"gyros": (), "references": ()}), say, stands)
+        bench_file = BenchFile.model_validate(document)
+        return _stopped(bench_file.model_copy(update={"gyros": (), "references": ()}), say, stands)
     except Exception as error:  # noqa: BLE001  whatever it is, the answer is that the bench is not known to stand
         return InstrumentsLeft(stands=False, safe=False, text=f"the instruments cannot be reached: {error}")
 
@@ -44,11 +44,11 @@ def stop_instruments(
 def _stopped(bench: BenchFile, say: Callable[[str], None], stands: Callable[[], None]) -> InstrumentsLeft:
     at_rest = False
 
-    def note(what: str, complaint: str) -> None:
+    def note(text: str, complaint: str) -> None:
         nonlocal at_rest
         if complaint:
-            say(f"{what}: {complaint}")
-        elif what == TABLE:
+            say(f"{text}: {complaint}")
+        elif text == TABLE:
             at_rest = True
             stands()
 

@@ -84,26 +84,26 @@ class StopLatch:
     def stamp(self) -> tuple[int, int]:
         """What changes when a line is added: size and time of the file; zeros while there is none."""
         try:
-            found = self._path.stat()
+            status = self._path.stat()
         except OSError:
             return 0, 0
-        return found.st_size, found.st_mtime_ns
+        return status.st_size, status.st_mtime_ns
 
     def prepare(self) -> None:
         """Make the folder and the file, so that a full disk later leaves room for the mark. Raises OSError."""
         if self._path.exists():
             return
         self._folder.mkdir(parents=True, exist_ok=True, mode=FOLDER)
-        made = self._folder / f".{NAME}-{uuid4().hex}"
-        handle = os.open(made, os.O_WRONLY | os.O_CREAT | os.O_EXCL, FILE)
+        new_folder = self._folder / f".{NAME}-{uuid4().hex}"
+        handle = os.open(new_folder, os.O_WRONLY | os.O_CREAT | os.O_EXCL, FILE)
         try:
             os.write(handle, UNMARKED)
             os.fsync(handle)
             with contextlib.suppress(FileExistsError):  # another process was quicker: its file stays
-                self._path.hardlink_to(made)  # it appears whole, so that no line comes before its first
+                self._path.hardlink_to(new_folder)  # it appears whole, so that no line comes before its first
         finally:
             os.close(handle)
-            made.unlink()
+            new_folder.unlink()
 
     def request(self, stop: StopRequest) -> None:
         """Remember a stop; one that is known already stays as it is. Raises OSError where nothing could be written."""

@@ -62,10 +62,10 @@ class PageAccess:
 
 def write_keys(path: Path, keys: dict[str, tuple[str, str]]) -> None:
     """Write digest -> (name, role) of the keys in force for a process that has no database. Raises OSError."""
-    made = path.with_suffix(".new")
-    made.touch(mode=0o600)
-    made.write_text(json.dumps(keys), encoding="ascii")
-    made.replace(path)
+    new_file = path.with_suffix(".new")
+    new_file.touch(mode=0o600)
+    new_file.write_text(json.dumps(keys), encoding="ascii")
+    new_file.replace(path)
 
 
 class StopPage:
@@ -189,12 +189,12 @@ def _peeked(caller: socket.socket) -> bytes:
     clock = SystemClock()
     until_s = clock.now_s() + PATIENCE_S
     while True:
-        found = caller.recv(BODY_BYTES, socket.MSG_PEEK)
-        head, end, body = found.partition(b"\r\n\r\n")
+        content = caller.recv(BODY_BYTES, socket.MSG_PEEK)
+        head, end, body = content.partition(b"\r\n\r\n")
         length = re.search(rb"\r\ncontent-length: *(\d+)", head, re.IGNORECASE)
         wanted = int(length[1]) if length else 0
-        if not found or len(found) >= BODY_BYTES or (end and len(body) >= min(wanted, BODY_BYTES)):
-            return found
+        if not content or len(content) >= BODY_BYTES or (end and len(body) >= min(wanted, BODY_BYTES)):
+            return content
         if clock.now_s() > until_s:
             raise TimeoutError("the request does not come to its end")
         clock.sleep(0.01)
@@ -257,17 +257,17 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         """Stop what runs, or one campaign."""
         body = self.rfile.read(min(int(self.headers.get("Content-Length") or 0), BODY_BYTES))
-        found = STOP_PATH.fullmatch(self.path.partition("?")[0])
-        if found is None:
+        match = STOP_PATH.fullmatch(self.path.partition("?")[0])
+        if match is None:
             self._problem(503, "no-web-process", f"{NO_WEB}. {self.describe().text}")
             return
-        given = _fields(body, self.headers.get("Content-Type", ""))
-        caller = self._caller(str(given.get("key", "")))
+        fields = _fields(body, self.headers.get("Content-Type", ""))
+        caller = self._caller(str(fields.get("key", "")))
         if caller is None:
             return
-        by = str(given.get("by") or caller)
-        campaign = int(found[1]) if found[1] else None
-        reason = f"{given.get('reason') or 'stopped on the page'} ({by})"
+        by = str(fields.get("by") or caller)
+        campaign = int(match[1]) if match[1] else None
+        reason = f"{fields.get('reason') or 'stopped on the page'} ({by})"
         stop = StopRequest.new(by, "stop page", reason, campaign)
         last = _followed(self.respond(stop))
         if last.phase == "stands" and self.web_is_back():
@@ -351,19 +351,19 @@ class _Handler(BaseHTTPRequestHandler):
 def _followed(stopping: Stopping) -> Word:
     """Follow a stop for as long as a caller waits; returns the last that is known."""
     last = Word("asked", stopping.text, stopping.campaign)
-    found: list[Word] = []
+    words: list[Word] = []
     over = threading.Event()
 
     def follow() -> None:
         for word in phases(stopping):
-            found.append(word)
+            words.append(word)
             if word.phase in LAST:
                 break
         over.set()
 
     threading.Thread(target=follow, name="stop-follow", daemon=True).start()
     over.wait(ANSWER_S)
-    return found[-1] if found else last
+    return words[-1] if words else last
 
 
 def _fields(body: bytes, kind: str) -> dict[str, Any]:
@@ -371,7 +371,7 @@ def _fields(body: bytes, kind: str) -> dict[str, Any]:
     try:
         if "urlencoded" in kind:
             return dict(parse_qsl(body.decode(), max_num_fields=10))
-        given = json.loads(body or b"{}") if "json" in kind else {}
+        document = json.loads(body or b"{}") if "json" in kind else {}
     except ValueError:
         return {}
-    return given if isinstance(given, dict) else {}
+    return document if isinstance(document, dict) else {}

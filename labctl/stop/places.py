@@ -91,9 +91,9 @@ class BenchPlace:
     def note(self) -> DriverNote | None:
         """Return who drives the bench; None where no process ever wrote that down, or it cannot be read."""
         try:
-            given = json.loads((self.folder / NOTE).read_bytes())
-            driver, guardian = ProcessId(**given.pop("driver")), ProcessId(**given.pop("guardian"))
-            return DriverNote(driver=driver, guardian=guardian, **given)
+            note_fields = json.loads((self.folder / NOTE).read_bytes())
+            driver, guardian = ProcessId(**note_fields.pop("driver")), ProcessId(**note_fields.pop("guardian"))
+            return DriverNote(driver=driver, guardian=guardian, **note_fields)
         except (OSError, ValueError, TypeError, KeyError, AttributeError):
             return None
 
@@ -103,7 +103,7 @@ class BenchPlace:
         _write(self.folder / NOTE, asdict(note))
 
     def register(self) -> None:
-        """Let a stop that does not know the database find this bench; raises nothing: it can still be named."""
+        """Register this bench for a stop without the database; raises nothing: the bench can still be named."""
         with contextlib.suppress(OSError, RuntimeError):
             pointers = state_folder() / POINTERS
             pointers.mkdir(parents=True, exist_ok=True, mode=FOLDER)
@@ -127,22 +127,22 @@ def places_of(location: str) -> list[BenchPlace]:
 
 def known_places() -> list[BenchPlace]:
     """Return the folders of every bench that this user has driven and whose folder is still there."""
-    found = []
+    places = []
     with contextlib.suppress(OSError, RuntimeError):
         for pointer in sorted((state_folder() / POINTERS).glob("*.json")):
             with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
                 folder = Path(json.loads(pointer.read_bytes())["folder"])
                 if folder.is_dir():
-                    found.append(BenchPlace(folder))
+                    places.append(BenchPlace(folder))
                 else:
                     pointer.unlink()  # the database was removed, and its benches' folders with it
-    return found
+    return places
 
 
 def state_folder() -> Path:
     """Return the folder for what outlives a process: systemd's, XDG's, or that in the home folder."""
-    if given := os.environ.get("STATE_DIRECTORY", ""):
-        return Path(given.partition(":")[0])
+    if state_directory := os.environ.get("STATE_DIRECTORY", ""):
+        return Path(state_directory.partition(":")[0])
     named = os.environ.get("XDG_STATE_HOME", "")
     return (Path(named) if named.startswith("/") else Path.home() / ".local" / "state") / "labctl"
 

@@ -45,7 +45,7 @@ def of_the_bench() -> None:
 
 
 def of_the_pages() -> None:
-    """Let the processes that drive a bench go first.
+    """Give processes that drive a bench priority over this one.
 
     Where those could be raised, this one stays beside all others: a page is not to wait for every other program.
     """

@@ -51,19 +51,19 @@ def main(words: Sequence[str]) -> int:
     return run(Asked(**vars(parser.parse_args(words))))
 
 
-def run(asked: Asked) -> int:
+def run(request: Asked) -> int:
     """Stop what was asked for, print the result; returns the exit status."""
     try:
-        results = stop_all(asked)
+        results = stop_all(request)
     except WrongUse as error:
         _say(str(error))
         return 2
     stands = bool(results) and all(result.stands for result in results)
-    if asked.as_json:
+    if request.as_json:
         document = {"stands": stands, "benches": [asdict(result) for result in results]}
         sys.stdout.write(json.dumps(document, indent=2) + "\n")
     for result in results:
-        _print(result, quiet=asked.as_json)
+        _print(result, quiet=request.as_json)
     if not results:
         _say(
             f"{NOT_STOPPED}: labctl knows of no bench that this user has driven. {SWITCH}, or name the bench file: "
@@ -89,25 +89,25 @@ def _print(result: StopResult, *, quiet: bool) -> None:
         )
 
 
-def stop_all(asked: Asked) -> list[StopResult]:
+def stop_all(request: Asked) -> list[StopResult]:
     """Stop every bench that is meant, all at the same time. Raises WrongUse."""
-    document = None if asked.bench is None else _document(asked.bench)
-    places = [place for place in _places(asked.database) if document is None or _is(place, document)]
-    by = asked.by or _user()
-    stop = StopRequest.new(by, "command line", f"{asked.reason} ({by})")
+    document = None if request.bench is None else _document(request.bench)
+    places = [place for place in _places(request.database) if document is None or _is(place, document)]
+    by = request.by or _user()
+    stop = StopRequest.new(by, "command line", f"{request.reason} ({by})")
     if document is not None and not places:
-        return [_unknown(asked, document, stop)]
-    found: dict[int, StopResult] = {}
+        return [_unknown(request, document, stop)]
+    results: dict[int, StopResult] = {}
 
     def one(number: int, place: BenchPlace) -> None:
-        found[number] = _stop(place, stop)
+        results[number] = _stop(place, stop)
 
     threads = [threading.Thread(target=one, args=each, daemon=True) for each in enumerate(places)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    return [found[number] for number in sorted(found)]
+    return [results[number] for number in sorted(results)]
 
 
 def _stop(place: BenchPlace, stop: StopRequest) -> StopResult:
@@ -158,17 +158,17 @@ def _table(document: dict[str, Any]) -> tuple[Any, ...] | None:
     return None if not address or str(address).startswith("sim://") else (address, section.get("tcp_port", 502))
 
 
-def _unknown(asked: Asked, document: dict[str, Any], stop: StopRequest) -> StopResult:
+def _unknown(request: Asked, document: dict[str, Any], stop: StopRequest) -> StopResult:
     """Stop a bench that no process of this user has driven, at its instruments."""
     name = document["name"]
     if _table(document) is None and "table" in document:
         return StopResult(name, True, "its instruments are simulated, and no process runs it")
-    latched = _latched(place_of(asked.database, name), stop) if asked.database else True
+    latched = _latched(place_of(request.database, name), stop) if request.database else True
     with contextlib.suppress(ImportError):
         from instruments.bench_config import read_bench  # noqa: PLC0415  it loads the libraries of the drivers
 
         with contextlib.suppress(Exception):
-            document = read_bench(str(asked.bench)).model_dump(mode="json")
+            document = read_bench(str(request.bench)).model_dump(mode="json")
     result = at_instruments(DriverNote(name, document=document), lambda _: None)
     return StopResult(name, result.stands, result.text, None, latched)
 

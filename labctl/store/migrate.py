@@ -50,7 +50,7 @@ def refuse_unknown(revision: str | None, location: str) -> None:
 
 
 def upgrade(connection: sa.Connection) -> None:
-    """Bring a database to today's tables, inside the transaction of `connection`."""
+    """Migrate a database to the present tables, inside the transaction of `connection`."""
     from alembic import command  # noqa: PLC0415  as above
 
     command.upgrade(configuration(connection), "head")

@@ -121,15 +121,15 @@ class HumanOperator:
                 self._pending, self._answer = None, None
 
     def confirm(self, prompt_id: str, by: str) -> None:
-        """Say that it is done. Raises StalePrompt when another question, or none, is open."""
+        """Answer that it is done. Raises StalePrompt when another question, or none, is open."""
         self._reply(Answer(prompt_id, confirmed=True, by=by))
 
     def decline(self, prompt_id: str, by: str, reason: str) -> None:
-        """Say that it cannot be done; the campaign ends. Raises StalePrompt like `confirm`."""
+        """Answer that it cannot be done; the campaign ends. Raises StalePrompt like `confirm`."""
         self._reply(Answer(prompt_id, confirmed=False, by=by, reason=reason))
 
     def repeat(self, prompt_id: str, by: str, reason: str) -> None:
-        """Say that it did not go well and is to be asked again. Raises StalePrompt, also for what is no turn."""
+        """Answer that it did not go well and is to be asked again. Raises StalePrompt, also for what is no turn."""
         with self._lock:
             if self._pending is not None and self._pending.id == prompt_id and self._pending.kind != "turn":
                 raise StalePrompt(
@@ -139,7 +139,7 @@ class HumanOperator:
         self._reply(Answer(prompt_id, confirmed=False, by=by, reason=reason, again=True))
 
     def reply(self, answer: Answer) -> None:
-        """Give an answer of any kind. Raises StalePrompt like `confirm` and `repeat`."""
+        """Answer the question in any way. Raises StalePrompt like `confirm` and `repeat`."""
         if answer.again:
             self.repeat(answer.prompt_id, answer.by, answer.reason)
         elif answer.confirmed:

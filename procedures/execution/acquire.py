@@ -126,8 +126,8 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             raise
     context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
     context.unchecked.append(number)
-    taken = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
-    return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **rates, **taken}
+    reading_counts = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
+    return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **rates, **reading_counts}
 
 
 def _demand_answer(context: ExecutionContext, step: Acquire, spin: Spin) -> None:
@@ -142,15 +142,15 @@ def _note_angles(
     context: ExecutionContext, encoder: EncoderLog, spin: Spin, gate: tuple[float, float], number: int
 ) -> dict[str, float]:
     """Record what the table's encoder said, and warn once where the table does not turn as commanded."""
-    found = encoder.result(spin, gate[0], context.recorder.time)
-    if found is None:
+    angles = encoder.result(spin, gate[0], context.recorder.time)
+    if angles is None:
         return {}
-    context.recorder.journal.table_angles(number, found)
-    event = rate_event(context.bench.table, found)
+    context.recorder.journal.table_angles(number, angles)
+    event = rate_event(context.bench.table, angles)
     if event is not None and not context.warned_of_rate:
         context.warned_of_rate = True
         context.recorder.event(event)
-    return {"encoder_dps": found.rate_dps, "encoder_u_dps": found.rate_u_dps}
+    return {"encoder_dps": angles.rate_dps, "encoder_u_dps": angles.rate_u_dps}
 
 
 def _steady_s(context: ExecutionContext, step: Acquire) -> float:
@@ -174,7 +174,7 @@ def _gate(spin: Spin, step: Acquire) -> tuple[float, float]:
 
 
 def _wait_for_gate(context: ExecutionContext, watch: TableWatch, from_s: float) -> None:
-    """Let the table settle, then drop what the streams have buffered meanwhile, unless the gate is open already."""
+    """Wait until the table settles, then drop what the streams have buffered, unless the gate is open already."""
     clear_s = from_s - LEAD_S - latency_s(context.clock)
     while watch.next_s < clear_s:
         pass_time(context, watch.next_s - context.clock.now_s(), pausing=False)

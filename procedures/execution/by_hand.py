@@ -52,7 +52,7 @@ class TurnReadings:
         self._rest(-1, self._context.clock.now_s() + duration_s)
         self._stillness = {name: Stillness.of(rest, self._still_dps) for name, rest in self._courses[-1].items()}
 
-    def read_turn(self, shown: TurnProgress) -> None:
+    def read_turn(self, progress: TurnProgress) -> None:
         """Read about a second of the turn, and show what has come out so far. Raises as `rest_before`."""
         blocks = self._read()
         moves = any(self._stillness[name].is_left(readings) for name, readings in blocks.items())
@@ -64,7 +64,7 @@ class TurnReadings:
             self._held = [blocks]
         else:
             self._held.append(blocks)
-        self._context.recorder.tracker.update(turn=replace(shown, came_deg=self.came_deg))
+        self._context.recorder.tracker.update(turn=replace(progress, came_deg=self.came_deg))
 
     def end_turn(self) -> None:
         """End the turn half a second after its last movement; what was read since then is of the rest after it."""
@@ -119,22 +119,22 @@ class TurnReadings:
     def _read(self) -> Round:
         """Read every unit once; the bench is polled when that is due."""
         context = self._context
-        gyros, found = list(context.bench.gyros.items()), {}
+        gyros, samples = list(context.bench.gyros.items()), {}
         for name, gyro in gyros:
-            found[name] = gyro.read(max(BLOCK_S / len(gyros), 1.5 / gyro.sample_rate_hz))
-            if len(found[name]):
-                context.monitor.add_readings(name, gyro, found[name])
+            samples[name] = gyro.read(max(BLOCK_S / len(gyros), 1.5 / gyro.sample_rate_hz))
+            if len(samples[name]):
+                context.monitor.add_readings(name, gyro, samples[name])
         if context.monitor.is_due(within_s=BLOCK_S):
             context.poll(read_latest=False)
         checkpoint(context)
-        return found
+        return samples
 
     def _keep(self, part: Part, *rounds: Round) -> None:
         """Take readings in as part of the attempt, and write them down."""
         recorder = self._context.recorder
         for blocks in rounds:
             if part not in self._numbers:
-                self._open(part, min((float(each.t_s[0]) for each in blocks.values() if len(each)), default=None))
+                self._open(part, min((float(block.t_s[0]) for block in blocks.values() if len(block)), default=None))
             for name, readings in blocks.items():
                 self._courses[part][name].add(readings)
                 if len(readings) or readings.lost or readings.damaged:
@@ -165,7 +165,7 @@ class TurnReadings:
 
 
 def turn(context: ExecutionContext, step: Turn) -> dict[str, float]:
-    """Have the units turned until a turn is good; returns what came out of it, by unit.
+    """Ask for a turn by hand until one is good; returns its result, by unit.
 
     Raises StepFailed after as many refused attempts as the recipe allows, and for an answer that does not come, or is
     no; InstrumentError, Aborted.
@@ -177,10 +177,10 @@ def turn(context: ExecutionContext, step: Turn) -> dict[str, float]:
         for attempt in range(1, rules.attempts + 1):
             shown = TurnProgress(step.position, step.turn_deg, "rest", attempt, refused=refused)
             context.recorder.tracker.update(turn=shown)
-            found = _attempt(context, step, rules, shown)
-            if not found.refused:
-                return {"attempts": float(attempt), **found.figures}
-            refused = found.refused
+            turned = _attempt(context, step, rules, shown)
+            if not turned.refused:
+                return {"attempts": float(attempt), **turned.figures}
+            refused = turned.refused
     finally:
         context.recorder.tracker.update(turn=None)
     raise StepFailed(
@@ -197,14 +197,14 @@ class _Found:
     figures: dict[str, float]  #: what came out of each unit
 
 
-def _attempt(context: ExecutionContext, step: Turn, rules: TurnRules, shown: TurnProgress) -> _Found:
+def _attempt(context: ExecutionContext, step: Turn, rules: TurnRules, progress: TurnProgress) -> _Found:
     readings = TurnReadings(context, step, rules.still_dps)
     try:
         refused, again = _rest(readings, step, rules), False
         if not refused:
-            context.recorder.tracker.update(turn=(shown := replace(shown, phase="turn")))
-            answer = ask(context, _question(context, step, rules, shown), lambda: readings.read_turn(shown))
-            readings.read_turn(shown)  # what came with the answer
+            context.recorder.tracker.update(turn=(progress := replace(progress, phase="turn")))
+            answer = ask(context, _question(context, step, rules, progress), lambda: readings.read_turn(progress))
+            readings.read_turn(progress)  # what came with the answer
             readings.end_turn()
             again = answer.again
             refused = (answer.reason or f"{answer.by} requested the turn again") if again else ""
@@ -214,7 +214,7 @@ def _attempt(context: ExecutionContext, step: Turn, rules: TurnRules, shown: Tur
             return _record(context, step, refused, {})
         results: dict[str, TurnResult] = {}
         if not again:
-            context.recorder.tracker.update(turn=replace(shown, phase="rest", came_deg=readings.came_deg))
+            context.recorder.tracker.update(turn=replace(progress, phase="rest", came_deg=readings.came_deg))
             readings.rest_after(step.rest_s)
             results = {unit.name: check_turn(step, rules, unit) for unit in readings.units()}
             named = len(results) > 1
@@ -232,9 +232,9 @@ def _rest(readings: TurnReadings, step: Turn, rules: TurnRules) -> str:
     return next((text for course in readings.before() if (text := moved(course, rules.still_dps, "before"))), "")
 
 
-def _question(context: ExecutionContext, step: Turn, rules: TurnRules, shown: TurnProgress) -> Prompt:
+def _question(context: ExecutionContext, step: Turn, rules: TurnRules, progress: TurnProgress) -> Prompt:
     text = rules.ask.of(rules.ask.turn, step.position, step.turn_deg)
-    text = f"{shown.refused}: turn again; {text}" if shown.refused else text
+    text = f"{progress.refused}: turn again; {text}" if progress.refused else text
     return Prompt(context.new_prompt_id(), "turn", text, step.position, step.turn_deg, step.within_s)
 
 
@@ -245,19 +245,21 @@ def _ask_for_rest(context: ExecutionContext, step: Turn, rules: TurnRules, refus
 
 def _record(context: ExecutionContext, step: Turn, refused: str, results: dict[str, TurnResult]) -> _Found:
     """Write down what came out, of every unit that measures the axis, and whether it was refused."""
-    asked = f"turn by {step.turn_deg:g} deg, {step.position} up"
+    instruction = f"turn by {step.turn_deg:g} deg, {step.position} up"
     figures = {f"came_deg.{name}": result.came_deg for name, result in results.items() if result.came_deg is not None}
     if refused:
         value = next(iter(figures.values()), None)
-        event = Event("turn.refused", f"{asked}: {refused}: turn again", "warning", None, value, step.turn_deg, "deg")
+        event = Event(
+            "turn.refused", f"{instruction}: {refused}: turn again", "warning", None, value, step.turn_deg, "deg"
+        )
         context.recorder.event(event)
     else:
         for name, result in results.items():
             came = result.came_deg
             text = (
-                f"{asked}: the unit turned by {came:.1f} deg"
+                f"{instruction}: the unit turned by {came:.1f} deg"
                 if came is not None
-                else f"{asked}: {name} has no such axis"
+                else f"{instruction}: {name} has no such axis"
             )
             context.recorder.event(Event("turn.taken", text, "info", name, came, step.turn_deg, "deg"))
     return _Found(refused, figures)

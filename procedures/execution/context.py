@@ -84,11 +84,11 @@ class ExecutionContext:
     def require_same_settings(self, gyro: str, reported: Mapping[str, str]) -> None:
         """Raise WrongInstrument where a unit is set otherwise than in the campaign so far, or than it is to be."""
         before = self._set.get(gyro) or self.full_bench.configurations.get(gyro, {})
-        if found := changed(before, reported):
-            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in found.items())
+        if changes := changed(before, reported):
+            text = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
             raise WrongInstrument(
                 gyro,
-                f"the unit is set otherwise than before: {said}. What was not saved in the unit is lost when it is "
+                f"the unit is set otherwise than before: {text}. What was not saved in the unit is lost when it is "
                 "switched off: set it as it was, save that, and resume the campaign",
             )
         self._set[gyro] = {**before, **configuration_of(reported)}
@@ -119,6 +119,6 @@ class ExecutionContext:
 
 def raise_violation(violations: list[GuardViolation]) -> None:
     """Raise GuardTripped for the first limit that does more than warn; one that fails goes before one that suspends."""
-    serious = [each for each in violations if each.action != "warn"]
+    serious = [violation for violation in violations if violation.action != "warn"]
     if serious:
         raise min(serious, key=lambda each: each.action != "fail").error()

@@ -60,16 +60,16 @@ def _follow(
             read_late(context, number, gate, counts, late_readings.WAIT_S)
             demand_readings(counts)
             count_missing(context, number, gate, counts)
-            found = _note_course(context, run, log, number)
+            angles = _note_course(context, run, log, number)
         except BaseException as error:
             reason = str(error) or type(error).__name__
             count_silence(context, number, gate, counts, error)
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
             raise
     context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
-    taken = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
-    figures = {"encoder_dps": found.rate_dps, "encoder_u_dps": found.rate_u_dps, "angles": float(len(found.t_s))}
-    return {"gate_s": gate[1] - gate[0], **figures, **taken}
+    reading_counts = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
+    figures = {"encoder_dps": angles.rate_dps, "encoder_u_dps": angles.rate_u_dps, "angles": float(len(angles.t_s))}
+    return {"gate_s": gate[1] - gate[0], **figures, **reading_counts}
 
 
 def _read(
@@ -100,13 +100,13 @@ def _note_course(context: ExecutionContext, run: CourseRun, log: CourseLog, numb
     """Record the course as the encoder measured it, and say where it is not as commanded."""
     table = context.bench.table
     is_reference = table.limits.reference == "measured"
-    found = log.result(run, context.recorder.time, is_reference=is_reference)
-    context.recorder.journal.table_angles(number, found)
-    assert found.course is not None
-    event = course_event(table, found, found.course, run.course.duration_s)
+    angles = log.result(run, context.recorder.time, is_reference=is_reference)
+    context.recorder.journal.table_angles(number, angles)
+    assert angles.course is not None
+    event = course_event(table, angles, angles.course, run.course.duration_s)
     if event is not None:
         context.recorder.event(replace(event, message=f"data set {number}: {event.message}"))
-    return found
+    return angles
 
 
 def _header(context: ExecutionContext, step: Acquire, run: CourseRun, gate: tuple[float, float]) -> DataSetHeader:

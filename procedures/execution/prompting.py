@@ -27,8 +27,10 @@ def ask(context: ExecutionContext, prompt: Prompt, meanwhile: Callable[[], None]
     if answer is None:
         answer = _wait_for_answer(context, prompt, meanwhile)
     if answer.again:
-        said = f": {answer.reason}" if answer.reason else ""
-        context.recorder.event(Event(f"operator.{prompt.kind}", f"{prompt.text}: {answer.by} requests it again{said}"))
+        reason = f": {answer.reason}" if answer.reason else ""
+        context.recorder.event(
+            Event(f"operator.{prompt.kind}", f"{prompt.text}: {answer.by} requests it again{reason}")
+        )
         return answer
     if not answer.confirmed:
         raise StepFailed(f"{answer.by} declined: {prompt.text}: {answer.reason}")

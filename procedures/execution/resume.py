@@ -92,7 +92,7 @@ class _ChamberDeviation:
 
 
 def _switch_on(context: ExecutionContext, run: int, restart: Restart) -> None:
-    """Have the units on, streams open. After a power cut they come back by themselves, or a person is asked."""
+    """Ensure that the units are on, streams open. After a power cut they come back alone, or a person is asked."""
     if not restart.power_lost:
         open_streams(context, run)
         return

@@ -63,13 +63,13 @@ class Shutdown:
         recorder.change_state(state, reason)
         return Outcome(state, reason, safe=not self.complaints)
 
-    def _note(self, what: str, complaint: str) -> None:
+    def _note(self, text: str, complaint: str) -> None:
         """Show how far the safe state is, with all that is open: a silent instrument is no campaign that runs."""
         if complaint:
-            self._open[what] = complaint
+            self._open[text] = complaint
         else:
-            self._open.pop(what, None)
+            self._open.pop(text, None)
         hindrance = "; ".join(f"{part}: {why}" for part, why in self._open.items())
-        self._context.control.note_safe_state(hindrance, at_rest=what == TABLE and not complaint)
+        self._context.control.note_safe_state(hindrance, at_rest=text == TABLE and not complaint)
         if hindrance:
             self._context.recorder.tracker.update(step_text=f"stopping: {hindrance}", last_error=hindrance)

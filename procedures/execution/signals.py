@@ -73,8 +73,8 @@ def shutdown_hook(hook: Callable[[], None]) -> Iterator[None]:
 
         return handle
 
-    found = {number: signal.getsignal(number) for number in ENDING}
-    with signal_handlers({number: before_the(handler) for number, handler in found.items() if callable(handler)}):
+    handlers = {number: signal.getsignal(number) for number in ENDING}
+    with signal_handlers({number: before_the(handler) for number, handler in handlers.items() if callable(handler)}):
         yield
 
 
@@ -91,7 +91,7 @@ def ignore_signals(note: Callable[[int], None] = lambda _: None) -> Iterator[Non
 
 @contextmanager
 def defer_signals() -> Iterator[None]:
-    """Let an ending signal take effect only after the block, which has to be short.
+    """Defer an ending signal until after the block, which has to be short.
 
     A write that is torn in the middle leaves a connection that takes no further write, not even that of the end.
     """

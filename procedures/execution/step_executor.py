@@ -57,7 +57,7 @@ def reconnect(context: ExecutionContext, error: LinkError) -> None:
         pass_time(context, pause_s, pausing=False)
         violations = context.without_dropouts(context.monitor.poll(POLL_S))
         # a violation that suspends is found again when the step begins
-        raise_violation([each for each in violations if each.action == "fail"])
+        raise_violation([violation for violation in violations if violation.action == "fail"])
         try:
             _reach(context, device)
         except InstrumentError as silent:
@@ -174,7 +174,7 @@ class StepExecutor:
         self._recorder.step_ended(index, StepResult(outcome="done", figures=figures))
 
     def _prepare(self, step: Step) -> None:
-        """Obey a request to pause or abort; before a data set, repeat a soak that is owed."""
+        """Act on a request to pause or abort; before a data set, repeat a soak that is owed."""
         context = self._context
         checkpoint(context)
         with context.owing_soak():

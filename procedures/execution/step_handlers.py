@@ -44,7 +44,7 @@ def home(context: ExecutionContext, _step: Home) -> Figures:
 
 
 def power_on(context: ExecutionContext, step: PowerOn) -> Figures:
-    """Have the units switched on, check that they are those of the bench file, open their streams, warm up."""
+    """Switch the units on, check that they are those of the bench file, open their streams, warm up."""
     context.soaked = None
     run = step.run + context.added_runs
     ask(context, Prompt(context.new_prompt_id(), "power_on", f"switch the units on (session {run})"))
@@ -99,7 +99,7 @@ def power_off(context: ExecutionContext, step: PowerOff) -> Figures:
 
 
 def mount(context: ExecutionContext, step: Mount) -> Figures:
-    """Have a person turn the units."""
+    """Ask a person to turn the units."""
     context.soaked = None
     text = mounting_text(step.position)
     if (rules := context.recipe.turns) is not None:
@@ -110,13 +110,17 @@ def mount(context: ExecutionContext, step: Mount) -> Figures:
 
 def mounting_text(position: str) -> str:
     """Return what a person is asked for to mount the units in a position."""
-    asked = Position.of(position)
-    text = f"turn the units so that body axis {asked.end} points up along the table axis"
-    if asked.unit_deg:
-        text += f", and each unit on the same face of its fixture by {asked.unit_deg} deg from where it was first"
-    if asked.fixture_deg:
-        text += f", and the fixture with the units on the table by {asked.fixture_deg} deg from where it was first"
-    return f"{text} (counter-clockwise seen from above)" if asked.turned_deg else text
+    axis_position = Position.of(position)
+    text = f"turn the units so that body axis {axis_position.end} points up along the table axis"
+    if axis_position.unit_deg:
+        text += (
+            f", and each unit on the same face of its fixture by {axis_position.unit_deg} deg from where it was first"
+        )
+    if axis_position.fixture_deg:
+        text += (
+            f", and the fixture with the units on the table by {axis_position.fixture_deg} deg from where it was first"
+        )
+    return f"{text} (counter-clockwise seen from above)" if axis_position.turned_deg else text
 
 
 def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
@@ -174,7 +178,7 @@ def _unsettled(context: ExecutionContext, step: Soak, judge: SoakCriterion, took
 
 
 def rest(context: ExecutionContext, step: Rest) -> Figures:
-    """Let nothing move for a while."""
+    """Wait at rest."""
     with context.monitor.taking_readings():
         record_for(context, step.duration_s)
     return {}

@@ -51,7 +51,7 @@ class StoppableClock:
         return self._clock.latency_s
 
     def attending(self) -> AbstractContextManager[Callable[[], None]]:
-        """Have the clock wait for this thread, as the clock itself does."""
+        """Make the clock wait for this thread, as the clock itself does."""
         return self._clock.attending()
 
     def sleep(self, duration_s: float) -> None:

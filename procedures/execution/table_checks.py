@@ -35,34 +35,34 @@ def measure_clock(context: ExecutionContext, step: MeasureClock) -> dict[str, fl
     lengths_s = step.runs_s or run_lengths_s(FIRST_RUNS, 0, step.short_s, table.limits.clock_run_s)
     for steady_s in lengths_s:
         _add_run(context, table, step.rate_dps, steady_s, block)
-    found = step_clock.measured(context.clock_runs, table.step_clock)
+    clock_result = step_clock.measured(context.clock_runs, table.step_clock)
     for n in range(MOST_ADDED):
-        if found is not None and found.expanded_ppm <= table.limits.clock_limit_ppm:
+        if clock_result is not None and clock_result.expanded_ppm <= table.limits.clock_limit_ppm:
             break
         _add_run(context, table, step.rate_dps, lengths_s[n % len(lengths_s)], block)
-        found = step_clock.measured(context.clock_runs, table.step_clock)
-    if found is None:
+        clock_result = step_clock.measured(context.clock_runs, table.step_clock)
+    if clock_result is None:
         raise StepFailed(f"the step clock is not known: {len(context.clock_runs)} runs are too few; plan more of them")
-    _require_agreement(context, found, first=first)
-    _use(context, found)
-    _say_clock(context, found)
-    return _figures(found)
+    _require_agreement(context, clock_result, first=first)
+    _use(context, clock_result)
+    _say_clock(context, clock_result)
+    return _figures(clock_result)
 
 
-def _use(context: ExecutionContext, found: MeasuredClock) -> None:
-    """Let every rate be by the step clock as it is known now, those of the data sets so far, too."""
+def _use(context: ExecutionContext, measured_clock: MeasuredClock) -> None:
+    """Compute every rate by the measured step clock, also those of the data sets so far."""
     before = step_clock.fitted([run for run in context.clock_runs if run.used])
 
     def factor(t_s: float) -> float:
-        return 1.0 if before is None else found.fit.ratio(t_s) / before.ratio(t_s)
+        return 1.0 if before is None else measured_clock.fit.ratio(t_s) / before.ratio(t_s)
 
-    context.recorder.journal.step_clock(found.u_ppm, found.fit.freedom, factor)
+    context.recorder.journal.step_clock(measured_clock.u_ppm, measured_clock.fit.freedom, factor)
     context.clock_runs = [replace(run, used=True) for run in context.clock_runs]
     follow_clock(context)
 
 
 def follow_clock(context: ExecutionContext) -> None:
-    """Have the table compute its rates by its step clock as it is known now; before, they are by the nominal one."""
+    """Make the table compute its rates by its step clock as it is known now; before, they are by the nominal one."""
     table = context.bench.table
     fit = step_clock.fitted([run for run in context.clock_runs if run.used])
     if fit is not None and isinstance(table, OpenLoopTable):
@@ -84,7 +84,7 @@ def _add_run(context: ExecutionContext, table: OpenLoopTable, rate_dps: float, s
     context.recorder.journal.timed_run(timed)
 
 
-def _require_agreement(context: ExecutionContext, found: MeasuredClock, *, first: bool) -> None:
+def _require_agreement(context: ExecutionContext, measured_clock: MeasuredClock, *, first: bool) -> None:
     """Raise StepFailed where runs disagree before data sets rely on them; say it where data sets exist already."""
     name, limit_ppm = context.bench.table.name, context.bench.table.limits.clock_limit_ppm
     change = step_clock.change_ppm(context.clock_runs, context.clock_session) if first else None
@@ -94,59 +94,82 @@ def _require_agreement(context: ExecutionContext, found: MeasuredClock, *, first
             f"{change[1] + LARGEST_CHANGE_PPM:.0f} ppm: {QUIETEN} and resume the campaign, or start a new one where "
             "the controller or its settings were changed"
         )
-    if found.expanded_ppm <= limit_ppm:
+    if measured_clock.expanded_ppm <= limit_ppm:
         return
     text = (
-        f"{name}: the runs that time the step clock disagree: U = {found.expanded_ppm:.0f} ppm (95 %) by the scatter "
-        f"of {found.runs} runs, {1e3 * found.fit.scatter_s:.1f} ms, limit {limit_ppm:g} ppm; {QUIETEN}, or make the "
+        f"{name}: the runs that time the step clock disagree: U = {measured_clock.expanded_ppm:.0f} ppm (95 %) by the "
+        "scatter "
+        f"of {measured_clock.runs} runs, {1e3 * measured_clock.fit.scatter_s:.1f} ms, limit {limit_ppm:g} ppm; "
+        f"{QUIETEN}, or make the "
         "runs longer by clock_run_s in the bench file"
     )
     if first:
         raise StepFailed(text)
     context.recorder.event(
-        Event("table_clock", text, level="warning", device=name, value=found.expanded_ppm, limit=limit_ppm, unit="ppm")
+        Event(
+            "table_clock",
+            text,
+            level="warning",
+            device=name,
+            value=measured_clock.expanded_ppm,
+            limit=limit_ppm,
+            unit="ppm",
+        )
     )
 
 
-def _say_clock(context: ExecutionContext, found: MeasuredClock) -> None:
-    name, beyond = context.bench.table.name, abs(found.deviation_ppm) > found.limit_ppm
+def _say_clock(context: ExecutionContext, measured_clock: MeasuredClock) -> None:
+    name, beyond = context.bench.table.name, abs(measured_clock.deviation_ppm) > measured_clock.limit_ppm
     text = (
-        f"{name}: the step rate is {found.deviation_ppm:+.0f} ppm off step_clock_hz = {found.nominal.nominal_hz:g} Hz, "
-        f"u = {found.u_ppm:.1f} ppm with {found.fit.freedom} degrees of freedom by the scatter of {found.runs} runs "
-        f"({1e3 * found.fit.scatter_s:.1f} ms), limit {found.limit_ppm:.0f} ppm; rates are by the measured clock"
+        f"{name}: the step rate is {measured_clock.deviation_ppm:+.0f} ppm off step_clock_hz = "
+        f"{measured_clock.nominal.nominal_hz:g} Hz, "
+        f"u = {measured_clock.u_ppm:.1f} ppm with {measured_clock.fit.freedom} degrees of freedom by the scatter of "
+        f"{measured_clock.runs} runs "
+        f"({1e3 * measured_clock.fit.scatter_s:.1f} ms), limit {measured_clock.limit_ppm:.0f} ppm; rates are by the "
+        "measured clock"
     )
-    drift = f"{found.fit.drift_ppm_per_h:+.1f} ppm/h, u = {found.fit.drift_u_ppm_per_h:.1f} ppm/h"
-    if found.fit.is_drift_applied:
+    drift = f"{measured_clock.fit.drift_ppm_per_h:+.1f} ppm/h, u = {measured_clock.fit.drift_u_ppm_per_h:.1f} ppm/h"
+    if measured_clock.fit.is_drift_applied:
         text += f"; it drifts by {drift}"
-    elif found.fit.has_drift:
+    elif measured_clock.fit.has_drift:
         text += f"; a drift of {drift}, is not significant: it is not applied, and u contains it"
     if beyond:
-        text += f": set step_clock_hz = {found.nominal.nominal_hz * found.ratio:.0f} in the bench file"
+        text += (
+            f": set step_clock_hz = {measured_clock.nominal.nominal_hz * measured_clock.ratio:.0f} in the bench file"
+        )
     level = "warning" if beyond else "info"
     context.recorder.event(
-        Event("table_clock", text, level, name, value=found.deviation_ppm, limit=found.limit_ppm, unit="ppm")
+        Event(
+            "table_clock",
+            text,
+            level,
+            name,
+            value=measured_clock.deviation_ppm,
+            limit=measured_clock.limit_ppm,
+            unit="ppm",
+        )
     )
 
 
-def _figures(found: MeasuredClock) -> dict[str, float]:
+def _figures(measured_clock: MeasuredClock) -> dict[str, float]:
     return {
-        "step_clock_ratio": found.ratio,
-        "step_clock_hz": found.nominal.nominal_hz * found.ratio,
-        "deviation_ppm": found.deviation_ppm,
-        "u_ppm": found.u_ppm,
-        "freedom": float(found.fit.freedom),
-        "expanded_ppm": found.expanded_ppm,
-        "deviation_expanded_ppm": found.deviation_expanded_ppm,
-        "limit_ppm": found.limit_ppm,
-        "drift_ppm_per_h": found.fit.drift_ppm_per_h,
-        "drift_u_ppm_per_h": found.fit.drift_u_ppm_per_h,
-        "scatter_s": found.fit.scatter_s,
-        "runs": float(found.runs),
+        "step_clock_ratio": measured_clock.ratio,
+        "step_clock_hz": measured_clock.nominal.nominal_hz * measured_clock.ratio,
+        "deviation_ppm": measured_clock.deviation_ppm,
+        "u_ppm": measured_clock.u_ppm,
+        "freedom": float(measured_clock.fit.freedom),
+        "expanded_ppm": measured_clock.expanded_ppm,
+        "deviation_expanded_ppm": measured_clock.deviation_expanded_ppm,
+        "limit_ppm": measured_clock.limit_ppm,
+        "drift_ppm_per_h": measured_clock.fit.drift_ppm_per_h,
+        "drift_u_ppm_per_h": measured_clock.fit.drift_u_ppm_per_h,
+        "scatter_s": measured_clock.fit.scatter_s,
+        "runs": float(measured_clock.runs),
     }
 
 
 def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
-    """Look for missed steps. Those that were found end the campaign, and the data sets since the last check with it.
+    """Check for missed steps. Those that are found end the campaign, and the data sets since the last check with it.
 
     Raises TableStopped, InstrumentError.
     """
@@ -155,52 +178,56 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
         return {}
     stalls = context.monitor.stalls
     stalled_s = stalls.total_s()
-    found = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
+    check = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
     stalled_s = stalls.total_s() - stalled_s
-    if found is not None and found.learning and stalled_s:
+    if check is not None and check.learning and stalled_s:
         context.recorder.event(warning("home_unchecked", f"home is checked again: {not_run(stalled_s)} meanwhile"))
-        found = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
+        check = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
     since, context.unchecked = context.unchecked, []
-    if found is None:
+    if check is None:
         return {}
-    if found.is_missing and stalls.speed * stalled_s / found.step_s < found.missed_steps - found.limit_steps:
-        reason = _missing_text(table.name, found, step.temperature_c)
+    if check.is_missing and stalls.speed * stalled_s / check.step_s < check.missed_steps - check.limit_steps:
+        reason = _missing_text(table.name, check, step.temperature_c)
         for number in since:
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
-        raise TableStopped(reason, {"missed_steps": found.missed_steps, "u_steps": found.u_steps})
-    if found.u_steps > found.limit_steps:
+        raise TableStopped(reason, {"missed_steps": check.missed_steps, "u_steps": check.u_steps})
+    if check.u_steps > check.limit_steps:
         text = (
-            f"{table.name}: the check for missed steps is blind below {COVERAGE * found.u_steps:.0f} steps, limit "
-            f"{found.limit_steps:g} steps, because homings from one place scatter (u = {found.u_steps:.1f} steps)"
+            f"{table.name}: the check for missed steps is blind below {COVERAGE * check.u_steps:.0f} steps, limit "
+            f"{check.limit_steps:g} steps, because homings from one place scatter (u = {check.u_steps:.1f} steps)"
         )
         context.recorder.event(warning("home_uncertain", f"{text}; {QUIETEN}", table.name))
-    if found.is_doubtful or found.is_missing:
+    if check.is_doubtful or check.is_missing:
         text = (
-            f"{table.name}: home seems {found.missed_steps:g} steps from where it was left, limit "
-            f"{found.limit_steps:g} steps, but a late reply explains it (u = {found.u_steps:.1f} steps"
+            f"{table.name}: home seems {check.missed_steps:g} steps from where it was left, limit "
+            f"{check.limit_steps:g} steps, but a late reply explains it (u = {check.u_steps:.1f} steps"
         )
         text += f", {not_run(stalled_s)} meanwhile)" if stalled_s else ")"
         context.recorder.event(warning("home_doubtful", f"{text}; {QUIETEN}", table.name))
-    return {"missed_steps": found.missed_steps, "u_steps": found.u_steps, "limit_steps": found.limit_steps}
+    return {
+        "missed_steps": check.missed_steps,
+        "u_steps": check.u_steps,
+        "limit_steps": check.limit_steps,
+    }
 
 
-def _missing_text(name: str, found: HomeCheck, temperature_c: float) -> str:
-    turn_steps = 360.0 / found.step_deg  # a table that stands beyond home homes by nearly a whole turn
-    missed_steps = math.remainder(found.missed_steps, turn_steps)
-    size = f"{missed_steps:g} steps ({missed_steps * found.step_deg:.3g} deg)"
+def _missing_text(name: str, home_check: HomeCheck, temperature_c: float) -> str:
+    turn_steps = 360.0 / home_check.step_deg  # a table that stands beyond home homes by nearly a whole turn
+    missed_steps = math.remainder(home_check.missed_steps, turn_steps)
+    size = f"{missed_steps:g} steps ({missed_steps * home_check.step_deg:.3g} deg)"
     where = (
         f"about {size} were missed in the short turns from which the homing is learned"
-        if found.learning
+        if home_check.learning
         else f"home is {size} from where it was left"
     )
     return (
-        f"{name}: {where}, u = {found.u_steps:.1f} steps, limit {found.limit_steps:g} steps, "
+        f"{name}: {where}, u = {home_check.u_steps:.1f} steps, limit {home_check.limit_steps:g} steps, "
         f"at {temperature_c:g} deg C; steps were missed: check load, acceleration_dps2 and supply of the motor"
     )
 
 
 def _watched_wait(context: ExecutionContext, wait_s: float) -> None:
-    """Let time pass under control of requests, with the bench watched."""
+    """Wait while requests are obeyed and the bench is watched."""
     until_s = context.clock.now_s() + wait_s
     while (left_s := until_s - context.clock.now_s()) > 0:
         if context.monitor.is_due():

@@ -20,14 +20,14 @@ CHECK_S = 1.0  #: how long the clock runs at most between two polls of the contr
 
 
 def checkpoint(context: ExecutionContext) -> None:
-    """Obey a request to end. Raises Interrupted for a campaign that is to be resumed, else Aborted."""
+    """Check for a request to end. Raises Interrupted for a campaign that is to be resumed, else Aborted."""
     request = context.control.poll()
     if request.abort:
         raise Interrupted(request.reason) if request.resumable else Aborted(request.reason)
 
 
 def pass_time(context: ExecutionContext, duration_s: float, *, pausing: bool = True) -> None:
-    """Let the clock run, with a checkpoint at least once a second. Raises Aborted."""
+    """Wait, with a checkpoint at least once a second. Raises Aborted."""
     until_s = context.clock.now_s() + duration_s
     checkpoint(context)
     while (left_s := until_s - context.clock.now_s()) > 0:
@@ -49,7 +49,7 @@ def polls(context: ExecutionContext, *, pausing: bool = True) -> Iterator[None]:
 
 
 def record_for(context: ExecutionContext, duration_s: float) -> None:
-    """Let time pass with the environment recorded. Raises what `polls` raises."""
+    """Wait while the environment is recorded. Raises what `polls` raises."""
     until_s = context.clock.now_s() + duration_s
     context.poll()
     while (left_s := until_s - context.clock.now_s()) > 0:
@@ -76,7 +76,7 @@ def hold(context: ExecutionContext) -> None:
 
 
 def take_back(context: ExecutionContext) -> None:
-    """Give the chamber the set point again that it had before others changed it. Raises StepFailed."""
+    """Restore the chamber's set point after others changed it. Raises StepFailed."""
     if (given_c := context.monitor.given_c) is None:
         return
     chamber = context.bench.chamber

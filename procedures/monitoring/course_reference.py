@@ -67,17 +67,19 @@ class CourseLog:
 
         Raises StepFailed for too few angles, and for angles that do not follow the course.
         """
-        t_s = np.array([one.t_s for one in self.readings])
+        t_s = np.array([reading.t_s for reading in self.readings])
         needed = ANGLES_EACH * regressors(run.course, np.zeros(1)).shape[1]
         if len(t_s) < needed:
             raise StepFailed(
                 f"{self._name}: its encoder was read {len(t_s)} times during a {run.course.text}, but {needed} angles "
                 "are needed; make it longer, or check the link"
             )
-        angle_deg = np.array([one.angle_deg for one in self.readings])
+        angle_deg = np.array([reading.angle_deg for reading in self.readings])
         since_s = t_s - run.began_s
         own_dps = np.abs(run.course.rate_dps(since_s))
-        u_deg = np.hypot([one.u_deg for one in self.readings], own_dps * [one.u_s for one in self.readings])
+        u_deg = np.hypot(
+            [reading.u_deg for reading in self.readings], own_dps * [reading.u_s for reading in self.readings]
+        )
         design = regressors(run.course, since_s)
         fitted, covariance, excess = _fitted(design, angle_deg - run.course.angle_deg(since_s), u_deg)
         if excess > MOST_EXCESS:
@@ -90,7 +92,9 @@ class CourseLog:
         ends = measured.angle_deg(np.asarray(time.of(np.array([run.began_s, run.ends_s]))))
         mean_dps = float(ends[1] - ends[0]) / run.course.duration_s
         commanded = run.course.angle_deg(np.array([run.course.duration_s]))
-        common_u_s = float(np.mean([one.common_u_s for one in self.readings]))  # as early or late in each answer
+        common_u_s = float(
+            np.mean([reading.common_u_s for reading in self.readings])
+        )  # as early or late in each answer
         by_encoder = CourseTime(_time_u_s(run, covariance), common_u_s)
         return TableAngles(
             tuple(np.asarray(time.of(t_s)).tolist()), tuple(angle_deg.tolist()), mean_dps,
@@ -142,16 +146,16 @@ def _time_u_s(run: CourseRun, covariance: Array) -> float:
     return math.sqrt(max(float(along @ covariance @ along), 0.0))
 
 
-def course_event(table: RateTable, found: TableAngles, course: MeasuredCourse, duration_s: float) -> Event | None:
+def course_event(table: RateTable, angles: TableAngles, course: MeasuredCourse, duration_s: float) -> Event | None:
     """Return a warning where the measured rate differs from the commanded one by more than a share of the largest."""
     at = course.began_s + np.linspace(RATE_OVER_S, duration_s, POINTS)
     measured, commanded = course.rates_dps(at, RATE_OVER_S)
     off_dps, limit_dps = float(np.abs(measured - commanded).max()), NEWS_SHARE * course.course.largest_dps
     if off_dps <= limit_dps:
         return None
-    used = "the encoder is the reference" if found.is_reference else "the commanded rate is the reference"
+    used = "the encoder is the reference" if angles.is_reference else "the commanded rate is the reference"
     text = (
         f"{table.name}: during a {course.course.text} its encoder measures up to {off_dps:.3g} deg/s more or less than "
-        f"was commanded (limit of this message {limit_dps:.3g} deg/s, u {found.rate_u_dps:.2g} deg/s); {used}"
+        f"was commanded (limit of this message {limit_dps:.3g} deg/s, u {angles.rate_u_dps:.2g} deg/s); {used}"
     )
     return Event("table_course", text, level="warning", device=table.name, value=off_dps, limit=limit_dps, unit="deg/s")

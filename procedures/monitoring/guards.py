@@ -172,9 +172,9 @@ def _invalid(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
         yield from _fraction(name, count.invalid, count.base, guards.rules.max_invalid_fraction, "marked bad")
 
 
-def _fraction(name: str, count: int, base: float, limit: float, what: str) -> Iterator[Excess]:
+def _fraction(name: str, count: int, base: float, limit: float, quantity: str) -> Iterator[Excess]:
     if count > 1 + limit * base:  # a single bad reading is never a trend
-        yield Excess(name, 100 * count / base, 100 * limit, "%", f"readings {what}")
+        yield Excess(name, 100 * count / base, 100 * limit, "%", f"readings {quantity}")
 
 
 def _rate(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:

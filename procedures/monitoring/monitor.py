@@ -35,7 +35,7 @@ class LinkStates:
         self._broken: dict[str, LinkState] = {}
 
     def restart(self) -> None:
-        """Forget when any device has answered."""
+        """Reset the times of the devices' last answers."""
         self._heard_s = {}
 
     def heard(self, device: str) -> None:

@@ -53,7 +53,7 @@ class LiveOutput:
 
     def outputs(self) -> tuple[Output, ...]:
         """Return the mean of what each unit sent last, channel by channel; readings it marked bad do not count."""
-        found = []
+        channel_outputs = []
         for name, (channels, readings, t_s) in list(self._last.items()):
             for channel in channels:
                 if not channel.name.startswith("gyro_"):
@@ -61,8 +61,10 @@ class LiveOutput:
                 values = channel.value(readings.raw[channel.name][readings.valid])
                 if n := len(values):
                     spread = float(np.std(values, ddof=1)) if n > 1 else 0.0
-                    found.append(Output(name, channel.name, channel.unit, float(np.mean(values)), spread, n, t_s))
-        return tuple(found)
+                    channel_outputs.append(
+                        Output(name, channel.name, channel.unit, float(np.mean(values)), spread, n, t_s)
+                    )
+        return tuple(channel_outputs)
 
 
 @dataclass(frozen=True)

@@ -58,9 +58,9 @@ class EncoderLog:
                 f"{self._table.name}: its encoder was read {len(self.readings)} times during a data set, but a "
                 f"mean rate needs {LEAST} angles; take longer data sets, or check the link"
             )
-        t_s = np.array([one.t_s for one in self.readings])
-        angle_deg = np.array([one.angle_deg for one in self.readings])
-        u_deg = np.array([math.hypot(one.u_deg, spin.rate_dps * one.u_s) for one in self.readings])
+        t_s = np.array([reading.t_s for reading in self.readings])
+        angle_deg = np.array([reading.angle_deg for reading in self.readings])
+        u_deg = np.array([math.hypot(reading.u_deg, spin.rate_dps * reading.u_s) for reading in self.readings])
         rate_dps, u_dps, from_deg = fitted_line(t_s - gate_from_s, angle_deg, u_deg)
         if spin.rate_dps == 0 and abs(rate_dps) <= COVERAGE * u_dps:
             rate_dps = 0.0  # it holds its angle
@@ -92,18 +92,18 @@ def fitted_line(
     return slope, excess / math.sqrt(spread), middle_deg - slope * middle_s
 
 
-def rate_event(table: RateTable, found: TableAngles) -> Event | None:
+def rate_event(table: RateTable, angles: TableAngles) -> Event | None:
     """Return a warning where the table does not turn as commanded; None where that is within the uncertainties."""
-    if not isinstance(table, EncoderTable) or found.computed_dps == 0:
+    if not isinstance(table, EncoderTable) or angles.computed_dps == 0:
         return None
-    off_ppm = 1e6 * (found.rate_dps / found.computed_dps - 1)
-    u_ppm = 1e6 * found.rate_u_dps / abs(found.computed_dps)
+    off_ppm = 1e6 * (angles.rate_dps / angles.computed_dps - 1)
+    u_ppm = 1e6 * angles.rate_u_dps / abs(angles.computed_dps)
     limit_ppm = COVERAGE * math.hypot(u_ppm, table.rate_u_ppm)
     if abs(off_ppm) <= limit_ppm:
         return None
     used = (
         "the encoder is the reference, so this difference does not affect a calibration"
-        if found.is_reference
+        if angles.is_reference
         else (
             "the demanded rate is the reference, so this difference becomes part of the scale factor: set "
             'reference = "measured" in the bench file'
@@ -111,7 +111,7 @@ def rate_event(table: RateTable, found: TableAngles) -> Event | None:
     )
     text = (
         f"{table.name}: table_rate_ratio {off_ppm:+.0f} ppm (u {u_ppm:.0f} ppm, limit {limit_ppm:.0f} ppm): its "
-        f"encoder measures {found.rate_dps:.5f} deg/s, but {found.computed_dps:g} deg/s was demanded; {used}"
+        f"encoder measures {angles.rate_dps:.5f} deg/s, but {angles.computed_dps:g} deg/s was demanded; {used}"
     )
     return Event(
         "table_rate_ratio", text, level="warning", device=table.name, value=off_ppm, limit=limit_ppm, unit="ppm"

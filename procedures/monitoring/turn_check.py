@@ -60,11 +60,13 @@ class Stillness:
     part: int  #: readings of the means that are compared
 
     @classmethod
-    def of(cls, rest: Course, still_dps: float) -> Stillness:
+    def of(cls, course_at_rest: Course, still_dps: float) -> Stillness:
         """Return the stillness that a rest shows."""
-        n = _part(rest.sample_rate_hz)
-        limits = {axis: _limit_dps(rest.rate_dps(axis), n, still_dps) for axis in rest.outputs}
-        return cls(rest.outputs, {axis: rest.mean_dps(axis) for axis in rest.outputs}, limits, n)
+        n = _part(course_at_rest.sample_rate_hz)
+        limits = {axis: _limit_dps(course_at_rest.rate_dps(axis), n, still_dps) for axis in course_at_rest.outputs}
+        return cls(
+            course_at_rest.outputs, {axis: course_at_rest.mean_dps(axis) for axis in course_at_rest.outputs}, limits, n
+        )
 
     def is_left(self, readings: Readings) -> bool:
         """Return whether a unit moved in a block of readings. One that it marked bad may be at its limit."""
@@ -123,11 +125,11 @@ def _at_limit(unit: UnitTurn) -> str:
     )
 
 
-def moved(rest: Course, still_dps: float, when: str) -> str:
+def moved(course_at_rest: Course, still_dps: float, when: str) -> str:
     """Return what moved in a rest, empty when nothing did: its mean over parts of a quarter of a second changed."""
-    n = _part(rest.sample_rate_hz)
-    for axis in rest.outputs:
-        rates = rest.rate_dps(axis)
+    n = _part(course_at_rest.sample_rate_hz)
+    for axis in course_at_rest.outputs:
+        rates = course_at_rest.rate_dps(axis)
         parts = _means(rates, n)
         off = float(np.abs(parts - np.median(parts)).max()) if len(parts) > 1 else 0.0
         if off > _limit_dps(rates, n, still_dps):
@@ -179,13 +181,15 @@ def _other_axis(step: Turn, axis: str, angles: dict[str, float]) -> str:
 
 
 def _angle(step: Turn, rules: TurnRules, came_deg: float, axis: str) -> str:
-    asked = step.turn_deg
-    if abs(came_deg) < NOTHING_SHARE * abs(asked):
-        return f"the unit turned by only {abs(came_deg):.0f} deg about axis {axis} instead of {abs(asked):g} deg"
-    if came_deg * asked < 0:
-        sense = "clockwise" if asked > 0 else "counter-clockwise"
+    commanded_deg = step.turn_deg
+    if abs(came_deg) < NOTHING_SHARE * abs(commanded_deg):
+        return (
+            f"the unit turned by only {abs(came_deg):.0f} deg about axis {axis} instead of {abs(commanded_deg):g} deg"
+        )
+    if came_deg * commanded_deg < 0:
+        sense = "clockwise" if commanded_deg > 0 else "counter-clockwise"
         return f"the unit turned by {abs(came_deg):.0f} deg in the wrong direction, {sense}"
-    if abs(came_deg - asked) <= max(rules.tolerance * abs(asked), UNCERTAINTIES * step.turn_u_deg):
+    if abs(came_deg - commanded_deg) <= max(rules.tolerance * abs(commanded_deg), UNCERTAINTIES * step.turn_u_deg):
         return ""
-    only = "only " if abs(came_deg) < abs(asked) else ""
-    return f"the unit turned by {only}{abs(came_deg):.0f} deg about axis {axis} instead of {abs(asked):g} deg"
+    only = "only " if abs(came_deg) < abs(commanded_deg) else ""
+    return f"the unit turned by {only}{abs(came_deg):.0f} deg about axis {axis} instead of {abs(commanded_deg):g} deg"

@@ -36,16 +36,18 @@ def nominal_outputs(
     channels: tuple[Channel, ...], output: Mapping[str, Mapping[str, float | str]]
 ) -> dict[str, Nominal]:
     """Return axis -> nominal law of each gyro channel, by the unit's own statement where it makes one."""
-    found = {}
+    by_axis = {}
     for channel in channels:
         if not channel.name.startswith(PREFIX):
             continue
         axis = channel.name.removeprefix(PREFIX)
-        said = output.get(axis, {})
-        usual = RATE_UNITS.get(str(said.get("unit", channel.unit)), 1.0)
-        unit, scale = str(said.get("unit", channel.unit)), float(said.get("scale", usual))
-        found[axis] = Nominal(channel, float(said.get("offset", 0.0)), scale, unit in RATE_UNITS or "scale" in said)
-    return found
+        nominal = output.get(axis, {})
+        usual = RATE_UNITS.get(str(nominal.get("unit", channel.unit)), 1.0)
+        unit, scale = str(nominal.get("unit", channel.unit)), float(nominal.get("scale", usual))
+        by_axis[axis] = Nominal(
+            channel, float(nominal.get("offset", 0.0)), scale, unit in RATE_UNITS or "scale" in nominal
+        )
+    return by_axis
 
 
 @dataclass

@@ -41,7 +41,7 @@ class UnitResponse:
 
     def expect(self, name: str, outputs: Mapping[str, Nominal]) -> None:
         """Take note of what the channels of a unit mean; those without a nominal scale factor are left out."""
-        self._outputs[name] = {axis: each for axis, each in outputs.items() if each.is_scaled}
+        self._outputs[name] = {axis: output for axis, output in outputs.items() if output.is_scaled}
 
     def begin(self, mounting: tuple[int, int]) -> None:
         """Begin a data set of a mounting and powered session."""

@@ -167,18 +167,18 @@ def make_plan(recipe: Recipe, limits: BenchLimits, *, clip: bool = False) -> Pla
 def _refuse_endless(recipe: Recipe) -> None:
     """Refuse what no bench would ever finish, before it is written down step by step."""
     rates = len(recipe.rates_dps) * (recipe.repeats + 1)
-    asked = len(recipe.positions) * (len(recipe.temperatures_c) + 1) * rates
+    data_sets = len(recipe.positions) * (len(recipe.temperatures_c) + 1) * rates
     if (turned := recipe.indexing) is not None:
         mountings = len(recipe.positions) * (len(turned.unit_deg) + len(turned.fixture_deg))
-        asked += mountings * len(turned.temperatures_c) * len(turned.rates_dps)
+        data_sets += mountings * len(turned.temperatures_c) * len(turned.rates_dps)
     if recipe.inverted is not None:
-        asked += len(recipe.positions) * len(recipe.inverted.temperatures_c) * len(recipe.inverted.rates_dps)
+        data_sets += len(recipe.positions) * len(recipe.inverted.temperatures_c) * len(recipe.inverted.rates_dps)
     if recipe.power_cycle is not None:
-        asked += recipe.power_cycle.count * len(recipe.power_cycle.rates_dps)
+        data_sets += recipe.power_cycle.count * len(recipe.power_cycle.rates_dps)
     if (verify := recipe.verification) is not None:
-        asked += len(verify.positions or recipe.positions) * verify.temperatures * verify.rates
+        data_sets += len(verify.positions or recipe.positions) * verify.temperatures * verify.rates
     if recipe.turns is not None:
-        asked = DATA_SETS_OF_TURN * len(recipe.positions) * len(recipe.turns.turns_deg) * recipe.turns.repeats
-    if asked > MOST_DATASETS:
-        text = f"about {asked} data sets, but a campaign may have at most {MOST_DATASETS}"
+        data_sets = DATA_SETS_OF_TURN * len(recipe.positions) * len(recipe.turns.turns_deg) * recipe.turns.repeats
+    if data_sets > MOST_DATASETS:
+        text = f"about {data_sets} data sets, but a campaign may have at most {MOST_DATASETS}"
         raise PlanRefused(recipe.name, [text], "Ask for fewer rates, temperatures or repeats.")

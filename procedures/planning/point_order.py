@@ -43,8 +43,8 @@ def verification_blocks(recipe: Recipe) -> list[MountingBlock]:
         return []
     positions = rules.positions or recipe.positions
     lot = np.random.default_rng(rules.seed)
-    warm = _drawn(recipe.temperatures_c, len(positions) * rules.temperatures, lot)
-    shares = np.sort(lot.permutation(warm).reshape(len(positions), rules.temperatures), axis=1)
+    temperatures_c = _drawn(recipe.temperatures_c, len(positions) * rules.temperatures, lot)
+    shares = np.sort(lot.permutation(temperatures_c).reshape(len(positions), rules.temperatures), axis=1)
     return [
         MountingBlock(
             position,
@@ -90,7 +90,7 @@ def _blocks(recipe: Recipe) -> list[MountingBlock]:
         visits = [(position, (temperature,)) for temperature in temperatures for position in recipe.positions]
     blocks: list[MountingBlock] = []
     for position, levels in visits:
-        blocks.append(MountingBlock(position, tuple(Level(each, recipe.rates_dps) for each in levels)))
+        blocks.append(MountingBlock(position, tuple(Level(level, recipe.rates_dps) for level in levels)))
         blocks += _turned(recipe, position, levels)
     return _merged(blocks)
 
@@ -104,15 +104,15 @@ def _turned(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[M
         tables.append((rules, [*of_unit, *(replace(straight, fixture_deg=angle) for angle in rules.fixture_deg)]))
     if recipe.inverted is not None:
         tables.append((recipe.inverted, [straight.upside_down]))
-    found = []
+    blocks = []
     for table, positions in tables:
-        wanted = table.temperatures_c
+        order_c = table.temperatures_c
         if recipe.order == "temperature-major":
-            wanted = tuple(each for each in wanted if each in visited)
-        levels = tuple(Level(each, table.rates_dps) for each in wanted)
+            order_c = tuple(each for each in order_c if each in visited)
+        levels = tuple(Level(each, table.rates_dps) for each in order_c)
         hold_s = table.hold_s if isinstance(table, Indexing) else None
-        found += [MountingBlock(str(each), levels, same_session=True, hold_s=hold_s) for each in positions if levels]
-    return found
+        blocks += [MountingBlock(str(each), levels, same_session=True, hold_s=hold_s) for each in positions if levels]
+    return blocks
 
 
 def _merged(blocks: list[MountingBlock]) -> list[MountingBlock]:

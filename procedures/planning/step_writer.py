@@ -67,7 +67,7 @@ class _StepWriter:
             self.measure(block)
         self.power_cycles()
         for block in verification_blocks(self.recipe):
-            levels = tuple(Level(each.temperature_c, self.runnable(each.rates_dps)) for each in block.levels)
+            levels = tuple(Level(level.temperature_c, self.runnable(level.rates_dps)) for level in block.levels)
             self.measure(replace(block, levels=levels))
         if any(isinstance(step, Acquire) and step.rate_dps for step in self.steps[self.timed_at :]):
             self.measure_clock(LATER_RUNS)
@@ -113,7 +113,7 @@ class _StepWriter:
             self.measure_clock(LATER_RUNS)
 
     def check_home(self, level: Level) -> None:
-        """Look for missed steps, where the table does that and turns at this level."""
+        """Write a check for missed steps, where the table does that and turns at this level."""
         table = self.limits.table
         if table is not None and table.checks_home and any(level.rates_dps):
             earlier = self.limits.earlier

@@ -82,11 +82,11 @@ class Recipe(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _without_rates(cls, given: Any) -> Any:
-        """Give a recipe of turns no rates and no temperatures."""
-        if isinstance(given, dict) and given.get("turns") is not None:
-            return {"temperatures_c": (), "rates_dps": (), **given}
-        return given
+    def _without_rates(cls, document: Any) -> Any:
+        """Fill in empty rates and temperatures in a recipe of turns."""
+        if isinstance(document, dict) and document.get("turns") is not None:
+            return {"temperatures_c": (), "rates_dps": (), **document}
+        return document
 
     @field_validator(*_OF_RATES)
     @classmethod
@@ -121,30 +121,32 @@ def read_recipe(source: str | Path) -> Recipe:
     except tomllib.TOMLDecodeError as error:
         raise RecipeError(f"recipe {path}: not TOML: {error}; correct it") from error
     except FileNotFoundError:
-        known = ", ".join(shipped_recipes())
+        recipe_names = ", ".join(shipped_recipes())
         raise RecipeError(
-            f"there is no recipe {str(source)!r}; give a recipe file, or one of the names {known}"
+            f"there is no recipe {str(source)!r}; give a recipe file, or one of the names {recipe_names}"
         ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise RecipeError(f"recipe {path}: cannot be read: {error}; check path and permissions") from error
-    return parse_recipe(text, where=str(path))
+    return parse_recipe(text, source=str(path))
 
 
-def parse_recipe(text: str, *, where: str = "recipe") -> Recipe:
-    """Read a recipe from TOML text; `where` names it in errors. Raises RecipeError."""
+def parse_recipe(text: str, *, source: str = "recipe") -> Recipe:
+    """Read a recipe from TOML text; `source` names it in errors. Raises RecipeError."""
     try:
         return Recipe.model_validate(parse_toml(text))
     except tomllib.TOMLDecodeError as error:
-        raise RecipeError(f"{where}: not TOML: {error}; correct it") from error
+        raise RecipeError(f"{source}: not TOML: {error}; correct it") from error
     except ValidationError as error:
-        raise RecipeError(f"{where}: {_complaints(error)}") from error
+        raise RecipeError(f"{source}: {_complaints(error)}") from error
 
 
 def _complaints(error: ValidationError) -> str:
     """Return everything that is wrong in one line; a list that is empty only because of its items is not said twice."""
-    found: list[dict[str, Any]] = [dict(each) for each in error.errors()]
-    blamed = [each["loc"][:-1] for each in found]
-    return listed(_complaint(each) for each in found if not (each["type"] == "too_short" and each["loc"] in blamed))
+    details: list[dict[str, Any]] = [dict(each) for each in error.errors()]
+    blamed = [detail["loc"][:-1] for detail in details]
+    return listed(
+        _complaint(detail) for detail in details if not (detail["type"] == "too_short" and detail["loc"] in blamed)
+    )
 
 
 def _complaint(error: dict[str, Any]) -> str:
@@ -166,5 +168,7 @@ def _keys(location: list[str]) -> list[str]:
     for part in location:
         field = table.model_fields.get(part)
         options = [field.annotation, *getattr(field.annotation, "__args__", ())] if field else []
-        table = next((each for each in options if isinstance(each, type) and issubclass(each, BaseModel)), Recipe)
+        table = next(
+            (option for option in options if isinstance(option, type) and issubclass(option, BaseModel)), Recipe
+        )
     return list(table.model_fields)

@@ -53,7 +53,7 @@ def test_a_unit_that_is_set_otherwise_is_refused(calibration: Calibration) -> No
     )
 
 
-def test_what_is_exported_says_it(calibration: Calibration) -> None:
+def test_exports_state_the_configuration(calibration: Calibration) -> None:
     header, _ = exported(calibration, "c")
     assert " * The unit was set to: filter_hz = 262; firmware = 12.\n" in header
     module: dict[str, Any] = {}

@@ -75,7 +75,7 @@ def test_the_page_has_the_numbers_of_the_study(small: dict[str, list[Row]]) -> N
     assert NOTES in text
 
 
-def test_what_is_worse_is_said(small: dict[str, list[Row]]) -> None:
+def test_agreement_with_published_values_is_classified(small: dict[str, list[Row]]) -> None:
     worse = Row("error, deg/s", Value(1.2), Value(1.0))
     assert worse.agreement == "labctl worse"
     assert Row("error, deg/s", Value(0.8), Value(1.0)).agreement == "labctl better"

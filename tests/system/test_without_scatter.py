@@ -32,7 +32,7 @@ def without_scatter(per_set: int, step_dps: float) -> Recording:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_it_goes_the_whole_way(tmp_path: Path, case: str) -> None:
+def test_data_without_scatter_pass_through_fit_and_criticism(tmp_path: Path, case: str) -> None:
     write_recording(without_scatter(*CASES[case]), tmp_path / "made")
     lab = Lab(tmp_path)
     lab.run("import", str(tmp_path / "made"))

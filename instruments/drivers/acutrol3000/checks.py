@@ -17,18 +17,18 @@ CLOSE_S, POLL_S = 15.0, 0.2
 def numbers(device: str, text: str, least: int) -> list[float]:
     """Return the numbers of a reply, separated by commas or semicolons; raises MalformedReply for fewer or others."""
     try:
-        found = [float(part) for part in re.split("[;,]", text) if part.strip()]
+        values = [float(part) for part in re.split("[;,]", text) if part.strip()]
     except ValueError:
-        found = []
-    if len(found) < least:
+        values = []
+    if len(values) < least:
         raise MalformedReply(device, f"answered {text!r}, but {least} numbers were expected; check axis and cable")
-    return found
+    return values
 
 
-def check_factory_limits(device: str, settings: Acutrol3000Settings, found: list[float]) -> None:
+def check_factory_limits(device: str, settings: Acutrol3000Settings, limits: list[float]) -> None:
     """Compare rate and acceleration of the bench file with the controller's absolute limits; raises WrongInstrument."""
-    wanted = {"max_rate_dps": settings.max_rate_dps, "acceleration_dps2": settings.acceleration_dps2}
-    for (key, value), limit in zip(wanted.items(), found, strict=False):
+    expected = {"max_rate_dps": settings.max_rate_dps, "acceleration_dps2": settings.acceleration_dps2}
+    for (key, value), limit in zip(expected.items(), limits, strict=False):
         if value > limit * (1 + 1e-9):
             raise WrongInstrument(
                 device,
@@ -47,12 +47,12 @@ def interlock_cause(device: str, axis: int, link: AcutrolLink) -> str:
     state = interlock(axis, link)
     if state == acl.CLOSED:
         return ""
-    found = [
+    causes = [
         name
         for register, names in (("INTLK", acl.INTERLOCKS), ("SWFLT", acl.SOFTWARE_FAULTS))
         for name in acl.named_bits(int(numbers(device, link.ask(acl.register(f"A{axis}{register}")), 1)[0]), names)
     ]
-    named = f" ({', '.join(found)})" if found else ""
+    named = f" ({', '.join(causes)})" if causes else ""
     return f"; its interlock is {'at fault' if state == acl.FAULT else 'open'}{named}"
 
 

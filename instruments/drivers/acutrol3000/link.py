@@ -134,8 +134,8 @@ class AcutrolLink:
 
     def _read(self, port: SerialPort, size: int, deadline_s: float) -> bytes:
         """Return so many bytes; raises NoReply where they do not come by the deadline."""
-        found = b""
-        while len(found) < size:
+        received = b""
+        while len(received) < size:
             left_s = deadline_s - self._clock.now_s()
             if left_s <= 0:
                 raise NoReply(
@@ -144,8 +144,8 @@ class AcutrolLink:
                     "address, and that the interface of the controller is active",
                 )
             port.timeout = self._ports.port_timeout_s(self.url, left_s, device=self._device)
-            found += bytes(port.read(size - len(found)))
-        return found
+            received += bytes(port.read(size - len(received)))
+        return received
 
     def _drain(self, port: SerialPort, quiet_s: float, longest_s: float) -> None:
         """Read until nothing has come for a while; bounded."""

@@ -72,7 +72,7 @@ class Acutrol3000:
         return round(rate_dps, acl.DECIMALS)
 
     def home(self) -> None:
-        """Control the table to the zero of its encoder, by the shorter way.
+        """Turn the table to the zero of its encoder, by the shorter way.
 
         Raises RequestRejected for an open interlock that does not close, NoReply, MalformedReply, LinkError.
         """
@@ -91,7 +91,7 @@ class Acutrol3000:
             self._clock.sleep(POLL_S)
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
-        """Control the table to a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
+        """Turn the table at a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
 
         Raises LimitError (nothing was sent), RequestRejected, NoReply, MalformedReply, LinkError.
         """
@@ -105,11 +105,11 @@ class Acutrol3000:
             ramp_s = self._ramp_s(demand_dps)
             sleep_until(self._clock, self._clock.now_s() + ramp_s)
             self._await_rate(demand_dps, self._clock.now_s() + self._tolerated_s(ramp_s))
-        found = self.read_angle()
-        return Spin(rate_dps, demand_dps, found.t_s, self._clock.now_s() + steady_s + SPARE_S, found.angle_deg)
+        angle_deg = self.read_angle()
+        return Spin(rate_dps, demand_dps, angle_deg.t_s, self._clock.now_s() + steady_s + SPARE_S, angle_deg.angle_deg)
 
     def settle(self, spin: Spin) -> None:
-        """Control the end of a run: stop the table, and return when it is at rest.
+        """Stop the table and return when it is at rest.
 
         Raises RequestRejected where it stopped by itself before, NoReply, MalformedReply, LinkError.
         """
@@ -124,7 +124,7 @@ class Acutrol3000:
             )
 
     def begin_course(self, course: RateCourse) -> CourseRun:
-        """Bring the table to the rate from which a course begins, then begin it.
+        """Turn the table at the rate from which a course begins, then begin it.
 
         Raises LimitError (nothing was sent), RequestRejected, NoReply, MalformedReply, LinkError.
         """
@@ -144,7 +144,7 @@ class Acutrol3000:
         return self._courses.angle(run)
 
     def end_course(self, run: CourseRun) -> None:
-        """Control the table to rest, and set the limits of constant rates again.
+        """Stop the table and set the limits of constant rates again.
 
         Raises RequestRejected where an interlock ended the course, NoReply, MalformedReply, LinkError.
         """
@@ -153,7 +153,7 @@ class Acutrol3000:
         self._prepare()
 
     def stop(self) -> None:
-        """Control the table to rest (Off mode). It is sent before anything is read; raises LinkError."""
+        """Stop the table (Off mode). The command is sent before anything is read; raises LinkError."""
         self._rate_dps, self._last = 0.0, None
         self._link.send_stop(acl.off(self._axis))
 
@@ -199,7 +199,7 @@ class Acutrol3000:
         return self._last
 
     def close(self) -> None:
-        """Control the link: close it; safe to call twice. The table goes on as commanded."""
+        """Close the link; safe to call twice. The table goes on as commanded."""
         self._link.close()
 
     @property
@@ -228,12 +228,12 @@ class Acutrol3000:
             self._link.ask(acl.limit_acceleration(mode, self._axis, acceleration))
         self._link.ask(acl.limit_rate(acl.POSITION, self._axis, self._home_dps))
         self._link.ask(acl.limit_rate(acl.RATE, self._axis, self.settings.max_rate_dps))
-        for name, wanted in (("Rate", self.settings.max_rate_dps), ("Acceleration", acceleration)):
-            (found,) = self._numbers(f":Limit:{name}? {acl.RATE},{self._axis}", 1)
-            if not math.isclose(found, wanted, rel_tol=1e-4):
+        for name, expected in (("Rate", self.settings.max_rate_dps), ("Acceleration", acceleration)):
+            (limit,) = self._numbers(f":Limit:{name}? {acl.RATE},{self._axis}", 1)
+            if not math.isclose(limit, expected, rel_tol=1e-4):
                 raise RequestRejected(
                     self.name,
-                    f"limits the {name.lower()} to {found:g}, but labctl set {wanted:g}; query :Limit:Absolute? "
+                    f"limits the {name.lower()} to {limit:g}, but labctl set {expected:g}; query :Limit:Absolute? "
                     "of the controller, then correct max_rate_dps and acceleration_dps2 in the bench file",
                 )
 
@@ -256,12 +256,12 @@ class Acutrol3000:
                 raise NoReply(self.name, "the table still turns after the command Off; press its stop switch")
             self._clock.sleep(POLL_S)
 
-    def _demand_time(self, deadline_s: float, what: str) -> None:
+    def _demand_time(self, deadline_s: float, purpose: str) -> None:
         """Stop the table and say why, after the deadline or once the interlock is not closed any more."""
         cause = self._cause()
         if cause or self._clock.now_s() > deadline_s:
             self.stop()
-            raise RequestRejected(self.name, what + (cause or "; check load, limits and mode of the controller"))
+            raise RequestRejected(self.name, purpose + (cause or "; check load, limits and mode of the controller"))
 
     def _quickest_answer(self, message: str) -> tuple[str, float, float]:
         """Return the answer that came quickest to a few equal questions, where answers are quick, and its times."""

@@ -19,7 +19,7 @@ def analog_channels(settings: AnalogSettings, scaling: list[tuple[float, float]]
     `scaling` holds (V per code, code at 0 V) of each input. A raw value is the sum of `average` codes.
     """
     options = settings.options
-    found = [
+    channels = [
         Channel(f"gyro_{axis}", "V", v_per_code / options.average, -centre * v_per_code)
         for axis, (v_per_code, centre) in zip(settings.axes, scaling, strict=False)
     ]
@@ -27,8 +27,8 @@ def analog_channels(settings: AnalogSettings, scaling: list[tuple[float, float]]
         v_per_code, centre = scaling[-1]
         per_v = options.thermometer_c_per_v
         zero_c = options.thermometer_zero_c - centre * v_per_code * per_v
-        found.append(Channel("temperature_c", "deg C", per_v * v_per_code / options.average, zero_c))
-    return tuple(found)
+        channels.append(Channel("temperature_c", "deg C", per_v * v_per_code / options.average, zero_c))
+    return tuple(channels)
 
 
 def analog_identity(settings: AnalogSettings, model: str, reported: dict[str, str]) -> GyroIdentity:

@@ -80,7 +80,7 @@ class LabJackGyro:
         return analog_identity(self.settings, f"analog gyro on {self._model}", self._said)
 
     def start(self) -> None:
-        """Control the stream: set it up and begin; one that runs goes on. Raises InstrumentError."""
+        """Set up and start the stream; one that runs goes on. Raises InstrumentError."""
         if self._stream.is_open:
             self._discard()
             return
@@ -88,13 +88,13 @@ class LabJackGyro:
         self._stream.open()
         self._readings.start(self._clock.now_s())
         self._registers.put(lj.ENABLE, 1)
-        found = self._registers.get(lj.SCAN_RATE)
-        if abs(found / self.scans_per_s - 1.0) > RATE_TOLERANCE:
+        scan_rate_hz = self._registers.get(lj.SCAN_RATE)
+        if abs(scan_rate_hz / self.scans_per_s - 1.0) > RATE_TOLERANCE:
             self.stop()
             raise WrongInstrument(
                 self.name,
-                f"scans {found:g} times per second, but the bench file states {self.scans_per_s:g}; set "
-                f"sample_rate_hz = {found:g}",
+                f"scans {scan_rate_hz:g} times per second, but the bench file states {self.scans_per_s:g}; set "
+                f"sample_rate_hz = {scan_rate_hz:g}",
             )
         self._discard()
         self._last_s = self._clock.now_s()
@@ -122,7 +122,7 @@ class LabJackGyro:
         raise self._silent(SILENCE_S)
 
     def stop(self) -> None:
-        """Control the stream: end it and close both links; safe to call twice, and without a reply."""
+        """Stop the stream and close both links; safe to call twice, and without a reply."""
         if self._stream.is_open:
             self._stream.close()
             with contextlib.suppress(InstrumentError):  # the next start ends a stream that goes on
@@ -142,32 +142,32 @@ class LabJackGyro:
             self._said = {"inputs": f"{self._model} {self._registers.get_int(lj.SERIAL_NUMBER)}"}
             constants = self._constants()
             scalings = [self._scaling_of(product, constants, number) for number in self._inputs]
-            self._scaling = [(each.slope_v, each.centre) for each in scalings]
+            self._scaling = [(scaling.slope_v, scaling.centre) for scaling in scalings]
         return self._scaling
 
     def _scaling_of(self, product: int, constants: list[float], number: int) -> lj.Scaling:
         if product == lj.T4:
             return lj.t4_scaling(constants, number)
         try:
-            found = lj.t7_scaling(constants, lj.gain_index(self.settings.options.range_v))
+            scaling = lj.t7_scaling(constants, lj.gain_index(self.settings.options.range_v))
         except ValueError as error:
             raise LimitError(self.name, f"{error}; correct options.range_v in the bench file") from error
-        if found.kink > lj.LARGEST_KINK:
+        if scaling.kink > lj.LARGEST_KINK:
             raise WrongInstrument(
                 self.name,
-                f"the slopes of its input below and above mid-range differ by {1e6 * found.kink:.0f} ppm, limit "
+                f"the slopes of its input below and above mid-range differ by {1e6 * scaling.kink:.0f} ppm, limit "
                 f"{1e6 * lj.LARGEST_KINK:.0f} ppm; check the calibration of the device",
             )
-        return found
+        return scaling
 
     def _constants(self) -> list[float]:
         """Return the calibration constants from the device's flash."""
-        found: list[float] = []
+        constants: list[float] = []
         for frame in range(2):
             self._registers.put(lj.FLASH_POINTER, lj.CONSTANTS_AT + 4 * lj.FRAME * frame)
             words = self._registers.words(lj.FLASH, 2 * lj.FRAME)
-            found += struct.unpack(f">{lj.FRAME}f", struct.pack(f">{len(words)}H", *words))
-        return found
+            constants += struct.unpack(f">{lj.FRAME}f", struct.pack(f">{len(words)}H", *words))
+        return constants
 
     def _configure(self) -> None:
         """End a stream that runs, and set up inputs and stream."""
@@ -195,8 +195,8 @@ class LabJackGyro:
     def _scans_per_packet(self) -> int:
         """Scans of a packet: whole readings where they fit."""
         average, most = self.settings.options.average, lj.MOST_SAMPLES_PER_PACKET // len(self._inputs)
-        wanted = min(max(round(self.scans_per_s / PACKETS_PER_S), 1), most)
-        return wanted if average > wanted else wanted - wanted % average
+        scans = min(max(round(self.scans_per_s / PACKETS_PER_S), 1), most)
+        return scans if average > scans else scans - scans % average
 
     def _discard(self) -> None:
         self._stream.discard_input()
@@ -214,11 +214,12 @@ class LabJackGyro:
     def _decode(self, data: bytes) -> Readings:
         packets, self._unfinished, damaged = stream.split(self._unfinished + data)
         for packet in packets:
-            if (why := stream.FATAL.get(packet.status)) is not None:
+            if (reason := stream.FATAL.get(packet.status)) is not None:
                 self.stop()
                 raise LinkError(
                     self.name,
-                    f"the stream ended (status {packet.status}): {why}; check the device, then start the stream again",
+                    f"the stream ended (status {packet.status}): {reason}; check the device, then start the stream "
+                    "again",
                 )
         numbers, codes, behind = self._packets.add(packets)
         good = np.all((codes > LOWEST_CODE) & (codes < HIGHEST_CODE), axis=1)

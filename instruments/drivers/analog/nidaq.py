@@ -90,10 +90,10 @@ class NidaqmxTask:
         if self._task is None:
             raise LinkError(self.name, f"the scans of {self._settings.address} were not started; start them first")
         try:
-            found = self._task.read(number_of_samples_per_channel=-1, timeout=0.0)
+            samples = self._task.read(number_of_samples_per_channel=-1, timeout=0.0)
         except Exception as error:
             raise self._failed("read the scans", error) from error
-        return np.asarray(found, dtype=np.float64).reshape(len(self._settings.options.all_inputs), -1)
+        return np.asarray(samples, dtype=np.float64).reshape(len(self._settings.options.all_inputs), -1)
 
     def close(self) -> None:
         """End the scans; safe to call twice. Raises LinkError."""
@@ -154,7 +154,7 @@ class NidaqmxTask:
             return LinkError(self.name, f"the package {PACKAGE} is not installed; run `{command}`")
         return LinkError(self.name, f"{PACKAGE} needs the module {error.name}, which is not installed; run `{command}`")
 
-    def _failed(self, what: str, error: Exception) -> LinkError:
+    def _failed(self, purpose: str, error: Exception) -> LinkError:
         """Return an error of nidaqmx as one line; the scans must be started again.
 
         A buffer that ran over (error -200279) is one of them: the number of scans that are missing is not known, so the
@@ -171,14 +171,14 @@ class NidaqmxTask:
         if status in (RpcStatus.DEADLINE_EXCEEDED, RpcStatus.UNAVAILABLE):
             return NoReply(
                 self.name,
-                f"cannot {what} of {settings.address}: NI's gRPC device server does not answer ({one_line(error)}); "
+                f"cannot {purpose} of {settings.address}: NI's gRPC device server does not answer ({one_line(error)}); "
                 "check host, tcp_port, network, and that the server is running",
             )
         code = getattr(error, "error_code", None)
         text = f"error {code}: {one_line(error)}" if code is not None else one_line(error)
         software = "driver software" if settings.host is None else "the driver software of the server"
         return LinkError(
-            self.name, f"cannot {what} of {settings.address} ({text}); check device name, cable and {software}"
+            self.name, f"cannot {purpose} of {settings.address} ({text}); check device name, cable and {software}"
         )
 
     def _close_channel(self) -> None:
@@ -234,24 +234,24 @@ class NidaqGyro:
         """Get the unit's identity by the bench file, after one reading came; raises LinkError, NoReply."""
         was_open = self._task.is_open
         self.start()
-        said = {"inputs": f"{self._task.product() or 'NI-DAQ'} {self.settings.device}"}
+        reported = {"inputs": f"{self._task.product() or 'NI-DAQ'} {self.settings.device}"}
         self.read_latest()
         if not was_open:
             self.stop()
-        return analog_identity(self.settings, f"analog gyro on {said['inputs']}", said)
+        return analog_identity(self.settings, f"analog gyro on {reported['inputs']}", reported)
 
     def start(self) -> None:
-        """Control the scans: begin; those that run go on. Raises LinkError, WrongInstrument for another rate."""
+        """Start the scans; those that run go on. Raises LinkError, WrongInstrument for another rate."""
         if self._task.is_open:
             self._discard()
             return
-        found, wanted = self._task.open(), self.settings.scans_per_s
-        if abs(found / wanted - 1.0) > RATE_TOLERANCE:
+        scan_rate_hz, requested_hz = self._task.open(), self.settings.scans_per_s
+        if abs(scan_rate_hz / requested_hz - 1.0) > RATE_TOLERANCE:
             self.stop()
             raise WrongInstrument(
                 self.name,
-                f"scans {found:g} times per second, but the bench file states {wanted:g}; set "
-                f"sample_rate_hz = {found:g}",
+                f"scans {scan_rate_hz:g} times per second, but the bench file states {requested_hz:g}; set "
+                f"sample_rate_hz = {scan_rate_hz:g}",
             )
         self._taken = 0
         self._last_s = self._clock.now_s()
@@ -280,7 +280,7 @@ class NidaqGyro:
         raise self._silent()
 
     def stop(self) -> None:
-        """Control the scans: end them; safe to call twice, and where nidaqmx fails."""
+        """Stop the scans; safe to call twice, and where nidaqmx fails."""
         self._task.close()
 
     def _available(self) -> Readings:

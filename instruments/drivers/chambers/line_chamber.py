@@ -43,15 +43,15 @@ class TextChamber(SetpointChamber):
         self._ends_off = settings.safe_state == "off"
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe set point, and off where the bench file says so; returns the value read back.
+        """Set the safe set point, and switch the chamber off where the bench file says so; returns the value read back.
 
         Raises as `set_temperature_c` does.
         """
-        found = super().make_safe()
+        setpoint_c = super().make_safe()
         if self._ends_off:
             self._switch_off()
             self._has_controlled = False  # that the chamber is off is no fault from now on
-        return found
+        return setpoint_c
 
     @abstractmethod
     def _switch_off(self) -> None:
@@ -83,7 +83,7 @@ class LineChamber(TextChamber):
         return f"{self._dialect.maker} {text}"
 
     def set_temperature_c(self, temperature_c: float) -> float:
-        """Control the set point, with the panel locked afterwards where the bench file says so.
+        """Set the temperature; the panel is locked afterwards where the bench file says so.
 
         Raises as every chamber does, and RequestRejected where the panel is not locked after the command.
         """
@@ -92,16 +92,16 @@ class LineChamber(TextChamber):
             return super().set_temperature_c(temperature_c)
         self._checked(temperature_c)
         self._unlock(lock)  # a protected controller may refuse a set point
-        found = super().set_temperature_c(temperature_c)
+        setpoint_c = super().set_temperature_c(temperature_c)
         self._command(lock.lock, "lock its panel")
         if not lock.is_locked(self._ask(lock.question)):
             raise RequestRejected(
                 self.name, "the panel is not locked after the command; leave lock_panel out of the bench file"
             )
-        return found
+        return setpoint_c
 
     def make_safe(self) -> float:
-        """Control the panel, which is unlocked first, and the chamber to its safe state; returns the value read back.
+        """Unlock the panel, then bring the chamber to its safe state; returns the value read back.
 
         A panel that cannot be unlocked keeps no set point from being written. Raises as `set_temperature_c` does.
         """
@@ -111,10 +111,10 @@ class LineChamber(TextChamber):
                 self._unlock(self._panel_lock)
             except InstrumentError as error:
                 failure = error
-        found = super().make_safe()
+        setpoint_c = super().make_safe()
         if failure is not None:
             raise failure
-        return found
+        return setpoint_c
 
     def _unlock(self, lock: PanelLock) -> None:
         if lock.is_locked(self._ask(lock.question)):
@@ -163,12 +163,12 @@ class LineChamber(TextChamber):
     def _ask_c(self, question: Question) -> float:
         return float(self._lines.ask(question.send.format(**self._names), question.reply, question.what)["c"])
 
-    def _command(self, command: str, what: str, **values: float) -> None:
+    def _command(self, command: str, purpose: str, **values: float) -> None:
         line = command.format(**self._names, **values)
         if self._acknowledges:
-            self._lines.ask(line, self._dialect.acknowledged, what)
+            self._lines.ask(line, self._dialect.acknowledged, purpose)
         else:
-            self._lines.tell(line, what)
+            self._lines.tell(line, purpose)
 
 
 class Espec(LineChamber):

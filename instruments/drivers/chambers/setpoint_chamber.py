@@ -110,7 +110,7 @@ class SetpointChamber(ABC):
             self._start()
 
     def set_temperature_c(self, temperature_c: float) -> float:
-        """Control the set point: limited, rounded, written on change only (EEPROM wear); returns the value read back.
+        """Write the set point: limited, rounded, written on change only (EEPROM wear); returns the value read back.
 
         Raises LimitError (nothing was written), RequestRejected while a profile runs or when another value is read
         back, and what an exchange with the controller raises.
@@ -122,7 +122,7 @@ class SetpointChamber(ABC):
         return self._write_and_verify(rounded)
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe set point; returns the value read back, deg C. Switches nothing on.
+        """Set the chamber to its safe set point; returns the value read back, deg C. Switches nothing on.
 
         Raises as `set_temperature_c` does.
         """
@@ -139,13 +139,13 @@ class SetpointChamber(ABC):
 
     def shortcomings(self) -> tuple[str, ...]:
         """Get why a set point would have no effect, and what to do; raises what a read of the controller raises."""
-        found = self._hindrance()
-        if not found and not self.switches_on and (stopped := self._stopped()):
-            found = f"{stopped}, so a set point would have no effect; switch it on at its panel"
-        return tuple(filter(None, [found]))
+        hindrance = self._hindrance()
+        if not hindrance and not self.switches_on and (stopped := self._stopped()):
+            hindrance = f"{stopped}, so a set point would have no effect; switch it on at its panel"
+        return tuple(filter(None, [hindrance]))
 
     def close(self) -> None:
-        """Control the link: close it. The controller keeps its set point."""
+        """Close the link. The controller keeps its set point."""
         self._link.close()
 
     def _checked(self, temperature_c: float) -> float:
@@ -181,10 +181,10 @@ class SetpointChamber(ABC):
             self._ask_again_s = asked_s + SLOW_SHARE * (self._clock.now_s() - asked_s)
         # a program has a state of its own: a controller that runs one is not in its manual mode, and yet not off
         stopped = "" if self._found_hindrance or not self._has_controlled else self._stopped()
-        found = [self._found_hindrance, stopped]
+        hindrances = [self._found_hindrance, stopped]
         if abs(setpoint_c - self._given_c) > self.limits.resolution_c / 2 + TINY_C:
-            found.append(f"the set point is {setpoint_c:g} deg C, labctl gave {self._given_c:g} deg C")
-        return tuple(filter(None, found))
+            hindrances.append(f"the set point is {setpoint_c:g} deg C, labctl gave {self._given_c:g} deg C")
+        return tuple(filter(None, hindrances))
 
     def _refuse_without_effect(self) -> None:
         if hint := self._hindrance():
@@ -194,15 +194,15 @@ class SetpointChamber(ABC):
         self._given_c, self._ask_again_s = None, 0.0
         if abs(self._read_setpoint() - rounded_c) > TINY_C:
             self._write_setpoint(rounded_c)
-        found = self._read_setpoint()
-        if abs(found - rounded_c) > self.limits.resolution_c / 2:
+        setpoint_c = self._read_setpoint()
+        if abs(setpoint_c - rounded_c) > self.limits.resolution_c / 2:
             raise RequestRejected(
                 self.name,
-                f"set point {rounded_c:g} deg C was written, but the controller reports {found:g} deg C; set "
+                f"set point {rounded_c:g} deg C was written, but the controller reports {setpoint_c:g} deg C; set "
                 "the controller to its run page",
             )
-        self._given_c = found
-        return found
+        self._given_c = setpoint_c
+        return setpoint_c
 
     def _wrong(self, text: str) -> WrongInstrument:
         return WrongInstrument(self.name, text)

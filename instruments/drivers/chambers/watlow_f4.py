@@ -135,14 +135,14 @@ class WatlowF4(Watlow):
 
     def _alarms(self) -> tuple[str, ...]:
         """Return the active alarm inputs, and the alarms and input error that came with the air temperature."""
-        found = [f"digital input {number}" for number in self.settings.alarm_inputs if self._is_active(number)]
+        alarms = [f"digital input {number}" for number in self.settings.alarm_inputs if self._is_active(number)]
         words = dict(enumerate(self._alarm_words)) if self.settings.alarm_registers else {}
         if (code := words.get(f4.INPUT_ERROR, 0)) in f4.INPUT_ERRORS:
-            found.append(f"error {code} of input 1")
+            alarms.append(f"error {code} of input 1")
         for alarm, offset in f4.ALARM_OFFSETS.items():
             if state := f4.ALARM_STATES.get(words.get(offset, 0)):
-                found.append(f"alarm {alarm} {state}")
-        return tuple(found)
+                alarms.append(f"alarm {alarm} {state}")
+        return tuple(alarms)
 
     def _is_active(self, number: int) -> bool:
         state = self._registers.get_int(f4.INPUT_STATE.nth(number, f4.INPUT_STRIDE))

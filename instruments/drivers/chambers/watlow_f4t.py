@@ -69,8 +69,8 @@ class WatlowF4T(Watlow):
         return self._known_part
 
     def _loop(self) -> f4t.ControlLoop:
-        wanted = self.settings.cascade
-        cascade = f4t.has_cascade(self._part_number()) if wanted is None else wanted
+        stated_cascade = self.settings.cascade
+        cascade = f4t.has_cascade(self._part_number()) if stated_cascade is None else stated_cascade
         return f4t.CASCADE if cascade else f4t.LOOP
 
     def _controller_limits(self) -> tuple[float, float]:
@@ -99,8 +99,8 @@ class WatlowF4T(Watlow):
     def _stopped(self) -> str:
         loop = self._loop()
         if (mode := self._registers.get_int(loop.mode)) != f4t.MODE_AUTO:
-            what = "cascade loop 1" if loop is f4t.CASCADE else "control loop 1"
-            return f"{what} is in mode {f4t.MODES.get(mode, mode)}, not auto"
+            loop_name = "cascade loop 1" if loop is f4t.CASCADE else "control loop 1"
+            return f"{loop_name} is in mode {f4t.MODES.get(mode, mode)}, not auto"
         if self.settings.run_output is None:
             return ""
         module, output = self.settings.run_output
@@ -129,9 +129,11 @@ class WatlowF4T(Watlow):
 
     def _read_alarms(self) -> tuple[str, ...]:
         alarms = f4t.alarms_of(self._part_number())
-        found = [f"alarm {number}" for number in range(1, alarms + 1) if not self._is_quiet(number)]
-        found += [f"limit module {number}" for number in self._present_limit_modules() if self._has_tripped(number)]
-        return tuple(found)
+        active_alarms = [f"alarm {number}" for number in range(1, alarms + 1) if not self._is_quiet(number)]
+        active_alarms += [
+            f"limit module {number}" for number in self._present_limit_modules() if self._has_tripped(number)
+        ]
+        return tuple(active_alarms)
 
     def _is_quiet(self, number: int) -> bool:
         return self._registers.get_int(f4t.ALARM.nth(number, f4t.ALARM_STRIDE)) in f4t.ALARM_QUIET

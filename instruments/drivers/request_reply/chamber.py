@@ -39,7 +39,7 @@ class DescribedChamber(TextChamber):
         return text
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe state, then end its remote operation; returns the set point read back.
+        """Bring the chamber to its safe state, then end its remote operation; returns the set point read back.
 
         What ends the remote operation is sent also where the safe state is refused. Raises as `set_temperature_c`.
         """
@@ -105,15 +105,15 @@ class DescribedChamber(TextChamber):
     def _switch_off(self) -> None:
         self._command(self._described.switch_off, "switch off")
 
-    def _command(self, lines: Sequence[str], what: str, values: Mapping[str, object] = NONE) -> None:
+    def _command(self, lines: Sequence[str], purpose: str, values: Mapping[str, object] = NONE) -> None:
         """Send commands; what prepares the chamber goes first, once for each opening of the link."""
         if self.dialogue.is_new:
             self.dialogue.command(self._described.start, "prepare")
-        self.dialogue.command(lines, what, values)
+        self.dialogue.command(lines, purpose, values)
         self.dialogue.started()
 
-    def _ask_c(self, ask: AskNumber, what: str) -> float:
-        return round(self._described.temperature.read(self.dialogue.number(ask, what)), 9)
+    def _ask_c(self, ask: AskNumber, purpose: str) -> float:
+        return round(self._described.temperature.read(self.dialogue.number(ask, purpose)), 9)
 
 
 DRIVER = ChamberDriver(

@@ -23,12 +23,12 @@ class AerotechEnsembleSettings(DescribedTableSettings):
 
     @model_validator(mode="before")
     @classmethod
-    def _described(cls, given: object) -> object:
-        return _with_format(given, "aerotech-ensemble")
+    def _described(cls, document: object) -> object:
+        return _with_format(document, "aerotech-ensemble")
 
 
-def _with_format(given: object, name: str) -> object:
-    return {"format": name, **given} if isinstance(given, dict) else given
+def _with_format(document: object, name: str) -> object:
+    return {"format": name, **document} if isinstance(document, dict) else document
 
 
 XPS_DRIVER = TableDriver(

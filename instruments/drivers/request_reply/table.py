@@ -68,7 +68,7 @@ class DescribedTable:
         return math.copysign(unit.read(written), rate_dps) if rate_dps else 0.0
 
     def home(self) -> None:
-        """Control the table to its home position; the angle is 0 deg there.
+        """Turn the table to its home position; the angle is 0 deg there.
 
         Raises RequestRejected where it does not come there in time, MalformedReply, NoReply, LinkError.
         """
@@ -96,7 +96,7 @@ class DescribedTable:
         self._last = None
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
-        """Control the table to a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
+        """Turn the table at a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
 
         Raises LimitError (nothing was sent), RequestRejected, MalformedReply, NoReply, LinkError.
         """
@@ -110,11 +110,11 @@ class DescribedTable:
             except InstrumentError:
                 self.stop()
                 raise
-        found = self.read_angle()
-        return Spin(rate_dps, demand_dps, found.t_s, self._clock.now_s() + steady_s + SPARE_S, found.angle_deg)
+        angle_deg = self.read_angle()
+        return Spin(rate_dps, demand_dps, angle_deg.t_s, self._clock.now_s() + steady_s + SPARE_S, angle_deg.angle_deg)
 
     def settle(self, spin: Spin) -> None:
-        """Control the end of a run: stop the table, and return when it is at rest.
+        """Stop the table and return when it is at rest.
 
         Raises RequestRejected where it stopped by itself too early, MalformedReply, NoReply, LinkError.
         """
@@ -130,7 +130,7 @@ class DescribedTable:
             )
 
     def stop(self) -> None:
-        """Control the table to rest. The stop is sent before anything is asked; raises LinkError.
+        """Stop the table. The command is sent before anything is asked; raises LinkError.
 
         A home search that another process has begun may refuse it: it is ended by what `stop_slow` describes.
         """
@@ -178,7 +178,7 @@ class DescribedTable:
         return self._last
 
     def close(self) -> None:
-        """Control the link: close it; safe to call twice. The table goes on as commanded."""
+        """Close the link; safe to call twice. The table goes on as commanded."""
         self.dialogue.link.close()
 
     def _prepare(self) -> None:
@@ -228,8 +228,8 @@ class DescribedTable:
         """Return the rate, deg/s, by the controller or by two positions, and the share by which it may be off."""
         described = self._described
         if described.rate is not None:
-            found = described.turning.read(self.dialogue.number(described.rate, "read its rate"))
-            return self.settings.direction * found, described.rate_within
+            rate_dps = described.turning.read(self.dialogue.number(described.rate, "read its rate"))
+            return self.settings.direction * rate_dps, described.rate_within
         first = self.read_angle()
         self._clock.sleep(min(MEASURED_OVER_S, MEASURED_OVER_DEG / abs(demand_dps)))
         last = self.read_angle()

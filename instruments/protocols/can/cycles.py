@@ -49,7 +49,7 @@ class CycleDecoder:
         return [self._layout.database.message_name(key) for key in self._layout.parts if key not in self.seen]
 
     def drop(self) -> None:
-        """Forget the unfinished frame and the unfinished cycle."""
+        """Drop the unfinished frame and the unfinished cycle."""
         self._scanner.drop()
         self._cycle, self._is_fit, self._is_headless = {}, True, False
         self._damaged = self._missed = 0
@@ -87,8 +87,8 @@ class CycleDecoder:
             self._damaged += not self._layout.database.is_multiplexed(frame.id)
             return None
         self.seen.add(frame.id)
-        found = {name: raw[each.name] for name, each in self._layout.parts[frame.id] if each.name in raw}
-        numbers = {name: self._whole(value) for name, value in found.items()}
+        raw_values = {name: raw[each.name] for name, each in self._layout.parts[frame.id] if each.name in raw}
+        numbers = {name: self._whole(value) for name, value in raw_values.items()}
         self._held |= {name: numbers.pop(name) for name in self._layout.held & set(numbers)}
         if not numbers or not self._continues(frame.id, raw, numbers):
             return None

@@ -79,10 +79,10 @@ class CanDatabase:
         from cantools.database import DecodeError
 
         try:
-            found = self._by_id[frame_id].decode_simple(data, decode_choices=False, scaling=False)
+            signals = self._by_id[frame_id].decode_simple(data, decode_choices=False, scaling=False)
         except DecodeError:
             return None
-        return {name: value for name, value in found.items() if isinstance(value, int | float)}
+        return {name: value for name, value in signals.items() if isinstance(value, int | float)}
 
 
 def frame_id_of(message: Message) -> int:
@@ -90,10 +90,10 @@ def frame_id_of(message: Message) -> int:
     return message.frame_id | (EXTENDED if message.is_extended_frame else 0)
 
 
-def _choice(where: str, what: str, wrong: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(wrong, known, n=1)
+def _choice(location: str, quantity: str, wrong: str, choices: list[str]) -> str:
+    near = difflib.get_close_matches(wrong, choices, n=1)
     hint = f"did you mean {near[0]!r}? If not, " if near else ""
-    return f"{where} has no {what} {wrong!r}; {hint}choose one of {listed(known, 20)}"
+    return f"{location} has no {quantity} {wrong!r}; {hint}choose one of {listed(choices, 20)}"
 
 
 def _signal(message: Message, signal: Signal) -> CanSignal:
@@ -120,9 +120,9 @@ def _parsed(text: str) -> Database:
             "a DBC file is read by cantools, which is not installed; run `pip install labctl[can]`"
         ) from None
     try:
-        found = database.load_string(text, database_format="dbc")
+        parsed = database.load_string(text, database_format="dbc")
     except (Error, ValueError, KeyError) as error:
         raise ValueError(f"the DBC text cannot be read ({one_line(error)}); correct the file") from None
-    if isinstance(found, database.can.Database):
-        return found
+    if isinstance(parsed, database.can.Database):
+        return parsed
     raise ValueError("the DBC text describes no CAN messages; give the DBC file of the unit")

@@ -66,7 +66,7 @@ class FrameScanner:
         self._rest = b""
 
     def drop(self) -> None:
-        """Forget the unfinished frame."""
+        """Drop the unfinished frame."""
         self._rest = b""
 
     @property
@@ -77,11 +77,11 @@ class FrameScanner:
     def feed(self, data: bytes) -> tuple[list[CanFrame], int]:
         """Return every frame that is whole now, and in how many places there were bytes that are no frame."""
         data, at, damaged = self._rest + data, 0, 0
-        found: list[CanFrame] = []
+        frames: list[CanFrame] = []
         while (n := (len(data) - at) // FRAME_BYTES) > 0:
             good = _good(np.frombuffer(data, _RECORD, n, at))
             whole = n if good.all() else int(np.argmin(good))
-            found += (_frame(data, at + FRAME_BYTES * each) for each in range(whole))
+            frames += (_frame(data, at + FRAME_BYTES * each) for each in range(whole))
             at += FRAME_BYTES * whole
             if whole < n:
                 damaged += 1
@@ -89,7 +89,7 @@ class FrameScanner:
                 while len(data) - at >= FRAME_BYTES and not _is_frame(data, at):
                     at += 1
         self._rest = data[at:]
-        return found, damaged
+        return frames, damaged
 
 
 def _is_frame(data: bytes, at: int) -> bool:

@@ -13,8 +13,8 @@ from instruments.protocols.can.signals import CanLayout
 from instruments.protocols.stream_formats.document import Name
 
 
-def _several(given: Any) -> Any:
-    return (given,) if isinstance(given, str | int) else given
+def _several(value: Any) -> Any:
+    return (value,) if isinstance(value, str | int) else value
 
 
 class CanCounter(Strict):
@@ -25,8 +25,8 @@ class CanCounter(Strict):
     wrap: int | None = Field(default=None, gt=1)  #: it begins again at 0 after this minus 1; None: after all its bits
 
 
-def _counter(given: Any) -> Any:
-    return {"signals": given} if isinstance(given, str | list | tuple) else given
+def _counter(value: Any) -> Any:
+    return {"signals": value} if isinstance(value, str | list | tuple) else value
 
 
 class CanSettings(GyroSettings):
@@ -44,11 +44,15 @@ class CanSettings(GyroSettings):
 
     @model_validator(mode="before")
     @classmethod
-    def _usual(cls, given: Any) -> Any:
-        if not isinstance(given, dict) or given.get("axes") is not None or not isinstance(given.get("signals"), dict):
-            return given
-        axes = [axis for axis in "xyz" if f"gyro_{axis}" in given["signals"]]
-        return {**given, "axes": axes or ["z"]}
+    def _usual(cls, document: Any) -> Any:
+        if (
+            not isinstance(document, dict)
+            or document.get("axes") is not None
+            or not isinstance(document.get("signals"), dict)
+        ):
+            return document
+        axes = [axis for axis in "xyz" if f"gyro_{axis}" in document["signals"]]
+        return {**document, "axes": axes or ["z"]}
 
     @model_validator(mode="after")
     def _usable(self) -> CanSettings:

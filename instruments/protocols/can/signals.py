@@ -38,7 +38,7 @@ class CanLayout:
         database = CanDatabase(dbc)
         _require_channels(signals, axes, units, hold)
         channels = {name: database.signal(path) for name, path in signals.items()}
-        scales = {name: _scale(name, each, units.get(name)) for name, each in channels.items()}
+        scales = {name: _scale(name, channel, units.get(name)) for name, channel in channels.items()}
         checked = {path: database.signal(path) for path in status}
         counting = [database.signal(path) for path in counters]
         parts: dict[int, list[tuple[str, CanSignal]]] = {}
@@ -94,12 +94,16 @@ def _require_channels(
         raise ValueError(f"hold names {held[0]}, but a rate must come in every cycle; leave it out of hold")
 
 
-def _scale(name: str, signal: CanSignal, stated: str | None) -> Scale:
-    text = signal.unit if stated is None else stated
-    unit, wanted = unit_of_text(text), unit_of_channel(name)
-    fitting = [each for each, found in UNITS.items() if wanted in (None, found.unit) and not found.is_per_sample]
+def _scale(name: str, signal: CanSignal, unit_text: str | None) -> Scale:
+    text = signal.unit if unit_text is None else unit_text
+    unit, channel_unit = unit_of_text(text), unit_of_channel(name)
+    fitting = [
+        each
+        for each, unit_scale in UNITS.items()
+        if channel_unit in (None, unit_scale.unit) and not unit_scale.is_per_sample
+    ]
     if unit is None or unit not in fitting:
-        whose = f"signal {signal.path} has the unit {text!r}" if stated is None else f"units gives {text!r}"
+        whose = f"signal {signal.path} has the unit {text!r}" if unit_text is None else f"units gives {text!r}"
         raise ValueError(
             f"channel {name}: {whose}, which is no unit of this quantity; state the unit of the signal in the bench "
             f"file, units = {{ {name} = {fitting[0]!r} }}, by one of {', '.join(map(repr, fitting))}"
@@ -112,13 +116,14 @@ def _scale(name: str, signal: CanSignal, stated: str | None) -> Scale:
 def _good(signal: CanSignal, values: Sequence[int | str]) -> frozenset[int]:
     if signal.is_float:
         raise ValueError(f"status {signal.path!r} is a floating-point number; name a signal of whole numbers")
-    if unknown := next((each for each in values if isinstance(each, str) and each not in signal.choices), None):
-        known = ", ".join(map(repr, signal.choices)) or "none"
+    if unknown := next((value for value in values if isinstance(value, str) and value not in signal.choices), None):
+        choices = ", ".join(map(repr, signal.choices)) or "none"
         raise ValueError(
-            f"status {signal.path!r}: the DBC file has no value {unknown!r} (it has {known}); write one of them, or a "
+            f"status {signal.path!r}: the DBC file has no value {unknown!r} (it has {choices}); write one of them, or "
+            "a "
             "raw number"
         )
-    return frozenset(signal.choices[each] if isinstance(each, str) else each for each in values)
+    return frozenset(signal.choices[value] if isinstance(value, str) else value for value in values)
 
 
 def _counter_bits(counting: Sequence[CanSignal]) -> int | None:

@@ -24,7 +24,7 @@ class PacketScans:
         self.drop()
 
     def drop(self) -> None:
-        """Forget the count: the next packet is the first."""
+        """Reset the count: the next packet is the first."""
         self._number: int | None = None
         self._base = 0
 
@@ -37,10 +37,10 @@ class PacketScans:
         codes: list[Counts] = [np.zeros((0, self._inputs), dtype=np.int64)]
         behind: list[Counts] = [np.zeros(0, dtype=np.int64)]
         for packet in packets:
-            taken, theirs = self._scans_of(packet)
-            numbers.append(taken)
+            own_scans, theirs = self._scans_of(packet)
+            numbers.append(own_scans)
             codes.append(theirs)
-            behind.append(np.full(len(taken), packet.behind, dtype=np.int64))
+            behind.append(np.full(len(own_scans), packet.behind, dtype=np.int64))
         return np.concatenate(numbers), np.concatenate(codes), np.concatenate(behind)
 
     def _scans_of(self, packet: Packet) -> tuple[Counts, Counts]:
@@ -50,11 +50,11 @@ class PacketScans:
         self._base += ((packet.number - self._number) % NUMBERS) * self._per_packet
         self._number = packet.number
         numbers = self._base + np.arange(len(scans), dtype=np.int64)
-        taken = np.ones(len(scans), dtype=bool)
+        is_measured = np.ones(len(scans), dtype=bool)
         if packet.status == RECOVERED:
-            taken = ~np.all(scans == DUMMY, axis=1)
+            is_measured = ~np.all(scans == DUMMY, axis=1)
             skipped = max(packet.info - 1, 0)
-            first = 0 if taken.all() else int(np.argmin(taken))
+            first = 0 if is_measured.all() else int(np.argmin(is_measured))
             numbers[first:] += skipped
             self._base += skipped
-        return numbers[taken], scans[taken]
+        return numbers[is_measured], scans[is_measured]

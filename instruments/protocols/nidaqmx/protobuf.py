@@ -38,13 +38,13 @@ class Fields:
 
     def integer(self, number: int) -> int:
         """Return a signed integer; 0 where it was left out."""
-        found = self._integers.get(number, 0)
-        return found - (1 << 64) if found >> 63 else found
+        value = self._integers.get(number, 0)
+        return value - (1 << 64) if value >> 63 else value
 
     def double(self, number: int) -> float:
         """Return a double; 0 where it was left out."""
-        found = self._bytes.get(number)
-        return 0.0 if found is None else float(struct.unpack("<d", found)[0])
+        content = self._bytes.get(number)
+        return 0.0 if content is None else float(struct.unpack("<d", content)[0])
 
     def text(self, number: int) -> str:
         """Return a text; empty where it was left out."""
@@ -89,11 +89,11 @@ def _key(number: int, kind: int) -> bytes:
 
 
 def _of_varint(value: int) -> bytes:
-    found = bytearray()
+    encoded = bytearray()
     while value > 0x7F:
-        found.append(value & 0x7F | 0x80)
+        encoded.append(value & 0x7F | 0x80)
         value >>= 7
-    return bytes(found) + bytes([value])
+    return bytes(encoded) + bytes([value])
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:

@@ -48,9 +48,11 @@ class ChamberDescription(Description):
         self.require_requests({"set": [SETPOINT]})
         if not any(name == SETPOINT for line in self.set for name, _ in places(line)):
             raise ValueError("set: no line holds the set point; write it like {setpoint:.1f}")
-        for key, asked in (("end_program", "program"), ("switch_on", "running"), ("switch_off", "running")):
-            if getattr(self, key) and getattr(self, asked) is None:
-                raise ValueError(f"{key} is there, but not how its effect is confirmed; add [{asked}] with a request")
+        for key, question in (("end_program", "program"), ("switch_on", "running"), ("switch_off", "running")):
+            if getattr(self, key) and getattr(self, question) is None:
+                raise ValueError(
+                    f"{key} is there, but not how its effect is confirmed; add [{question}] with a request"
+                )
         return self
 
     @cached_property

@@ -21,11 +21,11 @@ Title = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, ma
 def require_pattern(pattern: str, *groups: str) -> str:
     """Return a regular expression that has the groups; raises ValueError."""
     try:
-        found = re.compile(pattern).groupindex
+        named_groups = re.compile(pattern).groupindex
     except re.error as error:
         raise ValueError(f"pattern {pattern!r} is not a regular expression ({error}); correct it") from None
     for group in groups:
-        if group not in found:
+        if group not in named_groups:
             raise ValueError(f"pattern {pattern!r} has no group (?P<{group}>...); put it around the {group}")
     return pattern
 
@@ -34,8 +34,8 @@ def _pattern(pattern: str) -> str:
     return require_pattern(pattern)
 
 
-def _listed(given: object) -> object:
-    return [given] if isinstance(given, str) else given
+def _listed(value: object) -> object:
+    return [value] if isinstance(value, str) else value
 
 
 Pattern = Annotated[str, StringConstraints(max_length=500), BeforeValidator(lambda given: _pattern(str(given)))]
@@ -198,11 +198,11 @@ class Description(Strict):
 
     @field_validator("parameters")
     @classmethod
-    def _are_texts(cls, given: dict[str, str | int | float]) -> dict[str, str | int | float]:
-        for name, value in given.items():
+    def _are_texts(cls, texts: dict[str, str | int | float]) -> dict[str, str | int | float]:
+        for name, value in texts.items():
             if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or not str(value).isprintable() or not str(value):
                 raise ValueError(f"parameter {name} = {value!r} is not a printable text under a name; correct it")
-        return given
+        return texts
 
     def require_requests(self, numbers: dict[str, Iterable[str]]) -> None:
         """Raise ValueError, with its place, for a request with an unknown value. key -> names of its numbers."""

@@ -20,9 +20,9 @@ class ReferenceDescription(Description):
 
     @model_validator(mode="after")
     def _is_whole(self) -> ReferenceDescription:
-        for name, each in self.quantities.items():
+        for name, quantity in self.quantities.items():
             try:
-                require_template(each.ask, (), ("input",))
+                require_template(quantity.ask, (), ("input",))
             except ValueError as error:
                 raise ValueError(f"quantities.{name}: {error}") from None
         return self

@@ -26,28 +26,30 @@ def shipped_descriptions() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def found_description(given: object) -> object:
+def found_description(document: object) -> object:
     """Return the document of a shipped description for its name; anything else as it is. Raises ValueError."""
-    if not isinstance(given, str):
-        return given
-    if given.endswith(".toml"):
-        raise ValueError(f"the folder of the bench file has no file {given!r}; correct the name, or put the file there")
+    if not isinstance(document, str):
+        return document
+    if document.endswith(".toml"):
+        raise ValueError(
+            f"the folder of the bench file has no file {document!r}; correct the name, or put the file there"
+        )
     shipped = shipped_descriptions()
-    if given in shipped:
-        return read_toml(shipped[given])
-    near = difflib.get_close_matches(given, shipped, n=1)
+    if document in shipped:
+        return read_toml(shipped[document])
+    near = difflib.get_close_matches(document, shipped, n=1)
     hint = f"did you mean {near[0]!r}? If not, " if near else ""
     raise ValueError(
-        f"no description {given!r} comes with labctl (those that do: {', '.join(shipped)}); {hint}name one of "
+        f"no description {document!r} comes with labctl (those that do: {', '.join(shipped)}); {hint}name one of "
         "these, or a .toml file in the folder of the bench file"
     )
 
 
-def with_line(given: object) -> object:
+def with_line(document: object) -> object:
     """Return settings with baud rate and TCP port of their description, where the bench file gives none."""
-    if not isinstance(given, dict):
-        return given
-    description = given.get("format")
+    if not isinstance(document, dict):
+        return document
+    description = document.get("format")
     if isinstance(description, str) and description in shipped_descriptions():
         description = read_toml(shipped_descriptions()[description])
     usual: dict[str, object] = {}
@@ -56,20 +58,20 @@ def with_line(given: object) -> object:
     elif isinstance(description, dict) and isinstance(line := description.get("line"), dict):
         usual = line
     kept = {key: usual[key] for key in ("baudrate", "tcp_port") if usual.get(key) is not None}
-    return {**kept, **{key: value for key, value in given.items() if value is not None}, "format": description}
+    return {**kept, **{key: value for key, value in document.items() if value is not None}, "format": description}
 
 
-def parameters_of(description: Description, given: Parameters) -> Parameters:
+def parameters_of(description: Description, parameters: Parameters) -> Parameters:
     """Return the parameters of a description with those of the bench file; raises ValueError for one it has not."""
-    for name, value in given.items():
+    for name, value in parameters.items():
         if name not in description.parameters:
-            known = ", ".join(description.parameters) or "none"
+            names = ", ".join(description.parameters) or "none"
             raise ValueError(
-                f"parameters: {description.name!r} has no parameter {name!r} (it has: {known}); correct it"
+                f"parameters: {description.name!r} has no parameter {name!r} (it has: {names}); correct it"
             )
         if not str(value).isprintable() or not str(value):
             raise ValueError(f"parameters: {name} = {value!r} is not a printable text; correct it")
-    return {**description.parameters, **given}
+    return {**description.parameters, **parameters}
 
 
 class DescribedChamberSettings(LineChamberSettings):
@@ -122,13 +124,14 @@ class DescribedTableSettings(TableSettings):
             raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
         require_tcp_port(self.host, self.tcp_port)
         parameters_of(self.format, self.parameters)
-        for what, unit, asked, limit in (
+        for what, unit, requested, limit in (
             ("max_rate_dps", "deg/s", self.max_rate_dps, self.format.max_rate_dps),
             ("acceleration_dps2", "deg/s2", self.acceleration_dps2, self.format.max_acceleration_dps2),
         ):
-            if asked > limit:
+            if requested > limit:
                 raise ValueError(
-                    f"{what} = {asked:g} {unit} is beyond the limit of {self.format.name!r}, {limit:g} {unit}; lower it"
+                    f"{what} = {requested:g} {unit} is beyond the limit of {self.format.name!r}, {limit:g} {unit}; "
+                    "lower it"
                 )
         if self.reference == "measured" and not self.format.encoder:
             raise ValueError(

@@ -58,12 +58,12 @@ class TableDescription(Description):
 
     @model_validator(mode="before")
     @classmethod
-    def _is_safe(cls, given: Any) -> Any:
-        if isinstance(given, dict):
-            missing = [why for key, why in SAFETY.items() if not given.get(key)]
+    def _is_safe(cls, document: Any) -> Any:
+        if isinstance(document, dict):
+            missing = [why for key, why in SAFETY.items() if not document.get(key)]
             if missing:
                 raise ValueError(f"a table must say {'; '.join(missing)}; labctl turns no table without")
-        return given
+        return document
 
     @model_validator(mode="after")
     def _is_whole(self) -> TableDescription:

@@ -16,14 +16,14 @@ def places(template: str) -> list[tuple[str, str]]:
         parsed = list(Formatter().parse(template))
     except ValueError as error:
         raise ValueError(f"{template!r}: {error}; double a brace that is sent as it is") from None
-    found = []
+    fields = []
     for _, name, spec, conversion in parsed:
         if name is None:
             continue
         if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or conversion:
             raise ValueError(f"{template!r}: {{{name}}} is not a name; write {{name}} or {{name:.3f}}")
-        found.append((name, spec or ""))
-    return found
+        fields.append((name, spec or ""))
+    return fields
 
 
 def require_template(template: str, numbers: Iterable[str], names: Iterable[str]) -> str:
@@ -37,8 +37,8 @@ def require_template(template: str, numbers: Iterable[str], names: Iterable[str]
         raise ValueError(f'{template!r} is not one line of text; list several lines as ["...", "..."]')
     for name, spec in places(template):
         if name not in (*numbers, *names):
-            known = ", ".join((*numbers, *names)) or "none"
-            raise ValueError(f"{template!r}: {{{name}}} is not known here (known: {known}); correct it")
+            allowed = ", ".join((*numbers, *names)) or "none"
+            raise ValueError(f"{template!r}: {{{name}}} is not known here (known: {allowed}); correct it")
         if name in numbers and not SPEC.fullmatch(spec):
             raise ValueError(
                 f"{template!r}: {{{name}}} does not say how the number is written; write {{{name}:.3f}} for three "
@@ -68,7 +68,7 @@ def written(value: float, spec: str) -> str:
 def as_written(templates: Iterable[str], name: str, value: float) -> float:
     """Return the number that the first template that holds `name` carries for a value: rounded as it is written."""
     for template in templates:
-        for found, spec in places(template):
-            if found == name:
+        for field, spec in places(template):
+            if field == name:
                 return float(written(value, spec))
     return value

@@ -39,12 +39,14 @@ def temperature_unit(name: str) -> Unit:
     return Unit(*TEMPERATURES[name])
 
 
-def turning_unit(what: str, name: str, known: dict[str, float], suffix: str, counts_per_turn: float | None) -> Unit:
-    """Return a unit of angle, rate or acceleration; raises ValueError. `suffix` is what `known` has behind an angle."""
+def turning_unit(quantity: str, name: str, units: dict[str, float], suffix: str, counts_per_turn: float | None) -> Unit:
+    """Return a unit of angle, rate or acceleration; raises ValueError. `suffix` is what `units` has behind an angle."""
     if name == f"{COUNT}{suffix}":
         if counts_per_turn is None:
-            raise ValueError(f"unit {name!r} of {what} needs counts_per_turn: the counts of one whole turn; add it")
+            raise ValueError(f"unit {name!r} of {quantity} needs counts_per_turn: the counts of one whole turn; add it")
         return Unit(360.0 / counts_per_turn)
-    if name not in known:
-        raise ValueError(f"unit {name!r} of {what} is not known; choose one of {', '.join([*known, COUNT + suffix])}")
-    return Unit(known[name])
+    if name not in units:
+        raise ValueError(
+            f"unit {name!r} of {quantity} is not known; choose one of {', '.join([*units, COUNT + suffix])}"
+        )
+    return Unit(units[name])

@@ -105,12 +105,12 @@ def parse_configuration(frame: bytes) -> Configuration | None:
     )
 
 
-def _named(known: Sequence[int], code: int) -> str:
-    return str(known[code]) if code < len(known) else f"code {code}"
+def _named(values: Sequence[int], code: int) -> str:
+    return str(values[code]) if code < len(values) else f"code {code}"
 
 
-def _code(known: Sequence[int], name: str) -> int:
-    return known.index(int(name)) if name.isdecimal() else int(name.removeprefix("code "))
+def _code(values: Sequence[int], name: str) -> int:
+    return values.index(int(name)) if name.isdecimal() else int(name.removeprefix("code "))
 
 
 def parse_serial_number(frame: bytes) -> str | None:
@@ -127,30 +127,35 @@ def parse_bias_trim(frame: bytes) -> tuple[float, ...] | None:
     return tuple(int.from_bytes(frame[at : at + 3], "big", signed=True) * TRIM_PER_LSB for at in (1, 4, 7))
 
 
-def configuration_frame(given: Configuration) -> bytes:
+def configuration_frame(configuration: Configuration) -> bytes:
     """Return the configuration datagram, with CR LF where it is set so, of a unit that is set as given."""
-    rate_hz = given.sample_rate_hz
+    rate_hz = configuration.sample_rate_hz
     code = EXTERNAL_TRIGGER if rate_hz is None else SAMPLE_RATES_HZ.index(rate_hz)
-    content = given.content
+    content = configuration.content
     body = bytearray(21)
-    body[0], body[1] = ord(given.revision), given.firmware
+    body[0], body[1] = ord(configuration.revision), configuration.firmware
     body[2] = code << 5 | content.pps << 4 | content.temperature << 3 | content.inclination << 2
-    body[2] |= content.acceleration << 1 | given.crlf
+    body[2] |= content.acceleration << 1 | configuration.crlf
     bit_rates = {baudrate: number for number, baudrate in BIT_RATES.items()}
-    bit_rate = USER_DEFINED if given.baudrate is None else bit_rates.get(given.baudrate, USER_DEFINED)
-    body[3] = bit_rate << 4 | (given.stop_bits == 2) << 3 | PARITIES.index(given.parity) << 1 | given.crlf
-    body[4] = sum(bit for axis, bit in (("x", 0x40), ("y", 0x20), ("z", 0x10)) if axis in given.axes)
-    body[4] |= OUTPUT_UNITS.index(given.unit) | (DELAYED if given.is_delayed else 0)
-    x_hz, y_hz, z_hz = (_code(FILTERS_HZ, each) for each in given.filters_hz)
+    bit_rate = USER_DEFINED if configuration.baudrate is None else bit_rates.get(configuration.baudrate, USER_DEFINED)
+    body[3] = (
+        bit_rate << 4
+        | (configuration.stop_bits == 2) << 3
+        | PARITIES.index(configuration.parity) << 1
+        | configuration.crlf
+    )
+    body[4] = sum(bit for axis, bit in (("x", 0x40), ("y", 0x20), ("z", 0x10)) if axis in configuration.axes)
+    body[4] |= OUTPUT_UNITS.index(configuration.unit) | (DELAYED if configuration.is_delayed else 0)
+    x_hz, y_hz, z_hz = (_code(FILTERS_HZ, filter_hz) for filter_hz in configuration.filters_hz)
     compensations = {name: code for code, name in G_COMPENSATIONS.items()}
-    body[5], body[6] = x_hz << 4 | y_hz, z_hz << 4 | compensations[given.g_compensation]
-    body[13] = 8 if given.has_pps else 0
-    x_dps, y_dps, z_dps = (_code(RANGES_DPS, each) for each in given.ranges_dps)
+    body[5], body[6] = x_hz << 4 | y_hz, z_hz << 4 | compensations[configuration.g_compensation]
+    body[13] = 8 if configuration.has_pps else 0
+    x_dps, y_dps, z_dps = (_code(RANGES_DPS, range_dps) for range_dps in configuration.ranges_dps)
     ranges = {value: number for number, value in ACCELERATION_RANGES_G.items()}
-    reach = ranges[given.acceleration_range_g or 10]
+    reach = ranges[configuration.acceleration_range_g or 10]
     body[14], body[15] = x_dps << 4 | y_dps, z_dps << 4
     body[16], body[17] = reach << 4 | reach, reach << 4
-    return _frame(CONFIGURATION[given.crlf], bytes(body), crlf=given.crlf)
+    return _frame(CONFIGURATION[configuration.crlf], bytes(body), crlf=configuration.crlf)
 
 
 def serial_number_frame(serial: str, *, crlf: bool) -> bytes:

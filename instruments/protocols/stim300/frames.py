@@ -57,19 +57,19 @@ class Scan:
 def scan(data: bytes, layout: Layout) -> Scan:
     """Find every intact frame in `data`; `rest` holds the unfinished end, for the next scan."""
     raw = np.frombuffer(data, dtype=np.uint8)
-    stride, found, at, gaps = layout.stride, [], 0, _Gaps(data, layout)
+    stride, scanned_frames, at, gaps = layout.stride, [], 0, _Gaps(data, layout)
     begins: list[NDArray[np.int64]] = []
     while len(raw) - at >= stride:
         n = min((len(raw) - at) // stride, CHUNK)
         frames = raw[at : at + n * stride].reshape(n, stride)
         good = layout.intact(frames)
         if good.all():
-            found.append(frames)
+            scanned_frames.append(frames)
             begins.append(at + stride * np.arange(n, dtype=np.int64))
             at += n * stride
             continue
         last = _last_at_stride(good)
-        found.append(frames[:last][good[:last]])
+        scanned_frames.append(frames[:last][good[:last]])
         begins.append(at + stride * np.flatnonzero(good[:last]))
         for bad in np.flatnonzero(~good[:last]).tolist():
             gaps.add(at + bad * stride, at + (bad + 1) * stride)
@@ -83,7 +83,7 @@ def scan(data: bytes, layout: Layout) -> Scan:
         if is_unfinished:
             break
     return Scan(
-        np.concatenate(found) if found else np.zeros((0, stride), dtype=np.uint8),
+        np.concatenate(scanned_frames) if scanned_frames else np.zeros((0, stride), dtype=np.uint8),
         raw[at:].tobytes(),
         gaps.damaged,
         len(raw) - stride - np.concatenate([np.zeros(0, dtype=np.int64), *begins]),

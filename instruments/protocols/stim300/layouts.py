@@ -125,10 +125,10 @@ def content_of(identifier: int) -> Content:
 def _layout(identifier: int) -> Layout:
     content = content_of(identifier)
     clusters = 1 + content.acceleration + content.inclination
-    warm = 1 + CLUSTER_BYTES * clusters
-    covered = warm + content.temperature * clusters * TEMPERATURES_BYTES + content.pps * PPS_BYTES
+    temperature_byte = 1 + CLUSTER_BYTES * clusters
+    covered = temperature_byte + content.temperature * clusters * TEMPERATURES_BYTES + content.pps * PPS_BYTES
     covered += COUNTER_BYTES + LATENCY_BYTES
-    temperature = warm if content.temperature else None
+    temperature = temperature_byte if content.temperature else None
     return Layout(
         identifier,
         covered + CRC_BYTES,

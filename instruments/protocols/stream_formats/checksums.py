@@ -40,7 +40,10 @@ def algorithm(name: str) -> Algorithm:
         return _SUMS[name]
     group, _, one = name.partition("/")
     if group not in _CRCS or one not in getattr(fastcrc, group).algorithms_available:
-        known = [each for each in algorithm_names() if each.startswith(group)] or [*_SUMS, "crc32/mpeg_2 ..."]
-        raise ValueError(f"checksum {name!r} is not known; choose one of {', '.join(known)}")
+        algorithms = [algorithm_name for algorithm_name in algorithm_names() if algorithm_name.startswith(group)] or [
+            *_SUMS,
+            "crc32/mpeg_2 ...",
+        ]
+        raise ValueError(f"checksum {name!r} is not known; choose one of {', '.join(algorithms)}")
     of: Callable[[bytes], int] = getattr(getattr(fastcrc, group), one)
     return Algorithm(_CRCS[group], of)

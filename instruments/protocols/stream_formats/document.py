@@ -52,9 +52,9 @@ class StreamField(Strict):
             return self
         if self.unit not in UNITS:
             raise ValueError(f"field {self.name}: unit {self.unit!r} is not known; choose one of {_units()}")
-        wanted = unit_of_channel(self.name)
-        if wanted is not None and UNITS[self.unit].unit != wanted:
-            fitting = [unit for unit, each in UNITS.items() if each.unit == wanted]
+        channel_unit = unit_of_channel(self.name)
+        if channel_unit is not None and UNITS[self.unit].unit != channel_unit:
+            fitting = [unit for unit, each in UNITS.items() if each.unit == channel_unit]
             raise ValueError(
                 f"field {self.name}: unit {self.unit!r} does not belong to this quantity; choose "
                 f"one of {', '.join(fitting)}"
@@ -196,19 +196,19 @@ class FrameLayout(Strict):
                 f"length = {self.length} bytes; give more than the number of bytes of sync, and at "
                 f"most {LONGEST_FRAME} bytes"
             )
-        for each in self.fields:
-            if each.item is not None and self.items is None:
+        for field in self.fields:
+            if field.item is not None and self.items is None:
                 raise ValueError(
-                    f"field {each.name} has the key `item`, but the format has no section "
+                    f"field {field.name} has the key `item`, but the format has no section "
                     "[frame.items]; leave the key out, or add the section"
                 )
             if (
                 isinstance(self.length, int)
-                and each.item is None
-                and each.at + each.size > (end := self.content_end(self.length))
+                and field.item is None
+                and field.at + field.size > (end := self.content_end(self.length))
             ):
                 raise ValueError(
-                    f"field {each.name} ends at byte {each.at + each.size}, but the data of a frame end at byte "
+                    f"field {field.name} ends at byte {field.at + field.size}, but the data of a frame end at byte "
                     f"{end}; correct `at`, `type` or `length`"
                 )
         return self
@@ -246,13 +246,13 @@ class StreamFormat(Strict):
     @property
     def axes(self) -> tuple[str, ...]:
         """Axes of the rates, in the order of the document."""
-        return tuple(each.name.removeprefix("gyro_") for each in self.fields if each.name.startswith("gyro_"))
+        return tuple(field.name.removeprefix("gyro_") for field in self.fields if field.name.startswith("gyro_"))
 
     @model_validator(mode="after")
     def _whole(self) -> StreamFormat:
         if (self.line is None) == (self.frame is None):
             raise ValueError("a stream format has one of the sections [line] and [frame]; give exactly one")
-        names = [each.name for each in self.fields]
+        names = [field.name for field in self.fields]
         if twice := next((name for name in names if names.count(name) > 1), None):
             raise ValueError(f"two fields have the name {twice!r}; rename one")
         if not self.axes or not set(self.axes) <= {"x", "y", "z"}:
@@ -260,7 +260,7 @@ class StreamFormat(Strict):
                 f"no field is named gyro_x, gyro_y or gyro_z (the fields are {', '.join(names)}); "
                 "give the rates of the gyro these names"
             )
-        if silent := [each.name for each in self.fields if each.name.startswith("gyro_") and each.unit is None]:
+        if silent := [field.name for field in self.fields if field.name.startswith("gyro_") and field.unit is None]:
             raise ValueError(f"field {silent[0]} has no unit; add one like unit = 'rad/s'")
         if self.counter is not None and self.counter.field not in names:
             raise ValueError(f"counter: no field is named {self.counter.field!r}; choose one of {', '.join(names)}")

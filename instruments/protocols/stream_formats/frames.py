@@ -40,7 +40,7 @@ class FrameScanner:
         self._skipped = 0  #: bytes since the last intact frame
 
     def drop(self) -> None:
-        """Forget the unfinished frame; bytes before the next intact one are no damage."""
+        """Drop the unfinished frame; bytes before the next intact one are no damage."""
         self._unfinished, self._in_step, self._skipped = b"", False, 0
 
     def feed(self, new: bytes) -> tuple[list[tuple[Bytes, Whole]], int]:
@@ -146,7 +146,7 @@ class FrameDecoder:
         self._held: dict[str, int] = {}  #: newest value of the fields that come more rarely
 
     def drop(self) -> None:
-        """Forget the unfinished frame."""
+        """Drop the unfinished frame."""
         self._scanner.drop()
 
     def feed(self, data: bytes) -> Decoded:
@@ -206,5 +206,5 @@ class FrameDecoder:
             values[field.name] = numbers
             if field.hold:
                 self._held[field.name] = int(numbers[-1])
-        kept = {name: each[is_reading] for name, each in values.items()}
+        kept = {name: value[is_reading] for name, value in values.items()}
         return _Part(kept, good[is_reading], behind[is_reading])

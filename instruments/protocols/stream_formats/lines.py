@@ -32,7 +32,7 @@ class LineDecoder:
         self._unfinished, self._in_line = b"", False
 
     def drop(self) -> None:
-        """Forget the unfinished line."""
+        """Drop the unfinished line."""
         self._unfinished, self._in_line = b"", False
 
     def feed(self, data: bytes) -> Decoded:
@@ -41,16 +41,16 @@ class LineDecoder:
         if pieces and not self._in_line:
             pieces, behind = pieces[1:], behind[1:]
             self._in_line = True
-        found = [self._numbers(piece) if piece else _Not.OTHER_MESSAGE for piece in pieces]
-        rows = [each for each in found if isinstance(each, list)]
+        parsed_lines = [self._numbers(piece) if piece else _Not.OTHER_MESSAGE for piece in pieces]
+        rows = [parsed_line for parsed_line in parsed_lines if isinstance(parsed_line, list)]
         numbers = np.asarray(rows, dtype=np.float64).reshape(-1, len(self._columns)).T
         good = np.ones(len(rows), dtype=bool)
         values = {}
         for field, column, step in zip(self._layout.fields, numbers, self._steps, strict=True):
             values[field.name], fits = whole_numbers(column, step)
             good &= fits
-        after = behind[[isinstance(each, list) for each in found]]
-        return Decoded(values, flags(self._format, values, good), after, found.count(_Not.DAMAGED))
+        after = behind[[isinstance(parsed_line, list) for parsed_line in parsed_lines]]
+        return Decoded(values, flags(self._format, values, good), after, parsed_lines.count(_Not.DAMAGED))
 
     def _numbers(self, line: bytes) -> list[float] | _Not:
         """Return the numbers of the fields of one line, or why it has none."""

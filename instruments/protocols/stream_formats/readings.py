@@ -68,7 +68,7 @@ class Decoder(Protocol):
     """Takes the bytes of a stream as they come."""
 
     def drop(self) -> None:
-        """Forget the unfinished message: what comes next may begin anywhere in one."""
+        """Drop the unfinished message: what comes next may begin anywhere in one."""
         ...
 
     def feed(self, data: bytes) -> Decoded:
@@ -92,10 +92,10 @@ def scale_of(field: StreamField, rate_hz: float) -> Scale:
 
 def stamp_ticks(format_: StreamFormat) -> StampTicks | None:
     """Return what the whole numbers of a format's time stamps are; None for a format without time stamps."""
-    if (told := format_.time) is None:
+    if (stamp := format_.time) is None:
         return None
-    step = next(step_of(field) for field in format_.fields if field.name == told.field)
-    return StampTicks(told.field, told.tick_s * step, None if told.wrap is None else round(told.wrap / step))
+    step = next(step_of(field) for field in format_.fields if field.name == stamp.field)
+    return StampTicks(stamp.field, stamp.tick_s * step, None if stamp.wrap is None else round(stamp.wrap / step))
 
 
 def pulse_ticks(format_: StreamFormat) -> PulseTicks | None:

@@ -30,34 +30,34 @@ class StreamSettings(GyroSettings):
 
     @model_validator(mode="before")
     @classmethod
-    def _of_the_format(cls, given: Any) -> Any:
-        if not isinstance(given, dict):
-            return given
-        format_ = given.get("format")
+    def _of_the_format(cls, document: Any) -> Any:
+        if not isinstance(document, dict):
+            return document
+        format_ = document.get("format")
         if isinstance(format_, str) and format_ in shipped_formats():
             format_ = read_toml(shipped_formats()[format_])
         if not isinstance(format_, dict):
-            return given
+            return document
         usual = {"axes": _axes(format_), "sample_rate_hz": format_.get("rate_hz")}
         usual |= {"technology": format_.get("technology"), "model": format_.get("name")}
-        said = {name: value for name, value in given.items() if value is not None}
-        return {name: value for name, value in usual.items() if value} | said | {"format": format_}
+        stated = {name: value for name, value in document.items() if value is not None}
+        return {name: value for name, value in usual.items() if value} | stated | {"format": format_}
 
     @field_validator("format", mode="before")
     @classmethod
-    def _found(cls, given: Any) -> Any:
-        if isinstance(given, str):
-            if given.endswith(".toml"):
+    def _found(cls, document: Any) -> Any:
+        if isinstance(document, str):
+            if document.endswith(".toml"):
                 raise ValueError(
-                    f"the folder of the bench file has no file {given!r}; correct the name, or put the file there"
+                    f"the folder of the bench file has no file {document!r}; correct the name, or put the file there"
                 )
-            near = difflib.get_close_matches(given, shipped_formats(), n=1)
+            near = difflib.get_close_matches(document, shipped_formats(), n=1)
             hint = f"did you mean {near[0]!r}? If not, " if near else ""
             raise ValueError(
-                f"no stream format {given!r} comes with labctl (those that do: {', '.join(shipped_formats())}); "
+                f"no stream format {document!r} comes with labctl (those that do: {', '.join(shipped_formats())}); "
                 f"{hint}name one of these, or a .toml file in the folder of the bench file"
             )
-        return given
+        return document
 
     @model_validator(mode="after")
     def _usable(self) -> StreamSettings:

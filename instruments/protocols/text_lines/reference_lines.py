@@ -75,11 +75,11 @@ class LineReferenceSettings(ReferenceSettings):
 
     @model_validator(mode="before")
     @classmethod
-    def _as_described(cls, given: Any) -> Any:
+    def _as_described(cls, document: Any) -> Any:
         """Take what the description says where the bench file says nothing."""
-        if not isinstance(given, dict) or given.get("format") is None:
-            return given
-        lined = with_line(given)
+        if not isinstance(document, dict) or document.get("format") is None:
+            return document
+        lined = with_line(document)
         if not isinstance(lined, dict) or not isinstance(description := lined["format"], dict):
             return lined
         line = description.get("line")
@@ -114,13 +114,13 @@ class LineReferenceSettings(ReferenceSettings):
     @property
     def known(self) -> ReferenceModel:
         """The model, with what the bench file says otherwise."""
-        known = MODELS.get(self.model) or ReferenceModel(
+        model = MODELS.get(self.model) or ReferenceModel(
             "reference" if self.format is None else self.format.name, "the bench file", "", IDN, {}
         )
         return ReferenceModel(
-            known.title, known.source, known.identity if self.identity is None else self.identity, known.serial or IDN,
-            self.quantities or known.quantities, known.end if self.end is None else self.end,
-            self.baudrate or known.baudrate, self.tcp_port or known.tcp_port,
+            model.title, model.source, model.identity if self.identity is None else self.identity, model.serial or IDN,
+            self.quantities or model.quantities, model.end if self.end is None else self.end,
+            self.baudrate or model.baudrate, self.tcp_port or model.tcp_port,
         )  # fmt: skip
 
     @property

@@ -59,15 +59,21 @@ class SimulatedAcutrol3000(TimedReplies):
         super().__init__()
         table = part_of(setup.instrument("table"), Acutrol3000Settings)
         self._world, self._faults = setup.world, setup.faults
-        said = setup.world.settings.table
+        table_section = setup.world.settings.table
         self.motion = setup.world.servo = setup.world.servo or ServoMotion()
         self._number, self._sign = table.axis, table.direction
-        self._absolute = (number(said, "absolute_dps", 1000.0), number(said, "absolute_dps2", 4200.0))
+        self._absolute = (number(table_section, "absolute_dps", 1000.0), number(table_section, "absolute_dps2", 4200.0))
         #: True rate over the demanded one, forwards and backwards.
-        self.ratio = number(said, "rate_ratio", 1.0), number(said, "rate_ratio_reverse", number(said, "rate_ratio", 1))
-        self._noise_deg = number(said, "encoder_noise_deg", 0.0)
-        self._reply_s, self._jitter_s = number(said, "reply_s", 0.002), number(said, "reply_jitter_s", 0.0)
-        self._lines = bool(said.get("plain_lines", False))
+        self.ratio = (
+            number(table_section, "rate_ratio", 1.0),
+            number(table_section, "rate_ratio_reverse", number(table_section, "rate_ratio", 1)),
+        )
+        self._noise_deg = number(table_section, "encoder_noise_deg", 0.0)
+        self._reply_s, self._jitter_s = (
+            number(table_section, "reply_s", 0.002),
+            number(table_section, "reply_jitter_s", 0.0),
+        )
+        self._lines = bool(table_section.get("plain_lines", False))
         self._rng = np.random.default_rng([setup.world.settings.seed, setup.world.settings.noise_seed, 3000])
         self.axis = _Axis()
         self._line = bytearray()
@@ -113,17 +119,17 @@ class SimulatedAcutrol3000(TimedReplies):
 
     def _execute(self, message: str, t_s: float) -> tuple[int, str]:
         """Execute a message; returns the error of the first command that was refused, or the replies to its queries."""
-        said = []
+        replies = []
         try:
             for command in commands_of(message):
                 if self._faults.trigger(["refusal"], t_s) is not None:
                     raise Refused(OUT_OF_RANGE)
-                said.append(self._one(command, t_s))
+                replies.append(self._one(command, t_s))
         except (ParseError, Refused) as error:
             code = error.args[0] if isinstance(error, Refused) else PARSING
             self._errors.append(f"{code}:{TEXTS[code]}")
             return code, TEXTS[code]
-        return 0, ";".join(text for text in said if text) or acl.DONE
+        return 0, ";".join(text for text in replies if text) or acl.DONE
 
     def _one(self, command: Command, t_s: float) -> str:
         if self.axis.closing_until_s and t_s >= self.axis.closing_until_s:
@@ -265,12 +271,12 @@ class SimulatedAcutrol3000(TimedReplies):
         return acl.number(self._sign * self.motion.rate_dps(t_s) + RATE_NOISE_DPS * self._rng.standard_normal())
 
     def _register(self, command: Command, t_s: float) -> str:
-        found = re.fullmatch(rf"a{self._number}(dyn|intlk|swflt|state)", command.arguments[0].lower())
-        if found is None:
+        match = re.fullmatch(rf"a{self._number}(dyn|intlk|swflt|state)", command.arguments[0].lower())
+        if match is None:
             raise Refused(OUT_OF_RANGE)
         done = t_s >= self.axis.done_s
         values = {
             "dyn": done << (acl.POSITION_COMPLETE if self.axis.mode == acl.POSITION else acl.RATE_COMPLETE),
             "intlk": self.axis.hardware, "swflt": self.axis.software, "state": (self.axis.interlock == acl.CLOSED) << 4,
         }  # fmt: skip
-        return str(values[found[1]])
+        return str(values[match[1]])

@@ -47,17 +47,17 @@ class SimulatedEnsemble(TimedReplies):
             self._turn(0.0, t_s, self._abort_dps2)
         lost = self.faults.trigger(["lost_reply", "silence"], t_s) is not None
         if self.faults.trigger(["refusal"], t_s) is not None:
-            said, done_s = FAULT, t_s
+            reply, done_s = FAULT, t_s
         else:
-            said, done_s = self._execute(text, t_s)
+            reply, done_s = self._execute(text, t_s)
         if not lost:
-            self.send_in_order(done_s + self.axis.reply_s, f"{said}\n".encode())
+            self.send_in_order(done_s + self.axis.reply_s, f"{reply}\n".encode())
 
     def _execute(self, text: str, t_s: float) -> tuple[str, float]:
         """Return the reply and when the command is done."""
         for pattern, act in self._commands:
-            if found := pattern.fullmatch(text):
-                return act(found, t_s)
+            if match := pattern.fullmatch(text):
+                return act(match, t_s)
         return INVALID, t_s
 
     def _compiled(self) -> list[tuple[re.Pattern[str], Act]]:
@@ -68,8 +68,8 @@ class SimulatedEnsemble(TimedReplies):
             r"RAMP RATE {axis} {number}": self._ramp_rate,
             r"SETPARM {axis}, *73, *{number}": self._abort_rate,
             r"GETPARM\({axis}, *140\)": lambda _, t_s: (f"{DONE}TABLE", t_s),
-            r"(AXISSTATUS|AXISFAULT|PFBKPROG|VFBK)\({axis}\)": lambda found, t_s: (
-                DONE + self._value(found[1], t_s),
+            r"(AXISSTATUS|AXISFAULT|PFBKPROG|VFBK)\({axis}\)": lambda match, t_s: (
+                DONE + self._value(match[1], t_s),
                 t_s,
             ),
             r"FAULTACK {axis}": self._acknowledge,
@@ -82,16 +82,16 @@ class SimulatedEnsemble(TimedReplies):
         named = {text.replace("{axis}", axis).replace("{number}", f"({NUMBER})"): act for text, act in acts.items()}
         return [(re.compile(text), act) for text, act in named.items()]
 
-    def _wait_mode(self, found: re.Match[str], t_s: float) -> tuple[str, float]:
-        self.waits = found[1] != "NOWAIT"
+    def _wait_mode(self, match: re.Match[str], t_s: float) -> tuple[str, float]:
+        self.waits = match[1] != "NOWAIT"
         return DONE, t_s
 
-    def _ramp_rate(self, found: re.Match[str], t_s: float) -> tuple[str, float]:
-        self._ramp_dps2 = float(found[1])
+    def _ramp_rate(self, match: re.Match[str], t_s: float) -> tuple[str, float]:
+        self._ramp_dps2 = float(match[1])
         return DONE, t_s
 
-    def _abort_rate(self, found: re.Match[str], t_s: float) -> tuple[str, float]:
-        self._abort_dps2 = float(found[1])
+    def _abort_rate(self, match: re.Match[str], t_s: float) -> tuple[str, float]:
+        self._abort_dps2 = float(match[1])
         return DONE, t_s
 
     def _value(self, name: str, t_s: float) -> str:
@@ -117,8 +117,8 @@ class SimulatedEnsemble(TimedReplies):
         done_s = self._turn(0.0, t_s, self._abort_dps2)
         return DONE, done_s if self.waits else t_s
 
-    def _freerun(self, found: re.Match[str], t_s: float) -> tuple[str, float]:
-        rate_dps = float(found[1])
+    def _freerun(self, match: re.Match[str], t_s: float) -> tuple[str, float]:
+        rate_dps = float(match[1])
         if not self._can_move or abs(rate_dps) > MAX_DPS:
             return FAULT, t_s
         self._turn(rate_dps, t_s, self._ramp_dps2)

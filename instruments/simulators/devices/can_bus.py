@@ -51,11 +51,11 @@ class PackedSignal:
         if self.is_intel:
             yield from range(self.start, self.start + self.bits)
             return
-        at, found = self.start, []
+        at, bits = self.start, []
         for _ in range(self.bits):
-            found.append(at)
+            bits.append(at)
             at = at + 15 if at % 8 == 0 else at - 1  # from bit 0 of a byte on to bit 7 of the next
-        yield from reversed(found)
+        yield from reversed(bits)
 
     def code(self, value: float) -> int:
         """Return the bits of a value as a whole number that is not negative."""
@@ -90,25 +90,25 @@ class PackedMessage:
 
 def read_messages(dbc: str) -> dict[str, PackedMessage]:
     """Return the messages of a DBC text by name."""
-    found: dict[str, PackedMessage] = {}
+    by_name: dict[str, PackedMessage] = {}
     message = PackedMessage(0, "", 0)
     for line in dbc.splitlines():
         if begins := _MESSAGE.match(line):
             message = PackedMessage(int(begins[1]), begins[2], int(begins[3]))
-            found[message.name] = message
+            by_name[message.name] = message
         elif given := _SIGNAL.match(line):
             name, start, bits, order, sign, scale, offset, unit = given.groups()
             message.signals[name] = PackedSignal(
                 name, int(start), int(bits), order == "1", sign == "-", float(scale), float(offset), unit
             )
-    by_id = {each.id: each for each in found.values()}
+    by_id = {each.id: each for each in by_name.values()}
     for line in dbc.splitlines():
         if (given := _FLOAT.match(line)) and int(given[1]) in by_id:
             by_id[int(given[1])].signals[given[2]].float_bits = 32 * int(given[3])
         elif (given := _TEXTS.match(line)) and int(given[1]) in by_id:
             texts = re.findall(r'(-?\d+) "([^"]*)"', given[3])
             by_id[int(given[1])].signals[given[2]].texts = {text: int(raw) for raw, text in texts}
-    return found
+    return by_name
 
 
 class SimulatedCanUnit(SampledUnit):
@@ -184,6 +184,6 @@ class SimulatedCanUnit(SampledUnit):
         return (value - conversion.offset) / conversion.factor
 
 
-def _good_value(signal: PackedSignal, given: int | str) -> float:
-    raw = signal.texts[given] if isinstance(given, str) else given
+def _good_value(signal: PackedSignal, value: int | str) -> float:
+    raw = signal.texts[value] if isinstance(value, str) else value
     return signal.offset + signal.scale * raw

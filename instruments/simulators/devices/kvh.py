@@ -39,8 +39,8 @@ class _SimulatedLines(ABC):
         self._sent = newest
         sample = self._unit.sample(index / self._rate_hz)
         lines = [
-            self.line(self.format.sign * float(rate[0]), float(warm[0]))
-            for rate, warm in zip(sample.rate_dps, sample.temperature_c, strict=True)
+            self.line(self.format.sign * float(rate[0]), float(temperature_c[0]))
+            for rate, temperature_c in zip(sample.rate_dps, sample.temperature_c, strict=True)
         ]
         if self._faults.trigger(["wrong_crc"], t_s) is not None:
             lines[0] = "?" + lines[0][1:]
@@ -54,7 +54,7 @@ class _SimulatedLines(ABC):
         return self._sent / self._rate_hz
 
     def skip(self, t_s: float) -> None:
-        """Lose the lines up to `t_s`."""
+        """Drop the lines up to `t_s`."""
         self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))
 
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the stream never waits

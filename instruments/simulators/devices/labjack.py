@@ -149,13 +149,13 @@ class SimulatedT7Stream:
         self.stream.sent = max(newest, self.stream.sent)
         if newest <= first:
             return b""
-        found = self._packets(first, newest)
+        packets = self._packets(first, newest)
         if (gap := self._faults.trigger(["counter_gap"], t_s)) is not None:
-            found = found[gap.value :]
-        return b"".join(found)
+            packets = packets[gap.value :]
+        return b"".join(packets)
 
     def skip(self, t_s: float) -> None:
-        """Lose the packets up to `t_s`."""
+        """Drop the packets up to `t_s`."""
         self.stream.sent = max(self.stream.sent, self.stream.packets_by(t_s))
 
     @property
@@ -173,20 +173,20 @@ class SimulatedT7Stream:
         assert s.started_s is not None
         index = np.arange(first * s.per_packet, end * s.per_packet) + s.skipped + 1
         codes = self._codes(s.started_s + index / s.rate_hz).reshape(end - first, s.per_packet, -1)
-        found = []
+        packets = []
         for number, scans in zip(range(first, end), codes, strict=True):
             status, info, self.status = self.status, 0, 0
             if self._recovered:
                 status, info, self._recovered = stream.RECOVERED, self._recovered, 0
                 scans[0] = stream.DUMMY
-            found.append(stream.build(stream.Packet(number, 0, status, info, scans.ravel())))
-        return found
+            packets.append(stream.build(stream.Packet(number, 0, status, info, scans.ravel())))
+        return packets
 
     def _codes(self, t_s: NDArray[np.float64]) -> NDArray[np.int64]:
         options, sample = self.stream.settings.options, self.stream.unit.sample(t_s)
         volts = options.rest_v + options.v_per_dps * sample.rate_dps
         if options.thermometer_input is not None:
-            warm = (sample.temperature_c[:, :1] - options.thermometer_zero_c) / options.thermometer_c_per_v
-            volts = np.hstack([volts, warm])
+            above_zero_c = (sample.temperature_c[:, :1] - options.thermometer_zero_c) / options.thermometer_c_per_v
+            volts = np.hstack([volts, above_zero_c])
         slope, _, centre, _ = NOMINAL[4 * lj.gain_index(options.range_v) :][:4]
         return np.clip(np.rint(volts / slope + centre), 0, stream.DUMMY).astype(np.int64)

@@ -43,7 +43,7 @@ class SimulatedEspec(LineDevice):
             "TYPE?": lambda: f"T,P300,{chamber.max_c:.1f}",
             "TEMP?": lambda: f"{chamber.air_c(t_s):.1f},{chamber.setpoint_c:.1f},{limits}",
             "MODE?": lambda: "RUN" if chamber.program else "CONSTANT" if chamber.runs else "STANDBY",
-            "ALARM?": lambda: ",".join(str(each) for each in (len(chamber.alarms), *chamber.alarms)),
+            "ALARM?": lambda: ",".join(str(alarm) for alarm in (len(chamber.alarms), *chamber.alarms)),
             "KEYPROTECT?": lambda: "ON" if self.is_locked else "OFF",
         }
         return values[request]() if request in values else self._command(request, t_s)
@@ -142,8 +142,8 @@ class SimulatedThermotron(LineDevice):
     def __init__(self, setup: InstrumentSetup) -> None:
         super().__init__(THERMOTRON.syntax, setup.faults)
         settings = part_of(setup.instrument("chamber"), ThermotronSettings)
-        said = setup.world.settings.chamber.get("acknowledges", settings.acknowledges)
-        self._channel, self._acknowledges = settings.channel, bool(said)
+        acknowledges = setup.world.settings.chamber.get("acknowledges", settings.acknowledges)
+        self._channel, self._acknowledges = settings.channel, bool(acknowledges)
         self.chamber = ChamberState(setup)
 
     def answer(self, request: str, t_s: float) -> str | None:

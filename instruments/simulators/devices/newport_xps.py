@@ -42,7 +42,7 @@ class XpsController:
         }
 
     def stall(self, t_s: float) -> None:
-        """Lose the motion where a fault says so."""
+        """Drop the motion where a fault says so."""
         if self.faults.trigger(["stall"], t_s) is not None and self.status == JOGGING:
             self.axis.run(t_s, 0.0, MAX_DPS2)
             self.status = AFTER_ERROR
@@ -95,7 +95,7 @@ class XpsController:
         if self.status != JOGGING:
             return NOT_ALLOWED, "", t_s
         try:
-            rate, acceleration = (float(each) for each in arguments)
+            rate, acceleration = (float(argument) for argument in arguments)
         except ValueError:
             return ARGUMENTS, "", t_s
         if abs(rate) > MAX_DPS or not 0 < acceleration <= MAX_DPS2:
@@ -139,9 +139,9 @@ class SimulatedXps(TimedReplies):
     def receive(self, data: bytes, t_s: float) -> None:
         """Take bytes; a function is run once its bracket closes."""
         self._data = self._data[-LONGEST:] + data
-        while (found := CALL.match(self._data)) is not None:
-            self._data = self._data[found.end() :]
-            self._run(found[1].decode(), [each.strip() for each in found[2].decode("latin-1").split(",")], t_s)
+        while (call := CALL.match(self._data)) is not None:
+            self._data = self._data[call.end() :]
+            self._run(call[1].decode(), [each.strip() for each in call[2].decode("latin-1").split(",")], t_s)
 
     def end_waiting(self, t_s: float) -> None:
         """End the function that is under way: it answers that it was aborted."""

@@ -61,18 +61,18 @@ class Inputs:
     def sample(self, numbers: list[int], range_v: float, t_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the volts (inputs, n) of inputs at rising times (n,) s, in steps of the converter."""
         options, sample = self._options, self._unit.sample(t_s)
-        found = np.zeros((len(numbers), len(t_s)))
+        volts = np.zeros((len(numbers), len(t_s)))
         rates_v = options.rest_v + options.v_per_dps * sample.rate_dps
         for row, number in enumerate(numbers):
             if number in self.volts:
-                found[row] = self.volts[number]
+                volts[row] = self.volts[number]
             elif number in options.inputs:
-                found[row] = rates_v[:, options.inputs.index(number)]
+                volts[row] = rates_v[:, options.inputs.index(number)]
             elif number == options.thermometer_input:
                 warm_c = sample.temperature_c[:, 0] - options.thermometer_zero_c
-                found[row] = warm_c / options.thermometer_c_per_v
+                volts[row] = warm_c / options.thermometer_c_per_v
         step_v = 2 * range_v / CODES
-        return np.clip(np.rint(found / step_v) * step_v, -range_v, range_v)
+        return np.clip(np.rint(volts / step_v) * step_v, -range_v, range_v)
 
 
 @dataclass
@@ -117,11 +117,11 @@ class Task:
         there = self.available(t_s)
         if self.started_s is None or there > self.buffer:
             raise DaqFailure(Status.OVERRUN if there else Status.NOT_YET_AVAILABLE)
-        wanted = there if count == ALL_AVAILABLE else min(count, there)
-        index = self.taken + 1 + np.arange(wanted)
-        self.taken += wanted
+        samples = there if count == ALL_AVAILABLE else min(count, there)
+        index = self.taken + 1 + np.arange(samples)
+        self.taken += samples
         volts = self.inputs.sample(self.numbers, self.range_v, self.started_s + index / self._true_hz)
-        return (Status.NOT_YET_AVAILABLE if wanted < count else None), volts
+        return (Status.NOT_YET_AVAILABLE if samples < count else None), volts
 
     @property
     def _true_hz(self) -> float:
@@ -274,9 +274,9 @@ class SimulatedNidaq(RpcDevice):
 
     def _task(self, fields: Fields) -> Task:
         """Return the task of a request; raises DaqFailure where there is none."""
-        if (found := self.tasks.get(self._name(fields))) is None:
+        if (task := self.tasks.get(self._name(fields))) is None:
             raise DaqFailure(Status.TASK_UNKNOWN)
-        return found
+        return task
 
 
 def _failed(status: Status, metadata: tuple[tuple[str, str], ...] = ()) -> Reply:

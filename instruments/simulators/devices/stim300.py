@@ -78,18 +78,18 @@ def _settings_of(setup: InstrumentSetup) -> DeviceSettings:
 
 def _serial_of(gyro: GyroSettings) -> str:
     """Return the serial number of the bench file where it is one of a STIM300, else one that is made from it."""
-    known = SERIAL_PATTERN.fullmatch(gyro.serial)
-    return "N" + (known[1] if known else f"{zlib.crc32(gyro.serial.encode()):014d}")
+    number = SERIAL_PATTERN.fullmatch(gyro.serial)
+    return "N" + (number[1] if number else f"{zlib.crc32(gyro.serial.encode()):014d}")
 
 
 def _constant_part(layout: Layout) -> Bytes:
     """Return a datagram, (stride,), with what is the same in each: identifier, latency and line end; the rest is 0."""
-    found = np.zeros(layout.stride, dtype=np.uint8)
-    found[0] = layout.id
-    found[layout.counter + 1 : layout.counter + 3] = np.array([LATENCY_US], dtype=">u2").view(np.uint8)
+    frame = np.zeros(layout.stride, dtype=np.uint8)
+    frame[0] = layout.id
+    frame[layout.counter + 1 : layout.counter + 3] = np.array([LATENCY_US], dtype=">u2").view(np.uint8)
     if layout.crlf:
-        found[layout.length :] = (0x0D, 0x0A)
-    return found
+        frame[layout.length :] = (0x0D, 0x0A)
+    return frame
 
 
 class SimulatedStim300:
@@ -138,12 +138,12 @@ class SimulatedStim300:
             self._execute(command + b"\r", int(np.floor(t_s * self._rate_hz + 1e-9)) + 1)
 
     def _execute(self, command: bytes, index: int) -> None:
-        """Obey a command that came before the frame of an index was sent."""
+        """Execute a command that arrived before the frame of an index was sent."""
         if command == RESET:
             index = self._silent_until = index + round(SILENT_AFTER_RESET_S * self._rate_hz)
             self._starts_until = index + round(STARTS_UP_S * self._rate_hz)
-        asked = [ASK_SERIAL_NUMBER, ASK_CONFIGURATION] if command == RESET else [command]
-        for question in asked:
+        requests = [ASK_SERIAL_NUMBER, ASK_CONFIGURATION] if command == RESET else [command]
+        for question in requests:
             if question in self._says:
                 while index in self._replies:
                     index += 1
@@ -163,7 +163,7 @@ class SimulatedStim300:
         return self._with_replies(index, frames) if self._replies else frames.tobytes()
 
     def skip(self, t_s: float) -> None:
-        """Lose the frames up to `t_s`."""
+        """Drop the frames up to `t_s`."""
         self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))
 
     @property
@@ -200,16 +200,16 @@ class SimulatedStim300:
         """Return values of the unit's axes, (n, axes), as those of x, y and z, (n, 3), with 0 for one that it lacks."""
         if self._columns == [0, 1, 2]:
             return values
-        found = np.zeros((len(values), 3))
-        found[:, self._columns] = values
-        return found
+        by_axis = np.zeros((len(values), 3))
+        by_axis[:, self._columns] = values
+        return by_axis
 
     def _encode(self, index: NDArray[np.int64], t_s: float) -> Bytes:
         layout, n = self._layout, len(index)
         sample = self._unit.sample(index / self._rate_hz)
         frames = np.empty((n, layout.stride), dtype=np.uint8)
         frames[:] = self._constant
-        rates, warm = self._on_three_axes(sample.rate_dps), self._on_three_axes(sample.temperature_c)
+        rates, temperature_c = self._on_three_axes(sample.rate_dps), self._on_three_axes(sample.temperature_c)
         over = np.abs(rates) > SATURATION_DPS
         words = self._words(rates).astype(">i4")
         frames[:, 1:10] = words.view(np.uint8).reshape(n, 3, 4)[:, :, 1:].reshape(n, 9)
@@ -218,7 +218,7 @@ class SimulatedStim300:
         if self._starts_until:
             frames[index < self._starts_until, layout.status] |= START_UP
         if layout.temperature is not None:
-            codes = np.rint(warm / TEMPERATURE_PER_LSB).astype(">i2")
+            codes = np.rint(temperature_c / TEMPERATURE_PER_LSB).astype(">i2")
             frames[:, layout.temperature : layout.temperature + 6] = codes.view(np.uint8).reshape(n, 6)
         skip = 0
         if (gap := self._faults.trigger(["counter_gap"], t_s)) is not None:

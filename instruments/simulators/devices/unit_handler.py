@@ -14,11 +14,11 @@ class SimulatedUnitHandler:
         self._clock = clock
 
     def mount(self, position: str) -> None:
-        """Control the world: turn its units."""
+        """Turn the units of the simulated bench."""
         self._world.mount(self._clock.now_s(), position)
 
     def turn(self, position: str, turn_deg: float) -> None:
-        """Control the world: have its units turned by its hand."""
+        """Have the simulated person turn the units."""
         self._world.turn_by_hand(self._clock.now_s(), position, turn_deg)
 
     def is_turning(self) -> bool:
@@ -26,5 +26,5 @@ class SimulatedUnitHandler:
         return self._world.hand.is_turning(self._clock.now_s())
 
     def power(self, on: bool) -> None:
-        """Control the world: switch its units on or off."""
+        """Switch the units of the simulated bench on or off."""
         self._world.power(self._clock.now_s(), on)

@@ -77,7 +77,7 @@ class SimulatedF4(ModbusDevice):
         return True
 
     def _control(self, t_s: float) -> None:
-        """Let the air go to the set point, or to that of the room while the event that lets the chamber run is off."""
+        """Move the air to the set point, or to that of the room while the event that lets the chamber run is off."""
         runs = self._enabling is None or self.events[self._enabling] == f4.EVENT_ON
         self._world.heat.set(t_s, self.setpoint / self.counts_per_c if runs else AMBIENT_C)
 

@@ -28,8 +28,8 @@ class SimulatedF4T(ModbusDevice):
         self._order: WordOrder = chamber.word_order
         part = str(setup.world.settings.chamber.get("part_number", PART_NUMBER))
         self.part_number = [ord(letter) for letter in part]
-        wanted = chamber.cascade
-        self._loop = f4t.CASCADE if (f4t.has_cascade(part) if wanted is None else wanted) else f4t.LOOP
+        cascade = chamber.cascade
+        self._loop = f4t.CASCADE if (f4t.has_cascade(part) if cascade is None else cascade) else f4t.LOOP
         self.status = f4t.STATUS_OK
         self.units = f4t.UNITS_CELSIUS  #: 30: Fahrenheit
         self.control_mode = f4t.MODE_AUTO

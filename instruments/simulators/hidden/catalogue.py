@@ -72,8 +72,8 @@ KINDS: tuple[type[HiddenEffect], ...] = (
 )
 
 
-def _checked(found: Any) -> tuple[type[HiddenEffect], ...]:
-    kinds = (found,) if isinstance(found, type) else tuple(found)
+def _checked(effect: Any) -> tuple[type[HiddenEffect], ...]:
+    kinds = (effect,) if isinstance(effect, type) else tuple(effect)
     for kind in kinds:
         if not (isinstance(kind, type) and issubclass(kind, HiddenEffect)):
             raise TypeError(

@@ -17,7 +17,7 @@ class SimulatedDevice(Protocol):
         ...
 
     def skip(self, t_s: float) -> None:
-        """Lose the bytes sent up to `t_s` without making them."""
+        """Drop the bytes sent up to `t_s` without making them."""
         ...
 
     def next_byte_s(self, t_s: float) -> float | None:

@@ -75,9 +75,9 @@ class Faults:
 
     def trigger(self, kinds: Iterable[FaultKind], t_s: float) -> Fault | None:
         """Return the first active fault of the given kinds, counted down; None when there is none."""
-        wanted = set(kinds)
+        fault_kinds = set(kinds)
         for fault in self.armed:
-            if fault.kind in wanted and fault.active(t_s):
+            if fault.kind in fault_kinds and fault.active(t_s):
                 if fault.count is not None:
                     fault.count -= 1
                 return fault
@@ -122,7 +122,7 @@ class FaultyWire:
         return sent
 
     def skip(self, t_s: float) -> None:
-        """Lose the bytes that have arrived and the delayed ones; raises serial.SerialException on a dropped link."""
+        """Drop the bytes that have arrived and the delayed ones; raises serial.SerialException on a dropped link."""
         self._check_link(t_s)
         self._held.clear()
         self._device.skip(t_s)

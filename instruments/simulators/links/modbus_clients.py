@@ -67,9 +67,9 @@ class SimulatedTcpClient(ModbusTcpClient):
             self._await_bytes()
         if not self._ready:
             return b""
-        found = super().recv(size)
-        self._ready -= len(found)
-        return found
+        received = super().recv(size)
+        self._ready -= len(received)
+        return received
 
     def _await_bytes(self) -> None:
         deadline_s = self._clock.now_s() + self._timeout_s

@@ -15,7 +15,7 @@ class Replies:
         return sent
 
     def skip(self, t_s: float) -> None:
-        """Lose the replies."""
+        """Drop the replies."""
         self.transmit(t_s)
 
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002
@@ -48,7 +48,7 @@ class TimedReplies:
         return due
 
     def skip(self, t_s: float) -> None:
-        """Lose the replies that are due."""
+        """Drop the replies that are due."""
         self.transmit(t_s)
 
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the times of all replies are known

@@ -28,8 +28,8 @@ class RpcDevice(Replies, ABC):
         """Take bytes and answer every whole call in them; bytes that cannot become a call are dropped."""
         self._pending += data
         try:
-            while (found := take_call(self._pending)) is not None:
-                call, self._pending = found
+            while (received_call := take_call(self._pending)) is not None:
+                call, self._pending = received_call
                 self._reply_to(call, t_s)
         except ValueError:
             self._pending = b""

@@ -63,8 +63,8 @@ class SimulatedSerialPort(serial.SerialBase):
     @property
     def newest_s(self) -> float | None:
         """Clock time at which the newest byte was sent; None where the instrument does not tell."""
-        found = getattr(self._device, "newest_s", None)
-        return None if found is None else float(found)
+        device_newest_s = getattr(self._device, "newest_s", None)
+        return None if device_newest_s is None else float(device_newest_s)
 
     def read(self, size: int = 1) -> bytes:
         """Read `size` bytes, or as many as come before the time-out."""
@@ -80,9 +80,9 @@ class SimulatedSerialPort(serial.SerialBase):
                 until_s = deadline_s if until_s is None else min(until_s, deadline_s)
             self._clock.sleep(max((until_s or 0.0) - now_s, 1e-6))
             self._receive()
-        found = bytes(self._unread[:size])
+        data = bytes(self._unread[:size])
         del self._unread[:size]
-        return found
+        return data
 
     def write(self, data: Buffer, /) -> int:
         """Send bytes to the instrument."""

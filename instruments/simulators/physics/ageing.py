@@ -42,22 +42,22 @@ class Ageing:
         return np.asarray(np.multiply.outer(years, self.bias_dps_per_year))
 
 
-def ageing_of(given: object, axes: int) -> Ageing | None:
+def ageing_of(document: object, axes: int) -> Ageing | None:
     """Return the ageing that the settings of a simulated unit state, None where they state none.
 
     Raises ValueError for what is no such table.
     """
-    if given is None:
+    if document is None:
         return None
-    known = (BIAS, SCALE_FACTOR, SINCE)
-    if not isinstance(given, Mapping) or (unknown := set(given) - set(known)):
-        said = repr(given) if not isinstance(given, Mapping) else ", ".join(sorted(map(str, unknown)))
-        raise ValueError(f"simulated unit: ageing has no {said}; write a table of {', '.join(known)}")
-    return Ageing(_per_axis(given, BIAS, axes), _per_axis(given, SCALE_FACTOR, axes), _since(given.get(SINCE)))
+    allowed = (BIAS, SCALE_FACTOR, SINCE)
+    if not isinstance(document, Mapping) or (unknown := set(document) - set(allowed)):
+        given_text = repr(document) if not isinstance(document, Mapping) else ", ".join(sorted(map(str, unknown)))
+        raise ValueError(f"simulated unit: ageing has no {given_text}; write a table of {', '.join(allowed)}")
+    return Ageing(_per_axis(document, BIAS, axes), _per_axis(document, SCALE_FACTOR, axes), _since(document.get(SINCE)))
 
 
-def _per_axis(given: Mapping[str, object], name: str, axes: int) -> Array:
-    value = given.get(name, 0.0)
+def _per_axis(by_axis: Mapping[str, object], name: str, axes: int) -> Array:
+    value = by_axis.get(name, 0.0)
     listed: Sequence[object] = value if isinstance(value, list | tuple) else [value] * axes
     numbers = [float(each) for each in listed if isinstance(each, int | float) and np.isfinite(each)]
     if len(numbers) != len(listed) or len(numbers) != axes:

@@ -46,7 +46,7 @@ class BenchErrors:
             quantity: _summed(standards, quantity, rng)
             for quantity in ("thermometer", "chamber_gradient", "fixture_angle", "tilt", "level")
         }
-        table = sum(float(_drawn(each, rng)[0]) for each in standards if each.unit_name == "ppm")
+        table = sum(float(_drawn(standard, rng)[0]) for standard in standards if standard.unit_name == "ppm")
         faces = np.radians(np.concatenate([of["fixture_angle"], _summed(standards, "fixture_angle", below)]))
         ends = [f"{sign}{axis}" for sign in ("", "-") for axis in AXES]
         return BenchErrors(
@@ -55,7 +55,7 @@ class BenchErrors:
             float(of["level"][0]),
             {end: _lean(two) for end, two in zip(ends, faces.reshape(6, 2), strict=True)} if np.any(faces) else {},
             _lean(np.radians(of["tilt"][:2])),
-            tuple(each for each in standards if each.quantity == "mounting_repeatability"),
+            tuple(standard for standard in standards if standard.quantity == "mounting_repeatability"),
             tuple(seed),
         )
 
@@ -88,17 +88,17 @@ def _lean(two: Array) -> Lean:
     return float(two[0]), float(two[1])
 
 
-def _rotated(rates: Array, one: int, other: int, angle_rad: float) -> Array:
+def _rotated(rates: Array, axis: int, other: int, angle_rad: float) -> Array:
     """Return rates (n, 3) in axes that are turned by an angle in the plane of two of them."""
     turned = rates.copy()
-    turned[:, one] = np.cos(angle_rad) * rates[:, one] - np.sin(angle_rad) * rates[:, other]
-    turned[:, other] = np.sin(angle_rad) * rates[:, one] + np.cos(angle_rad) * rates[:, other]
+    turned[:, axis] = np.cos(angle_rad) * rates[:, axis] - np.sin(angle_rad) * rates[:, other]
+    turned[:, other] = np.sin(angle_rad) * rates[:, axis] + np.cos(angle_rad) * rates[:, other]
     return turned
 
 
 def _summed(standards: Sequence[Standard], quantity: str, rng: np.random.Generator) -> Array:
     """Return six errors of a quantity, the sums of what its standards state, in its unit."""
-    return sum((_drawn(each, rng) for each in standards if each.quantity == quantity), np.zeros(6))
+    return sum((_drawn(standard, rng) for standard in standards if standard.quantity == quantity), np.zeros(6))
 
 
 def _drawn(standard: Standard, rng: np.random.Generator) -> Array:

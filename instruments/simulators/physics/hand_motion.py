@@ -52,18 +52,20 @@ class HandMotion:
 
     def __init__(self, settings: Mapping[str, object], below: Motion | None, seed: Sequence[int]) -> None:
         """Take the settings of [simulation.hand]; raises ValueError for one that is not known."""
-        known = {"u_deg": 0.5, "rate_dps": 90.0, "reaction_s": 2.0}
+        defaults = {"u_deg": 0.5, "rate_dps": 90.0, "reaction_s": 2.0}
         mistakes = settings.get("mistakes", ())
-        if wrong := sorted(set(settings) - {*known, "mistakes"}):
-            raise ValueError(f"[simulation] hand.{wrong[0]} is not known; choose one of {', '.join(known)}, mistakes")
+        if wrong := sorted(set(settings) - {*defaults, "mistakes"}):
+            raise ValueError(
+                f"[simulation] hand.{wrong[0]} is not known; choose one of {', '.join(defaults)}, mistakes"
+            )
         if not isinstance(mistakes, list | tuple) or not set(mistakes) <= set(MISTAKES):
             raise ValueError(f"[simulation] hand.mistakes = {mistakes!r}: give a list of {', '.join(MISTAKES)}")
-        for name, usual in known.items():
+        for name, usual in defaults.items():
             value = settings.get(name, usual)
             if not isinstance(value, int | float) or not (value > 0 or (name == "u_deg" and value == 0)):
                 raise ValueError(f"[simulation] hand.{name} = {value!r}; give a number above 0")
-            known[name] = float(value)
-        self._u_deg, self.rate_dps, self.reaction_s = known["u_deg"], known["rate_dps"], known["reaction_s"]
+            defaults[name] = float(value)
+        self._u_deg, self.rate_dps, self.reaction_s = defaults["u_deg"], defaults["rate_dps"], defaults["reaction_s"]
         self._mistakes = [str(each) for each in cast("Sequence[object]", mistakes)]  #: made first, one in each turn
         self._below = below
         self._rng = np.random.default_rng(seed)
@@ -108,13 +110,13 @@ class HandMotion:
         return np.asarray(below + self._by_hand(t_s))
 
     def _by_hand(self, t_s: Array) -> Array:
-        found = np.zeros(len(t_s))
+        rates = np.zeros(len(t_s))
         if not len(t_s):
-            return found
+            return rates
         first_s, last_s = float(np.min(t_s)), float(np.max(t_s))
         for swing in self._swings:
             if swing.end_s <= first_s:
-                found += swing.angle_deg
+                rates += swing.angle_deg
             elif swing.start_s < last_s:
-                found += swing.at(t_s)
-        return found
+                rates += swing.at(t_s)
+        return rates

@@ -54,7 +54,7 @@ class BiasInstability:
 
     def _intervals(self, times_s: list[float]) -> list[_Interval]:
         """Return the grid intervals that hold rising times, from where the process is now."""
-        found, start, here_s = [], 0, self._here_s
+        intervals, start, here_s = [], 0, self._here_s
         while start < len(times_s):
             skipped_s, draws = 0.0, 0
             if times_s[start] >= here_s + GRID_S:
@@ -62,10 +62,10 @@ class BiasInstability:
                 here_s += skipped_s + GRID_S
                 draws = 2 if skipped_s else 1
             stop = bisect_left(times_s, here_s + GRID_S, start)
-            found.append(_Interval(here_s, skipped_s, draws, stop - start))
+            intervals.append(_Interval(here_s, skipped_s, draws, stop - start))
             start = stop
         self._here_s = here_s
-        return found
+        return intervals
 
     def _advance(self, interval: _Interval, draws: Array) -> None:
         """Move to an interval by its draws from the normal distribution, (draws, taus, axes)."""

@@ -126,8 +126,8 @@ class TableMotion:
 
     def _in_force(self, t_s: float) -> int:
         """Return which move gives the position at a time: the last one that counts by then."""
-        found = (index for index in range(len(self._moves) - 1, 0, -1) if self._moves[index].from_s <= t_s)
-        return next(found, 0)
+        begun = (index for index in range(len(self._moves) - 1, 0, -1) if self._moves[index].from_s <= t_s)
+        return next(begun, 0)
 
     def commanded_deg(self, t_s: Array) -> Array:
         """Return the commanded angle, (n,) degrees, unwrapped since home."""
@@ -148,8 +148,8 @@ class TableMotion:
         if len(t_s) and t_s[0] >= last.from_s:
             return last.position(t_s)
         which = np.searchsorted([move.from_s for move in self._moves[1:]], t_s, side="right")
-        found = np.empty(len(t_s))
+        steps = np.empty(len(t_s))
         for index in np.unique(which):
             rows = which == index
-            found[rows] = self._moves[index].position(t_s[rows])
-        return found
+            steps[rows] = self._moves[index].position(t_s[rows])
+        return steps

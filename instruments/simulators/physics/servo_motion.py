@@ -82,12 +82,12 @@ class ServoMotion:
         rate, angle = np.array(self._rate), np.array(self._angle)
         slope = np.append(np.diff(rate) / np.maximum(np.diff(corner_s), 1e-12), 0.0)
         since = t_s - corner_s[k]
-        found = np.asarray(angle[k] + since * (rate[k] + 0.5 * slope[k] * since))
+        angles_deg = np.asarray(angle[k] + since * (rate[k] + 0.5 * slope[k] * since))
         for from_s, until_s, motion in self._sines:
             inside = (t_s >= from_s) & (t_s < until_s)
             if inside.any():
-                found[inside] = motion.angle_deg(t_s[inside])
-        return found
+                angles_deg[inside] = motion.angle_deg(t_s[inside])
+        return angles_deg
 
     def commanded_deg(self, t_s: Array) -> Array:
         """Return the angle of the encoder, degrees: a servo's is the true one."""
@@ -107,7 +107,7 @@ class ServoMotion:
         return angle, self._rate[k] + max(share, 0.0) * (self._rate[k + 1] - self._rate[k])
 
     def _end_sine(self, t_s: float) -> None:
-        """Let the sine that is followed end at a time, with a corner where it ends."""
+        """End the sine that is followed at a time, with a corner where it ends."""
         if not self._sines or self._sines[-1][1] < math.inf:
             return
         from_s, _, motion = self._sines[-1]

@@ -130,15 +130,15 @@ class Heat:
         """Return the air temperature after each of the next seconds, deg C."""
         target_c, ramped_c, air_c, noise_c = self._target_c, self._ramped_c, self._air_c, self._air_noise_c
         step_c, scatter_c, share = self._ramp_per_s * GRID_S, self._noise_c * 0.31, self._air_share
-        found = []
+        airs_c = []
         for draw in self._draws_of(seconds):
             distance = target_c - ramped_c
             ramped_c += math.copysign(step_c, distance) if abs(distance) > step_c else distance
             air_c += (ramped_c - air_c) * share
             noise_c += -noise_c * 0.05 + scatter_c * draw
-            found.append(air_c + noise_c)
+            airs_c.append(air_c + noise_c)
         self._ramped_c, self._air_c, self._air_noise_c = ramped_c, air_c, noise_c
-        return found
+        return airs_c
 
     def _draws_of(self, number: int) -> Iterator[float]:
         for _ in range(number):

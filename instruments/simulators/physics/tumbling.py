@@ -70,7 +70,7 @@ class Tumbling:
         self._asked: tuple[float, ...] = ()
 
     def lay(self, t_s: float, up: Sequence[float]) -> None:
-        """Have the person lay the units down with direction `up` (3,) of the body pointing up.
+        """Make the person lay the units down with direction `up` (3,) of the body pointing up.
 
         A person who still turns them, or has just met this pose, does nothing.
         """
@@ -87,16 +87,16 @@ class Tumbling:
 
     def attitudes(self, t_s: Array) -> Array:
         """Return the attitude at rising times (n,), (n, 3, 3) from body to laboratory."""
-        found = np.broadcast_to(self._first, (len(t_s), 3, 3)).copy()
+        attitude = np.broadcast_to(self._first, (len(t_s), 3, 3)).copy()
         for turn in self._turns:
             since = t_s >= turn.start_s
-            found[since] = turn.attitudes(t_s[since])
-        return found
+            attitude[since] = turn.attitudes(t_s[since])
+        return attitude
 
     def rates_dps(self, t_s: Array, period_s: float) -> Array:
         """Return the mean rate of the body over the periods that end at times (n,), (n, 3) deg/s in body axes."""
-        found = np.zeros((len(t_s), 3))
+        rates = np.zeros((len(t_s), 3))
         for turn in self._turns:
             come = turn.angles(t_s) - turn.angles(t_s - period_s)
-            found += np.degrees(come / period_s)[:, None] * turn.axis
-        return found
+            rates += np.degrees(come / period_s)[:, None] * turn.axis
+        return rates

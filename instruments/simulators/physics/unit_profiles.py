@@ -55,8 +55,8 @@ def _matrices(matrix: Array, diagonal: Array, rows: list[int]) -> Array:
     flat = np.empty((len(diagonal), 9))
     flat[:] = matrix.ravel()
     flat[:, ::4] += diagonal
-    found = flat.reshape(-1, 3, 3)
-    return found if rows == [0, 1, 2] else found[:, rows]
+    matrices = flat.reshape(-1, 3, 3)
+    return matrices if rows == [0, 1, 2] else matrices[:, rows]
 
 
 def mems_triaxial(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
@@ -72,8 +72,8 @@ def mems_triaxial(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
         return _matrices(k25, slope * (temperature_c[:, None] - 25.0), rows)
 
     def offset(temperature_c: Array) -> Array:
-        warm = temperature_c[:, None] - 25.0
-        return (level + tilt * warm + curve * warm * warm)[:, rows]
+        from_25_c = temperature_c[:, None] - 25.0
+        return (level + tilt * from_25_c + curve * from_25_c * from_25_c)[:, rows]
 
     return UnitTruth(axes, gain, offset, None, 0.01, 0.0015)
 
@@ -117,8 +117,8 @@ def yang_paper(axes: tuple[str, ...], _: np.random.Generator) -> UnitTruth:
         return _matrices(YANG_K, slope * (temperature_c[:, None] - 25.0), rows)
 
     def offset(temperature_c: Array) -> Array:
-        warm = temperature_c[:, None] - 25.0
-        return (YANG_B_DPS + tilt * warm + curve * warm * warm)[:, rows]
+        from_25_c = temperature_c[:, None] - 25.0
+        return (YANG_B_DPS + tilt * from_25_c + curve * from_25_c * from_25_c)[:, rows]
 
     def bend(own_dps: Array, temperature_c: Array) -> Array:
         """Return the soft limit less its straight line over the paper's rates, which the printed K contains."""
@@ -254,14 +254,14 @@ def make_unit(driver: str, axes: tuple[str, ...], settings: Mapping[str, object]
         raise ValueError(f"simulated unit profile {profile!r} is not known; choose one of {', '.join(PROFILES)}")
     made = PROFILES[profile](axes, np.random.default_rng(seed))
     ageing = ageing_of(given.pop("ageing", None), len(axes))
-    known = {
+    names = {
         name
         for name in UnitTruth.__dataclass_fields__
         if name not in {"axes", "gain", "offset", "bend", "warm_up", "ageing"}
     }
     for name in given:
-        if name not in known:
+        if name not in names:
             raise ValueError(
-                f"simulated unit has no setting {name!r}; choose one of {', '.join(sorted({*known, 'ageing'}))}"
+                f"simulated unit has no setting {name!r}; choose one of {', '.join(sorted({*names, 'ageing'}))}"
             )
     return UnitTruth(**{**made.__dict__, **given, "ageing": ageing})

@@ -149,12 +149,12 @@ class World:
         return self._gyros[name]
 
     def follow(self, t_s: float, step_s: float, rates_dps: Array) -> float:
-        """Let the table follow rates (k,) deg/s at even times from `t_s` on; returns the time of the last."""
+        """Make the table follow rates (k,) deg/s at even times from `t_s` on; returns the time of the last."""
         self._profile = ProfileMotion(t_s, step_s, rates_dps)
         return self._profile.end_s
 
     def leave_profile(self) -> None:
-        """Let the table be the stepper again that it was before."""
+        """Return the table to its stepper motion."""
         self._profile = None
 
     @property
@@ -192,11 +192,11 @@ class World:
         self._lean_rad = self.errors.lean_rad(self.position, self.mounting)
 
     def turn_by_hand(self, t_s: float, position: str, turn_deg: float) -> None:
-        """Have the hand turn every unit by an angle, deg, about body axis `position`, which points up."""
+        """Make the hand turn every unit by an angle, deg, about body axis `position`, which points up."""
         self.position = Position.of(self.hand.turn(t_s, position, turn_deg))
 
     def lay(self, t_s: float, up: Sequence[float]) -> None:
-        """Have a person turn the units until direction `up` (3,) of the body points up; they lie as mounted before."""
+        """Make a person turn the units until direction `up` (3,) of the body points up; they lie as mounted before."""
         if self.tumbling is None:
             seed = [self.settings.seed, self.settings.noise_seed, zlib.crc32(b"poses")]
             self.tumbling = Tumbling(self.gravity(np.zeros(1))[0], self.hand.rate_dps, self.hand.reaction_s, seed)

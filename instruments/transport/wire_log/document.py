@@ -47,8 +47,8 @@ class Event:
 
     def number(self, key: str) -> float | None:
         """Return a number of `more`, such as a time in s; None where the event has none."""
-        found = self.more.get(key)
-        return float(found) if isinstance(found, int | float) else None
+        value = self.more.get(key)
+        return float(value) if isinstance(value, int | float) else None
 
 
 def line_of(event: Event) -> bytes:

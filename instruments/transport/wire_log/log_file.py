@@ -64,7 +64,7 @@ class WireLogFile:
                 self._changed.notify_all()
 
     def rename(self, path: Path) -> None:
-        """Give the file another name in the same file system; what is there is replaced. Raises OSError."""
+        """Rename the file in the same file system; what is there is replaced. Raises OSError."""
         self.path = self.path.replace(path)
 
     def close(self, t_s: float, result: Mapping[str, object] | None = None) -> None:

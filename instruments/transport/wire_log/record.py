@@ -97,8 +97,8 @@ class WireRecord:
 
     def _first(self) -> dict[str, object]:
         header = next(self._documents, {})
-        if (found := header.get("format")) != FORMAT:
-            raise self._error(f"its format is {found!r}; this release reads {FORMAT!r}")
+        if (named_format := header.get("format")) != FORMAT:
+            raise self._error(f"its format is {named_format!r}; this release reads {FORMAT!r}")
         return header
 
     def _read(self) -> Iterator[dict[str, object]]:
@@ -113,5 +113,5 @@ class WireRecord:
         except WireLogError as error:
             raise self._error(str(error)) from error
 
-    def _error(self, why: str) -> WireLogError:
-        return WireLogError(f"{self.path} is no wire log of labctl: {why}; give a file that --wire-log wrote")
+    def _error(self, reason: str) -> WireLogError:
+        return WireLogError(f"{self.path} is no wire log of labctl: {reason}; give a file that --wire-log wrote")

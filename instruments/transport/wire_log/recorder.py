@@ -74,9 +74,9 @@ class RecordedPort:
             data = noted(self._note, "received", lambda: self.raw.read(missing))
             self._note("received", data, **({} if len(data) == missing else {"timed_out": True}))
             self._kept += data
-        found = bytes(self._kept[:size])
+        chunk = bytes(self._kept[:size])
         del self._kept[:size]
-        return found
+        return chunk
 
     def write(self, data: bytes, /) -> int | None:
         """Send bytes."""
@@ -110,11 +110,11 @@ class RecordedReader:
 
     def take(self) -> Received:
         """Return everything that has come since the last call."""
-        found: Received = noted(self._note, "arrived", self._reader.take)
+        received: Received = noted(self._note, "arrived", self._reader.take)
         arrived: Kind = "arrived"
-        known = {"now_s": found.now_s, "newest_s": found.newest_s, "width_s": found.width_s}
-        self._note(arrived, found.data, **{key: value for key, value in known.items() if value is not None})
-        return found
+        times = {"now_s": received.now_s, "newest_s": received.newest_s, "width_s": received.width_s}
+        self._note(arrived, received.data, **{key: value for key, value in times.items() if value is not None})
+        return received
 
     def discard(self) -> None:
         """Drop everything that was not taken yet."""
@@ -262,7 +262,7 @@ class WireRecorder:
         return RecordedUnitHandler(handler, partial(self.note, UNIT_HANDLER))
 
     def rename(self, path: Path) -> None:
-        """Give the file of the log another name. Raises OSError."""
+        """Rename the file of the log. Raises OSError."""
         self._log.rename(path)
 
     def note(self, port: str, kind: Kind, data: bytes = b"", **more: object) -> None:
@@ -316,12 +316,12 @@ class RecordedUnitHandler:
         self._handler, self._note = handler, note
 
     def mount(self, position: str) -> None:
-        """Control the units: turn them so that `position` is up."""
+        """Turn the units so that `position` is up."""
         self._handler.mount(position)
         self._note("sent", mount_line(position).encode())
 
     def turn(self, position: str, turn_deg: float) -> None:
-        """Control the units: have them turned by hand."""
+        """Have the units turned by hand."""
         self._handler.turn(position, turn_deg)
         self._note("sent", turn_line(position, turn_deg).encode())
 
@@ -333,6 +333,6 @@ class RecordedUnitHandler:
         return turns
 
     def power(self, on: bool) -> None:
-        """Control the units: switch their power on or off."""
+        """Switch the power of the units on or off."""
         self._handler.power(on)
         self._note("sent", power_line(on).encode())

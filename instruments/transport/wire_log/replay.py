@@ -46,7 +46,7 @@ class Difference:
 
 
 def _nothing(_: Difference) -> None:
-    """Let the session find out by itself."""
+    """Do nothing: the session finds out by itself."""
 
 
 class Replay:
@@ -125,12 +125,12 @@ class Replay:
             self.record.take(port)
         return event
 
-    def _over(self, port: str, number: int, event: Event | None, found: str) -> ReplayOver:
+    def _over(self, port: str, number: int, event: Event | None, actual: str) -> ReplayOver:
         cut = False
         if event is None:
             self.record.read_to_end()
             cut = self.record.result is None
-        self.difference = Difference(port, number, self.clock.now_s(), did(event), found, cut)
+        self.difference = Difference(port, number, self.clock.now_s(), did(event), actual, cut)
         self.on_over(self.difference)
         return ReplayOver("replay", self.difference.text)
 

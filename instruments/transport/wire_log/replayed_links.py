@@ -107,9 +107,9 @@ class ReplayedPort:
                 break
             if self._take(event).more.get("timed_out") and len(self._unread) < size:
                 break
-        found = bytes(self._unread[:size])
+        data = bytes(self._unread[:size])
         del self._unread[:size]
-        return found
+        return data
 
     def write(self, data: bytes, /) -> int:
         """Send bytes; raises ReplayOver where the session sent others."""
@@ -152,8 +152,8 @@ class ReplayedReader:
         """Return what the next reading of the session returned, and what came since where that is past."""
         replay, data, event = self._replay, b"", None
         replay.refuse_over(self._port)
-        while (found := replay.record.next(self._port)) is not None and _arrives(found):
-            if event is not None and found.t_s > replay.clock.now_s():
+        while (next_event := replay.record.next(self._port)) is not None and _arrives(next_event):
+            if event is not None and next_event.t_s > replay.clock.now_s():
                 break
             event = replay.take(self._port)
             if event.kind == "failed":
@@ -287,13 +287,13 @@ class ReplayedChannel:
         """Close the channel; safe to call twice."""
         self._replay.closed(self._port)
 
-    def _failure(self, said: Any) -> Exception:
+    def _failure(self, failure: Any) -> Exception:
         """Return a failure with the methods of a failed call."""
-        status = next(each for each in self._grpc.StatusCode if each.value[0] == said["status"])
-        metadata = tuple((key, value) for key, value in said.get("metadata", ()))
-        error: Exception = type("ReplayedRpcError", (self._grpc.RpcError,), {})(said["text_of_error"])
+        status = next(each for each in self._grpc.StatusCode if each.value[0] == failure["status"])
+        metadata = tuple((key, value) for key, value in failure.get("metadata", ()))
+        error: Exception = type("ReplayedRpcError", (self._grpc.RpcError,), {})(failure["text_of_error"])
         error.__dict__.update(
-            code=lambda: status, details=lambda: said["text_of_error"], trailing_metadata=lambda: metadata,
+            code=lambda: status, details=lambda: failure["text_of_error"], trailing_metadata=lambda: metadata,
             initial_metadata=tuple,
         )  # fmt: skip
         return error
@@ -306,11 +306,11 @@ class ReplayedUnitHandler:
         self._replay = replay
 
     def mount(self, position: str) -> None:
-        """Control the units: as recorded."""
+        """Replay what was recorded."""
         self._request(mount_line(position))
 
     def turn(self, position: str, turn_deg: float) -> None:
-        """Control the units: as recorded."""
+        """Replay what was recorded."""
         self._request(turn_line(position, turn_deg))
 
     def is_turning(self) -> bool:
@@ -320,7 +320,7 @@ class ReplayedUnitHandler:
         return event is not None and event.kind == "received" and self._replay.take(UNIT_HANDLER).data == BUSY.encode()
 
     def power(self, on: bool) -> None:
-        """Control the units: as recorded."""
+        """Replay what was recorded."""
         self._request(power_line(on))
 
     def _request(self, line: str) -> None:

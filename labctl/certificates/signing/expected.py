@@ -43,13 +43,14 @@ def _is(signer: Signatory, expected: str) -> bool:
 
 def _wanted(expected: str) -> Attributes:
     try:
-        if found := _attributes(expected):
-            return found
-        why = "it is empty"
+        if attributes := _attributes(expected):
+            return attributes
+        reason = "it is empty"
     except ValueError as error:
-        why = str(error)
+        reason = str(error)
     raise BadInput(
-        f"the expected signer {expected!r} is no subject as RFC 4514 writes it ({why}) and no fingerprint; give it as "
+        f"the expected signer {expected!r} is no subject as RFC 4514 writes it ({reason}) and no fingerprint; give it "
+        "as "
         "'CN=Ada Authoriser,O=Laboratory', or the SHA-256 of the certificate in 64 hexadecimal digits"
     )
 

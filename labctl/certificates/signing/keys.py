@@ -66,10 +66,10 @@ class SigningKey:
 
         Raises BadInput where the token does not sign, or the key is not that of the certificate.
         """
-        made = self._sign(data)
-        if not fits(_public(self.certificate, self.where), self.digest, made, data):
+        signature = self._sign(data)
+        if not fits(_public(self.certificate, self.where), self.digest, signature, data):
             raise BadInput(_mismatch(self.where, self.signatory))
-        return made
+        return signature
 
 
 def signatory_of(certificate: x509.Certificate) -> Signatory:
@@ -109,60 +109,62 @@ def open_signing_key(settings: SigningSettings) -> SigningKey:
 
 def _of_file(path: Path, settings: SigningSettings) -> SigningKey:
 
-    where = f"signing key {path}"
+    place_text = f"signing key {path}"
     refuse_open_key(path, SIGNING_KEY)
     password = read_secret(Path(settings.password_file), PASSWORD_FILE).encode() if settings.password_file else None
     content = path.read_bytes()
-    key, beside = (_pem if b"-----BEGIN" in content else _pkcs12)(content, password, where)
+    key, beside = (_pem if b"-----BEGIN" in content else _pkcs12)(content, password, place_text)
     if not isinstance(key, RSAPrivateKey | EllipticCurvePrivateKey):
-        raise _unused(where)
-    given = read_certificates(Path(settings.certificate)) if settings.certificate else beside
-    certificate, chain = _own(given, key.public_key(), where)
-    digest = digest_of(_public(certificate, where))
+        raise _unused(place_text)
+    certificates = read_certificates(Path(settings.certificate)) if settings.certificate else beside
+    certificate, chain = _own(certificates, key.public_key(), place_text)
+    digest = digest_of(_public(certificate, place_text))
 
     def sign(data: bytes) -> bytes:
         if isinstance(key, RSAPrivateKey):
             return key.sign(data, PKCS1v15(), _hash(digest))
         return key.sign(data, ECDSA(_hash(digest)))
 
-    return SigningKey(where, certificate, chain, sign)
+    return SigningKey(place_text, certificate, chain, sign)
 
 
-def _pem(content: bytes, password: bytes | None, where: str) -> tuple[object, list[x509.Certificate]]:
+def _pem(content: bytes, password: bytes | None, location: str) -> tuple[object, list[x509.Certificate]]:
 
     try:
         key = load_pem_private_key(content, password if b"ENCRYPTED" in content else None)
     except (ValueError, TypeError) as error:
-        raise _unreadable(where, password, encrypted=b"ENCRYPTED" in content) from error
+        raise _unreadable(location, password, encrypted=b"ENCRYPTED" in content) from error
     return key, x509.load_pem_x509_certificates(content) if b"-----BEGIN CERTIFICATE" in content else []
 
 
-def _pkcs12(content: bytes, password: bytes | None, where: str) -> tuple[object, list[x509.Certificate]]:
+def _pkcs12(content: bytes, password: bytes | None, location: str) -> tuple[object, list[x509.Certificate]]:
 
     try:
         key, own, more = load_key_and_certificates(content, password)
     except ValueError as error:
         is_der = content[:1] == b"\x30"
-        raise _unreadable(where, password, encrypted=is_der) from error
+        raise _unreadable(location, password, encrypted=is_der) from error
     return key, [*([own] if own else []), *more]
 
 
-def _unreadable(where: str, password: bytes | None, *, encrypted: bool) -> BadInput:
+def _unreadable(location: str, password: bytes | None, *, encrypted: bool) -> BadInput:
     if not encrypted:
-        return BadInput(f"{where}: this is no private key in PEM form or PKCS#12; name such a file")
+        return BadInput(f"{location}: this is no private key in PEM form or PKCS#12; name such a file")
     if password is None:
         return BadInput(
-            f"{where}: it needs a password; write it into a file with mode 0600, and name that by "
+            f"{location}: it needs a password; write it into a file with mode 0600, and name that by "
             f"{SIGN_PASSWORD_VARIABLE}"
         )
     return BadInput(
-        f"{where}: the password in the file that {SIGN_PASSWORD_VARIABLE} names does not open it; correct the password"
+        f"{location}: the password in the file that {SIGN_PASSWORD_VARIABLE} names does not open it; correct the "
+        "password"
     )
 
 
-def _unused(where: str) -> BadInput:
+def _unused(location: str) -> BadInput:
     return BadInput(
-        f"{where}: this kind of key is not used; give an RSA key of {RSA_BITS} bits or more, or an ECDSA key on P-256 "
+        f"{location}: this kind of key is not used; give an RSA key of {RSA_BITS} bits or more, or an ECDSA key on "
+        "P-256 "
         "or P-384"
     )
 
@@ -171,28 +173,32 @@ def _of_token(uri: TokenUri, settings: SigningSettings) -> SigningKey:
     from pkcs11 import Attribute, ObjectClass  # noqa: PLC0415  only where a token is used
     from pkcs11.exceptions import PKCS11Error  # noqa: PLC0415  as above
 
-    where = f"signing key {uri.named}"
+    place_text = f"signing key {uri.named}"
     try:
         session = open_session(uri)
         key = session.get_key(object_class=ObjectClass.PRIVATE_KEY, label=uri.object)
-        found = session.get_objects({Attribute.CLASS: ObjectClass.CERTIFICATE, Attribute.LABEL: uri.object})
-        kept = [x509.load_der_x509_certificate(each[Attribute.VALUE]) for each in found]
+        certificates = session.get_objects({Attribute.CLASS: ObjectClass.CERTIFICATE, Attribute.LABEL: uri.object})
+        token_certificates = [
+            x509.load_der_x509_certificate(certificate[Attribute.VALUE]) for certificate in certificates
+        ]
     except (PKCS11Error, RuntimeError, KeyError, OSError, ValueError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
-        raise BadInput(f"{where}: {said}; check token, object, module and PIN") from error
-    given = read_certificates(Path(settings.certificate)) if settings.certificate else kept
-    if not given:
-        raise BadInput(f"{where}: the token holds no certificate of it; name a PEM file by {SIGN_CERTIFICATE_VARIABLE}")
-    digest = digest_of(_public(given[0], where))
+        raise BadInput(f"{place_text}: {said}; check token, object, module and PIN") from error
+    own_certificates = read_certificates(Path(settings.certificate)) if settings.certificate else token_certificates
+    if not own_certificates:
+        raise BadInput(
+            f"{place_text}: the token holds no certificate of it; name a PEM file by {SIGN_CERTIFICATE_VARIABLE}"
+        )
+    digest = digest_of(_public(own_certificates[0], place_text))
 
     def sign(data: bytes) -> bytes:
         try:
             return _signed_by_token(key, digest, data)
         except PKCS11Error as error:
             said = " ".join(str(error).split()) or type(error).__name__
-            raise BadInput(f"{where}: {said}; nothing was signed; check the token") from error
+            raise BadInput(f"{place_text}: {said}; nothing was signed; check the token") from error
 
-    return SigningKey(where, given[0], tuple(given[1:]), sign, session.close)
+    return SigningKey(place_text, own_certificates[0], tuple(own_certificates[1:]), sign, session.close)
 
 
 def _signed_by_token(key: Any, digest: Digest, data: bytes) -> bytes:
@@ -201,9 +207,9 @@ def _signed_by_token(key: Any, digest: Digest, data: bytes) -> bytes:
 
     if key.key_type == KeyType.RSA:
         return bytes(key.sign(data, mechanism=Mechanism.SHA256_RSA_PKCS))
-    made = bytes(key.sign(hashlib.new(digest, data).digest(), mechanism=Mechanism.ECDSA))
-    half = len(made) // 2
-    return encode_dss_signature(int.from_bytes(made[:half], "big"), int.from_bytes(made[half:], "big"))
+    signature = bytes(key.sign(hashlib.new(digest, data).digest(), mechanism=Mechanism.ECDSA))
+    half = len(signature) // 2
+    return encode_dss_signature(int.from_bytes(signature[:half], "big"), int.from_bytes(signature[half:], "big"))
 
 
 def read_certificates(path: Path) -> list[x509.Certificate]:
@@ -218,40 +224,40 @@ def read_certificates(path: Path) -> list[x509.Certificate]:
 
 
 def _own(
-    given: Sequence[x509.Certificate], public: object, where: str
+    certificates: Sequence[x509.Certificate], public: object, location: str
 ) -> tuple[x509.Certificate, tuple[x509.Certificate, ...]]:
     """Return the certificate of a public key, and the others. Raises BadInput where none is."""
-    if not given:
-        raise BadInput(f"{where}: it holds no certificate; name a PEM file with it by {SIGN_CERTIFICATE_VARIABLE}")
-    own = next((each for each in given if each.public_key() == public), None)
+    if not certificates:
+        raise BadInput(f"{location}: it holds no certificate; name a PEM file with it by {SIGN_CERTIFICATE_VARIABLE}")
+    own = next((certificate for certificate in certificates if certificate.public_key() == public), None)
     if own is None:
-        raise BadInput(_mismatch(where, signatory_of(given[0])))
-    _public(own, where)
-    return own, tuple(each for each in given if each is not own)
+        raise BadInput(_mismatch(location, signatory_of(certificates[0])))
+    _public(own, location)
+    return own, tuple(certificate for certificate in certificates if certificate is not own)
 
 
-def _mismatch(where: str, signatory: Signatory) -> str:
+def _mismatch(location: str, signatory: Signatory) -> str:
     return (
-        f"{where}: the key is not that of the certificate ({signatory.subject}); nothing was signed; name the "
+        f"{location}: the key is not that of the certificate ({signatory.subject}); nothing was signed; name the "
         f"certificate of this key by {SIGN_CERTIFICATE_VARIABLE}, or the key of this certificate by {SIGN_KEY_VARIABLE}"
     )
 
 
-def _public(certificate: x509.Certificate, where: str) -> PublicKey:
+def _public(certificate: x509.Certificate, location: str) -> PublicKey:
     """Return the public key of a certificate that may sign documents. Raises BadInput."""
 
     public = certificate.public_key()
     is_rsa = isinstance(public, RSAPublicKey) and public.key_size >= RSA_BITS
     is_ec = isinstance(public, EllipticCurvePublicKey) and public.curve.name in ("secp256r1", "secp384r1")
     if not isinstance(public, RSAPublicKey | EllipticCurvePublicKey) or not (is_rsa or is_ec):
-        raise _unused(where)
+        raise _unused(location)
     try:
         usage = certificate.extensions.get_extension_for_class(x509.KeyUsage).value
     except x509.ExtensionNotFound:
         return public
     if not (usage.digital_signature or usage.content_commitment):
         raise BadInput(
-            f"{where}: its certificate ({certificate.subject.rfc4514_string()}) is not for signatures (key usage); "
+            f"{location}: its certificate ({certificate.subject.rfc4514_string()}) is not for signatures (key usage); "
             "name one with digitalSignature or nonRepudiation"
         )
     return public

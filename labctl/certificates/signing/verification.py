@@ -70,18 +70,18 @@ def _xades(root: Any, xml: bytes, roots: Sequence[x509.Certificate] | None) -> S
         own, *chain = [x509.load_pem_x509_certificate(_pem(text)) for text in texts]
     except (ValueError, TypeError) as error:
         return SignatureFound("XAdES", problem=f"its certificate cannot be read: {error}")
-    found = SignatureFound("XAdES", signatory=signatory_of(own))
+    signature = SignatureFound("XAdES", signatory=signatory_of(own))
     try:
         stated = datetime.fromisoformat(root.findtext(f"{{{DS}}}Signature//{{{XADES}}}SigningTime"))
         config = XAdESSignatureConfiguration(location="./", verification_time=stated)
         results = XAdESVerifier().verify(xml, x509_cert=own, expect_config=config)
     except (SignXMLException, ValueError, TypeError, etree.LxmlError) as error:
-        return replace(found, problem=" ".join(str(error).split()) or type(error).__name__)
-    if not any(each.signed_xml is not None and each.signed_xml.tag == root.tag for each in results):
-        return replace(found, problem="the signature is not over the whole certificate")
-    (signed,) = [each for each in results if isinstance(each, XAdESVerifyResult)]
+        return replace(signature, problem=" ".join(str(error).split()) or type(error).__name__)
+    if not any(result.signed_xml is not None and result.signed_xml.tag == root.tag for result in results):
+        return replace(signature, problem="the signature is not over the whole certificate")
+    (signed,) = [result for result in results if isinstance(result, XAdESVerifyResult)]
     at = datetime.fromisoformat(signed.signed_properties.findtext(f"{{{XADES}}}SigningTime"))
-    return _with_trust(replace(found, valid=True, signed_at=at), at, own, chain, roots)
+    return _with_trust(replace(signature, valid=True, signed_at=at), at, own, chain, roots)
 
 
 def _pem(text: str) -> bytes:
@@ -99,10 +99,10 @@ def signatures_of_pdf(pdf: bytes, roots: Sequence[x509.Certificate] | None) -> l
         embedded, attached = reader.embedded_signatures, list(_attached(reader))
     except Exception as error:  # a damaged file makes the reader raise errors of many kinds
         raise BadInput(f"this PDF cannot be read ({error}); give the file as it was issued") from error
-    found = [_pades(each, roots) for each in embedded]
+    signatures = [_pades(each, roots) for each in embedded]
     for xml in attached:
-        found += signatures_of_dcc(xml, roots)
-    return found
+        signatures += signatures_of_dcc(xml, roots)
+    return signatures
 
 
 def _attached(reader: PdfFileReader) -> Iterator[bytes]:
@@ -112,31 +112,34 @@ def _attached(reader: PdfFileReader) -> Iterator[bytes]:
 
 def _pades(signature: EmbeddedPdfSignature, roots: Sequence[x509.Certificate] | None) -> SignatureFound:
     own, *chain = [
-        x509.load_der_x509_certificate(each.dump()) for each in (signature.signer_cert, *signature.other_embedded_certs)
+        x509.load_der_x509_certificate(other_embedded_cert.dump())
+        for other_embedded_cert in (signature.signer_cert, *signature.other_embedded_certs)
     ]
     at = signature.self_reported_timestamp
-    found = SignatureFound("PAdES", signatory=signatory_of(own), signed_at=at)
+    pades_signature = SignatureFound("PAdES", signatory=signatory_of(own), signed_at=at)
     try:
         intact, by_key = validate_sig_integrity(
             signature.signer_info, signature.signer_cert, "data", signature.compute_digest()
         )
         covered = signature.evaluate_signature_coverage()
     except Exception as error:  # noqa: BLE001  as above
-        return replace(found, problem=" ".join(str(error).split()) or type(error).__name__)
+        return replace(pades_signature, problem=" ".join(str(error).split()) or type(error).__name__)
     if not by_key:
-        return replace(found, problem="it is not by the key of its certificate")
+        return replace(pades_signature, problem="it is not by the key of its certificate")
     if not intact:
-        return replace(found, problem="the file was changed after it was signed")
+        return replace(pades_signature, problem="the file was changed after it was signed")
     if covered is not SignatureCoverageLevel.ENTIRE_FILE:
-        return replace(found, problem="something was added to the file after it was signed")
+        return replace(pades_signature, problem="something was added to the file after it was signed")
     first, last = own.not_valid_before_utc, own.not_valid_after_utc
     if at is None or not first <= at <= last:
-        return replace(found, problem=f"its certificate is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d} only")
-    return _with_trust(replace(found, valid=True), at, own, chain, roots)
+        return replace(
+            pades_signature, problem=f"its certificate is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d} only"
+        )
+    return _with_trust(replace(pades_signature, valid=True), at, own, chain, roots)
 
 
 def _with_trust(
-    found: SignatureFound,
+    signature: SignatureFound,
     at: datetime,
     own: x509.Certificate,
     chain: Sequence[x509.Certificate],
@@ -144,15 +147,19 @@ def _with_trust(
 ) -> SignatureFound:
     """Return a valid signature with whether an authority that is trusted vouches for the signer at the time `at`."""
     if roots is None:
-        what = "self-signed" if own.issuer == own.subject else f"issued by {own.issuer.rfc4514_string()}"
-        return replace(found, reason=f"{what}: trust not established; name the file of a trusted authority by --ca")
-    context = ValidationContext(trust_roots=[_asn1(each) for each in roots], allow_fetching=False, moment=at)
+        issuer_text = "self-signed" if own.issuer == own.subject else f"issued by {own.issuer.rfc4514_string()}"
+        return replace(
+            signature, reason=f"{issuer_text}: trust not established; name the file of a trusted authority by --ca"
+        )
+    context = ValidationContext(trust_roots=[_asn1(root) for root in roots], allow_fetching=False, moment=at)
     validator = CertificateValidator(_asn1(own), [_asn1(each) for each in chain], validation_context=context)
     try:
         in_own_thread(lambda: asyncio.run(validator.async_validate_path()))
     except (PathBuildingError, PathError, ValidationError) as error:
-        return replace(found, trust="not trusted", reason=" ".join(str(error).split()))
-    return replace(found, trust="trusted", reason=f"issued by {own.issuer.rfc4514_string()}, valid on {at:%Y-%m-%d}")
+        return replace(signature, trust="not trusted", reason=" ".join(str(error).split()))
+    return replace(
+        signature, trust="trusted", reason=f"issued by {own.issuer.rfc4514_string()}, valid on {at:%Y-%m-%d}"
+    )
 
 
 def _asn1(certificate: x509.Certificate) -> Any:

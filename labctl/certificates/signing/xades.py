@@ -27,8 +27,8 @@ def sign_dcc(xml: bytes, key: SigningKey, at: datetime) -> bytes:
     )
 
     def add_signing_time(properties: Any, *_: object, **__: object) -> None:
-        made = etree.SubElement(properties, f"{{{XADES}}}SigningTime", nsmap=signer.namespaces)
-        made.text = at.isoformat(timespec="seconds")
+        signing_time = etree.SubElement(properties, f"{{{XADES}}}SigningTime", nsmap=signer.namespaces)
+        signing_time.text = at.isoformat(timespec="seconds")
 
     annotators = cast("list[Any]", signer.signed_signature_properties_annotators)
     annotators[0] = add_signing_time  # that of the library reads the system's clock

@@ -49,7 +49,7 @@ def accelerometer(
     from labctl.services.sensor_exports import check_export, write_export
     from labctl.services.sensor_versions import measured_data
 
-    kept = None
+    kept_version = None
     with one_clear_line():
         check_export(export, out)
         source = Source([name.strip() for name in columns.split(",")], unit, latitude_deg, temperature)
@@ -57,11 +57,11 @@ def accelerometer(
         answer = accelerometer_of_files(paths, source, serial, before)
         write_export(answer, export, out, instance, device_id)
         if serial is not None:
-            kept = _kept(database, serial, measured_data(paths, source.text), answer, by)
+            kept_version = _kept(database, serial, measured_data(paths, source.text), answer, by)
     if as_json:
-        print_json(answer if kept is None else kept)
+        print_json(answer if kept_version is None else kept_version)
     else:
-        print_sensor(answer) if kept is None else print_kept(kept)
+        print_sensor(answer) if kept_version is None else print_kept(kept_version)
 
 
 def _kept(

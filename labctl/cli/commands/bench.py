@@ -52,17 +52,17 @@ def check(
 @app.command("ports")
 def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001  every command takes it
     """List the serial ports of this computer: name for a bench file, USB adapter, and what prevents its use."""
-    from labctl.services.benches.ports import list_ports
+    from labctl.services.benches.serial_ports import list_ports
 
-    found = list_ports()
+    port_listing = list_ports()
     if as_json:
-        print_json(found)
+        print_json(port_listing)
         return
-    for port in found:
+    for port in port_listing:
         adapter = f"USB adapter {port.adapter or 'without a serial number'} ({port.product})" if port.product else ""
-        said = [f"now {port.device}" if port.device != port.path else "", adapter, port.trouble]
-        console.print(f"{port.path}  {'; '.join(filter(None, said))}", soft_wrap=True)
-    if not found:
+        text = [f"now {port.device}" if port.device != port.path else "", adapter, port.trouble]
+        console.print(f"{port.path}  {'; '.join(filter(None, text))}", soft_wrap=True)
+    if not port_listing:
         console.print("this computer has no serial port: plug in the USB adapters")
 
 
@@ -114,8 +114,8 @@ def new(
     asks = asking if not yes and not as_json and is_terminal() else not_asking
     with one_clear_line():
         settings = dict(map(parse_setting, setting or []))
-        given = {"name": name or file.stem, "latitude_deg": latitude_deg, "ports": port or [], "hosts": host or []}
-        request = NewBenchRequest.model_validate({**given, "settings": settings})
+        options = {"name": name or file.stem, "latitude_deg": latitude_deg, "ports": port or [], "hosts": host or []}
+        request = NewBenchRequest.model_validate({**options, "settings": settings})
         answer = new_bench(file, request, asks, lambda line: None if as_json else print_search(line), force=force)
     if as_json:
         print_json(answer)
@@ -160,21 +160,21 @@ def status(as_json: Json = False, database: Database = None) -> None:
         print_json(benches)
     else:
         for bench in benches:
-            said = [
+            remarks = [
                 bench.unconfirmed,
-                *(f"not in its safe state; campaigns that did not end: {left}" for left in bench.left),
+                *(f"not in its safe state; campaigns that did not end: {campaign}" for campaign in bench.left),
             ]
             if bench.attempts:
-                said.insert(
+                remarks.insert(
                     1, f"labctl tried {bench.attempts} more times to set the safe state, last at {bench.attempted_at}"
                 )
             if bench.confirmed_at:
-                said.insert(
+                remarks.insert(
                     2,
                     f"labctl confirmed the safe state at {bench.confirmed_at}; a person must still inspect the "
                     "bench, then run `labctl bench clear`",
                 )
-            for line in filter(None, said if any(said) else ["the safe state is confirmed"]):
+            for line in filter(None, remarks if any(remarks) else ["the safe state is confirmed"]):
                 console.print(f"{bench.name:18} {line}", soft_wrap=True)
     if any(bench.unconfirmed or bench.left for bench in benches):
         raise typer.Exit(1)

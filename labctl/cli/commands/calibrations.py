@@ -192,8 +192,8 @@ def calibration(
         else:
             out.write_bytes(file.content)
     if file.withdrawn is not None:
-        said = f"labctl: calibration of {file.what} must not be used: {file.withdrawn.text}"
-        stderr.print(said, style="bold red", soft_wrap=True)
+        warning = f"labctl: calibration of {file.what} must not be used: {file.withdrawn.text}"
+        stderr.print(warning, style="bold red", soft_wrap=True)
     for loss in file.losses:
         typer.echo(f"format {format_} cannot express: {loss.text}", err=True)
 

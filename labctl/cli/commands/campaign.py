@@ -173,8 +173,8 @@ def start(
     from labctl.services.planning.loading import own_text
 
     with one_clear_line():
-        wanted = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}
-        given: dict[str, Any] = {name: value for name, value in wanted.items() if value is not None}
+        timing = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}
+        given: dict[str, Any] = {name: value for name, value in timing.items() if value is not None}
         if clear_confirmed_by is not None:
             given |= {"confirmed_by": clear_confirmed_by, "checks": list(BENCH_CHECKS)}
         if hide:
@@ -183,9 +183,9 @@ def start(
             given["fit"] = False
         request = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **given})
         start_at = simulated_start(simulated_from)
-        asked = CampaignStart(request, bench=bench, speed=speed, seed=seed, simulated_start=start_at, wire_log=wire_log)
+        order = CampaignStart(request, bench=bench, speed=speed, seed=seed, simulated_start=start_at, wire_log=wire_log)
         with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
-            answer = commands.execute(START_CAMPAIGN, asked)
+            answer = commands.execute(START_CAMPAIGN, order)
     print_started(answer, as_json=as_json)
 
 

@@ -29,14 +29,14 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
     from labctl.cli.progress_bar import CampaignProgress
     from labctl.services.commands.open import current_status
 
-    clock, asked, fault, turned = SystemClock(), "", "", ""
+    clock, asked_prompt, fault, turned = SystemClock(), "", "", ""
     with one_clear_line(), CampaignProgress(quiet=as_json) as progress:
         while True:
             answer = current_status(database, campaign)
             progress.update(answer)
-            if not as_json and answer.prompt is not None and answer.prompt.id != asked:
-                asked = answer.prompt.id
-                console.print(f"question {asked}: {answer.prompt.text}", style="yellow")
+            if not as_json and answer.prompt is not None and answer.prompt.id != asked_prompt:
+                asked_prompt = answer.prompt.id
+                console.print(f"question {asked_prompt}: {answer.prompt.text}", style="yellow")
             if not as_json and (text := turn_text(answer)) and text != turned:
                 turned = text
                 console.print(text)
@@ -84,9 +84,9 @@ def resume(
 
     with one_clear_line():
         request = ResumeRequest.model_validate({"by": person(by), "power": power})
-        asked = CampaignResume(campaign_to_resume(database, campaign), request, bench, speed, wire_log)
+        campaign_resume = CampaignResume(campaign_to_resume(database, campaign), request, bench, speed, wire_log)
         with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
-            answer = commands.execute(RESUME_CAMPAIGN, asked)
+            answer = commands.execute(RESUME_CAMPAIGN, campaign_resume)
     print_end(answer, as_json=as_json)
 
 
@@ -180,13 +180,13 @@ def confirm(
     from labctl.services.commands.requests import ToCampaign
 
     with one_clear_line():
-        wanted = campaign if campaign is not None else current_status(database, None).id
+        campaign_number = campaign if campaign is not None else current_status(database, None).id
         if again and decline is not None:
             raise BadInput("--again and --decline answer the same question; give one of them")
         request = ConfirmRequest(
             prompt=prompt, by=person(by), confirmed=decline is None and not again, again=again, reason=decline or ""
         )
-        answer = execute(database, CONFIRM_PROMPT, ToCampaign(wanted, request))
+        answer = execute(database, CONFIRM_PROMPT, ToCampaign(campaign_number, request))
     print_json(answer) if as_json else print_campaign(answer)
 
 
@@ -203,8 +203,8 @@ def draft(
     from labctl.services.commands.requests import ToCampaign
 
     with one_clear_line():
-        wanted = campaign if campaign is not None else current_status(database, None).id
-        answer = execute(database, MAKE_DRAFTS, ToCampaign(wanted, DraftsRequest(again=again)))
+        campaign_number = campaign if campaign is not None else current_status(database, None).id
+        answer = execute(database, MAKE_DRAFTS, ToCampaign(campaign_number, DraftsRequest(again=again)))
     if as_json:
         print_json(answer)
     elif answer.drafts:

@@ -97,8 +97,8 @@ def _of_manifests(answer: CheckResponse) -> list[str]:
         return []
     signed = "none signed"
     if answer.signed:
-        said = "verified" if answer.verified else "not verified: give --key"
-        signed = f"{answer.signed} signed by {', '.join(each[:16] for each in answer.keys)} ({said})"
+        text = "verified" if answer.verified else "not verified: give --key"
+        signed = f"{answer.signed} signed by {', '.join(key[:16] for key in answer.keys)} ({text})"
     number = answer.not_sealed
     unsealed = f"; {number} record{'s are' if number > 1 else ' is'} not sealed yet" if number else ""
     return [f"{answer.manifests} manifests, {signed}{unsealed}; anchor {answer.anchor}"]

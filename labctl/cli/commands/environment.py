@@ -44,7 +44,7 @@ def add(
     from labctl.services.commands.standards import ADD_ENVIRONMENT
 
     with one_clear_line():
-        given = [
+        values = [
             RoomValue.model_validate({"quantity": quantity, "value": value, "unit": unit})
             for quantity, value, unit in (
                 ("temperature", temperature_c, "deg C"),
@@ -53,16 +53,18 @@ def add(
             )
             if value is not None
         ]  # fmt: skip
-        if not given:
+        if not values:
             raise BadInput("nothing was read: give --temperature-c, --humidity-pct or --pressure-hpa")
-        record = RoomRecord(measured_at=instant(at, "--at"), values=given)
+        record = RoomRecord(measured_at=instant(at, "--at"), values=values)
         request = RoomEnvironmentRequest(readings=[record], source=source, bench=bench, by=by or actor().name)
         answer = execute(database, ADD_ENVIRONMENT, request)
     if as_json:
         print_json(answer)
         return
-    for each in answer.readings[: len(given)]:
-        console.print(f"{each.measured_at:%Y-%m-%d %H:%M}  {each.quantity} {each.value:g} {each.unit}", markup=False)
+    for reading in answer.readings[: len(values)]:
+        console.print(
+            f"{reading.measured_at:%Y-%m-%d %H:%M}  {reading.quantity} {reading.value:g} {reading.unit}", markup=False
+        )
 
 
 @app.command("show")
@@ -89,6 +91,6 @@ def show(
         print_json(answer)
         return
     rows = table("", "quantity", "unit", "least", "largest", "readings", numbers=3)
-    for each in answer.spans:
-        rows.add_row(each.quantity, each.unit, format_number(each.low), format_number(each.high), str(each.readings))
+    for span in answer.spans:
+        rows.add_row(span.quantity, span.unit, format_number(span.low), format_number(span.high), str(span.readings))
     console.print(rows)

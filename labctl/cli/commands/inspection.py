@@ -65,6 +65,6 @@ def _write(path: Path, answer: InspectionResponse) -> None:
 
     if path.exists():
         raise BadInput(f"--picture {path}: exists already; name a new file")
-    sentences = [f"{each.severity}: {each.text}" for each in answer.warnings]
+    sentences = [f"{warning.severity}: {warning.text}" for warning in answer.warnings]
     page = inspection_html(answer.source, sentences, answer.courses, answer.marks)
     path.write_text(page, encoding="utf-8")

@@ -127,8 +127,8 @@ def live(
         )
         assessor = InlineAssessor() if source.is_simulated else BackgroundAssessor()  # a real stream goes on meanwhile
         folder = out or usual_folder(database, source.serial, f"{source.clock.utc():%Y%m%dT%H%M%SZ}")
-        for kept in kept_beside(database):
-            printer.say(kept.text)
+        for session in kept_beside(database):
+            printer.say(session.text)
         answer = calibrate_live(
             DatabaseCommands(database), source, target, assessor, folder, keep_folder=out is not None,
             show=printer.show, say=printer.say, attended=ending_is_an_interrupt(),
@@ -181,5 +181,5 @@ def _gyro_source(
         return recorded_source(loaded, serial, clock_for(loaded, speed), wire_log)
     if serial is None or port is None or driver is None:
         raise BadInput("--driver needs the serial number of the unit and its --port: labctl live SERIAL --driver ...")
-    made = bench_of_driver(driver, port, serial, options, latitude_deg)
-    return recorded_source(made, serial, clock_for(made, speed), wire_log)
+    bench_file = bench_of_driver(driver, port, serial, options, latitude_deg)
+    return recorded_source(bench_file, serial, clock_for(bench_file, speed), wire_log)

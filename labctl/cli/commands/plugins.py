@@ -30,18 +30,18 @@ def plugins(as_json: Json = False, database: Database = None) -> None:  # noqa: 
     from labctl.services.plugins import list_plugins
 
     with one_clear_line():
-        found = list_plugins()
+        listing = list_plugins()
     if as_json:
-        print_json(found)
+        print_json(listing)
     else:
         rows = table("plug-ins", "group", "name", "package", "state")
-        for each in found:
+        for each in listing:
             state = "cannot be used" if each.problem else "ready"
             rows.add_row(each.group, each.name, f"{each.distribution} {each.version}", state)
         console.print(rows)
-        for line in dict.fromkeys(each.problem for each in found if each.problem):
+        for line in dict.fromkeys(each.problem for each in listing if each.problem):
             stderr.print(line, soft_wrap=True)
-    if any(each.problem for each in found):
+    if any(each.problem for each in listing):
         raise typer.Exit(1)
 
 
@@ -117,10 +117,10 @@ def _try_description(
     elif not sends:
         console.print(f"{answer.name}, a {answer.kind}: the description is valid; give --port or --host to try it")
     else:
-        failed = sum(1 for each in answer.checks if each.problem)
-        said = f"{failed} of {len(answer.checks)} failed" if failed else f"all {len(answer.checks)} passed"
-        left = "" if move or answer.kind == "reference" else "; its commands were not tried (--move)"
-        console.print(f"{answer.name}, a {answer.kind} at {answer.address}: {said}{left}", soft_wrap=True)
+        failed = sum(1 for check in answer.checks if check.problem)
+        result_text = f"{failed} of {len(answer.checks)} failed" if failed else f"all {len(answer.checks)} passed"
+        move_text = "" if move or answer.kind == "reference" else "; its commands were not tried (--move)"
+        console.print(f"{answer.name}, a {answer.kind} at {answer.address}: {result_text}{move_text}", soft_wrap=True)
         if failed and answer.wire_log is not None:
             text = f"every byte is in {answer.wire_log}: add this file to a report of a fault (zcat shows it)"
             console.print(text, soft_wrap=True, markup=False, highlight=False)
@@ -142,11 +142,11 @@ def _try_driver(name: str, bench: str | None, *, as_json: bool) -> None:
     if as_json:
         print_json(answer)
     else:
-        failed = sum(1 for each in answer.checks if each.problem)
-        said = (
+        failed = sum(1 for check in answer.checks if check.problem)
+        result_text = (
             f"{failed} of {len(answer.checks)} checks failed" if failed else f"all {len(answer.checks)} checks passed"
         )
-        console.print(f"{name} of {answer.distribution} {answer.version}: {said}")
+        console.print(f"{name} of {answer.distribution} {answer.version}: {result_text}")
         if failed:
             console.print(
                 "this was its simulator; `labctl bench check FILE --wire-log FILE` records every byte of an instrument",

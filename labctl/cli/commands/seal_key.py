@@ -61,5 +61,5 @@ def sign(as_json: Json = False, database: Database = None) -> None:
     if as_json:
         print_json(answer)
         return
-    what = "is signed already" if answer.signed is None else f"was signed: manifests 1 to {answer.signed}"
-    console.print(f"the chain {what}; key {answer.fingerprint[:16]}", soft_wrap=True)
+    state_text = "is signed already" if answer.signed is None else f"was signed: manifests 1 to {answer.signed}"
+    console.print(f"the chain {state_text}; key {answer.fingerprint[:16]}", soft_wrap=True)

@@ -77,10 +77,10 @@ def serve(
     with one_clear_line(), log_of_command("supervisor", default="info", location=request.location):
         try:
             _migrated(request.location)
-            left = serve_forever(request, ready)
+            unconfirmed = serve_forever(request, ready)
         finally:
             give_up_blocked_stderr()
-    stderr.print(f"labctl: stopped{'; ' if left else ''}{left}")
+    stderr.print(f"labctl: stopped{'; ' if unconfirmed else ''}{unconfirmed}")
 
 
 def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> None:
@@ -90,8 +90,8 @@ def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> Non
     named, start_at = request.bench_name, request.simulated_start
     unconfirmed, cut_short = ("", "") if named is None else _found(named, request.database)
     if as_json:
-        said = ServiceReady(**asdict(service), unconfirmed=unconfirmed, cut_short=cut_short)
-        print_json(said, one_line=True)
+        service_ready = ServiceReady(**asdict(service), unconfirmed=unconfirmed, cut_short=cut_short)
+        print_json(service_ready, one_line=True)
         return
     console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)")
     if start_at is not None:

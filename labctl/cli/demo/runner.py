@@ -102,5 +102,5 @@ class DemoRunner:
 
 @contextmanager
 def maybe_silent(quiet: bool) -> Iterator[Console]:
-    """Give a console that prints, or one that does not."""
+    """Yield a console that prints, or one that does not."""
     yield Console(highlight=False, markup=False, quiet=quiet)

@@ -29,12 +29,13 @@ def play(demo: DemoRunner, serials: list[str]) -> None:
                     compensator = Compensator.from_bytes(answer.content)
                     middle = float(np.mean(compensator.calibration.temperature_c))
                     corrected, _ = compensator.step(np.full(len(compensator.axes), 50.0), middle)
-                    shown = ", ".join(
+                    rates_text = ", ".join(
                         f"{axis} {rate:.4f}" for axis, rate in zip(compensator.axes, corrected, strict=True)
                     )
                     demo.say(
                         f"GET /api/units/{serial}/calibration: version {compensator.calibration.version}, "
-                        f"{len(answer.content)} bytes; an output of 50 deg/s at {middle:.0f} deg C is {shown} deg/s"
+                        f"{len(answer.content)} bytes; an output of 50 deg/s at {middle:.0f} deg C is {rates_text} "
+                        "deg/s"
                     )
         finally:
             service.terminate()

@@ -28,11 +28,11 @@ def play(demo: DemoRunner) -> None:
         "RMS over all temperatures", "rate, deg/s", "error, deg/s", "compensated", "per turn, deg (less static bias)",
         "per turn, compensated", numbers=5,
     )  # fmt: skip
-    for asked in np.unique(np.round(rate[np.abs(rate) >= LEAST_RATE_DPS], 0))[::4]:
-        here = np.abs(rate - asked) < 0.5
+    for nominal_dps in np.unique(np.round(rate[np.abs(rate) >= LEAST_RATE_DPS], 0))[::4]:
+        here = np.abs(rate - nominal_dps) < 0.5
         before, after = raw[here], result.residual_dps["z"][here]
         turns = (_rms(error_per_turn(errors, rate[here])) for errors in (before - bias, after))
-        rows.add_row(f"{asked:+.0f}", f"{_rms(before):.3f}", f"{_rms(after):.4f}", *(f"{t:.4f}" for t in turns))
+        rows.add_row(f"{nominal_dps:+.0f}", f"{_rms(before):.3f}", f"{_rms(after):.4f}", *(f"{t:.4f}" for t in turns))
     demo.console.print(rows)
     held = fitted.error.heldout_rms_dps
     assert held is not None

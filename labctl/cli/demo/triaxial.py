@@ -45,8 +45,8 @@ def play(demo: DemoRunner, *, quick: bool) -> None:
 
 def _gains(context: FitData, errors: dict[str, dict[str, np.ndarray]]) -> dict[str, float]:
     """Return raw over compensated RMS for the two large cross axes: x turning seen in y, and y turning seen in x."""
-    raw, left = by_turning_axis(context, errors["raw"]), by_turning_axis(context, errors["yang2018"])
-    return {f"{a}->{b}": raw[a][b].rms_dps / left[a][b].rms_dps for a, b in (("x", "y"), ("y", "x"))}
+    raw, yang_errors = by_turning_axis(context, errors["raw"]), by_turning_axis(context, errors["yang2018"])
+    return {f"{a}->{b}": raw[a][b].rms_dps / yang_errors[a][b].rms_dps for a, b in (("x", "y"), ("y", "x"))}
 
 
 def print_tables(demo: DemoRunner, context: FitData, errors: dict[str, dict[str, np.ndarray]]) -> None:

@@ -55,8 +55,8 @@ def print_plan(answer: PlanResponse) -> None:
     hidden = table("\nand what not", "effect", "because of", "experiment that would detect it")
     for line in answer.visibility:
         if not line.visible:
-            why = f"no channel {', '.join(line.needs)}" if line.why == "channel" else "the schedule"
-            hidden.add_row(line.effect, why, line.experiment)
+            reason = f"no channel {', '.join(line.needs)}" if line.why == "channel" else "the schedule"
+            hidden.add_row(line.effect, reason, line.experiment)
     console.print(hidden)
 
 
@@ -114,17 +114,17 @@ def print_campaign(answer: CampaignResponse) -> None:
     for serial, recording in answer.recordings.items():
         console.print(f"  recording {recording}: {serial}")
     print_drafts(answer.drafts)
-    for device, said in answer.reported.items():
-        known = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in said.items())
-        console.print(f"  {device} says: {known}", soft_wrap=True)
+    for device, identity in answer.reported.items():
+        identity_text = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in identity.items())
+        console.print(f"  {device} says: {identity_text}", soft_wrap=True)
 
 
 def _print_troubles(answer: CampaignResponse) -> None:
     """Print what is requested and not done yet, and what went wrong."""
     if answer.wish is not None:
         console.print(f"  requested and still to be carried out: {answer.wish}", style="yellow")
-    for unit, why in answer.dropped.items():
-        console.print(f"  {unit} is excluded from the rest of the campaign: {why}", style="red")
+    for unit, reason in answer.dropped.items():
+        console.print(f"  {unit} is excluded from the rest of the campaign: {reason}", style="red")
     _print_hindrances(answer)
     if answer.last_error:
         console.print(f"  last fault: {answer.last_error}", style="red")
@@ -146,8 +146,8 @@ def print_drafts(drafts: Sequence[DraftResponse]) -> None:
         if draft.state == "failed":
             console.print(f"  {draft.reason}", style="red", soft_wrap=True)
         elif draft.report is not None:
-            kept = draft.report.within_limits is not False and not draft.report.objections
-            console.print(f"  {draft.report.text}", style="" if kept else "yellow", soft_wrap=True)
+            is_certifiable = draft.report.within_limits is not False and not draft.report.objections
+            console.print(f"  {draft.report.text}", style="" if is_certifiable else "yellow", soft_wrap=True)
         else:
             text = f"  draft of {draft.serial}: not made yet; a service makes it, or `labctl campaign draft "
             console.print(f"{text}{draft.campaign}`", soft_wrap=True)

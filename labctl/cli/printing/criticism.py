@@ -26,8 +26,14 @@ def print_verification(answer: VerificationResponse) -> None:
 
     console.print(verification_sentence(answer), soft_wrap=not console.is_terminal)
     rows = table("", "axis", "RMS deg/s", "expected", "limit", "largest", "mean", numbers=5)
-    for axis, found in answer.axes.items():
-        figures = (found.rms_dps, found.expected_dps, found.limit_dps, found.max_dps, found.bias_dps)
+    for axis, axis_answer in answer.axes.items():
+        figures = (
+            axis_answer.rms_dps,
+            axis_answer.expected_dps,
+            axis_answer.limit_dps,
+            axis_answer.max_dps,
+            axis_answer.bias_dps,
+        )
         rows.add_row(axis, *map(format_number, figures))
     console.print(rows)
     off = f" on axis {', '.join(answer.axes_off)}" if answer.axes_off and len(answer.axes) > 1 else ""
@@ -37,10 +43,10 @@ def print_verification(answer: VerificationResponse) -> None:
 def print_criticism(answer: CriticismResponse) -> None:
     """Print a criticism: the version without refitting, the verdict on its model refitted, the errors, a small
     map, a table."""
-    whole = not console.is_terminal  # a program that reads lines gets each sentence on one
-    _print_applied(answer, whole=whole)
+    prints_all = not console.is_terminal  # a program that reads lines gets each sentence on one
+    _print_applied(answer, whole=prints_all)
     for line in answer.text:
-        console.print(line, style="bold" if line is answer.text[0] else None, soft_wrap=whole)
+        console.print(line, style="bold" if line is answer.text[0] else None, soft_wrap=prints_all)
     error = answer.error
     of = ", ".join(map(str, answer.recordings or [answer.recording]))
     console.print(
@@ -68,8 +74,8 @@ def print_criticism(answer: CriticismResponse) -> None:
             f"to distinguish {', '.join(experiment['separates'])}: {experiment['do']} "
             f"({experiment['hours']:.0f} h, {100 * experiment['power']:.0f} % sure to)",
         )
-    for why in _not_testable(answer):
-        console.print(why, style="dim", soft_wrap=whole)
+    for sentence in _not_testable(answer):
+        console.print(sentence, style="dim", soft_wrap=prints_all)
     if answer.named:
         fitted = {each["effect"] for each in answer.suspects if each["rms_after_dps"] is not None}
         first = next((name for name in answer.named if name in fitted), answer.named[0])
@@ -94,8 +100,10 @@ def _not_testable(answer: CriticismResponse) -> list[str]:
     for line in answer.not_testable:
         if line["why"] == "channel":
             lacking.setdefault(", ".join(map(_channel_in_words, line["needs"])), []).append(line["effect"])
-    said = [f"effects that this schedule cannot test: {', '.join(hidden)}"] if hidden else []
-    return said + [f"not recorded: {channel}, which would show {', '.join(each)}" for channel, each in lacking.items()]
+    sentences = [f"effects that this schedule cannot test: {', '.join(hidden)}"] if hidden else []
+    return sentences + [
+        f"not recorded: {channel}, which would show {', '.join(each)}" for channel, each in lacking.items()
+    ]
 
 
 def _channel_in_words(name: str) -> str:
@@ -107,12 +115,13 @@ def _print_static(static: StaticRecordJson) -> None:
     """Print what the longest section at rest shows."""
     for axis, noise in static["axes"].items():
         figures = (("N", noise["N"]), ("B", noise["B"]), ("K", noise["K"]))
-        shown = [(letter, figure) for letter, figure in figures if figure["value"] is not None]
-        said = ", ".join(
-            f"{letter} {format_number(f['value'], 3)} +- {format_number(f['u'], 2)} {f['unit']}" for letter, f in shown
+        shown_figures = [(letter, figure) for letter, figure in figures if figure["value"] is not None]
+        sentence = ", ".join(
+            f"{letter} {format_number(f['value'], 3)} +- {format_number(f['u'], 2)} {f['unit']}"
+            for letter, f in shown_figures
         )
         instead = "; B is the value of the data sheet" if noise["replaces_datasheet"] else ""
-        text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {said or 'no slope shows'}{instead}"
+        text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {sentence or 'no slope shows'}{instead}"
         console.print(text, style="dim")
 
 
@@ -123,19 +132,21 @@ def _name_of(suspect: Suspect) -> str:
 def _print_map(picture: ResidualMap, columns: int = 21) -> None:
     """Draw residual over floor, rates across and temperatures down."""
     rates = sorted({round(rate, 2) for rate in picture["table_rate_dps"]})
-    warm = sorted({round(value) for value in picture["temperature_c"]}, reverse=True)
-    if len(rates) < 2 or len(warm) < 2 or len(warm) > 40:
+    temperatures_c = sorted({round(value) for value in picture["temperature_c"]}, reverse=True)
+    if len(rates) < 2 or len(temperatures_c) < 2 or len(temperatures_c) > 40:
         return
     cells: dict[tuple[int, int], list[float]] = {}
     step = max(-(-len(rates) // columns), 1)
     for rate, value, score in zip(
         picture["table_rate_dps"], picture["temperature_c"], picture["over_floor"], strict=True
     ):
-        cells.setdefault((rates.index(round(rate, 2)) // step, warm.index(round(value))), []).append(abs(score))
+        cells.setdefault((rates.index(round(rate, 2)) // step, temperatures_c.index(round(value))), []).append(
+            abs(score)
+        )
     console.print(
         f"residual over floor, axis {picture['axis']}, {picture['position']} up  (' ' < 1, █ >= 5)", style="dim"
     )
-    for row, value in enumerate(warm):
+    for row, value in enumerate(temperatures_c):
         line = ""
         for column in range(-(-len(rates) // step)):
             scores = cells.get((column, row))
@@ -164,11 +175,11 @@ def print_improvement(answer: ImproveResponse) -> None:
                 "explain the same error: criticise the new version",
                 style="yellow",
             )
-    for left in answer.left_out:
-        size = left.get("rms_dps")
+    for entry in answer.left_out:
+        size = entry.get("rms_dps")
         cost = "" if size is None else f", so that {size:.2g} deg/s RMS remain uncorrected on these data"
         console.print(
-            f"  {left['effect']} ({left['origin']}) is not part of a calibration; a calibration file leaves it "
+            f"  {entry['effect']} ({entry['origin']}) is not part of a calibration; a calibration file leaves it "
             f"out{cost}",
             soft_wrap=True,
         )
@@ -183,10 +194,10 @@ def print_ladder(answer: LadderResponse) -> None:
 
 def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:
     """Return the errors as bars on a logarithmic scale, a line per version; `|` marks the noise floor in each."""
-    known = [e for s in answer.steps for e in (s.rms_dps, s.heldout_rms_dps) if e]
-    if not known:
+    errors = [e for s in answer.steps for e in (s.rms_dps, s.heldout_rms_dps) if e]
+    if not errors:
         return [f"{answer.serial}: no version has an error figure"]
-    drawn = [*known, answer.noise_floor_dps or known[0]]  # readings without scatter leave an error below the floor
+    drawn = [*errors, answer.noise_floor_dps or errors[0]]  # readings without scatter leave an error below the floor
     lowest = 0.7 * min(drawn)
     span = log10(max(drawn) / lowest)
 

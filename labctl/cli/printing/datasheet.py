@@ -16,15 +16,35 @@ def print_datasheet(answer: DatasheetResponse) -> None:
     """Print each characteristic with its uncertainty beside the specified value, then the decision in words."""
     print_heading(answer.serial, f" {answer.model}")
     rows = table("", "characteristic", "axis", "value", "u", "unit", "specified", "", "recording", numbers=0)
-    for each in answer.characteristics:
-        if each.value is None and each.at_most is None:
-            rows.add_row(each.title, each.axis, "–", "", each.unit, _specified(each), "", each.why)
+    for characteristic in answer.characteristics:
+        if characteristic.value is None and characteristic.at_most is None:
+            rows.add_row(
+                characteristic.title,
+                characteristic.axis,
+                "–",
+                "",
+                characteristic.unit,
+                _specified(characteristic),
+                "",
+                characteristic.why,
+            )
             continue
-        value = format_number(each.value) if each.value is not None else f"below {format_number(each.at_most)}"
-        recording = "" if each.conditions is None else str(each.conditions.recording)
-        along = f"{each.axis} per {each.along}" if each.along else each.axis
+        value = (
+            format_number(characteristic.value)
+            if characteristic.value is not None
+            else f"below {format_number(characteristic.at_most)}"
+        )
+        recording = "" if characteristic.conditions is None else str(characteristic.conditions.recording)
+        along = f"{characteristic.axis} per {characteristic.along}" if characteristic.along else characteristic.axis
         rows.add_row(
-            each.title, along, value, format_number(each.u, 2), each.unit, _specified(each), _decision(each), recording
+            characteristic.title,
+            along,
+            value,
+            format_number(characteristic.u, 2),
+            characteristic.unit,
+            _specified(characteristic),
+            _decision(characteristic),
+            recording,
         )
     console.print(rows)
     for text in answer.text:

@@ -14,9 +14,11 @@ if TYPE_CHECKING:
 
 def print_left_out(left_out: Sequence[LeftOut]) -> None:
     """Print what was left out of a recording by choice, each kind on one line."""
-    for left in left_out:
-        where = f" of {left.channel}" if left.channel else ""
-        console.print(f"left out: {left.n} of {left.of} readings{where} ({left.what}: {left.why})", soft_wrap=True)
+    for entry in left_out:
+        place_text = f" of {entry.channel}" if entry.channel else ""
+        console.print(
+            f"left out: {entry.n} of {entry.of} readings{place_text} ({entry.what}: {entry.why})", soft_wrap=True
+        )
 
 
 def print_inspection(answer: InspectionResponse) -> None:

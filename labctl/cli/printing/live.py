@@ -28,14 +28,14 @@ class LivePrinter:
 
     def show(self, state: LiveState) -> None:
         """Show a state; nothing is printed where nothing has changed."""
-        asked = state.request.text if state.request is not None else ""
-        now = (state.covered, asked)
+        question = state.request.text if state.request is not None else ""
+        now = (state.covered, question)
         if now != self._printed:
             self._clear()
             self._printed = now
             stderr.print(_progress(state))
-            if asked:
-                stderr.print(f"next: {asked}")
+            if question:
+                stderr.print(f"next: {question}")
         for text in state.left_out:
             if text not in self._said:
                 self._said.add(text)
@@ -95,10 +95,11 @@ def print_live(answer: LiveResponse) -> None:
 
         print_fit(answer.fit)
         return
-    for each in answer.coefficients:
-        limit = "" if each.limit is None else f", limit {each.limit:g}"
+    for coefficient in answer.coefficients:
+        limit = "" if coefficient.limit is None else f", limit {coefficient.limit:g}"
         console.print(
-            f"{each.axis} {each.name}: {_with_unit(each.value, each.unit)}, U = {each.expanded:.2g} (k = 2{limit})"
+            f"{coefficient.axis} {coefficient.name}: {_with_unit(coefficient.value, coefficient.unit)}, U = "
+            f"{coefficient.expanded:.2g} (k = 2{limit})"
         )
     console.print(f"not complete: {answer.text}" if not answer.complete else f"no version: {answer.refused}")
     for text in answer.missing:

@@ -29,8 +29,8 @@ def print_allan(answers: Sequence[AllanResponse]) -> None:
     console.print(rows)
     for name, noise in lines:
         figures = (("N", noise["N"]), ("B", noise["B"]), ("K", noise["K"]))
-        said = ", ".join(f"{letter} {_shown(figure)}" for letter, figure in figures)
-        console.print(f"{name}: {said}", soft_wrap=True)
+        text = ", ".join(f"{letter} {_shown(figure)}" for letter, figure in figures)
+        console.print(f"{name}: {text}", soft_wrap=True)
         for remark in _remarks(noise):
             console.print(f"  {remark}", soft_wrap=True, style="dim")
     for answer in answers:
@@ -41,11 +41,11 @@ def print_allan(answers: Sequence[AllanResponse]) -> None:
 
 def _times(noises: Sequence[AllanJson]) -> list[float]:
     """Return the averaging times of all axes, rising, those that are alike once."""
-    found: list[float] = []
+    times_s: list[float] = []
     for tau in sorted(tau for noise in noises for tau in noise["tau_s"] if tau is not None):
-        if not found or tau > found[-1] * (1 + SAME_TIME):
-            found.append(tau)
-    return found
+        if not times_s or tau > times_s[-1] * (1 + SAME_TIME):
+            times_s.append(tau)
+    return times_s
 
 
 def _deviation(noise: AllanJson, tau: float) -> str:

@@ -18,15 +18,15 @@ def print_list(answers: Sequence[StandardResponse]) -> None:
         console.print("the register holds no standard; `labctl standards add` adds one", markup=False)
         return
     rows = table("", "standard", "quantity", "state", "due", "certificate", "u now", "drift per year")
-    for each in answers:
-        newest = each.certificates[-1].number if each.certificates else "–"
-        largest = max(each.predictions, key=lambda one: one.u, default=None)
+    for answer in answers:
+        newest = answer.certificates[-1].number if answer.certificates else "–"
+        largest = max(answer.predictions, key=lambda prediction: prediction.u, default=None)
         rows.add_row(
-            each.label, each.quantity, each.state, str(each.due or "–"), newest,
-            "–" if largest is None else f"{largest.u:.3g} {each.unit}", "–" if largest is None else _drift(largest),
+            answer.label, answer.quantity, answer.state, str(answer.due or "–"), newest,
+            "–" if largest is None else f"{largest.u:.3g} {answer.unit}", "–" if largest is None else _drift(largest),
         )  # fmt: skip
     console.print(rows)
-    _print_text([text for each in answers for text in each.text])
+    _print_text([text for answer in answers for text in answer.text])
 
 
 def print_standard(answer: StandardResponse) -> None:
@@ -35,19 +35,20 @@ def print_standard(answer: StandardResponse) -> None:
     console.print(f"{answer.label}: {answer.quantity} in {answer.unit}{serial}; {answer.state}", markup=False)
     if answer.certificates:
         rows = table("certificates", "number", "laboratory", "calibrated", "due", "nominal", "error", "u", numbers=3)
-        for each in answer.certificates:
-            for point in each.points:
+        for certificate in answer.certificates:
+            for point in certificate.points:
                 rows.add_row(
-                    each.number, each.laboratory, str(each.calibrated), str(each.due or "–"),
+                    certificate.number, certificate.laboratory, str(certificate.calibrated),
+                    str(certificate.due or "–"),
                     format_number(point.nominal), format_number(point.value), format_number(point.u, 3),
                 )  # fmt: skip
         console.print(rows)
-    for found in answer.predictions:
-        where = "" if found.nominal is None else f" at {found.nominal:g}"
-        drift = _drift(found) if found.per_year is None else f"drift per year {_drift(found)}"
-        value = "not stated" if found.value is None else f"{found.value:.4g}"
+    for prediction in answer.predictions:
+        place_text = "" if prediction.nominal is None else f" at {prediction.nominal:g}"
+        drift = _drift(prediction) if prediction.per_year is None else f"drift per year {_drift(prediction)}"
+        value = "not stated" if prediction.value is None else f"{prediction.value:.4g}"
         console.print(
-            f"on {found.on}{where}: error {value}, u = {found.u:.3g} {answer.unit}; {drift}",
+            f"on {prediction.on}{place_text}: error {value}, u = {prediction.u:.3g} {answer.unit}; {drift}",
             markup=False,
             soft_wrap=True,
         )
@@ -62,31 +63,32 @@ def print_standard(answer: StandardResponse) -> None:
     for finding in answer.findings:
         until = finding.bad_until or "now"
         withdrawn = f"; withdrawn: {finding.withdrawn}" if finding.withdrawn else ""
-        said = f"finding {finding.number}: bad from {finding.bad_from} until {until}: {finding.reason}{withdrawn}"
-        console.print(said, markup=False, soft_wrap=True)
+        text = f"finding {finding.number}: bad from {finding.bad_from} until {until}: {finding.reason}{withdrawn}"
+        console.print(text, markup=False, soft_wrap=True)
     _print_text(answer.text)
 
 
-def _drift(found: DriftPrediction) -> str:
-    if found.per_year is None or found.u_per_year is None:
-        return found.why or "unknown"
-    return f"{found.per_year:.3g} (u {found.u_per_year:.2g})"
+def _drift(prediction: DriftPrediction) -> str:
+    if prediction.per_year is None or prediction.u_per_year is None:
+        return prediction.why or "unknown"
+    return f"{prediction.per_year:.3g} (u {prediction.u_per_year:.2g})"
 
 
 def _limits(limits: Sequence[ChartLimits]) -> str:
-    return "; ".join(f"{each.basis}: {each.low:.4g} to {each.high:.4g}" for each in limits) or "–"
+    return "; ".join(f"{limit.basis}: {limit.low:.4g} to {limit.high:.4g}" for limit in limits) or "–"
 
 
 def print_affected(answer: AffectedResponse) -> None:
     """Print the calibrations that a standard was used for."""
     if answer.calibrations:
         rows = table("", "unit", "version", "campaigns", "measured", "in force", "certificates")
-        for each in answer.calibrations:
+        for calibration in answer.calibrations:
+            measured = f"{calibration.performed_from} to {calibration.performed_until}"
             rows.add_row(
-                each.serial, str(each.version), ", ".join(map(str, each.campaigns)) or "imported",
-                f"{each.performed_from} to {each.performed_until}" if each.performed_from else "date not known",
-                "in force" if each.in_force else "",
-                ", ".join(each.certificates) or "–",
+                calibration.serial, str(calibration.version), ", ".join(map(str, calibration.campaigns)) or "imported",
+                measured if calibration.performed_from else "date not known",
+                "in force" if calibration.in_force else "",
+                ", ".join(calibration.certificates) or "–",
             )  # fmt: skip
         console.print(rows)
     _print_text(answer.text)
@@ -105,8 +107,8 @@ def print_check_gyro(answer: CheckGyroResponse) -> None:
                 format_number(point.u, 3),
             )  # fmt: skip
         console.print(rows)
-    for recording, why in answer.left_out.items():
-        console.print(f"recording {recording} is not on the charts: {why}", markup=False, soft_wrap=True)
+    for recording, reason in answer.left_out.items():
+        console.print(f"recording {recording} is not on the charts: {reason}", markup=False, soft_wrap=True)
     if not answer.marked:
         console.print(f"{answer.serial} is no check gyro; --mark makes it one", markup=False)
     _print_text(answer.text)
@@ -115,20 +117,20 @@ def print_check_gyro(answer: CheckGyroResponse) -> None:
 def print_comparison(answer: LaboratoryComparison) -> None:
     """Print two calibrations compared."""
     for name, side in (("first", answer.first), ("second", answer.second)):
-        where = ", ".join(filter(None, (side.laboratory, side.bench))) or "imported"
+        place_text = ", ".join(filter(None, (side.laboratory, side.bench))) or "imported"
         day = side.measured_on or "a date that is not known"
-        said = f"{name}: {side.serial} version {side.version}, {where}, measured on {day}"
-        console.print(said, markup=False)
+        text = f"{name}: {side.serial} version {side.version}, {place_text}, measured on {day}"
+        console.print(text, markup=False)
     title = f"at {answer.temperature_c:g} deg C"
     rows = table(title, "axis", "result", "unit", "first", "U", "second", "U", "En", "zeta", numbers=6)
-    for each in answer.results:
+    for result in answer.results:
         rows.add_row(
-            each.axis, each.result, each.unit, f"{each.values[0]:.6g}", f"{each.expanded[0]:.2g}",
-            f"{each.values[1]:.6g}", f"{each.expanded[1]:.2g}", f"{each.en:.2f}", f"{each.zeta:.2f}",
+            result.axis, result.result, result.unit, f"{result.values[0]:.6g}", f"{result.expanded[0]:.2g}",
+            f"{result.values[1]:.6g}", f"{result.expanded[1]:.2g}", f"{result.en:.2f}", f"{result.zeta:.2f}",
         )  # fmt: skip
     console.print(rows)
-    for what, why in answer.not_compared.items():
-        console.print(f"not compared: {what}: {why}", markup=False, soft_wrap=True)
+    for quantity, reason in answer.not_compared.items():
+        console.print(f"not compared: {quantity}: {reason}", markup=False, soft_wrap=True)
     _print_text(answer.text)
 
 

@@ -101,27 +101,27 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
 def largest_difference(part: StaticPart, fixed: FixedPoint) -> float:
     """Return the largest difference from the calibration, deg/s: one axis at a time, summed, and all axes at once."""
     axes = len(part.axes)
-    warm = part.temperatures(1 + 4 * (TEMPERATURES - 1))
+    temperatures_c = part.temperatures(1 + 4 * (TEMPERATURES - 1))
     nodes = fixed.tables.shape[-1]
     between = np.clip(
         np.linspace(fixed.low_q16, fixed.high_q16, 2 * nodes - 1) / 2.0**16, *part.calibration.temperature_c
     )
-    warm = part.with_kinks(np.union1d(warm, between))
+    temperatures_c = part.with_kinks(np.union1d(temperatures_c, between))
     apart = np.zeros((axes, axes))
     outputs = part.outputs(OUTPUTS)
-    still = np.zeros((len(warm), axes))
-    at_zero = np.abs(_apart(part, fixed, still, warm)).max(axis=0)
+    still = np.zeros((len(temperatures_c), axes))
+    at_zero = np.abs(_apart(part, fixed, still, temperatures_c)).max(axis=0)
     for by in range(axes):
-        raw = np.zeros((len(outputs) * len(warm), axes))
-        raw[:, by] = np.repeat(outputs, len(warm))
-        apart[:, by] = np.abs(_apart(part, fixed, raw, np.tile(warm, len(outputs)))).max(axis=0)
-    found = float((apart.sum(axis=1) + at_zero * (axes > 1)).max())
-    found = max(found, float(np.abs(_apart(part, fixed, *all_turning(part))).max()))
-    return found + fixed.rounding_dps()
+        raw = np.zeros((len(outputs) * len(temperatures_c), axes))
+        raw[:, by] = np.repeat(outputs, len(temperatures_c))
+        apart[:, by] = np.abs(_apart(part, fixed, raw, np.tile(temperatures_c, len(outputs)))).max(axis=0)
+    largest = float((apart.sum(axis=1) + at_zero * (axes > 1)).max())
+    largest = max(largest, float(np.abs(_apart(part, fixed, *all_turning(part))).max()))
+    return largest + fixed.rounding_dps()
 
 
-def _apart(part: StaticPart, fixed: FixedPoint, raw: Array, warm: Array) -> Array:
-    return fixed.rate_dps(raw, warm) - part.rate(raw, warm)
+def _apart(part: StaticPart, fixed: FixedPoint, raw: Array, temperature_c: Array) -> Array:
+    return fixed.rate_dps(raw, temperature_c) - part.rate(raw, temperature_c)
 
 
 def _source(calibration: Calibration, fixed: FixedPoint, force: FixedForce | None, head: list[str]) -> str:
@@ -145,7 +145,7 @@ def _table(values: object) -> str:
     if not isinstance(values, list):
         return str(values)
     between = ",\n " if isinstance(values[0], list) else ", "
-    return "{" + between.join(_table(each) for each in values) + "}"
+    return "{" + between.join(_table(value) for value in values) + "}"
 
 
 FORMAT = Format(

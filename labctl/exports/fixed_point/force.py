@@ -83,12 +83,12 @@ class FixedForce:
             held @ self.per_g.T + product(own, own, Q16) * self.per_g2, np.ones(1, dtype=np.int64), Q16 + self.shift
         )
         rate, outside = self.fixed.corrected(raw_q31, temperature_q16) if self.is_direct else (raw_q31, None)
-        left = np.clip(rate - error, -MOST_Q31 - 1, MOST_Q31)
-        beyond = np.any(held != force_q16, axis=1) | np.any(left != rate - error, axis=1)
+        limited = np.clip(rate - error, -MOST_Q31 - 1, MOST_Q31)
+        beyond = np.any(held != force_q16, axis=1) | np.any(limited != rate - error, axis=1)
         if outside is not None:
-            return left, outside | beyond
-        found, outside = self.fixed.corrected(left, temperature_q16)
-        return found, outside | beyond
+            return limited, outside | beyond
+        turning_q31, outside = self.fixed.corrected(limited, temperature_q16)
+        return turning_q31, outside | beyond
 
     def rounding_dps(self) -> float:
         """Return what rounding can add, deg/s, at forces up to `MOST_G`: of forces, squares, coefficients and sums.

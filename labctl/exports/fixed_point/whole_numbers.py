@@ -57,7 +57,7 @@ class FixedPoint:
         position = (above * self.reciprocal) >> RECIPROCAL_BITS
         node = np.minimum(position >> POSITION_BITS, self.tables.shape[-1] - 2)
         part = position - (node << POSITION_BITS)
-        found = np.empty_like(raw_q31)
+        rate_q31 = np.empty_like(raw_q31)
         for axis in range(raw_q31.shape[1]):
             error = np.zeros(len(raw_q31), dtype=np.int64)
             for by in range(raw_q31.shape[1]):
@@ -67,13 +67,13 @@ class FixedPoint:
                     total += row[node] + product(row[node + 1] - row[node], part, POSITION_BITS)
                 error += total
             scaled = error if self.shift == 0 else (error + (1 << (self.shift - 1))) >> self.shift
-            found[:, axis] = np.clip(raw_q31[:, axis] - scaled, -MOST_Q31 - 1, MOST_Q31)
-        return found, outside
+            rate_q31[:, axis] = np.clip(raw_q31[:, axis] - scaled, -MOST_Q31 - 1, MOST_Q31)
+        return rate_q31, outside
 
     def rate_dps(self, raw_dps: Array, temperature_c: Array) -> Array:
         """Return corrected rates, deg/s, through the whole numbers."""
-        found, _ = self.corrected(self.as_q31(raw_dps), np.rint(temperature_c * 2.0**Q16).astype(np.int64))
-        return np.asarray(found * (self.full_scale_dps / 2.0**Q31), dtype=np.float64)
+        rate_q31, _ = self.corrected(self.as_q31(raw_dps), np.rint(temperature_c * 2.0**Q16).astype(np.int64))
+        return np.asarray(rate_q31 * (self.full_scale_dps / 2.0**Q31), dtype=np.float64)
 
     def rounding_dps(self) -> float:
         """Return what rounding can add, deg/s: of outputs and rates to Q31, and of temperatures to 1/65536 K."""
@@ -104,9 +104,9 @@ def fixed_point(part: StaticPart, nodes: int, format_name: str) -> FixedPoint:
     full_scale = 2.0 ** math.ceil(math.log2(max(abs(slowest), abs(fastest), 2.0**-10) * (1 + 2.0**-20)))
     low, high = part.calibration.temperature_c
     low_q16, high_q16 = math.floor(low * 2**Q16), max(math.ceil(high * 2**Q16), math.floor(low * 2**Q16) + 1)
-    warm = np.linspace(low_q16, high_q16, nodes) / 2.0**Q16
+    temperatures_c = np.linspace(low_q16, high_q16, nodes) / 2.0**Q16
     for order in range(MOST_ORDER + 1) if part.has_rates else (0,):
-        coefficients, off = _polynomials(part, warm, (slowest, fastest), full_scale, order)
+        coefficients, off = _polynomials(part, temperatures_c, (slowest, fastest), full_scale, order)
         if off <= NEAR * full_scale:
             break
     if off > NEAR_ENOUGH * full_scale:
@@ -136,31 +136,31 @@ def fixed_point(part: StaticPart, nodes: int, format_name: str) -> FixedPoint:
 
 def _of_several_axes(part: StaticPart) -> float:
     """Return how far the error is from the sum of those that the output of each axis alone causes, deg/s."""
-    raw, warm = all_turning(part)
-    apart = raw - part.rate(raw, warm)
-    still = -part.rate(np.zeros_like(raw), warm)
+    raw, temperature_c = all_turning(part)
+    apart = raw - part.rate(raw, temperature_c)
+    still = -part.rate(np.zeros_like(raw), temperature_c)
     for by in range(raw.shape[1]):
         alone = np.zeros_like(raw)
         alone[:, by] = raw[:, by]
-        apart = apart - (alone - part.rate(alone, warm) - still)
+        apart = apart - (alone - part.rate(alone, temperature_c) - still)
     return float(np.abs(apart - still).max())
 
 
 def _polynomials(
-    part: StaticPart, warm: Array, limits: tuple[float, float], full_scale: float, order: int
+    part: StaticPart, temperature_c: Array, limits: tuple[float, float], full_scale: float, order: int
 ) -> tuple[NDArray[np.float64], float]:
     """Return coefficients (axes, by, order + 1, nodes), deg/s, of powers of output / full scale, and how far off."""
-    axes, nodes, middle, half = len(part.axes), len(warm), sum(limits) / 2, (limits[1] - limits[0]) / 2
+    axes, nodes, middle, half = len(part.axes), len(temperature_c), sum(limits) / 2, (limits[1] - limits[0]) / 2
     m = max(2 * order, 1) + 4
     at = np.cos(np.pi * (np.arange(m) + 0.5) / m) if part.has_rates else np.zeros(1)
-    still = -part.rate(np.zeros((nodes, axes)), warm)
-    found = np.zeros((axes, axes, order + 1, nodes))
+    still = -part.rate(np.zeros((nodes, axes)), temperature_c)
+    polynomials = np.zeros((axes, axes, order + 1, nodes))
     off = 0.0
     scale = full_scale / half if part.has_rates else 1.0
     for by in range(axes):
         raw = np.zeros((len(at) * nodes, axes))
         raw[:, by] = np.repeat(middle + half * at, nodes) if part.has_rates else 0.0
-        error = (raw - part.rate(raw, np.tile(warm, len(at)))).reshape(len(at), nodes, axes)
+        error = (raw - part.rate(raw, np.tile(temperature_c, len(at)))).reshape(len(at), nodes, axes)
         for axis in range(axes):
             values = error[:, :, axis] - (0.0 if axis == by else still[:, axis])
             series = chebyshev.chebfit(at, values, order)
@@ -168,5 +168,5 @@ def _polynomials(
             for node in range(nodes):
                 powers = np.polynomial.Polynomial(chebyshev.cheb2poly(series[:, node]))
                 moved = powers(np.polynomial.Polynomial([-middle / half, scale]))
-                found[axis, by, : len(moved.coef), node] = moved.coef
-    return found, off
+                polynomials[axis, by, : len(moved.coef), node] = moved.coef
+    return polynomials, off

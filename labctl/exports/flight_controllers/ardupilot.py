@@ -53,9 +53,9 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
 
     at_caltemp = polynomial(np.array([float(at_c)]))
     offsets = (cubic.coefficients[0] + at_caltemp[0]).astype(np.float32)
-    seen = compared(cubic, lambda warm: polynomial(warm) - at_caltemp + offsets.astype(np.float64))
-    hold_tolerance(options, seen, NAME)
-    losses = cubic.losses(seen, CONSUMER)
+    differences_seen = compared(cubic, lambda warm: polynomial(warm) - at_caltemp + offsets.astype(np.float64))
+    hold_tolerance(options, differences_seen, NAME)
+    losses = cubic.losses(differences_seen, CONSUMER)
     thermal, offset, caltemp = parameter_names(imu)
     rows = [(f"{thermal}ENABLE", "1"), (f"{thermal}TMIN", f"{t_min:.9g}"), (f"{thermal}TMAX", f"{t_max:.9g}")]
     rows += [
@@ -75,11 +75,11 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     )
     head = head_lines(
         calibration, "the bias over temperature, as a cubic about 35 deg C in 1e-6 rad/s, and its constant in rad/s",
-        float(seen.at_rest.max()), losses,
+        float(differences_seen.at_rest.max()), losses,
         ["Axes are the sensor's own after the rotation by its driver, before that of the board.", limits, learnt],
     )  # fmt: skip
     body = "".join(f"{name},{value}\n" for name, value in rows)
-    return Written((commented(head) + body).encode("ascii"), losses, float(seen.at_rest.max()))
+    return Written((commented(head) + body).encode("ascii"), losses, float(differences_seen.at_rest.max()))
 
 
 FORMAT = Format(

@@ -36,7 +36,7 @@ class BiasCubic:
     coefficients: Array
     reference_c: float
 
-    def losses(self, seen: Differences, consumer: str) -> tuple[Loss, ...]:
+    def losses(self, seen_differences: Differences, consumer: str) -> tuple[Loss, ...]:
         """Return what a bias alone loses of the calibration."""
         if not self.part.has_rates:
             return (Loss("scale factor and misalignment are not in this calibration"), *self.part.losses())
@@ -45,12 +45,13 @@ class BiasCubic:
         return (
             Loss(
                 f"scale factor and its nonlinearity, {over} ({consumer} has no parameter for them)",
-                float(seen.own.max()),
+                float(seen_differences.own.max()),
             ),
             Loss(
-                f"misalignment, {over} of the other axes ({consumer} has no parameter for it)", float(seen.cross.max())
+                f"misalignment, {over} of the other axes ({consumer} has no parameter for it)",
+                float(seen_differences.cross.max()),
             ),
-            Loss("both together, bias included", seen.together),
+            Loss("both together, bias included", seen_differences.together),
             *self.part.losses(),
         )
 
@@ -95,15 +96,17 @@ def bias_cubic(calibration: Calibration, format_name: str, consumer: str, refere
 def compared(cubic: BiasCubic, offset_rad_s: Callable[[Array], Array]) -> Differences:
     """Compare the rate after a consumer's offset, (n, 3) rad/s for x, y, z at temperatures (n,), with a calibration."""
     order = [AXES.index(axis) for axis in cubic.part.axes]
-    return differences(cubic.part, lambda raw, warm: raw - np.rad2deg(offset_rad_s(warm))[:, order])
+    return differences(cubic.part, lambda raw, temperature_c: raw - np.rad2deg(offset_rad_s(temperature_c))[:, order])
 
 
-def hold_tolerance(options: Mapping[str, str], seen: Differences, format_name: str) -> None:
+def hold_tolerance(options: Mapping[str, str], seen_differences: Differences, format_name: str) -> None:
     """Raise BadInput where more is lost than the user accepts."""
     limit = number(options, TOLERANCE, format_name)
-    if limit is not None and seen.together > limit:
+    if limit is not None and seen_differences.together > limit:
         raise BadInput(
-            f"format {format_name}: up to {at_most(seen.together):.3g} deg/s of the correction would be lost (scale "
-            f"factor {at_most(float(seen.own.max())):.3g}, misalignment {at_most(float(seen.cross.max())):.3g} deg/s), "
+            f"format {format_name}: up to {at_most(seen_differences.together):.3g} deg/s of the correction would be "
+            "lost (scale "
+            f"factor {at_most(float(seen_differences.own.max())):.3g}, misalignment "
+            f"{at_most(float(seen_differences.cross.max())):.3g} deg/s), "
             f"more than option {TOLERANCE} = {limit:g} deg/s allows; use format c or json, or raise {TOLERANCE}"
         )

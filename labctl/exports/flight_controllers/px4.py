@@ -44,12 +44,12 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
         squared = d * d
         return np.asarray(values[0] + values[1] * d + values[2] * squared + values[3] * squared * d, dtype=np.float64)
 
-    seen = compared(cubic, offset_rad_s)
-    hold_tolerance(options, seen, NAME)
-    warm = cubic.part.temperatures()
-    moved = np.rad2deg(offset_rad_s(warm + UPDATE_K) - offset_rad_s(warm))
+    differences_seen = compared(cubic, offset_rad_s)
+    hold_tolerance(options, differences_seen, NAME)
+    temperatures_c = cubic.part.temperatures()
+    moved = np.rad2deg(offset_rad_s(temperatures_c + UPDATE_K) - offset_rad_s(temperatures_c))
     losses = (
-        *cubic.losses(seen, CONSUMER),
+        *cubic.losses(differences_seen, CONSUMER),
         Loss("a new offset is applied only when the temperature has moved by 1 K", float(np.abs(moved).max())),
     )
     prefix = f"TC_G{instance}_"
@@ -65,16 +65,17 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
         for column in range(len(AXES))
     ]
     head = head_lines(
-        calibration, "the bias over temperature, as a cubic in rad/s about TC_G*_TREF", float(seen.at_rest.max()),
+        calibration, "the bias over temperature, as a cubic in rad/s about TC_G*_TREF",
+        float(differences_seen.at_rest.max()),
         losses, _notes(prefix, has_id="device_id" in options),
     )  # fmt: skip
     body = "".join(f"1\t1\t{name}\t{value}\t{kind}\n" for name, value, kind in rows)
-    return Written((commented(head) + body).encode("ascii"), losses, float(seen.at_rest.max()))
+    return Written((commented(head) + body).encode("ascii"), losses, float(differences_seen.at_rest.max()))
 
 
 def _notes(prefix: str, *, has_id: bool) -> list[str]:
     """Return what a person has to know who loads the file."""
-    found = [
+    notes = [
         "Axes are the sensor's own, as in its raw output, before the rotations of sensor and board.",
         (
             "This file contains the whole bias: set CAL_GYROn_XOFF, _YOFF and _ZOFF of this sensor to 0, or "
@@ -83,9 +84,9 @@ def _notes(prefix: str, *, has_id: bool) -> list[str]:
         "Vehicle, component, parameter, value, type (6: integer, 9: float):",
     ]
     if not has_id:
-        found.insert(0, f"{prefix}ID is not in this file and must be the sensor's device id (option device_id): "
+        notes.insert(0, f"{prefix}ID is not in this file and must be the sensor's device id (option device_id): "
                         "PX4 uses the set only then.")  # fmt: skip
-    return found
+    return notes
 
 
 FORMAT = Format(

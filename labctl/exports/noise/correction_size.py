@@ -11,14 +11,14 @@ from labctl.exports.format import Loss
 from labctl.exports.static_part import differences, static_part
 
 
-def correction_losses(calibration: Calibration, why: str) -> tuple[Loss, ...]:
+def correction_losses(calibration: Calibration, reason: str) -> tuple[Loss, ...]:
     """Return the whole correction as what is lost, with its size where it depends on output and temperature alone."""
-    what = f"the correction of bias, scale factor and misalignment ({why})"
+    subject = f"the correction of bias, scale factor and misalignment ({reason})"
     if not np.isfinite(calibration.temperature_c).all():
-        return (Loss(what), *force_losses(calibration))
+        return (Loss(subject), *force_losses(calibration))
     try:
         part = static_part(calibration, "", carries="")
     except BadInput:
-        return (Loss(what), *force_losses(calibration))
+        return (Loss(subject), *force_losses(calibration))
     size = differences(part, lambda raw, _: raw).together
-    return (Loss(what, size), *force_losses(calibration))
+    return (Loss(subject, size), *force_losses(calibration))

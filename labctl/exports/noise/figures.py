@@ -35,8 +35,8 @@ def noise_of(calibration: Calibration, options: Mapping[str, str], format_name: 
     """Return the noise; raises BadInput where it or the rate of the readings is not known."""
     white, walk = (_positive(calibration, options, name, format_name) for name in (WHITE, WALK))
     rate = _positive(calibration, options, RATE, format_name)
-    for name, found in ((WHITE, white), (RATE, rate)):
-        if found is None:
+    for name, noise in ((WHITE, white), (RATE, rate)):
+        if noise is None:
             raise BadInput(
                 f"format {format_name}: {name} of {calibration.serial} is not known ({OPTIONS[name].split(';')[0]}); "
                 f"record the unit at rest, or give option {name}"
@@ -51,12 +51,12 @@ def _positive(calibration: Calibration, options: Mapping[str, str], name: str, f
         return None
     axes = len(calibration.axes)
     try:
-        found = np.array([float(word) for word in options[name].split(",")])
+        numbers = np.array([float(word) for word in options[name].split(",")])
     except ValueError:
-        found = np.zeros(0)
-    if len(found) not in {1, axes} or not np.all(np.isfinite(found) & (found > 0)):
+        numbers = np.zeros(0)
+    if len(numbers) not in {1, axes} or not np.all(np.isfinite(numbers) & (numbers > 0)):
         raise BadInput(
             f"format {format_name}: option {name} = {options[name]!r}: give a number above 0, or {axes} of them with "
             f"commas, one for each of {', '.join(calibration.axes)}"
         )
-    return np.asarray(np.broadcast_to(found, (axes,)))
+    return np.asarray(np.broadcast_to(numbers, (axes,)))

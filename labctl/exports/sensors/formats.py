@@ -56,20 +56,22 @@ SENSOR_FORMATS: Mapping[str, Mapping[str, SensorFormat]] = {
 }
 
 
-def format_of(found: Parameters, name: str) -> SensorFormat:
+def format_of(parameters: Parameters, name: str) -> SensorFormat:
     """Return a format of a sensor. Raises BadInput for one that it has not."""
-    known = SENSOR_FORMATS[found.sensor]
-    if name not in known:
-        raise BadInput(f"--export {name}: this {found.sensor} is exported to {', '.join(known)}; name one of them")
-    return known[name]
+    formats = SENSOR_FORMATS[parameters.sensor]
+    if name not in formats:
+        raise BadInput(
+            f"--export {name}: this {parameters.sensor} is exported to {', '.join(formats)}; name one of them"
+        )
+    return formats[name]
 
 
-def written(found: Parameters, head: Sequence[str], name: str, instance: int | None, device_id: int | None) -> str:
+def written(parameters: Parameters, head: Sequence[str], name: str, instance: int | None, device_id: int | None) -> str:
     """Return a sensor's calibration in a format. Raises BadInput for what the format cannot express."""
-    chosen = format_of(found, name)
-    if chosen.first is not None:
-        return chosen.write(found, head, chosen.first if instance is None else instance, device_id)
-    given: dict[str, Any] = {"--instance": instance, "--device-id": device_id}
-    if wrong := [option for option, value in given.items() if value is not None]:
+    sensor_format = format_of(parameters, name)
+    if sensor_format.first is not None:
+        return sensor_format.write(parameters, head, sensor_format.first if instance is None else instance, device_id)
+    stated_options: dict[str, Any] = {"--instance": instance, "--device-id": device_id}
+    if wrong := [option for option, value in stated_options.items() if value is not None]:
         raise BadInput(f"--export {name} takes no {wrong[0]}: it is for the parameters of an autopilot; leave it out")
-    return chosen.write(found, head)
+    return sensor_format.write(parameters, head)

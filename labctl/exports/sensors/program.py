@@ -17,46 +17,49 @@ ALIGNED = "alignment turns what is corrected into the axes of the accelerometer 
 FORMULA = "corrected = matrix (reading - offset), along x, y, z of the sensor"
 
 
-def json_text(found: Parameters, head: Sequence[str]) -> str:
+def json_text(parameters: Parameters, head: Sequence[str]) -> str:
     """Return offset and matrix, with the parameters' covariance, as a JSON document."""
-    warm = found.temperature if isinstance(found, AccelerometerParameters) else None
+    response = parameters.temperature if isinstance(parameters, AccelerometerParameters) else None
     document: dict[str, object] = {
-        "schema": SCHEMA, "sensor": found.sensor, "formula": FORMULA, "unit": found.unit,
-        "offset": found.offset.tolist(), "matrix": found.matrix.tolist(),
-        "covariance": {"of": list(found.labels), "values": found.covariance.tolist()}, "text": list(head),
+        "schema": SCHEMA, "sensor": parameters.sensor, "formula": FORMULA, "unit": parameters.unit,
+        "offset": parameters.offset.tolist(), "matrix": parameters.matrix.tolist(),
+        "covariance": {"of": list(parameters.labels), "values": parameters.covariance.tolist()}, "text": list(head),
     }  # fmt: skip
-    if warm is not None:
+    if response is not None:
         document["temperature"] = {
             "formula": "offset and scale factors (diagonal of the inverse of matrix) as polynomials of T - reference_c",
-            "reference_c": warm.reference_c, "range_c": list(warm.range_c),
-            "offset_per_k": (warm.bias_g * STANDARD_GRAVITY).tolist(), "scale_factor_per_k": warm.scale_factor.tolist(),
+            "reference_c": response.reference_c, "range_c": list(response.range_c),
+            "offset_per_k": (response.bias_g * STANDARD_GRAVITY).tolist(),
+            "scale_factor_per_k": response.scale_factor.tolist(),
         }  # fmt: skip
-    turn = _alignment(found)
+    turn = _alignment(parameters)
     if turn is not None:
         document["alignment"] = {"formula": ALIGNED, "matrix": turn.tolist()}
     return json.dumps(document, indent=2) + "\n"
 
 
-def _alignment(found: Parameters) -> NDArray[np.float64] | None:
-    return found.alignment if isinstance(found, MagnetometerParameters) else None
+def _alignment(parameters: Parameters) -> NDArray[np.float64] | None:
+    return parameters.alignment if isinstance(parameters, MagnetometerParameters) else None
 
 
-def _lost(found: Parameters) -> list[str]:
-    if not isinstance(found, AccelerometerParameters) or found.temperature is None:
+def _lost(parameters: Parameters) -> list[str]:
+    if not isinstance(parameters, AccelerometerParameters) or parameters.temperature is None:
         return []
-    return [found.temperature.lost(found.gravity_g, bias=True)]
+    return [parameters.temperature.lost(parameters.gravity_g, bias=True)]
 
 
-def python_text(found: Parameters, head: Sequence[str]) -> str:
+def python_text(parameters: Parameters, head: Sequence[str]) -> str:
     """Return a module that needs nothing but Python."""
-    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}.", *_lost(found)]
-    turn = _alignment(found)
+    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {parameters.unit}.", *_lost(parameters)]
+    turn = _alignment(parameters)
     lines += [] if turn is None else [f"{ALIGNED.upper()[:9]}{ALIGNED[9:]}."]
     return commented(lines) + (
-        f"OFFSET = {found.offset.tolist()!r}\n"
-        f"MATRIX = {found.matrix.tolist()!r}\n" + ("" if turn is None else f"ALIGNMENT = {turn.tolist()!r}\n") + "\n\n"
+        f"OFFSET = {parameters.offset.tolist()!r}\n"
+        f"MATRIX = {parameters.matrix.tolist()!r}\n"
+        + ("" if turn is None else f"ALIGNMENT = {turn.tolist()!r}\n")
+        + "\n\n"
         "def correct(reading):\n"
-        f'    """Return the corrected {found.sensor} reading (x, y, z), {found.unit}, as a list."""\n'
+        f'    """Return the corrected {parameters.sensor} reading (x, y, z), {parameters.unit}, as a list."""\n'
         "    away = [float(value) - offset for value, offset in zip(reading, OFFSET, strict=True)]\n"
         "    return [sum(factor * value for factor, value in zip(row, away)) for row in MATRIX]\n"
         + (
@@ -76,20 +79,20 @@ def _rows(matrix: NDArray[np.float64]) -> str:
     return ", ".join("{" + ", ".join(f"{value:.17g}" for value in row) + "}" for row in matrix)
 
 
-def c_text(found: Parameters, head: Sequence[str]) -> str:
+def c_text(parameters: Parameters, head: Sequence[str]) -> str:
     """Return a C99 header with one function; `#define LABCTL_REAL float` before it for single precision."""
-    name = found.sensor
-    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}.", *_lost(found)]
-    turn = _alignment(found)
+    name = parameters.sensor
+    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {parameters.unit}.", *_lost(parameters)]
+    turn = _alignment(parameters)
     lines += [] if turn is None else [f"{name}_{ALIGNED}."]
     comment = "\n * ".join(line.replace("*/", "* /") for line in lines)
-    offset = ", ".join(f"{value:.17g}" for value in found.offset)
+    offset = ", ".join(f"{value:.17g}" for value in parameters.offset)
     return (
         f"/* {comment} */\n"
         f"#ifndef LABCTL_{name.upper()}_H\n#define LABCTL_{name.upper()}_H\n\n"
         "#ifndef LABCTL_REAL\n#define LABCTL_REAL double\n#endif\n\n"
         f"static const double {name}_offset[3] = {{{offset}}};\n"
-        f"static const double {name}_matrix[3][3] = {{{_rows(found.matrix)}}};\n"
+        f"static const double {name}_matrix[3][3] = {{{_rows(parameters.matrix)}}};\n"
         + ("" if turn is None else f"static const double {name}_alignment[3][3] = {{{_rows(turn)}}};\n")
         + "\n"
         f"static inline void {name}_correct(const LABCTL_REAL *reading, LABCTL_REAL *corrected)\n"

@@ -56,8 +56,8 @@ def alignment_of(k: Matrix, u: Matrix | None) -> Alignment:
                 moved[i, j] += STEP
                 variance += ((_angles_deg(moved) - values) / STEP * u[i, j]) ** 2
         spread = np.sqrt(variance).tolist()
-    found = [Estimate(float(value), each) for value, each in zip(values, spread, strict=True)]
-    return Alignment((found[0], found[1], found[2]), (found[3], found[4], found[5]))
+    estimates = [Estimate(float(value), each) for value, each in zip(values, spread, strict=True)]
+    return Alignment((estimates[0], estimates[1], estimates[2]), (estimates[3], estimates[4], estimates[5]))
 
 
 def _angles_deg(k: Matrix) -> NDArray[np.float64]:
@@ -68,5 +68,5 @@ def _angles_deg(k: Matrix) -> NDArray[np.float64]:
     turned = skew / 2 * (angle / sine if sine > 1e-15 else 1.0)
     # output = K rate: a triad turned by +a sees the rate turned by -a
     rows = symmetric / np.linalg.norm(symmetric, axis=1, keepdims=True)
-    off = [float(np.arcsin(np.clip(rows[i] @ rows[j], -1.0, 1.0))) for i, j in PAIRS]
-    return np.rad2deg(np.array([*(-turned), *off]))
+    angle_errors_deg = [float(np.arcsin(np.clip(rows[i] @ rows[j], -1.0, 1.0))) for i, j in PAIRS]
+    return np.rad2deg(np.array([*(-turned), *angle_errors_deg]))

@@ -45,10 +45,10 @@ def g_sensitivity(position: NDArray[np.str_], error_dps: Array) -> tuple[Estimat
     if not all(np.any(up[:, i] == end) for i in range(len(AXES)) for end in (1.0, -1.0)):
         return None
     columns = np.column_stack([np.ones(len(position)), up])
-    found, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
-    left = error_dps - columns @ found
+    coefficients, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
+    residual = error_dps - columns @ coefficients
     freedom = len(error_dps) - 4
-    variance = float(left @ left) / freedom
+    variance = float(residual @ residual) / freedom
     u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
-    x, y, z = (Estimate(float(value), float(one)) for value, one in zip(found[1:], u[1:], strict=True))
+    x, y, z = (Estimate(float(value), float(one)) for value, one in zip(coefficients[1:], u[1:], strict=True))
     return x, y, z

@@ -33,8 +33,8 @@ def straight_line(rate_dps: Array, output_dps: Array) -> StraightLine | None:
     if different_rates(rate_dps) < 2:
         return None
     columns = np.column_stack([np.ones(len(rate_dps)), rate_dps])
-    values, u, left = _solved(columns, output_dps)
-    return StraightLine(Estimate(values[1], u[1]), Estimate(values[0], u[0]), left)
+    values, u, residual = _solved(columns, output_dps)
+    return StraightLine(Estimate(values[1], u[1]), Estimate(values[0], u[0]), residual)
 
 
 def nonlinearity_ppm(line: StraightLine, full_scale_dps: float, u_mean_dps: Array | None) -> Estimate:
@@ -69,12 +69,12 @@ def slope_over(temperature_c: Array, estimates: list[Estimate]) -> Estimate | No
     if len(temperature_c) < 2 or float(np.ptp(temperature_c)) < 1.0:
         return None
     columns = np.column_stack([np.ones(len(temperature_c)), temperature_c - temperature_c.mean()])
-    values, u, _ = _solved(columns, np.array([each.value for each in estimates]))
+    values, u, _ = _solved(columns, np.array([estimate.value for estimate in estimates]))
     weights = columns[:, 1] / float(columns[:, 1] @ columns[:, 1])
-    own = [each.u for each in estimates if each.u is not None]
+    own = [estimate.u for estimate in estimates if estimate.u is not None]
     carried = float(np.sqrt(np.sum((weights * np.array(own)) ** 2))) if len(own) == len(estimates) else None
-    known = [each for each in (u[1], carried) if each is not None]
-    return Estimate(values[1], max(known) if known else None)
+    stated_u = [each for each in (u[1], carried) if each is not None]
+    return Estimate(values[1], max(stated_u) if stated_u else None)
 
 
 def different_rates(rate_dps: Array) -> int:
@@ -87,11 +87,11 @@ def different_rates(rate_dps: Array) -> int:
 
 def _solved(columns: Array, values: Array) -> tuple[list[float], list[float | None], Array]:
     """Return coefficients, their standard uncertainties by the scatter about the fit, and what is left."""
-    found, *_ = np.linalg.lstsq(columns, values, rcond=None)
-    left = values - columns @ found
+    solution, *_ = np.linalg.lstsq(columns, values, rcond=None)
+    residual = values - columns @ solution
     freedom = len(values) - columns.shape[1]
     if freedom < 1:
-        return found.tolist(), [None] * columns.shape[1], left
-    variance = float(left @ left) / freedom
+        return solution.tolist(), [None] * columns.shape[1], residual
+    variance = float(residual @ residual) / freedom
     u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
-    return found.tolist(), u.tolist(), left
+    return solution.tolist(), u.tolist(), residual

@@ -66,17 +66,23 @@ def advice_for(
 
     The terms `beside` are in the model already.
     """
-    found: list[Advice] = []
+    advice: list[Advice] = []
     beside = list(beside)
     for term in terms:
         report_stage(f"checking what a calibration with {term.effect} would do")
         checked = exported_errors(data, model, tuple(beside), term)
-        why = _why_not_carried(term) or _why_not_better(checked)
-        found.append(
-            Advice(effect=term.effect, add=not why, why=why, before_dps=checked.before_dps, after_dps=checked.after_dps)
+        reason = _why_not_carried(term) or _why_not_better(checked)
+        advice.append(
+            Advice(
+                effect=term.effect,
+                add=not reason,
+                why=reason,
+                before_dps=checked.before_dps,
+                after_dps=checked.after_dps,
+            )
         )
-        beside += [] if why else [term]
-    return tuple(found)
+        beside += [] if reason else [term]
+    return tuple(advice)
 
 
 def is_carried(term: Term) -> bool:
@@ -93,15 +99,15 @@ def _why_not_carried(term: Term) -> str:
     return f"a calibration does not carry it: it belongs to the {kind.origin}, and not to the unit"
 
 
-def _why_not_better(found: Exported) -> str:
-    if found.is_better:
+def _why_not_better(exported: Exported) -> str:
+    if exported.is_better:
         return ""
-    if found.before_dps is None or found.after_dps is None:
+    if exported.before_dps is None or exported.after_dps is None:
         return "no part of these data can be left out to check it"
-    scatter = ", and from part to part the difference scatters by more" if found.is_chance else ""
+    scatter = ", and from part to part the difference scatters by more" if exported.is_chance else ""
     return (
-        f"what would be exported does not become clearly better on parts left out of the fit: {found.after_dps:.3g} "
-        f"deg/s in place of {found.before_dps:.3g} deg/s{scatter}"
+        f"what would be exported does not become clearly better on parts left out of the fit: {exported.after_dps:.3g} "
+        f"deg/s in place of {exported.before_dps:.3g} deg/s{scatter}"
     )
 
 
@@ -118,12 +124,14 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
     except LabctlError:
         return Exported(None, None)
     errors: tuple[list[dict[str, Array]], list[dict[str, Array]]] = ([], [])
-    for seen, left_out in parts_of(data, inner_only=presets[0].inner_only):
+    for data_used, left_out in parts_of(data, inner_only=presets[0].inner_only):
         try:
-            both = [_left(seen, left_out, p, found) for p, found in zip(presets, whole, strict=True)]
+            axis_rms = [
+                _left(data_used, left_out, p, axis_errors) for p, axis_errors in zip(presets, whole, strict=True)
+            ]
         except LabctlError:  # a part that the others do not determine says nothing
             continue
-        for parts, values in zip(errors, both, strict=True):
+        for parts, values in zip(errors, axis_rms, strict=True):
             parts.append(values)
     before, after = (_pooled(parts) for parts in errors)
     least_gain = LEAST_GAIN if np.any(data.channels.table_rate_dps()) else LEAST_GAIN_AT_REST
@@ -154,16 +162,18 @@ def _pooled(parts: Sequence[dict[str, Array]]) -> float | None:
     return rms({axis: np.concatenate([part[axis] for part in parts]) for axis in parts[0]}) if parts else None
 
 
-def _left(seen: FitData, left_out: FitData, preset: Preset, whole: Mapping[str, Solution]) -> dict[str, Array]:
+def _left(
+    data_used: FitData, left_out: FitData, preset: Preset, axis_solutions: Mapping[str, Solution]
+) -> dict[str, Array]:
     """Return axis -> errors of data sets left out, corrected by what would be exported of a fit to the others."""
-    model, rows = preset.build(seen)
-    used = seen.take(rows)
-    require_enough_data(used, model)
-    found = solve_axes(used, model, whole)
-    fitted = FittedModel(model, found.fits)
+    model, rows = preset.build(data_used)
+    training = data_used.take(rows)
+    require_enough_data(training, model)
+    solutions = solve_axes(training, model, axis_solutions)
+    fitted = FittedModel(model, solutions.fits)
     for term in model.terms:
         fitted = fitted if is_carried(term) else without(fitted, term.effect)
-    return dict(residuals(fitted, left_out, found.nuisance))
+    return dict(residuals(fitted, left_out, solutions.nuisance))
 
 
 def parts_of(data: FitData, *, inner_only: bool) -> Iterator[tuple[FitData, FitData]]:
@@ -179,10 +189,10 @@ def parts_of(data: FitData, *, inner_only: bool) -> Iterator[tuple[FitData, FitD
         yield from pairs[1:-1] if inner_only else pairs
         return
     for mask in masks:
-        seen = data.take(~mask)
-        if len(seen) == 0:
+        data_used = data.take(~mask)
+        if len(data_used) == 0:
             continue
-        low, high = float(seen.temperature_c.min()) - BEYOND_K, float(seen.temperature_c.max()) + BEYOND_K
+        low, high = float(data_used.temperature_c.min()) - BEYOND_K, float(data_used.temperature_c.max()) + BEYOND_K
         left_out = data.take(mask & (data.temperature_c >= low) & (data.temperature_c <= high))
         if len(left_out):
-            yield seen, left_out
+            yield data_used, left_out

@@ -25,8 +25,8 @@ def base_of(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArr
     if len(largest):
         base = np.concatenate([base, data.rows_of(shifts)], axis=2)
         precision = np.concatenate([precision, largest**-2.0])
-    lattice, known = lattice_columns(data, base, precision, axis)
-    base, precision = np.concatenate([base, lattice], axis=2), np.concatenate([precision, known])
+    lattice, lattice_precision = lattice_columns(data, base, precision, axis)
+    base, precision = np.concatenate([base, lattice], axis=2), np.concatenate([precision, lattice_precision])
     slopes = _slope_errors(data, model, axis)
     if slopes is None:
         return base, precision
@@ -42,11 +42,12 @@ def _slope_errors(data: ReducedRecording, model: ErrorModel, axis: str) -> NDArr
     if not isinstance(model.temperature, LagrangeTable) or (slope := temperature_slope(data, model, axis)) is None:
         return None
     nodes_c = np.asarray(model.temperature.nodes_c)
-    warm = data.nodes.temperature_c(axis)
-    off = warm[:, None] - nodes_c[None, :]
-    nearest = np.argmin(np.abs(off), axis=1)[:, None] == np.arange(len(nodes_c))
+    temperature_c = data.nodes.temperature_c(axis)
+    from_node_k = temperature_c[:, None] - nodes_c[None, :]
+    nearest = np.argmin(np.abs(from_node_k), axis=1)[:, None] == np.arange(len(nodes_c))
     sides = np.concatenate(
-        [np.where(nearest, np.minimum(off, 0.0), 0.0), np.where(nearest, np.maximum(off, 0.0), 0.0)], axis=1
+        [np.where(nearest, np.minimum(from_node_k, 0.0), 0.0), np.where(nearest, np.maximum(from_node_k, 0.0), 0.0)],
+        axis=1,
     )
-    of_node = np.repeat(slope[0], len(warm) // len(data))
+    of_node = np.repeat(slope[0], len(temperature_c) // len(data))
     return np.asarray(SLOPE_ERROR * data.rows_of(of_node[:, None] * sides))

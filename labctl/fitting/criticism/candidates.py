@@ -55,14 +55,14 @@ def untestable_channels(data: ReducedRecording, catalogue: Mapping[str, Effect] 
 
     In a recording of turns the rate at each instant is not known: an effect that is not linear in the rate lacks it.
     """
-    found: dict[str, list[str]] = {}
+    needs_by_effect: dict[str, list[str]] = {}
     for kind in catalogue.values():
         absent = [name for name in data.nodes.missing(kind.channels) if name != "run"]
         if not absent and data.info.motion == "turns" and not _takes_mean_rate(data, kind):
             absent = [RATE]
         if absent:
-            found[kind.id] = absent
-    return found
+            needs_by_effect[kind.id] = absent
+    return needs_by_effect
 
 
 def _takes_mean_rate(data: ReducedRecording, kind: Effect) -> bool:
@@ -86,14 +86,14 @@ def base_rows(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDA
         if not np.any(column.values):
             continue
         over = np.ones((len(basis), 1)) if effect_id in model.steady else basis
-        known = forward.held.of(axis, effect_id, column.name)
-        if known is not None:
-            if not known.has_u or not min(known.u) > 0:
+        held = forward.held.of(axis, effect_id, column.name)
+        if held is not None:
+            if not held.has_u or not min(held.u) > 0:
                 continue
-            over = basis @ known.spread(model.temperature)
+            over = basis @ held.spread(model.temperature)
         rows.append(_over_temperature(data, column, over))
         names += [f"{column.name}@{k}" for k in range(over.shape[1])]
-        precision.append(np.zeros(over.shape[1]) if known is None else np.array(known.u) ** -2.0)
+        precision.append(np.zeros(over.shape[1]) if held is None else np.array(held.u) ** -2.0)
     turning = _turning(data, axis)
     if turning:
         rows.append(np.stack([data.rows(column) for column in turning], axis=2))
@@ -110,9 +110,9 @@ def beside_held(data: ReducedRecording, model: ErrorModel) -> ReducedRecording:
     for axis in forward.held.axes:
         basis = forward.temperature.basis(data.nodes.temperature_c(axis))
         for effect_id, column in forward.carried(data.nodes, axis):
-            if (known := forward.held.of(axis, effect_id, column.name)) is not None:
-                over = basis @ known.spread(forward.temperature)
-                output[axis] = output[axis] - _over_temperature(data, column, over) @ np.array(known.value)
+            if (held := forward.held.of(axis, effect_id, column.name)) is not None:
+                over = basis @ held.spread(forward.temperature)
+                output[axis] = output[axis] - _over_temperature(data, column, over) @ np.array(held.value)
     return data if not forward.held.axes else replace(data, output=output)
 
 
@@ -141,15 +141,15 @@ def options_of(
     """Return every shape of every testable effect on one axis, and a smooth function of every channel."""
     span, absent = span_of(data), untestable_channels(data, catalogue)
     turning = bool(np.any(data.nodes.table_rate_dps()))
-    found = []
+    shaped_options = []
     for kind in catalogue.values():
         if not turning and not kind.shows_at_rest:
             continue
         if kind.id in absent or kind.id in ONLY_BASE or _is_known(data, kind.id):
             continue
         options = (option_of(data, axis, reference, kind, term) for term in kind.options(span))
-        found += [option for option in options if option is not None]
-    return found + channel_options(data, axis)
+        shaped_options += [option for option in options if option is not None]
+    return shaped_options + channel_options(data, axis)
 
 
 def option_of(

@@ -70,38 +70,38 @@ def channel_options(data: ReducedRecording, axis: str) -> list[CandidateShape]:
     Each as bias and as scale factor, and those of temperature also as both together. The time since power-on is left
     out where it differs from time only by a constant.
     """
-    found = []
+    shapes = []
     channels = smooth_channels(data, axis)
     if "power_s" in channels:
         same = "t_s" in channels and np.ptp(channels["t_s"] - channels["power_s"]) < SAME_TIME_S
-        found += _decays(data, axis, "t_s" if same else "power_s", channels["power_s"])
+        shapes += _decays(data, axis, "t_s" if same else "power_s", channels["power_s"])
         if same:
             del channels["power_s"]
     for name, values in channels.items():
         if name not in OF_BASE_AND_TIME:
-            found += _line(data, axis, name, values)
+            shapes += _line(data, axis, name, values)
         for number in KNOTS:
-            found += _smooth(data, axis, name, values, number)
+            shapes += _smooth(data, axis, name, values, number)
         distinct = np.unique(np.round(values, 9))
         if name not in NO_SURROUNDINGS and len(distinct) > max(KNOTS):
-            found += _steps(
+            shapes += _steps(
                 data, axis, name, values, np.quantile(distinct, STEPS_IN_TIME if name in TIMES else STEPS_AT)
             )
-            found += _waves(data, name, values, WAVES_OVER_TIME if name in TIMES else WAVES_OVER_RANGE)
-    return found
+            shapes += _waves(data, name, values, WAVES_OVER_TIME if name in TIMES else WAVES_OVER_RANGE)
+    return shapes
 
 
 def _steps(data: ReducedRecording, axis: str, name: str, values: Array, places: Array) -> list[CandidateShape]:
     """Return steps of a channel, of the bias, and in time, where a step is sharp, of the scale factor."""
     half = (SHARP if name in TIMES else SPREAD) * np.ptp(values) / 2
-    found = []
+    step_shapes = []
     for place in places:
         step = np.clip((values - place) / half, -1.0, 1.0)[:, None]
-        found.append(CandidateShape(name, None, data.rows_of(step), (f"{name}>{place:.6g}",), ("deg/s",)))
+        step_shapes.append(CandidateShape(name, None, data.rows_of(step), (f"{name}>{place:.6g}",), ("deg/s",)))
         if name in TIMES:
             scaled = data.rows_of(step * data.nodes.rate_dps(axis)[:, None])
-            found.append(CandidateShape(name, None, scaled, (f"{name}>{place:.6g} x rate",), ("1",)))
-    return found
+            step_shapes.append(CandidateShape(name, None, scaled, (f"{name}>{place:.6g} x rate",), ("1",)))
+    return step_shapes
 
 
 def _waves(data: ReducedRecording, name: str, values: Array, over_range: tuple[float, ...]) -> list[CandidateShape]:
@@ -168,5 +168,9 @@ def _smooth(data: ReducedRecording, axis: str, name: str, values: Array, number:
     scale = CandidateShape(name, None, scaled, tuple(f"{each} x rate" for each in names), ("1",) * len(names))
     if name != "temperature_c":
         return [bias, scale]
-    both = np.concatenate([bias.rows, scale.rows], axis=2)
-    return [bias, scale, CandidateShape(name, None, both, bias.names + scale.names, bias.units + scale.units)]
+    columns_of_both = np.concatenate([bias.rows, scale.rows], axis=2)
+    return [
+        bias,
+        scale,
+        CandidateShape(name, None, columns_of_both, bias.names + scale.names, bias.units + scale.units),
+    ]

@@ -54,9 +54,9 @@ def size_in_noise_units(reference: SizeReference, recording: Recording) -> tuple
     best = (0.0, 0.0)
     for axis, design in reference.designs.items():
         difference = other.output[axis] - reference.data.output[axis]
-        left = _chi2(reference, axis, design.base, design.precision, difference)
+        chi2_left = _chi2(reference, axis, design.base, design.precision, difference)
         whole = _chi2(reference, axis, design.base[:, :, :0], design.precision[:0], difference)
-        best = max(best, (float(np.sqrt(left)), float(np.sqrt(left / whole)) if whole > 0 else 0.0))
+        best = max(best, (float(np.sqrt(chi2_left)), float(np.sqrt(chi2_left / whole)) if whole > 0 else 0.0))
     return best
 
 
@@ -82,10 +82,10 @@ def size_for_z(z_of: Callable[[float], float], z: float, start: float) -> float 
     at, slope = float(np.log(abs(start))), 1.0
     for _ in range(ROUNDS):
         size = float(np.copysign(np.exp(at), start))
-        found = z_of(size)
-        if found > 0 and abs(found / z - 1) < CLOSE:
+        z_at_size = z_of(size)
+        if z_at_size > 0 and abs(z_at_size / z - 1) < CLOSE:
             return size
-        logs.append((at, float(np.log(max(found, 1e-3)))))
+        logs.append((at, float(np.log(max(z_at_size, 1e-3)))))
         if len(logs) > 1 and abs(logs[-1][0] - logs[-2][0]) > 1e-6:
             secant = (logs[-1][1] - logs[-2][1]) / (logs[-1][0] - logs[-2][0])
             slope = float(np.clip(secant, LEAST_SLOPE, MOST_SLOPE))

@@ -51,25 +51,25 @@ def compare_axis(data: ReducedRecording, design: Design, axis: str) -> AxisCompa
         white_now = white + _growing(data, design, y, white, explained)
         if means is None or not np.array_equal(white_now, means.white_var):
             means = means_by_noise(design, y, white_now, noises)
-        found = evidence(design, y, means, scale, int(design.present.sum()))
-        leader = int(np.argmax(found.log_bf)) if len(found.log_bf) else -1
-        if estimate == 1 or leader < 0 or found.log_bf[leader] < REESTIMATE_FROM:
+        axis_evidence = evidence(design, y, means, scale, int(design.present.sum()))
+        leader = int(np.argmax(axis_evidence.log_bf)) if len(axis_evidence.log_bf) else -1
+        if estimate == 1 or leader < 0 or axis_evidence.log_bf[leader] < REESTIMATE_FROM:
             break
-        explained = _explained(design, found, leader)
-    return AxisComparison(found, white_now, scale)
+        explained = _explained(design, axis_evidence, leader)
+    return AxisComparison(axis_evidence, white_now, scale)
 
 
-def _explained(design: Design, found: AxisEvidence, option: int) -> NDArray[np.float64]:
+def _explained(design: Design, axis_evidence: AxisEvidence, option: int) -> NDArray[np.float64]:
     """Return what an option explains, (R, m)."""
-    coefficients, _ = solve_option(found.best, found.slices[option])
+    coefficients, _ = solve_option(axis_evidence.best, axis_evidence.slices[option])
     return np.asarray(design.options[option].rows @ coefficients)
 
 
 def _noise_of(data: ReducedRecording, design: Design, y: NDArray[np.float64], axis: str) -> tuple[Array, list[Noise]]:
     """Return the white variance of each mean, (m,) (deg/s)^2, and the drifts to average over."""
     stability = data.info.stability_dps
-    known = data.white_var
-    white = known[axis] if known is not None else np.full(len(data), max(_floor_squared(design, y), LEAST_VAR))
+    white_var = data.white_var
+    white = white_var[axis] if white_var is not None else np.full(len(data), max(_floor_squared(design, y), LEAST_VAR))
     level = float(np.sqrt(np.median(white)))
     return white, noise_grid(data.info.technology or "", stability, level, data.instability_dps(axis))
 
@@ -81,8 +81,8 @@ def _floor_squared(design: Design, y: NDArray[np.float64]) -> float:
     columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
     u, s, _ = np.linalg.svd(columns, full_matrices=False)
     u = u[:, s > 1e-6 * s[0]]
-    left = y[0] - u @ (u.T @ y[0])
-    return float((ROBUST * np.median(np.abs(left))) ** 2 * len(left) / max(len(left) - u.shape[1], 1))
+    residual = y[0] - u @ (u.T @ y[0])
+    return float((ROBUST * np.median(np.abs(residual))) ** 2 * len(residual) / max(len(residual) - u.shape[1], 1))
 
 
 def _base_residual(design: Design, y: NDArray[np.float64], white: Array) -> NDArray[np.float64]:
@@ -91,8 +91,8 @@ def _base_residual(design: Design, y: NDArray[np.float64], white: Array) -> NDAr
     prior = np.diag(np.sqrt(design.precision))[design.precision > 0]
     columns = np.vstack([design.base[0] * weight[:, None], prior])
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    wanted = np.concatenate([y[0] * weight, np.zeros(len(prior))])
-    solution, *_ = np.linalg.lstsq(columns / size, wanted, rcond=1e-9)
+    weighted_target = np.concatenate([y[0] * weight, np.zeros(len(prior))])
+    solution, *_ = np.linalg.lstsq(columns / size, weighted_target, rcond=1e-9)
     return np.asarray(y - design.base @ (solution / size))
 
 
@@ -120,9 +120,9 @@ def _growing(
     residual = _base_residual(design, y - explained, white)[0]
     centred = residual.copy()
     position = np.asarray(data.nodes["position"]).reshape(len(data), -1)[:, 0]
-    for there in np.unique(position):
-        for value in np.unique(np.round(rate[position == there], 2)):
-            same = (position == there) & (np.round(rate, 2) == value)
+    for up_position in np.unique(position):
+        for value in np.unique(np.round(rate[position == up_position], 2)):
+            same = (position == up_position) & (np.round(rate, 2) == value)
             centred[same] -= np.median(residual[same])
     speed = np.abs(rate)
     fast, slow = speed > np.quantile(speed, 2 / 3), speed < np.quantile(speed, 1 / 3)
@@ -213,8 +213,8 @@ def designs_beside(
 def constant_coordinates(base: NDArray[np.float64], data: ReducedRecording) -> NDArray[np.float64] | None:
     """Return the coordinates of a constant, (R, m), where it lies in the span of the base; None where not."""
     constant = data.rows_of(np.ones((len(data.nodes), 1)))[:, :, 0]
-    taken, *_ = np.linalg.lstsq(base[0], constant[0], rcond=1e-9)
-    return constant if np.max(np.abs(base[0] @ taken - constant[0]), initial=0.0) < 1e-6 else None
+    coordinates, *_ = np.linalg.lstsq(base[0], constant[0], rcond=1e-9)
+    return constant if np.max(np.abs(base[0] @ coordinates - constant[0]), initial=0.0) < 1e-6 else None
 
 
 def centred(option: CandidateShape, level: NDArray[np.float64] | None) -> CandidateShape:
@@ -225,8 +225,8 @@ def centred(option: CandidateShape, level: NDArray[np.float64] | None) -> Candid
     if level is None:
         return option
     rows = option.rows - level[:, :, None] * option.rows[0].mean(axis=0)
-    size, left = (np.linalg.norm(each, axis=(0, 1)) for each in (option.rows, rows))
-    return replace(option, rows=np.where(left > ROUNDING * size, rows, 0.0))
+    size, size_left = (np.linalg.norm(each, axis=(0, 1)) for each in (option.rows, rows))
+    return replace(option, rows=np.where(size_left > ROUNDING * size, rows, 0.0))
 
 
 def orthogonalised(option: CandidateShape, base: NDArray[np.float64]) -> CandidateShape:
@@ -238,8 +238,8 @@ def orthogonalised(option: CandidateShape, base: NDArray[np.float64]) -> Candida
     meant = option.beside_base or (option.term is not None and option.term.formula)
     if not meant or base.shape[2] == 0:
         return option
-    taken, *_ = np.linalg.lstsq(base[0], option.rows[0], rcond=1e-9)
-    rows = option.rows - base @ taken
+    coordinates, *_ = np.linalg.lstsq(base[0], option.rows[0], rcond=1e-9)
+    rows = option.rows - base @ coordinates
     return (
         replace(option, rows=rows)
         if np.linalg.norm(rows) > LEAST_ORTHOGONAL_SHARE * np.linalg.norm(option.rows)
@@ -256,16 +256,16 @@ def compare_models(
     """Compare every candidate with a model. `designs` may be those of an earlier call for the same model and data."""
     report_stage("preparing candidates")
     designs = designs or {axis: design_of(data, model, axis, catalogue) for axis in data.info.axes}
-    found = {}
+    axis_comparisons = {}
     for axis, design in designs.items():
         number = len({(option.candidate, option.smooth) for option in design.options})
         report_stage(f"comparing {number} candidates, axis {axis}")
-        found[axis] = compare_axis(data, design, axis)
-    axes = {axis: one.evidence for axis, one in found.items()}
+        axis_comparisons[axis] = compare_axis(data, design, axis)
+    axes = {axis: axis_comparison.evidence for axis, axis_comparison in axis_comparisons.items()}
     return Comparison(
         data, model, designs, axes,
-        {axis: one.white_var for axis, one in found.items()},
-        {axis: one.scale for axis, one in found.items()},
+        {axis: axis_comparison.white_var for axis, axis_comparison in axis_comparisons.items()},
+        {axis: axis_comparison.scale for axis, axis_comparison in axis_comparisons.items()},
         rank_candidates(designs, axes, data.info.technology or ""),
     )  # fmt: skip
 
@@ -287,11 +287,16 @@ def with_noise_of(comparison: Comparison, fuller: Comparison) -> Comparison:
     """
     axes = {}
     for axis, design in comparison.designs.items():
-        found, other = comparison.axes[axis], fuller.axes[axis]
+        axis_comparison, other = comparison.axes[axis], fuller.axes[axis]
         y = comparison.data.error_dps(axis)
-        (left,) = eliminate_base(design, y, fuller.white_var[axis], fuller.scales[axis], [other.best.noise])
-        gain, dimensions = gains_of(left, found.slices)
+        (eliminated,) = eliminate_base(design, y, fuller.white_var[axis], fuller.scales[axis], [other.best.noise])
+        gain, dimensions = gains_of(eliminated, axis_comparison.slices)
         axes[axis] = replace(
-            found, best=left, gain=gain, dimensions=dimensions, weights=other.weights, noises=other.noises
+            axis_comparison,
+            best=eliminated,
+            gain=gain,
+            dimensions=dimensions,
+            weights=other.weights,
+            noises=other.noises,
         )
     return replace(comparison, axes=axes, white_var=fuller.white_var, scales=fuller.scales)

@@ -29,12 +29,12 @@ def steps_of(recording: Recording, white_var: Mapping[str, Array] | None) -> dic
 
     `white_var` is the variance of the means, what the steps leave among it, (deg/s)^2; without it every step matters.
     """
-    found: dict[str, OutputStep] = {}
+    step_by_channel: dict[str, OutputStep] = {}
     for axis, step in output_steps(recording).items():
         noise = 0.0 if white_var is None else float(np.median(white_var[axis]))
         if step.left_dps**2 > LEAST_SHARE * noise:
-            found[axis] = {"step_dps": step.step_dps, "left_dps": step.left_dps}
-    return found
+            step_by_channel[axis] = {"step_dps": step.step_dps, "left_dps": step.left_dps}
+    return step_by_channel
 
 
 def lattice_columns(

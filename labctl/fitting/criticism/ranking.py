@@ -25,16 +25,16 @@ LARGEST = {"1": 3.0}
 SUPPORTED = 2.0
 
 
-def log_size_prior(option: CandidateShape, found: AxisEvidence, index: int, technology: str) -> float:
+def log_size_prior(option: CandidateShape, axis_evidence: AxisEvidence, index: int, technology: str) -> float:
     """Return the log prior, nats <= 0, of the size that an option is fitted with; -inf where it is not physical.
 
     The prior is flat inside the span of plausible sizes of `technology` and falls as its inverse beyond; where the
     technology is not known, that of the largest sizes counts. The largest coefficient in the unit of the first is
     taken: an effect of three axes has one for each. A size that is not significant is plausible.
     """
-    if option.term is None or option.term.effect not in CATALOGUE or found.log_bf[index] < SUPPORTED:
+    if option.term is None or option.term.effect not in CATALOGUE or axis_evidence.log_bf[index] < SUPPORTED:
         return 0.0
-    values, covariance = solve_option(found.best, found.slices[index])
+    values, covariance = solve_option(axis_evidence.best, axis_evidence.slices[index])
     least = np.maximum(np.abs(values) - SPARE_U * np.sqrt(np.maximum(np.diag(covariance), 0.0)), 0.0)
     if _is_beyond_all(option, least) or _has_wrong_sign(option, float(values[0]), float(least[0]), technology):
         return -np.inf
@@ -99,19 +99,19 @@ def rank_candidates(
     """Return every candidate of the designs, the one with the most evidence first."""
     places = {axis: _places(design) for axis, design in designs.items()}
     priors = {axis: _size_priors(design, axes[axis], technology) for axis, design in designs.items()}
-    found = []
-    for key in dict.fromkeys(key for each in places.values() for key in each):
-        which = {axis: each[key] for axis, each in places.items() if key in each}
-        found.append(_physical_or_not(key, which, designs, axes, priors))
-    return tuple(sorted((c for c in found if c is not None), key=lambda c: -c.log_bf))
+    ranked = []
+    for key in dict.fromkeys(key for place in places.values() for key in place):
+        which = {axis: place[key] for axis, place in places.items() if key in place}
+        ranked.append(_physical_or_not(key, which, designs, axes, priors))
+    return tuple(sorted((c for c in ranked if c is not None), key=lambda c: -c.log_bf))
 
 
 def _places(design: Design) -> dict[tuple[str, bool], list[int]]:
     """Return (candidate, whether it is smooth) -> the indices of its options."""
-    found: dict[tuple[str, bool], list[int]] = {}
+    places_by_term: dict[tuple[str, bool], list[int]] = {}
     for index, option in enumerate(design.options):
-        found.setdefault((option.candidate, option.smooth), []).append(index)
-    return found
+        places_by_term.setdefault((option.candidate, option.smooth), []).append(index)
+    return places_by_term
 
 
 def _physical_or_not(
@@ -126,9 +126,9 @@ def _physical_or_not(
     return whatever if physical.log_bf <= 0 and whatever.log_bf > UNPHYSICAL_FROM else physical
 
 
-def _size_priors(design: Design, found: AxisEvidence, technology: str) -> Array:
+def _size_priors(design: Design, axis_evidence: AxisEvidence, technology: str) -> Array:
     """Return the log prior of the size of every option, (options,)."""
-    return np.array([log_size_prior(option, found, i, technology) for i, option in enumerate(design.options)])
+    return np.array([log_size_prior(option, axis_evidence, i, technology) for i, option in enumerate(design.options)])
 
 
 def _candidate(

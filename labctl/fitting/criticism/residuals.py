@@ -55,21 +55,21 @@ def residuals_of(
     floors = {axis: noise.floor_dps for axis, noise in floor.axes.items()}
     if comparison.data.nodes.profile is not None:  # the floor of a fit is that of a window, and a row here is a piece
         floors = {
-            axis: np.sqrt(comparison.white_var[axis] + found.best.noise.size_dps**2)
-            for axis, found in comparison.axes.items()
+            axis: np.sqrt(comparison.white_var[axis] + axis_residuals.best.noise.size_dps**2)
+            for axis, axis_residuals in comparison.axes.items()
         }
     elif any(len(values) != m for values in floors.values()):  # long data sets in other pieces
         floors = {axis: np.full(m, np.sqrt(np.mean(values**2))) for axis, values in floors.items()}
-    found = {axis: _axis(comparison, axis, floors[axis]) for axis in comparison.axes}
+    axis_residuals = {axis: _axis(comparison, axis, floors[axis]) for axis in comparison.axes}
     if fitted is None or any(len(values) != m for values in fitted.values()):
-        return found
-    return {axis: replace(left, means=fitted[axis]) for axis, left in found.items()}
+        return axis_residuals
+    return {axis: replace(residuals, means=fitted[axis]) for axis, residuals in axis_residuals.items()}
 
 
 def _axis(comparison: Comparison, axis: str, floor_dps: Array) -> Residuals:
-    data, design, found = comparison.data, comparison.designs[axis], comparison.axes[axis]
+    data, design, axis_comparison = comparison.data, comparison.designs[axis], comparison.axes[axis]
     y = data.error_dps(axis)
-    noise, white = found.best.noise, comparison.white_var[axis]
+    noise, white = axis_comparison.best.noise, comparison.white_var[axis]
     blocks, _ = factors(noise, white, design.t_s, design.run)
     together = np.concatenate([design.base, y[:, :, None]], axis=2)
     means = np.empty_like(together[0])
@@ -85,14 +85,14 @@ def _axis(comparison: Comparison, axis: str, floor_dps: Array) -> Residuals:
         (y - design.base @ (solution / size))[0],
         floor_dps,
         float(np.sum((whole[:, -1] - whole[:, :-1] @ (solution / size)) ** 2)),
-        found.rows - found.base_columns,
+        axis_comparison.rows - axis_comparison.base_columns,
     )
 
 
-def where_it_fails(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[FailingRange]:
+def where_it_fails(data: ReducedRecording, axis_residuals: Mapping[str, Residuals]) -> list[FailingRange]:
     """Return the ranges of channels in which the mean residual is far from 0, worst first."""
-    found: list[FailingRange] = []
-    for axis, residuals in left.items():
+    failing_ranges: list[FailingRange] = []
+    for axis, residuals in axis_residuals.items():
         for name, nodes in smooth_channels(data, axis).items():
             values = data.at_sets(nodes)
             for low, high, rows in _bins(values):
@@ -100,8 +100,10 @@ def where_it_fails(data: ReducedRecording, left: Mapping[str, Residuals]) -> lis
                 z = float(abs(score.mean()) * np.sqrt(len(score)))
                 if z >= LEAST_Z:
                     rms = float(np.sqrt(np.mean(residuals.means[rows] ** 2)))
-                    found.append({"axis": axis, "channel": name, "from": low, "to": high, "rms_dps": rms, "z": z})
-    return sorted(found, key=lambda line: -line["z"])[:LINES]
+                    failing_ranges.append(
+                        {"axis": axis, "channel": name, "from": low, "to": high, "rms_dps": rms, "z": z}
+                    )
+    return sorted(failing_ranges, key=lambda line: -line["z"])[:LINES]
 
 
 def _bins(values: Array) -> list[tuple[float, float, NDArray[np.int64]]]:
@@ -119,19 +121,21 @@ def has_one_rising_leg(data: ReducedRecording) -> bool:
     """Return whether a recording's temperatures went one way only: then temperature and time are one variable."""
     if "t_s" not in data.nodes:
         return False
-    warm = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
+    temperature_c = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
     order = np.argsort(data.at_sets(np.asarray(data.nodes["t_s"], dtype=np.float64)), kind="stable")
-    steps, span = np.diff(warm[order]), float(np.ptp(warm))
+    steps, span = np.diff(temperature_c[order]), float(np.ptp(temperature_c))
     back = min(float(-steps[steps < 0].sum()), float(steps[steps > 0].sum()))
     return span > ONE_LEVEL_SPAN_C and back < BACK_SHARE * span
 
 
-def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most: int = 10) -> list[WorstDataSet]:
+def worst_data_sets(
+    data: ReducedRecording, axis_residuals: Mapping[str, Residuals], most: int = 10
+) -> list[WorstDataSet]:
     """Return the data sets with the largest mean residual over its floor, at most `most`, worst first."""
-    found: list[WorstDataSet] = []
-    for axis, residuals in left.items():
+    worst: list[WorstDataSet] = []
+    for axis, residuals in axis_residuals.items():
         order = np.argsort(-np.abs(residuals.score))[:most]
-        found.extend(
+        worst.extend(
             WorstDataSet(
                 axis=axis,
                 dataset=int(data.dataset[i]),
@@ -140,4 +144,4 @@ def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most:
             )
             for i in order
         )
-    return sorted(found, key=lambda line: -abs(line["over_floor"]))[:most]
+    return sorted(worst, key=lambda line: -abs(line["over_floor"]))[:most]

@@ -54,17 +54,21 @@ def separation_chi2(
             continue
         options = schedule.options(axis)
         own = [
-            (_shape_distance(option.term, signal.term), where)
-            for option, where in options
-            if option.candidate == signal.term.effect and where.stop - where.start == len(values)
+            (_shape_distance(option.term, signal.term), option_rows)
+            for option, option_rows in options
+            if option.candidate == signal.term.effect and option_rows.stop - option_rows.start == len(values)
         ]
         if not own:
             continue
         _, nearest = min(own, key=lambda pair: pair[0])
-        left = schedule.left[axis]
-        size = float(values @ left.gram[nearest, nearest] @ values)
+        eliminated = schedule.left[axis]
+        size = float(values @ eliminated.gram[nearest, nearest] @ values)
         shared = max(
-            (reproduced(left, nearest, values, where) for option, where in options if option.candidate == rival),
+            (
+                reproduced(eliminated, nearest, values, option_rows)
+                for option, option_rows in options
+                if option.candidate == rival
+            ),
             default=0.0,
         )
         total += max(size - shared, 0.0) * _noise_ratio(schedule, axis, (floor_dps or {}).get(axis, 0.0))

@@ -29,7 +29,7 @@ TEMPERATURE = "temperature_c"
 NEXT_SHARE = 0.05
 
 
-def slow_process(comparison: Comparison, left: Mapping[str, Residuals]) -> SlowProcess | None:
+def slow_process(comparison: Comparison, axis_residuals: Mapping[str, Residuals]) -> SlowProcess | None:
     """Return the slow process in the residuals of a record at rest; None of another record, or where they are noise."""
     nodes = comparison.data.nodes
     if np.any(nodes.table_rate_dps()) or "t_s" not in nodes or len(comparison.data) < LEAST_SETS:
@@ -37,7 +37,7 @@ def slow_process(comparison: Comparison, left: Mapping[str, Residuals]) -> SlowP
     design = next(iter(comparison.designs.values()))
     order = np.lexsort((design.t_s, design.run))
     courses, taus = {}, {}
-    for axis, residuals in left.items():
+    for axis, residuals in axis_residuals.items():
         course = residuals.means[order] - residuals.means.mean()
         tau_s = _time_constant_s(course, design.t_s[order], design.run[order])
         if tau_s is not None:

@@ -56,7 +56,7 @@ class Suspect:
 
 def suspects_of(
     comparison: Comparison,
-    seen: Comparison,
+    fuller: Comparison,
     data: FitData,
     model: ErrorModel,
     shape_of: Callable[[Comparison, Candidate], Term],
@@ -65,27 +65,28 @@ def suspects_of(
     """Return what may be missing, best first; last what is of a size that the unit's technology cannot have.
 
     The ranking is that of `comparison`. Coefficients are those of a fit with the effect in its best shape (`shape_of`),
-    the one that adding the effect makes; without that fit they are those of `seen`, with the noise that remains
-    beside a fuller model. An effect whose fit leaves more than `before`, the fit of the model, is not listed.
+    the one that adding the effect makes; without that fit they are those of `fuller`, with the noise
+    that remains beside a fuller model. An effect whose fit leaves more than `before`, the fit of the model, is not
+    listed.
     """
     probability = probabilities(comparison.candidates)
     effects = [c for c in comparison.candidates if not c.smooth]
-    shown = [c for c in effects if c.physical][:SHOWN]
-    shown += [c for c in effects if not c.physical and c.log_bf >= ENOUGH][:UNPHYSICAL_SHOWN]
-    found = []
-    for candidate in shown:
+    shown_candidates = [c for c in effects if c.physical][:SHOWN]
+    shown_candidates += [c for c in effects if not c.physical and c.log_bf >= ENOUGH][:UNPHYSICAL_SHOWN]
+    suspects = []
+    for candidate in shown_candidates:
         after = _fit_with(comparison, candidate, data, model, shape_of)
         if after is not None and _is_worse(before, after):
             continue  # another shape of an effect that the model has: what it would replace fits better
-        share = _share(before, after, share_removed(seen, candidate))
+        share = _share(before, after, share_removed(fuller, candidate))
         fitted = _fitted_coefficients(after, candidate) if after and candidate.id not in model.effect_ids else {}
         suspect = Suspect(
-            candidate, probability[candidate.id], _p_value(comparison, seen, candidate),
-            fitted or coefficients_of(seen, candidate), bool(fitted), share, after,
+            candidate, probability[candidate.id], _p_value(comparison, fuller, candidate),
+            fitted or coefficients_of(fuller, candidate), bool(fitted), share, after,
             alias_group(comparison, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,),
         )  # fmt: skip
-        found.append(suspect)
-    return found
+        suspects.append(suspect)
+    return suspects
 
 
 def is_only_shape(suspect: Suspect, model: ErrorModel) -> bool:
@@ -119,16 +120,16 @@ def _share(before: FitResult | None, after: FitResult | None, compared: float) -
     if before is None or after is None or before.error.rms_dps is None or after.error.rms_dps is None:
         return compared
     floor = before.error.noise_floor_dps or 0.0
-    excess, left = (max(fit.error.rms_dps or 0.0, floor) ** 2 - floor**2 for fit in (before, after))
+    excess, after_squared = (max(fit.error.rms_dps or 0.0, floor) ** 2 - floor**2 for fit in (before, after))
     if excess <= 0.0:  # nothing between data sets
         return compared
-    return float(np.clip(1.0 - left / excess, 0.0, 1.0))
+    return float(np.clip(1.0 - after_squared / excess, 0.0, 1.0))
 
 
-def _p_value(comparison: Comparison, seen: Comparison, candidate: Candidate) -> float:
+def _p_value(comparison: Comparison, fuller: Comparison, candidate: Candidate) -> float:
     """Return the probability of such a gain in chi2 by chance, corrected for the mean number of options per axis."""
-    dimensions = sum(int(seen.axes[a].dimensions[o]) for a, o in candidate.option.items())
-    gain = sum(float(seen.axes[a].gain[o]) for a, o in candidate.option.items())
+    dimensions = sum(int(fuller.axes[a].dimensions[o]) for a, o in candidate.option.items())
+    gain = sum(float(fuller.axes[a].gain[o]) for a, o in candidate.option.items())
     tried = sum(len(d.options) for d in comparison.designs.values()) / max(len(comparison.designs), 1)
     single = float(chdtrc(max(dimensions, 1), gain))
     return float(-np.expm1(tried * np.log1p(-min(single, 1 - 1e-16))))
@@ -153,13 +154,13 @@ def _fit_with(
 
 def _fitted_coefficients(after: FitResult, candidate: Candidate) -> dict[str, dict[str, Coefficient]]:
     """Return axis -> name -> value, u and unit of the candidate in a fit, on the axes on which it competed."""
-    found: dict[str, dict[str, Coefficient]] = {}
+    by_axis: dict[str, dict[str, Coefficient]] = {}
     for axis in (axis for axis in candidate.option if axis in after.fitted.axes):
         fit = after.fitted.axes[axis]
         rows = [k for k, owner in enumerate(fit.effects) if owner == candidate.id]
         # one coefficient for all temperatures: the columns of a table are alike
-        found[axis] = with_derived({
+        by_axis[axis] = with_derived({
             fit.names[k]: {"value": float(fit.values[k, 0]), "u": none_for_nan(fit.u)[k][0], "unit": fit.units[k]}
             for k in rows
         })  # fmt: skip
-    return {axis: values for axis, values in found.items() if values}
+    return {axis: values for axis, values in by_axis.items() if values}

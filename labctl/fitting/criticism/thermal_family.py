@@ -103,11 +103,11 @@ class ThermalFamily:
     @property
     def _lag(self) -> str:
         """The lag in words, with its time constants and structure."""
-        known = [2 * entry["u"] for entry in self._found if entry["u"] is not None]
+        u_values = [2 * entry["u"] for entry in self._found if entry["u"] is not None]
         values = [entry["value"] for entry in self._found]
         low, high = (f"{end(values, default=0.0):.0f}" for end in (min, max))
         span = f" of {low} s" if values and low == high else f" of {low} to {high} s" if values else ""
-        sure = f" (U at most {max(known):.0f} s, k = 2)" if known else ""
+        sure = f" (U at most {max(u_values):.0f} s, k = 2)" if u_values else ""
         return f"a lag{span}{sure}, {self.response.structure.sentence}"
 
     @property
@@ -142,8 +142,8 @@ def thermal_family(data: FitData, model: ErrorModel, verdict: Verdict) -> Therma
     It is named where it `is_certain`, and else a hint. None where it does not predict, and where another member or what
     is named predicts clearly better.
     """
-    asked = verdict.form == "unexplained" or bool(set(verdict.named) & FAMILY)
-    if data.info.motion != "rest" or not asked or LAG in model.effect_ids:
+    is_open = verdict.form == "unexplained" or bool(set(verdict.named) & FAMILY)
+    if data.info.motion != "rest" or not is_open or LAG in model.effect_ids:
         return None
     leaders = [group[0] for group in verdict.groups if group[0] in verdict.terms]
     others = [group[0] for group in verdict.groups if not set(group) & FAMILY and group[0] in verdict.terms]
@@ -206,11 +206,13 @@ def _rival(data: FitData, model: ErrorModel, effect: str) -> LeftOut:
          for term in terms]
         for axis in axes
     ]  # fmt: skip
-    found: list[tuple[Axis, NDArray[np.bool_], NDArray[np.float64]]] = []
-    for seen, tested in stretches_of(data):
-        left = np.zeros(len(terms))
+    rivals: list[tuple[Axis, NDArray[np.bool_], NDArray[np.float64]]] = []
+    for in_fit, tested in stretches_of(data):
+        residual = np.zeros(len(terms))
         for axis, own in zip(axes, options, strict=True):
-            left += [float(np.sum(axis.left_over_noise(columns, seen) ** 2)) for columns in own]
-        best = int(np.argmin(left))
-        found += [(axis, tested, axis.errors(own[best], seen, tested)) for axis, own in zip(axes, options, strict=True)]
-    return pooled(found)
+            residual += [float(np.sum(axis.left_over_noise(columns, in_fit) ** 2)) for columns in own]
+        best = int(np.argmin(residual))
+        rivals += [
+            (axis, tested, axis.errors(own[best], in_fit, tested)) for axis, own in zip(axes, options, strict=True)
+        ]
+    return pooled(rivals)

@@ -160,9 +160,9 @@ def is_at_end(comparison: Comparison, effect: Candidate, *, shortest: bool = Fal
     for axis in effect.option:
         own = {i: o.term for i, o in enumerate(comparison.designs[axis].options) if o.candidate == effect.id}
         tau_s = {i: term.parameters["tau_s"] ** sign for i, term in own.items() if term is not None}
-        end, found = NEAR_END * max(tau_s.values()), comparison.axes[axis].log_bf
-        last = max((float(found[i]) for i, tau in tau_s.items() if tau >= end), default=-np.inf)
-        inner = max((float(found[i]) for i, tau in tau_s.items() if tau < end), default=-np.inf)
+        end, axis_log_bf = NEAR_END * max(tau_s.values()), comparison.axes[axis].log_bf
+        last = max((float(axis_log_bf[i]) for i, tau in tau_s.items() if tau >= end), default=-np.inf)
+        inner = max((float(axis_log_bf[i]) for i, tau in tau_s.items() if tau < end), default=-np.inf)
         lead += last - inner if np.isfinite(last) and np.isfinite(inner) else 0.0
     return lead > LEAD
 
@@ -202,8 +202,8 @@ def _alike(comparison: Comparison, leader: Candidate, *, physical: bool) -> list
 
 def axes_of(comparison: Comparison, candidate: Candidate) -> tuple[str, ...]:
     """Return the axes on which there is evidence for a candidate; all of its axes where no single one has enough."""
-    shown = [axis for axis, i in candidate.option.items() if comparison.axes[axis].log_bf[i] >= LEAD]
-    return tuple(shown or candidate.option)
+    shown_axes = [axis for axis, i in candidate.option.items() if comparison.axes[axis].log_bf[i] >= LEAD]
+    return tuple(shown_axes or candidate.option)
 
 
 def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
@@ -244,11 +244,11 @@ def overlap(comparison: Comparison, leader: Candidate, rival: Candidate) -> floa
     """Return which share of the leader's fitted signal the rival's best shape on each axis reproduces, 0 to 1."""
     part = whole = 0.0
     for axis, option in leader.option.items():
-        left, slices = comparison.axes[axis].best, comparison.axes[axis].slices
+        eliminated, slices = comparison.axes[axis].best, comparison.axes[axis].slices
         shared, size = (
-            reproduced_and_size(left, slices[option], slices[rival.option[axis]])
+            reproduced_and_size(eliminated, slices[option], slices[rival.option[axis]])
             if axis in rival.option
-            else (0.0, reproduced_and_size(left, slices[option], slices[option])[1])
+            else (0.0, reproduced_and_size(eliminated, slices[option], slices[option])[1])
         )
         part, whole = part + shared, whole + size
     return part / whole if whole > 0 else 0.0
@@ -257,23 +257,23 @@ def overlap(comparison: Comparison, leader: Candidate, rival: Candidate) -> floa
 def share_removed(comparison: Comparison, candidate: Candidate) -> float:
     """Return the share of the excess chi2, over all axes, that a candidate removes, 0 to 1; 0 without any excess."""
     removed, excess = 0.0, 0.0
-    for axis, found in comparison.axes.items():
-        freedom = found.rows - found.base_columns
-        excess += max(found.best.chi2 - freedom, 0.0)
+    for axis, axis_comparison in comparison.axes.items():
+        freedom = axis_comparison.rows - axis_comparison.base_columns
+        excess += max(axis_comparison.best.chi2 - freedom, 0.0)
         if axis in candidate.option:
-            removed += float(found.gain[candidate.option[axis]])
+            removed += float(axis_comparison.gain[candidate.option[axis]])
     return removed / max(excess, removed) if excess > 0 and removed > 0 else 0.0
 
 
 def channels_behind(comparison: Comparison) -> tuple[str, ...]:
     """Return the channels on which the residual depends, strongest first."""
-    found = [c for c in comparison.candidates if c.smooth and c.log_bf >= ENOUGH]
-    temperature = next((c for c in found if c.id == "temperature_c"), None)
+    smooth_channels = [c for c in comparison.candidates if c.smooth and c.log_bf >= ENOUGH]
+    temperature = next((c for c in smooth_channels if c.id == "temperature_c"), None)
     # while the temperature only rises, time and chamber temperature are the same variable as the gyro's temperature
-    same = temperature is not None and found[0].id in SAME_AS_TEMPERATURE
-    if temperature is not None and same and overlap(comparison, found[0], temperature) > EXPLAINED_TIME:
-        found = [temperature, *(c for c in found if c is not temperature)]
-    return tuple(c.id for c in found)
+    same = temperature is not None and smooth_channels[0].id in SAME_AS_TEMPERATURE
+    if temperature is not None and same and overlap(comparison, smooth_channels[0], temperature) > EXPLAINED_TIME:
+        smooth_channels = [temperature, *(c for c in smooth_channels if c is not temperature)]
+    return tuple(c.id for c in smooth_channels)
 
 
 def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
@@ -291,13 +291,13 @@ def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
 
 def coefficients_of(comparison: Comparison, candidate: Candidate) -> dict[str, dict[str, Coefficient]]:
     """Return axis -> name -> value, standard uncertainty and unit of a candidate's best shape beside the base."""
-    found: dict[str, dict[str, Coefficient]] = {}
+    by_axis: dict[str, dict[str, Coefficient]] = {}
     for axis, index in candidate.option.items():
         option = comparison.designs[axis].options[index]
         values, covariance = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
         u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        found[axis] = with_derived({
+        by_axis[axis] = with_derived({
             name: {"value": float(value), "u": float(error), "unit": unit}
             for name, unit, value, error in zip(option.names, option.units, values, u, strict=True)
         })  # fmt: skip
-    return found
+    return by_axis

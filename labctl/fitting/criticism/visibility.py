@@ -76,25 +76,25 @@ def schedule_of(recording: Recording, model: ErrorModel | None = None) -> Schedu
             "readings that are all equal; measure longer, or at more readings per second"
         )
     drift = Noise(expected_drift_dps(info.technology or "", info.stability_dps), 0.0, 0.0)
-    designs, left, slices = {}, {}, {}
+    designs, eliminated_by_axis, slices = {}, {}, {}
     for axis in map(str, info.axes):
         design = design_of(data, model, axis)
         white = data.white_var[axis]
         scale = np.repeat(np.sqrt(white)[None, :], len(data.present), axis=0)
         no_output: NDArray[np.float64] = np.zeros(data.present.shape)
         designs[axis] = design
-        left[axis] = eliminate_base(design, no_output, white, scale, [drift])[0]
+        eliminated_by_axis[axis] = eliminate_base(design, no_output, white, scale, [drift])[0]
         slices[axis] = slices_of(design.options)
-    return Schedule(data, designs, left, slices)
+    return Schedule(data, designs, eliminated_by_axis, slices)
 
 
 def effect_visibilities(schedule: Schedule) -> list[EffectVisibility]:
     """Return every effect of the catalogue with its visible share and smallest detectable size, most visible first."""
     absent = untestable_channels(schedule.data)
-    found = [
+    visibilities = [
         _of_effect(schedule, effect_id, absent.get(effect_id)) for effect_id in CATALOGUE if effect_id != NEVER_MISSING
     ]
-    return sorted(found, key=lambda v: -v.share)
+    return sorted(visibilities, key=lambda v: -v.share)
 
 
 def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> EffectVisibility:
@@ -103,14 +103,14 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
     share = 0.0
     sizes: dict[str, float] = {}
     for axis in schedule.designs:
-        for option, where in schedule.options(axis):
+        for option, option_rows in schedule.options(axis):
             if option.candidate != effect_id:
                 continue
-            here = visible_share(schedule.left[axis], where)
+            here = visible_share(schedule.left[axis], option_rows)
             share = max(share, here)
             if here < LEAST_VISIBLE:
                 continue
-            norms = np.sqrt(np.maximum(np.diag(schedule.left[axis].gram)[where], 0.0))
+            norms = np.sqrt(np.maximum(np.diag(schedule.left[axis].gram)[option_rows], 0.0))
             best = int(np.argmax(norms))
             size = DETECTABLE_Z / max(float(norms[best]), 1e-300)
             sizes[option.units[best]] = min(size, sizes.get(option.units[best], np.inf))
@@ -123,7 +123,7 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
 def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> list[NotTestable]:
     """Return the effects that a recording cannot show, as JSON: a channel is missing, or the schedule hides them."""
     absent = untestable_channels(comparison.data, catalogue)
-    found: list[NotTestable] = [
+    untestable: list[NotTestable] = [
         {"effect": effect_id, "why": "channel", "needs": needs} for effect_id, needs in absent.items()
     ]
     shares = visible_shares(comparison)
@@ -131,17 +131,17 @@ def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> lis
         if kind.id in absent or kind.id in comparison.model.effect_ids or kind.id == NEVER_MISSING:
             continue
         if shares.get(kind.id, 0.0) < LEAST_VISIBLE:
-            found.append({"effect": kind.id, "why": "schedule", "needs": [], "visible": shares.get(kind.id, 0.0)})
-    return found
+            untestable.append({"effect": kind.id, "why": "schedule", "needs": [], "visible": shares.get(kind.id, 0.0)})
+    return untestable
 
 
 def visible_shares(comparison: Comparison) -> dict[str, float]:
     """Return effect id -> the share that is visible beside the base, 0 to 1, in its most visible shape."""
     shares: dict[str, float] = {}
     for axis, design in comparison.designs.items():
-        found = comparison.axes[axis]
-        for option, where in zip(design.options, found.slices, strict=True):
+        axis_comparison = comparison.axes[axis]
+        for option, option_rows in zip(design.options, axis_comparison.slices, strict=True):
             if not option.smooth:
-                share = visible_share(found.best, where)
+                share = visible_share(axis_comparison.best, option_rows)
                 shares[option.candidate] = max(shares.get(option.candidate, 0.0), share)
     return shares

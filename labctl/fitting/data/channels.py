@@ -92,7 +92,7 @@ class Channels:
     def positions(self) -> list[tuple[str, NDArray[np.bool_]]]:
         """Return every position that occurs and which rows are in it, (n,)."""
         position = np.asarray(self.columns["position"]).astype(np.str_)
-        return [(str(there), position == there) for there in np.unique(position)]
+        return [(str(up_position), position == up_position) for up_position in np.unique(position)]
 
     def by_recording(self, rows: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
         """Return rows (n,) recording by recording, those of each; as they are for a single recording."""
@@ -131,10 +131,10 @@ class Channels:
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Return which of the names are not logged."""
-        known = {*self.columns, "table_rate_dps", "temperature_c"}
+        available = {*self.columns, "table_rate_dps", "temperature_c"}
         if not self.history.thermometer:
-            known.remove("temperature_c")
-        return [name for name in names if name not in known]
+            available.remove("temperature_c")
+        return [name for name in names if name not in available]
 
 
 def body_rates(table_rate_dps: Array, position: NDArray[np.generic]) -> dict[str, Array]:

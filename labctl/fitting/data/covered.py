@@ -48,7 +48,7 @@ def covered_by_readings(recording: Recording, up_rate_dps: float = 0.0) -> Cover
     """Return what the valid readings of a recording cover; None without a reading."""
     columns = recording.columns
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
-    warm = temperature_of(columns)
+    temperature_c = temperature_of(columns)
     if not valid.any():
         return None
     turned = recording.info.motion == "turns"
@@ -57,13 +57,17 @@ def covered_by_readings(recording: Recording, up_rate_dps: float = 0.0) -> Cover
     axis = recording.info.axes[0]
     position = np.asarray(columns["position"])[valid][starts] if "position" in columns else np.full(len(starts), axis)
     ends = np.minimum.reduceat(rate, starts), np.maximum.reduceat(rate, starts)
-    span = (None, None) if warm is None else (float(warm[valid].min()), float(warm[valid].max()))
+    span = (
+        (None, None)
+        if temperature_c is None
+        else (float(temperature_c[valid].min()), float(temperature_c[valid].max()))
+    )
     return covered_by(ends, position, span, up_rate_dps)
 
 
 def covered_by_means(channels: Channels) -> Covered:
     """Return what data-set means cover, where their readings are not known."""
-    warm = np.asarray(channels["temperature_c"], dtype=np.float64)
+    temperature_c = np.asarray(channels["temperature_c"], dtype=np.float64)
     rates = {axis: (float(rate.min()), float(rate.max())) for axis, rate in channels.rates.items()}
-    known = channels.history.thermometer
-    return Covered((float(warm.min()), float(warm.max())) if known else (None, None), rates)
+    thermometer = channels.history.thermometer
+    return Covered((float(temperature_c.min()), float(temperature_c.max())) if thermometer else (None, None), rates)

@@ -54,14 +54,14 @@ def with_prior(
         return columns, y, scatter
     upper = np.column_stack([columns, np.vstack([extra, np.zeros((len(columns) - len(extra), more))])])
     lower = np.column_stack([np.zeros((more, columns.shape[1])), np.eye(more)])
-    known = replace(
+    extended = replace(
         scatter,
         t_s=np.concatenate([scatter.t_s, np.zeros(more)]),
         run=np.concatenate([scatter.run, min(int(scatter.run.min()), 0) - 1 - np.arange(more)]),
         rate_dps=np.concatenate([scatter.rate_dps, np.zeros(more)]),
         white_var=np.concatenate([scatter.white_var, variance]),
     )
-    return np.vstack([upper, lower]), np.concatenate([y, np.zeros(more)]), known
+    return np.vstack([upper, lower]), np.concatenate([y, np.zeros(more)]), extended
 
 
 def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array:
@@ -71,17 +71,17 @@ def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array
     zero, so both are fitted and belong to the environment. An axis along the table axis has none. Needs the table angle
     and the length of the data sets; k is 0 without them, and for turns, whose angle at each instant is not known.
     """
-    known = info.latitude_deg is not None and "table_angle_deg" in channels and "duration_s" in channels
-    if info.motion == "turns" or not known:
+    has_course = info.latitude_deg is not None and "table_angle_deg" in channels and "duration_s" in channels
+    if info.motion == "turns" or not has_course:
         return np.zeros((len(channels), 0))
     start = np.deg2rad(np.asarray(channels["table_angle_deg"], dtype=np.float64))
-    turned = np.deg2rad(channels.table_rate_dps() * np.asarray(channels["duration_s"], dtype=np.float64))
-    middle, half = start + turned / 2, turned / 2
+    angle_rad = np.deg2rad(channels.table_rate_dps() * np.asarray(channels["duration_s"], dtype=np.float64))
+    middle, half = start + angle_rad / 2, angle_rad / 2
     shrink = np.sinc(half / np.pi)  # the mean of a cosine over what was turned
     cosine, sine = np.cos(middle) * shrink, np.sin(middle) * shrink
-    found = []
-    for there, here in channels.positions():
-        if Position.of(there).axis != axis:
+    turning = []
+    for up_position, here in channels.positions():
+        if Position.of(up_position).axis != axis:
             for part in channels.by_recording(here):  # the table's zero may point elsewhere on another day
-                found += [np.where(part, cosine, 0.0), np.where(part, sine, 0.0)]
-    return np.column_stack(found) if found else np.zeros((len(channels), 0))
+                turning += [np.where(part, cosine, 0.0), np.where(part, sine, 0.0)]
+    return np.column_stack(turning) if turning else np.zeros((len(channels), 0))

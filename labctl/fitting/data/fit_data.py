@@ -194,8 +194,8 @@ def profile_of(recording: Recording) -> RateProfile | None:
     if recording.info.motion != "profile" or "t_s" not in columns:
         return None
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
-    known = {name: np.asarray(columns[name])[valid] for name in ("t_s", "dataset", "table_rate_dps")}
-    return rate_profile(known, windows=recording.info.kind == "samples")
+    rows = {name: np.asarray(columns[name])[valid] for name in ("t_s", "dataset", "table_rate_dps")}
+    return rate_profile(rows, windows=recording.info.kind == "samples")
 
 
 def _white(points: Recording) -> dict[str, Array] | None:
@@ -204,10 +204,10 @@ def _white(points: Recording) -> dict[str, Array] | None:
     `gyro_*_white_std` is taken where it is there: the white level alone, without lines from the table's steps, which
     average out over a data set and are no noise of the mean. What coarse steps of the output leave in a mean is added.
     """
-    found: dict[str, Array] = {}
+    white_by_axis: dict[str, Array] = {}
     for axis in points.info.axes:
         variance = white_var_of(points, axis)
         if variance is None or not np.all(np.isfinite(variance)) or not np.any(variance > 0):
             return None
-        found[axis] = np.maximum(variance, 1e-6 * float(np.median(variance[variance > 0])))
-    return found
+        white_by_axis[axis] = np.maximum(variance, 1e-6 * float(np.median(variance[variance > 0])))
+    return white_by_axis

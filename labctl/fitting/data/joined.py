@@ -107,17 +107,20 @@ def recordings_in(columns: Mapping[str, NDArray[np.generic]]) -> list[int]:
 
 def joined_coverage(parts: Sequence[Covered | None]) -> Covered | None:
     """Return what several recordings cover together; None where that is not known of one of them."""
-    known = [part for part in parts if part is not None]
-    if len(known) < len(parts):
+    known_parts = [part for part in parts if part is not None]
+    if len(known_parts) < len(parts):
         return None
-    axes = known[0].rate_dps
+    axes = known_parts[0].rate_dps
     low, high = (
-        [end for end in ends if end is not None] for ends in zip(*(p.temperature_c for p in known), strict=True)
+        [end for end in ends if end is not None] for ends in zip(*(p.temperature_c for p in known_parts), strict=True)
     )
-    is_known = len(low) == len(high) == len(known)  # a recording at rest may be without a thermometer
+    is_known = len(low) == len(high) == len(known_parts)  # a recording at rest may be without a thermometer
     return Covered(
         (min(low), max(high)) if is_known else (None, None),
-        {a: (min(part.rate_dps[a][0] for part in known), max(part.rate_dps[a][1] for part in known)) for a in axes},
+        {
+            a: (min(part.rate_dps[a][0] for part in known_parts), max(part.rate_dps[a][1] for part in known_parts))
+            for a in axes
+        },
     )
 
 
@@ -126,12 +129,12 @@ def _least_known(infos: Sequence[RecordingInfo]) -> tuple[Standard, ...]:
 
     Campaigns of one bench share the errors of its standards, so that more campaigns do not reduce this uncertainty.
     """
-    found: dict[tuple[str, str], Standard] = {}
+    least_known: dict[tuple[str, str], Standard] = {}
     for each in (standard for info in infos for standard in info.standards):
-        known = found.get((each.quantity, each.name))
-        if known is None or known.standard_u <= each.standard_u:
-            found[each.quantity, each.name] = each
-    return tuple(found.values())
+        current = least_known.get((each.quantity, each.name))
+        if current is None or current.standard_u <= each.standard_u:
+            least_known[each.quantity, each.name] = each
+    return tuple(least_known.values())
 
 
 def _require_alike(order: Sequence[int], parts: Mapping[int, Recording]) -> None:
@@ -195,13 +198,13 @@ def _environment(recording: Recording, columns: Rows) -> Rows:
         return {name: np.asarray(recording.columns[name] if name != "run" else columns["run"]) for name in names} | (
             {"run": np.asarray(columns["run"])} if "t_s" in names else {}
         )
-    found = {name: np.asarray(values) for name, values in source.items()}
-    if "run" in found:
+    environment_rows = {name: np.asarray(values) for name, values in source.items()}
+    if "run" in environment_rows:
         own = np.unique(np.asarray(recording.columns.get("run", np.ones(1))))
-        found["run"] = np.asarray(found["run"], dtype=np.int64) - int(own.min()) + int(runs.min())
-        return found
-    repeated = {name: np.tile(values, len(runs)) for name, values in found.items()}
-    return repeated | {"run": np.repeat(runs, len(found["t_s"]))}
+        environment_rows["run"] = np.asarray(environment_rows["run"], dtype=np.int64) - int(own.min()) + int(runs.min())
+        return environment_rows
+    repeated = {name: np.tile(values, len(runs)) for name, values in environment_rows.items()}
+    return repeated | {"run": np.repeat(runs, len(environment_rows["t_s"]))}
 
 
 def _below_one_another(tables: Sequence[Rows]) -> Rows:
@@ -211,5 +214,5 @@ def _below_one_another(tables: Sequence[Rows]) -> Rows:
 
 def without_recordings(recording: Recording, numbers: Sequence[int]) -> Recording:
     """Return a joined recording without some of its recordings; its environment stays whole."""
-    kept = ~np.isin(np.asarray(recording.columns[RECORDING]), numbers)
-    return replace(recording, columns={name: np.asarray(values)[kept] for name, values in recording.columns.items()})
+    is_used = ~np.isin(np.asarray(recording.columns[RECORDING]), numbers)
+    return replace(recording, columns={name: np.asarray(values)[is_used] for name, values in recording.columns.items()})

@@ -56,10 +56,10 @@ def turn_var_of(points: Recording, axis: str) -> Array:
 
 def quantisation_var_of(points: Recording, axis: str) -> Array:
     """Return what the steps of one output leave in each mean, (m,) (deg/s)^2; 0 where they are not coarse."""
-    left = points.columns.get(f"gyro_{axis}{QUANTISATION}")
-    if left is None:
+    quantisation_var = points.columns.get(f"gyro_{axis}{QUANTISATION}")
+    if quantisation_var is None:
         return np.zeros(len(points))
-    return np.asarray((np.asarray(left, dtype=np.float64) / _scale(points, axis)) ** 2)
+    return np.asarray((np.asarray(quantisation_var, dtype=np.float64) / _scale(points, axis)) ** 2)
 
 
 def response_dps(rates: Mapping[str, Array], output_dps: Array) -> Array:

@@ -79,11 +79,11 @@ class _Scheme:
         """Return the gains of a fit to so much of each position: the weighted least squares of the mountings."""
         root = np.sqrt([shares[str(position)] for position in self.positions])
         design = root[:, None] * np.column_stack([self.sign, self.angles @ self.separated])
-        taken = np.linalg.pinv(design, rcond=UNSEEN)[0] * root
-        of = taken @ self.angles
+        pseudo_inverse = np.linalg.pinv(design, rcond=UNSEEN)[0] * root
+        of = pseudo_inverse @ self.angles
         of[np.abs(of) < UNSEEN] = 0.0
         size = {part: float(np.linalg.norm(of[[part in name for name in self.names]])) for part in PARTS}
-        return AngleGains(size["fixture"], size["table"], float(np.linalg.norm(taken)))
+        return AngleGains(size["fixture"], size["table"], float(np.linalg.norm(pseudo_inverse)))
 
 
 @dataclass(frozen=True)
@@ -99,9 +99,9 @@ class AngleColumns:
         """Return k."""
         return self.values.shape[1]
 
-    def angles_rad(self, found: Array) -> dict[str, float]:
+    def angles_rad(self, coefficients: Array) -> dict[str, float]:
         """Return the angles by name, rad, for coefficients of the columns (k,)."""
-        return dict(zip(self.names, (self.combined @ found).tolist(), strict=True))
+        return dict(zip(self.names, (self.combined @ coefficients).tolist(), strict=True))
 
 
 def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> AngleColumns:
@@ -117,10 +117,10 @@ def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> Ang
         if not scheme.separates:
             continue
         placed = [f"{position}{PLACED}" for position in scheme.positions] if placed_rad else []
-        shown = np.column_stack([angle_regressor(channels, name) for name in (*scheme.names, *placed)])
+        regressors = np.column_stack([angle_regressor(channels, name) for name in (*scheme.names, *placed)])
         names += [*scheme.names, *placed]
         blocks.append(_block_diagonal([scheme.separated, np.eye(len(placed)) * placed_rad / PLACED_SIZE]))
-        values.append(shown @ blocks[-1])
+        values.append(regressors @ blocks[-1])
         sizes += [np.full(scheme.separated.shape[1], WIDE_RAD), np.full(len(placed), PLACED_SIZE)]
     combined = _block_diagonal(blocks)
     return AngleColumns(tuple(names), combined, np.concatenate(values, axis=1), np.concatenate(sizes))
@@ -128,12 +128,12 @@ def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> Ang
 
 def _block_diagonal(blocks: Sequence[Array]) -> Array:
     """Return a matrix with these, (r, c) each, along its diagonal."""
-    found = np.zeros((sum(len(block) for block in blocks), sum(block.shape[1] for block in blocks)))
+    stacked = np.zeros((sum(len(block) for block in blocks), sum(block.shape[1] for block in blocks)))
     row = column = 0
     for block in blocks:
-        found[row : row + len(block), column : column + block.shape[1]] = block
+        stacked[row : row + len(block), column : column + block.shape[1]] = block
         row, column = row + len(block), column + block.shape[1]
-    return found
+    return stacked
 
 
 def placed_rad(standards: Iterable[Standard]) -> float:
@@ -143,7 +143,7 @@ def placed_rad(standards: Iterable[Standard]) -> float:
 
 def stated_rad(standards: Iterable[Standard], quantities: Collection[str]) -> float:
     """Return the standard deviation of angles that are stated, deg, taken together, rad; 0 where none is stated."""
-    return math.radians(math.hypot(*(each.standard_u for each in standards if each.quantity in quantities)))
+    return math.radians(math.hypot(*(standard.standard_u for standard in standards if standard.quantity in quantities)))
 
 
 def leaning_rates(channels: Channels, angles_rad: Mapping[str, Mapping[str, float]]) -> dict[str, Array]:
@@ -161,14 +161,14 @@ def leaning_rates(channels: Channels, angles_rad: Mapping[str, Mapping[str, floa
 
 def angle_regressor(channels: Channels, name: str) -> Array:
     """Return what rows show of one angle, (n,) deg/s per radian, whichever of its mountings they hold."""
-    found = np.zeros(len(channels))
+    regressor = np.zeros(len(channels))
     for text, rows in channels.positions():
         position = Position.of(text)
         if name == f"{position}{PLACED}":
-            found[rows] = 1.0
+            regressor[rows] = 1.0
         elif name in _names(position):
-            found[rows] = _shown(position, (name,))[0]
-    return np.asarray(found * channels.table_rate_dps())
+            regressor[rows] = _shown(position, (name,))[0]
+    return np.asarray(regressor * channels.table_rate_dps())
 
 
 def turned_positions(channels: Channels) -> tuple[str, ...]:
@@ -204,16 +204,16 @@ def angle_gains(shares: Mapping[str, float], axis: str, *, separates: bool = Tru
 
 @lru_cache(maxsize=256)
 def _angle_gains(shares: tuple[tuple[str, float], ...], axis: str, separates: bool) -> AngleGains:
-    known: dict[str, float] = {}
+    gains: dict[str, float] = {}
     for text, share in shares:
-        known[str(Position.of(text))] = known.get(str(Position.of(text)), 0.0) + share
-    scheme = _scheme(tuple(sorted(known)), axis)
+        gains[str(Position.of(text))] = gains.get(str(Position.of(text)), 0.0) + share
+    scheme = _scheme(tuple(sorted(gains)), axis)
     if scheme is None:
         return AngleGains()
     if not separates:
         none = np.zeros((len(scheme.names), 0))
         scheme = _Scheme(scheme.positions, scheme.names, scheme.sign, scheme.angles, none)
-    return scheme.gains(known)
+    return scheme.gains(gains)
 
 
 def separates_any(positions: Iterable[str], axis: str) -> bool:
@@ -223,8 +223,8 @@ def separates_any(positions: Iterable[str], axis: str) -> bool:
 
 
 def _schemes(positions: tuple[str, ...], axis: str) -> Iterable[_Scheme]:
-    found = (_scheme(positions, other) for other in BODY_AXES if other != axis)
-    return [scheme for scheme in found if scheme is not None]
+    schemes = (_scheme(positions, other) for other in BODY_AXES if other != axis)
+    return [scheme for scheme in schemes if scheme is not None]
 
 
 @cache
@@ -245,12 +245,12 @@ def _names(position: Position) -> tuple[str, ...]:
 
 def _shown(position: Position, names: Iterable[str]) -> list[float]:
     """Return what a mounting shows of angles, by their names."""
-    shown = {}
+    regressors = {}
     for part, turned_deg in zip(PARTS, (position.unit_deg, position.turned_deg), strict=True):
         turned = np.deg2rad(turned_deg)
         for wave, value in zip(WAVES, (np.cos(turned), np.sin(turned)), strict=True):
-            shown[f"{position.end} {part} {wave}"] = float(value)
-    return [shown.get(name, 0.0) for name in names]
+            regressors[f"{position.end} {part} {wave}"] = float(value)
+    return [regressors.get(name, 0.0) for name in names]
 
 
 def _separated(sign: Array, angles: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -265,8 +265,8 @@ def _separated(sign: Array, angles: NDArray[np.float64]) -> NDArray[np.float64]:
     if np.linalg.norm(alike) > UNSEEN:
         free = _null_space(alike[None, 1:])
     _, sizes, rows = np.linalg.svd(angles @ free)
-    seen = sizes > UNSEEN * max(float(sizes.max(initial=0.0)), 1.0)
-    return np.asarray(free @ rows[: len(seen)][seen].T)
+    is_seen = sizes > UNSEEN * max(float(sizes.max(initial=0.0)), 1.0)
+    return np.asarray(free @ rows[: len(is_seen)][is_seen].T)
 
 
 def _null_space(matrix: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -60,19 +60,19 @@ def noise_floor_of(channels: Channels, errors_dps: Mapping[str, Array], scatter:
     axis.
     """
     surfaces = {axis: rich_surface(channels, axis) for axis in errors_dps}
-    white = {axis: known.white_var for axis, known in scatter.items()}
+    white = {axis: noise.white_var for axis, noise in scatter.items()}
     if all(values is not None for values in white.values()):
         return _with_known_white(channels, surfaces, errors_dps, scatter)
-    left = {axis: values - surfaces[axis] @ (surfaces[axis].T @ values) for axis, values in errors_dps.items()}
+    residuals_dps = {axis: values - surfaces[axis] @ (surfaces[axis].T @ values) for axis, values in errors_dps.items()}
     m = len(channels)
-    repeats = repeats_dps(channels, left)
+    repeats = repeats_dps(channels, residuals_dps)
     if repeats is not None:
         return _of_scatter(m, dict.fromkeys(errors_dps, repeats), "repeats")
-    about = {axis: _scatter_dps(left[axis], surfaces[axis]) for axis in left}
-    known = {axis: value for axis, value in about.items() if value is not None}
-    if len(known) < len(about):
+    about = {axis: _scatter_dps(residuals_dps[axis], surfaces[axis]) for axis in residuals_dps}
+    noise = {axis: value for axis, value in about.items() if value is not None}
+    if len(noise) < len(about):
         return _of_scatter(m, dict.fromkeys(errors_dps, np.nan), "none")
-    return _of_scatter(m, known, "scatter about a smooth surface")
+    return _of_scatter(m, noise, "scatter about a smooth surface")
 
 
 def _with_known_white(
@@ -85,16 +85,16 @@ def _with_known_white(
     stability = next(iter(scatter.values())).datasheet_drift_dps
     axes = {}
     for axis, surface in surfaces.items():
-        known = scatter[axis]
-        assert known.white_var is not None
+        noise = scatter[axis]
+        assert noise.white_var is not None
         if channels.profile is not None:
-            drift = _drift_of_many(surface, errors_dps[axis], known)
+            drift = _drift_of_many(surface, errors_dps[axis], noise)
         elif enough:
-            drift = _drift(surface, with_levels_of_temperature(surface, channels, axis), errors_dps[axis], known)
+            drift = _drift(surface, with_levels_of_temperature(surface, channels, axis), errors_dps[axis], noise)
         else:
             drift = Drift(float(stability or 0.0), 1.0)
-        floor = np.sqrt(known.white_var + drift.drift_dps**2 + (drift.per_rate * known.rate_dps) ** 2)
-        axes[axis] = AxisNoise(np.asarray(floor), float(np.sqrt(known.white_var.mean())), drift)
+        floor = np.sqrt(noise.white_var + drift.drift_dps**2 + (drift.per_rate * noise.rate_dps) ** 2)
+        axes[axis] = AxisNoise(np.asarray(floor), float(np.sqrt(noise.white_var.mean())), drift)
     if enough:
         return NoiseFloor(axes, "within and between data sets")
     return NoiseFloor(axes, "within data sets, and by the data sheet" if stability else "within data sets")
@@ -105,8 +105,8 @@ def _drift_of_many(surface: NDArray[np.float64], error_dps: Array, scatter: Scat
 
     The k directions that are then missing from it are a share k / m of all.
     """
-    left = error_dps - surface @ (surface.T @ error_dps)
-    return drift_beside(np.full((len(left), 1), 1.0 / np.sqrt(len(left))), left, scatter)
+    residual = error_dps - surface @ (surface.T @ error_dps)
+    return drift_beside(np.full((len(residual), 1), 1.0 / np.sqrt(len(residual))), residual, scatter)
 
 
 def _drift(surface: NDArray[np.float64], fuller: NDArray[np.float64], error_dps: Array, scatter: Scatter) -> Drift:
@@ -120,8 +120,8 @@ def _drift(surface: NDArray[np.float64], fuller: NDArray[np.float64], error_dps:
     # the last column of the triangle: what the surface takes of the data, what the levels take, and what is left
     triangle: NDArray[np.float64] = np.asarray(np.linalg.qr(rows, mode="r"))
     reduced = triangle[:, -1] ** 2
-    taken, left = float(np.sum(reduced[k:k_fuller])), float(np.sum(reduced[k_fuller:]))
-    if fdtrc(more, free, taken / more / max(left / free, 1e-300)) > FALSE_ALARM:
+    explained, unexplained = float(np.sum(reduced[k:k_fuller])), float(np.sum(reduced[k_fuller:]))
+    if fdtrc(more, free, explained / more / max(unexplained / free, 1e-300)) > FALSE_ALARM:
         return first
     return drift_beside(fuller, error_dps, scatter)
 
@@ -133,20 +133,20 @@ def _of_scatter(m: int, scatter_dps: Mapping[str, float], source: str) -> NoiseF
     )
 
 
-def _scatter_dps(left: Array, surface: NDArray[np.float64]) -> float | None:
-    freedom = len(left) - surface.shape[1]
-    return float(np.sqrt(left @ left / freedom)) if freedom >= LEAST_FREE else None
+def _scatter_dps(residual: Array, surface: NDArray[np.float64]) -> float | None:
+    freedom = len(residual) - surface.shape[1]
+    return float(np.sqrt(residual @ residual / freedom)) if freedom >= LEAST_FREE else None
 
 
 def repeats_dps(channels: Channels, residual: Mapping[str, Array]) -> float | None:
     """Return the noise of one data set from pairs that repeat a rate and a temperature; None when they are too few."""
     rate = channels.table_rate_dps()
-    warm = np.asarray(channels["temperature_c"], dtype=np.float64)
+    temperature_c = np.asarray(channels["temperature_c"], dtype=np.float64)
     near_rate = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
-    order = np.lexsort((warm, np.round(rate / near_rate)))
+    order = np.lexsort((temperature_c, np.round(rate / near_rate)))
     first, second = order[:-1], order[1:]
     close = (np.abs(rate[first] - rate[second]) <= near_rate) & (
-        np.abs(warm[first] - warm[second]) <= REPEAT_TEMPERATURE_C
+        np.abs(temperature_c[first] - temperature_c[second]) <= REPEAT_TEMPERATURE_C
     )
     position = np.asarray(channels["position"])
     close &= position[first] == position[second]

@@ -146,8 +146,8 @@ def _filtered(t_s: Array, rate_dps: Array, factor: Factor, memory_s: float) -> A
     whole = np.concatenate([before, values, after, after[-1] + (before[0] - after[-1]) * bend])
     rad_s: Array = np.asarray(2 * np.pi * np.fft.rfftfreq(total, step_s), dtype=np.float64)
     spectrum: NDArray[np.complex128] = np.asarray(np.fft.rfft(whole), dtype=np.complex128)
-    seen = np.fft.irfft(np.multiply(spectrum, factor(rad_s)), total)[spare : spare + n]
-    return np.asarray(seen if is_even else CubicSpline(even, seen)(t_s))
+    filtered = np.fft.irfft(np.multiply(spectrum, factor(rad_s)), total)[spare : spare + n]
+    return np.asarray(filtered if is_even else CubicSpline(even, filtered)(t_s))
 
 
 def _beyond(values: Array, number: int) -> Array:

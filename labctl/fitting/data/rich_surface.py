@@ -53,8 +53,13 @@ def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
     Of turns no law can be found that is not linear in the rate; what is linear is taken in whole, whatever m is.
     """
     if "turn_deg" in channels:
-        warm, rate = _chebyshev(channels.temperature_c(axis), max(DEGREES)), channels.rate_dps(axis)[:, None]
-        return _orthonormal(iter([warm[:, 1:4], warm[:, 1:3] * rate]), _linear(channels), MOST_SHARE)
+        temperature_basis, rate = (
+            _chebyshev(channels.temperature_c(axis), max(DEGREES)),
+            channels.rate_dps(axis)[:, None],
+        )
+        return _orthonormal(
+            iter([temperature_basis[:, 1:4], temperature_basis[:, 1:3] * rate]), _linear(channels), MOST_SHARE
+        )
     responses = _orthonormal(
         iter([_of_responses(channels, axis)]), np.zeros((len(channels), 0)), MOST_SHARE, LEAST_NEW_OF_RESPONSE
     )
@@ -77,35 +82,35 @@ def _orthonormal(
 ) -> NDArray[np.float64]:
     m, k = begin.shape
     most = min(int(share * m), m - LEAST_FREE)
-    found = np.empty((m, max(most, k)), order="F")
-    found[:, :k] = begin
+    orthonormal = np.empty((m, max(most, k)), order="F")
+    orthonormal[:, :k] = begin
     for block in blocks:
         for column in block.T:
-            if k < most and (new := _new_part(column, found[:, :k], least_new)) is not None:
-                found[:, k] = new
+            if k < most and (new := _new_part(column, orthonormal[:, :k], least_new)) is not None:
+                orthonormal[:, k] = new
                 k += 1
-    return found[:, :k]
+    return orthonormal[:, :k]
 
 
 def _linear(channels: Channels) -> NDArray[np.float64]:
     """Return orthonormal columns (m, k) of a bias in every position and the response to every axis."""
     places = [rows.astype(np.float64) for _, rows in channels.positions()]
-    found = np.zeros((len(channels), 0))
+    independent = np.zeros((len(channels), 0))
     for column in (*places, *channels.rates.values()):
-        if (new := _new_part(column, found, LEAST_NEW)) is not None:
-            found = np.column_stack([found, new])
-    return found
+        if (new := _new_part(column, independent, LEAST_NEW)) is not None:
+            independent = np.column_stack([independent, new])
+    return independent
 
 
-def _new_part(column: Array, found: NDArray[np.float64], least_new: float) -> Array | None:
+def _new_part(column: Array, basis: NDArray[np.float64], least_new: float) -> Array | None:
     size = float(np.linalg.norm(column))
     if size == 0:
         return None
-    left = column / size
+    residual = column / size
     for _ in range(2):  # the second time takes out what rounding left
-        left = left - found @ (found.T @ left)
-    new = float(np.linalg.norm(left))
-    return np.asarray(left / new) if new > least_new else None
+        residual = residual - basis @ (basis.T @ residual)
+    new = float(np.linalg.norm(residual))
+    return np.asarray(residual / new) if new > least_new else None
 
 
 def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
@@ -113,24 +118,26 @@ def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
     m = len(channels)
     rate = _scaled(channels.rate_dps(axis), about_zero=True)
     powers = np.column_stack([np.ones(m), rate, rate**2, rate**3])
-    warm = _chebyshev(channels.temperature_c(axis), max(DEGREES))
+    temperature_basis = _chebyshev(channels.temperature_c(axis), max(DEGREES))
     places = np.column_stack([rows.astype(np.float64) for _, rows in channels.positions()])
     yield places
     yield powers[:, 1:]
     yield shift_columns(channels, axis)
-    yield from _of_other_axes(channels, axis, warm)
+    yield from _of_other_axes(channels, axis, temperature_basis)
     for degree in range(1, max(DEGREES) + 1):
-        yield np.column_stack([warm[:, degree] * powers[:, n] for n, most in enumerate(DEGREES) if degree <= most])
+        yield np.column_stack(
+            [temperature_basis[:, degree] * powers[:, n] for n, most in enumerate(DEGREES) if degree <= most]
+        )
     if channels.profile is None:
         yield _levels_of_rate(channels)
-    yield from _history(channels, warm, rate)
+    yield from _history(channels, temperature_basis, rate)
     for name in sorted(set(channels.columns) - NO_SURROUNDINGS):
         values = channels[name]
         if not name.startswith("gyro_") and np.issubdtype(values.dtype, np.number) and np.all(np.isfinite(values)):
             around = _scaled(np.asarray(values, dtype=np.float64))
             yield np.column_stack([around, around * rate])
     yield np.column_stack([(place * powers[:, 1:].T).T for place in places.T])
-    yield np.column_stack([(place * warm[:, 1:4].T).T for place in places.T])
+    yield np.column_stack([(place * temperature_basis[:, 1:4].T).T for place in places.T])
 
 
 def _of_responses(channels: Channels, axis: str) -> NDArray[np.float64]:
@@ -139,14 +146,14 @@ def _of_responses(channels: Channels, axis: str) -> NDArray[np.float64]:
         return np.zeros((len(channels), 0))
     responses = [Response(delay_s=delay) for delay in DELAYS_S] + [Response(0.0, tau) for tau in TIME_CONSTANTS_S]
     rate = channels.rate_dps(axis)
-    return np.column_stack([rate, *(channels.through(each).rate_dps(axis) - rate for each in responses)])
+    return np.column_stack([rate, *(channels.through(response).rate_dps(axis) - rate for response in responses)])
 
 
-def _of_other_axes(channels: Channels, axis: str, warm: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+def _of_other_axes(channels: Channels, axis: str, temperature_c: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
     """Yield the rate about each other axis, alone, and times linear and quadratic functions of temperature."""
     for other in channels.rates:
         if other != axis:
-            yield _scaled(channels.rate_dps(other), about_zero=True)[:, None] * warm[:, :3]
+            yield _scaled(channels.rate_dps(other), about_zero=True)[:, None] * temperature_c[:, :3]
 
 
 def _levels_of_temperature(temperature_c: Array, rate: Array) -> NDArray[np.float64]:
@@ -171,20 +178,22 @@ def _levels_of_rate(channels: Channels) -> NDArray[np.float64]:
     return np.asarray(np.eye(int(cell.max()) + 1)[cell])
 
 
-def _history(channels: Channels, warm: NDArray[np.float64], rate: Array) -> Iterator[NDArray[np.float64]]:
+def _history(channels: Channels, temperature_c: NDArray[np.float64], rate: Array) -> Iterator[NDArray[np.float64]]:
     """Yield columns that distinguish rising from falling temperatures, and functions of the time since power-on."""
     if "t_s" not in channels:
         return
     t_s = np.asarray(channels["t_s"], dtype=np.float64)
     order = np.argsort(t_s, kind="stable")
-    steps = np.diff(warm[order, 1], prepend=warm[order[0], 1])
+    steps = np.diff(temperature_c[order, 1], prepend=temperature_c[order[0], 1])
     rising = np.empty(len(t_s))
     rising[order] = np.sign(np.where(np.abs(steps) > 1e-3, steps, 0.0))
     leg = _carried(rising[order])
     direction = np.empty(len(t_s))
     direction[order] = leg
     if np.ptp(direction) > 0:
-        yield np.column_stack([direction, direction * warm[:, 1], direction * warm[:, 2], direction * rate])
+        yield np.column_stack(
+            [direction, direction * temperature_c[:, 1], direction * temperature_c[:, 2], direction * rate]
+        )
     if channels.history.courses and (not np.any(rate) or _is_on_ramps(channels)):
         lags = np.column_stack([channels.history.lag_k(channels.columns, tau) for tau in LAGS_S])
         states = [channels.history.hysteresis_state(channels.columns, width) for width in WIDTHS_K]
@@ -204,19 +213,19 @@ def _is_on_ramps(channels: Channels) -> bool:
 def since_first(channels: Channels) -> Array:
     """Return the time since the first row of the same recording, (m,) s."""
     t_s = channels.recording_t_s()
-    found = np.empty(len(t_s))
+    elapsed_s = np.empty(len(t_s))
     for rows in channels.by_recording(np.ones(len(t_s), dtype=bool)):
-        found[rows] = t_s[rows] - t_s[rows].min()
-    return found
+        elapsed_s[rows] = t_s[rows] - t_s[rows].min()
+    return elapsed_s
 
 
 def _carried(signs: Array) -> Array:
     """Return signs (m,) in order of time with each 0 replaced by the last sign before it, at the start by the first."""
-    where = np.flatnonzero(signs)
-    if not len(where):
+    rows = np.flatnonzero(signs)
+    if not len(rows):
         return signs
-    last = np.searchsorted(where, np.arange(len(signs)), side="right") - 1
-    return np.asarray(signs[where[np.maximum(last, 0)]])
+    last = np.searchsorted(rows, np.arange(len(signs)), side="right") - 1
+    return np.asarray(signs[rows[np.maximum(last, 0)]])
 
 
 def _scaled(values: Array, *, about_zero: bool = False) -> Array:

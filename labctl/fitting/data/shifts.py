@@ -67,8 +67,8 @@ def shifts_of(channels: Channels, axis: str) -> list[Shift]:
 
 def shift_columns(channels: Channels, axis: str) -> NDArray[np.float64]:
     """Return the regressors of the shifts of one axis, (n, q)."""
-    found = [shift.values for shift in shifts_of(channels, axis)]
-    return np.column_stack(found) if found else np.zeros((len(channels), 0))
+    columns = [shift.values for shift in shifts_of(channels, axis)]
+    return np.column_stack(columns) if columns else np.zeros((len(channels), 0))
 
 
 def shift_contrasts(channels: Channels, axis: str, placed_rad: float = 0.0) -> tuple[NDArray[np.float64], Array]:

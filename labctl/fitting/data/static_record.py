@@ -55,7 +55,7 @@ class StaticRecord:
 
 
 def _axis_json(noise: Allan, is_prior: bool) -> AllanJson:
-    found: AllanJson = {
+    axis_json: AllanJson = {
         "tau_s": plain_list(noise.tau_s),
         "deviation_dps": plain_list(noise.deviation_dps),
         "low_dps": plain_list(noise.low_dps),
@@ -68,12 +68,12 @@ def _axis_json(noise: Allan, is_prior: bool) -> AllanJson:
         "replaces_datasheet": is_prior,
     }
     if noise.from_s > noise.tau_s[0]:
-        found["from_s"] = noise.from_s
+        axis_json["from_s"] = noise.from_s
     if noise.smoothing_s > 0:
-        found["smoothing_s"] = noise.smoothing_s
+        axis_json["smoothing_s"] = noise.smoothing_s
     if noise.step_dps is not None:
-        found["step_dps"] = noise.step_dps
-    return found
+        axis_json["step_dps"] = noise.step_dps
+    return axis_json
 
 
 def _figure_json(figure: Figure) -> NoiseFigure:
@@ -92,13 +92,13 @@ def static_record(recording: Recording, least_s: float = 0.0) -> StaticRecord | 
     if len(t_s) * period_s < least_s:
         return None
     axes = {str(axis): allan(recording.gyro_dps(axis)[rows], period_s) for axis in recording.info.axes}
-    known = {axis: noise for axis, noise in axes.items() if noise is not None}
-    if not known:
+    noise_by_axis = {axis: noise for axis, noise in axes.items() if noise is not None}
+    if not noise_by_axis:
         return None
     dataset = np.asarray(recording.columns["dataset"])[rows]
-    warm = temperature_of(recording.columns)
-    mean_c = float(warm[rows].mean()) if warm is not None else np.nan
-    return StaticRecord(int(dataset[0]), int(dataset[-1]), mean_c, float(len(t_s) * period_s), known)
+    temperature_c = temperature_of(recording.columns)
+    mean_c = float(temperature_c[rows].mean()) if temperature_c is not None else np.nan
+    return StaticRecord(int(dataset[0]), int(dataset[-1]), mean_c, float(len(t_s) * period_s), noise_by_axis)
 
 
 def longest_stretch(recording: Recording) -> slice | None:
@@ -120,19 +120,19 @@ def stretch_of(columns: Columns) -> slice | None:
         if name in columns:
             values = np.asarray(columns[name])
             together &= values[1:] == values[:-1]
-    still = np.asarray(columns.get("table_rate_dps", np.zeros(len(t_s))), dtype=np.float64) == 0
+    is_at_rest = np.asarray(columns.get("table_rate_dps", np.zeros(len(t_s))), dtype=np.float64) == 0
     if "valid" in columns:
-        still &= np.asarray(columns["valid"]) != 0
-    begins = np.flatnonzero(still & np.concatenate([[True], ~(together & still[:-1])]))
-    ends = np.flatnonzero(still & np.concatenate([~(together & still[1:]), [True]])) + 1
-    warm = temperature_of(columns)
-    if warm is None:  # the noise does not depend on a known temperature
-        warm = np.zeros(len(t_s))
+        is_at_rest &= np.asarray(columns["valid"]) != 0
+    begins = np.flatnonzero(is_at_rest & np.concatenate([[True], ~(together & is_at_rest[:-1])]))
+    ends = np.flatnonzero(is_at_rest & np.concatenate([~(together & is_at_rest[1:]), [True]])) + 1
+    temperature_c = temperature_of(columns)
+    if temperature_c is None:  # the noise does not depend on a known temperature
+        temperature_c = np.zeros(len(t_s))
     best = slice(0, 0)
     for begin, end in sorted(zip(begins, ends, strict=True), key=lambda pair: pair[0] - pair[1]):
         if end - begin <= best.stop - best.start:
             break
-        first, last = _steady(warm[begin:end])
+        first, last = _steady(temperature_c[begin:end])
         if last - first > best.stop - best.start:
             best = slice(int(begin + first), int(begin + last))
     return best if best.stop - best.start >= LEAST_READINGS else None

@@ -29,9 +29,10 @@ class _Acceleration(Effect):
         changes = {body: change_g(channels, body) for body in self.felt_along(axis)}
         if not changes or max(changes.values()) >= LEAST_CHANGE_G:
             return ""
-        seen = ", ".join(f"{body} by {change:.2g} g" for body, change in changes.items())
+        changes_text = ", ".join(f"{body} by {change:.2g} g" for body, change in changes.items())
         return (
-            f"no change of pose: the specific force changes less than {LEAST_CHANGE_G} g ({seen}), as a support tilts "
+            f"no change of pose: the specific force changes less than {LEAST_CHANGE_G} g ({changes_text}), as a "
+            "support tilts "
             "or an accelerometer drifts; measure each axis up and down"
         )
 
@@ -130,8 +131,8 @@ class CentripetalAcceleration(_Acceleration):
         if not term.parameters.get("by_position", 1.0):
             return [Column("centripetal", "deg/s/g", pull_g)]
         return [
-            Column(f"centripetal_{there}_up", "deg/s/g", np.where(here, pull_g, 0.0))
-            for there, here in channels.positions()
+            Column(f"centripetal_{up_position}_up", "deg/s/g", np.where(here, pull_g, 0.0))
+            for up_position, here in channels.positions()
         ]
 
     def options(self, span: Span) -> list[Term]:

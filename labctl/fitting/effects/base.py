@@ -211,10 +211,10 @@ def by_parameter(effect_id: str, **grids: Array) -> list[Term]:
 
 def powers(values: Array, exponents: range) -> dict[int, Array]:
     """Return values**k for each k of a rising range of whole exponents >= 1, by repeated multiplication."""
-    found: dict[int, Array] = {}
+    by_power: dict[int, Array] = {}
     power = np.ones_like(values)
     for exponent in range(1, exponents.stop):
         power = power * values
         if exponent in exponents:
-            found[exponent] = power
-    return found
+            by_power[exponent] = power
+    return by_power

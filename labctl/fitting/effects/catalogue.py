@@ -46,9 +46,9 @@ EFFECTS: tuple[type[Effect], ...] = tuple(kind for family in _OWN for kind in fa
 Kinds = tuple[Effect, ...]
 
 
-def _checked(found: Any) -> Kinds:
-    kinds = (found,) if isinstance(found, type) else tuple(found)
-    made = []
+def _checked(declared: Any) -> Kinds:
+    kinds = (declared,) if isinstance(declared, type) else tuple(declared)
+    effects = []
     for kind in kinds:
         if not (isinstance(kind, type) and issubclass(kind, Effect)):
             raise TypeError(f"{kind!r} is not a subclass of labctl.fitting.effects.Effect; derive it from that class")
@@ -58,8 +58,8 @@ def _checked(found: Any) -> Kinds:
                 f"effect id {effect.id!r} is not valid; use small letters, digits and _ only, beginning with a letter"
             )
         refuse_useless(effect)
-        made.append(effect)
-    return tuple(made)
+        effects.append(effect)
+    return tuple(effects)
 
 
 FAMILIES: PluginGroup[Kinds] = PluginGroup("labctl.effects", "family of effects", _checked)
@@ -69,8 +69,8 @@ class Catalogue(Mapping[str, Effect]):
     """Installed effects by id. labctl's own are imported at first use, those of others when one is asked for."""
 
     def __getitem__(self, effect_id: str) -> Effect:
-        found = _own().get(effect_id)
-        return _all()[effect_id] if found is None else found
+        own_effect = _own().get(effect_id)
+        return _all()[effect_id] if own_effect is None else own_effect
 
     def __iter__(self) -> Iterator[str]:
         return iter(_all())
@@ -88,7 +88,7 @@ def _own() -> dict[str, Effect]:
 
 @cache
 def _all() -> dict[str, Effect]:
-    return FAMILIES.merged(lambda kinds: ((each.id, each) for each in kinds), "effect")
+    return FAMILIES.merged(lambda kinds: ((kind.id, kind) for kind in kinds), "effect")
 
 
 CATALOGUE: Mapping[str, Effect] = Catalogue()
@@ -115,17 +115,17 @@ def kind_of(term: Term) -> Effect:
 def parse_term(text: str) -> Term:
     """Read `name` or `name:order`; raises BadInput when the effect has no such order."""
     name, _, order_text = text.partition(":")
-    found = effect(name.strip())
+    kind = effect(name.strip())
     if not order_text:
-        return Term(found.id)
-    if found.max_order is None:
-        raise BadInput(f"effect {found.id!r} has no polynomial order; write it without ':{order_text}'")
-    if not order_text.strip().isdigit() or not found.min_order <= int(order_text) <= found.max_order:
+        return Term(kind.id)
+    if kind.max_order is None:
+        raise BadInput(f"effect {kind.id!r} has no polynomial order; write it without ':{order_text}'")
+    if not order_text.strip().isdigit() or not kind.min_order <= int(order_text) <= kind.max_order:
         raise BadInput(
-            f"effect {found.id!r}: order {order_text!r} is not a whole number; give one from {found.min_order} to "
-            f"{found.max_order}"
+            f"effect {kind.id!r}: order {order_text!r} is not a whole number; give one from {kind.min_order} to "
+            f"{kind.max_order}"
         )
-    return Term(found.id, int(order_text))
+    return Term(kind.id, int(order_text))
 
 
 def describe_effects() -> list[EffectJson]:

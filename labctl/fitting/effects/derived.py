@@ -39,43 +39,43 @@ def with_derived(coefficients: Mapping[str, Coefficient]) -> dict[str, Coefficie
     `identified` besides; where that is false the data do not determine it: its value and u describe the distribution
     that a square above 0 leaves, and `at_most` is its 95 % bound.
     """
-    found = dict(coefficients)
+    extended = dict(coefficients)
     for time, (name, unit) in BANDWIDTHS.items():
-        if time in found:
-            band = _bandwidth(found[time]["value"], found[time]["u"])
-            found[name] = {"value": band.value, "u": band.u, "identified": band.identified, "unit": unit}
+        if time in extended:
+            band = _bandwidth(extended[time]["value"], extended[time]["u"])
+            extended[name] = {"value": band.value, "u": band.u, "identified": band.identified, "unit": unit}
     for square, (name, unit) in ROOTS.items():
-        if square in found:
-            root = _root(found[square]["value"], found[square]["u"])
-            found[name] = {
+        if square in extended:
+            root = _root(extended[square]["value"], extended[square]["u"])
+            extended[name] = {
                 "value": root.value, "u": root.u, "identified": root.identified, "at_most": root.at_most, "unit": unit,
             }  # fmt: skip
-    return found
+    return extended
 
 
 def with_derived_tables(tables: Mapping[str, CoefficientTable]) -> dict[str, CoefficientTable]:
     """Return the same of coefficients that have a value at each node of a temperature table."""
-    found = dict(tables)
+    extended = dict(tables)
     for time, (name, unit) in BANDWIDTHS.items():
-        if time in found:
-            bands = [_bandwidth(*each) for each in zip(found[time]["value"], found[time]["u"], strict=True)]
-            found[name] = {
+        if time in extended:
+            bands = [_bandwidth(*each) for each in zip(extended[time]["value"], extended[time]["u"], strict=True)]
+            extended[name] = {
                 "value": [band.value for band in bands],
                 "u": [band.u for band in bands],
                 "identified": [band.identified for band in bands],
                 "unit": unit,
             }
     for square, (name, unit) in ROOTS.items():
-        if square in found:
-            roots = [_root(*each) for each in zip(found[square]["value"], found[square]["u"], strict=True)]
-            found[name] = {
+        if square in extended:
+            roots = [_root(*each) for each in zip(extended[square]["value"], extended[square]["u"], strict=True)]
+            extended[name] = {
                 "value": [root.value for root in roots],
                 "u": [root.u for root in roots],
                 "identified": [root.identified for root in roots],
                 "at_most": [root.at_most for root in roots],
                 "unit": unit,
             }
-    return found
+    return extended
 
 
 def _bandwidth(time_constant_s: float, u: float | None) -> _Derived:

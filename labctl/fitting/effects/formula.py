@@ -139,9 +139,10 @@ def _parsed(name: str, text: str) -> ast.Expression:
         with _PARSER:
             tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        said = error.args[0] if error.args else type(error).__name__
+        message = error.args[0] if error.args else type(error).__name__
         raise BadInput(
-            f"formula {name!r}: {text!r} cannot be read ({said}); write a formula such as 0.02 * (temperature_c - 25)"
+            f"formula {name!r}: {text!r} cannot be read ({message}); write a formula such as 0.02 * (temperature_c - "
+            "25)"
         ) from None
     level: list[ast.AST] = [tree.body]
     depth = 0
@@ -159,8 +160,8 @@ def _parsed(name: str, text: str) -> ast.Expression:
 
 def _check(name: str, node: ast.AST) -> None:
     if isinstance(node, ast.Call):
-        known = isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS
-        if not known or len(node.args) != 1 or node.keywords:
+        is_function = isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS
+        if not is_function or len(node.args) != 1 or node.keywords:
             raise BadInput(
                 f"formula {name!r}: only {', '.join(FUNCTIONS)} of one value may be called; rewrite the formula with "
                 "these"

@@ -96,12 +96,12 @@ IDS = frozenset({TimeDelay.id, Bandwidth.id})
 
 def response_of_terms(terms: Iterable[Term]) -> Response:
     """Return the response that the terms of a model have as their parameters."""
-    found = Response()
+    response = Response()
     for term in terms:
         if term.effect in IDS:
             for value in term.parameters.values():
-                found = found.with_value(DELAY if term.effect == TimeDelay.id else TIME_CONSTANT, value)
-    return found
+                response = response.with_value(DELAY if term.effect == TimeDelay.id else TIME_CONSTANT, value)
+    return response
 
 
 EFFECTS: tuple[type[Effect], ...] = (TimeDelay, Bandwidth)

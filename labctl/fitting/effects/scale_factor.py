@@ -91,10 +91,10 @@ class _Power(Effect):
     origin: ClassVar[Origin] = "sensor"
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        found = powers(channels.rate_dps(axis), range(self.first, self.order(term) + 1))
+        by_power = powers(channels.rate_dps(axis), range(self.first, self.order(term) + 1))
         return [
             Column(f"scale_factor_r{k}", f"(deg/s)^-{k - 1}", column)
-            for k, column in found.items()
+            for k, column in by_power.items()
             if k % 2 == self.first % 2
         ]
 

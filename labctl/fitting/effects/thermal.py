@@ -73,10 +73,10 @@ class ThermalHysteresis(Effect):
             channels.columns, width_k, rounded=bool(term.parameters.get("rounded", 0.0))
         )
         if term.parameters.get("bowed", 0.0):
-            warm = channels.temperature_c(axis)
+            temperature_c = channels.temperature_c(axis)
             low, high = channels.history.span_c
             low, high = term.parameters.get("low_c", low), term.parameters.get("high_c", high)
-            share = np.clip((warm - low) / max(high - low, 1e-9), 0.0, 1.0)
+            share = np.clip((temperature_c - low) / max(high - low, 1e-9), 0.0, 1.0)
             state = state * 4 * share * (1 - share)
         return [Column("leg", "deg/s", state)]
 

@@ -55,12 +55,12 @@ def lag_elements(term: Term, axis: str) -> list[LagElement]:
     """Return the columns of a term on an axis, in order."""
     name, unit = term.effect, "1/K" if term.effect == ScaleFactorLag.id else "deg/s/K"
     tau_s = tau_of(term, "tau", axis) or USUAL_S
-    found = [LagElement(name, unit, "all", tau_s, tau_of(term, "cooling_tau", axis))]
+    elements = [LagElement(name, unit, "all", tau_s, tau_of(term, "cooling_tau", axis))]
     if (second := tau_of(term, "second_tau", axis)) is not None:
-        found.append(LagElement(f"{name}_second", unit, "all", second))
+        elements.append(LagElement(f"{name}_second", unit, "all", second))
     if term.parameters.get(f"curved_{axis}", term.parameters.get("curved", 0.0)):
-        found.append(LagElement(f"{name}_curved", f"{unit}2", "curved", tau_s, found[0].cooling_tau_s))
-    return found
+        elements.append(LagElement(f"{name}_curved", f"{unit}2", "curved", tau_s, elements[0].cooling_tau_s))
+    return elements
 
 
 class Lag(Effect):

@@ -30,7 +30,7 @@ def made_up_channels(needs: tuple[str, ...]) -> Channels:
 
 def first_column(effect: Effect) -> Column:
     """Return the first regressor of an effect on the made-up data sets, with its parameters at their least values."""
-    term = Term(effect.id, None, {each.name: each.low for each in effect.parameters})
+    term = Term(effect.id, None, {parameter.name: parameter.low for parameter in effect.parameters})
     return effect.columns(made_up_channels(effect.needs), "z", term, Reference())[0]
 
 

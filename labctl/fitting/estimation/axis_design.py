@@ -58,8 +58,8 @@ def axis_design(
     unknowns = 0
     for owner, column in _exercised(data, model, channels, axis):
         values = column.values
-        if (known := model.held.of(axis, owner, column.name)) is not None:
-            held.add(known, known.spread(model.temperature), values)
+        if (held_value := model.held.of(axis, owner, column.name)) is not None:
+            held.add(held_value, held_value.spread(model.temperature), values)
             spread.append(np.zeros((nodes, 0)))
             names.append((owner, column.name, column.unit))
             continue
@@ -112,17 +112,17 @@ def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) 
     At one rate the part of an effect that grows with the rate is the same as its part at rest, so only that is claimed.
     A held coefficient is known whatever the recording exercises.
     """
-    found = model.columns(channels, axis)
+    named_columns = model.columns(channels, axis)
     still = {name for name in channels.rates if data.distinct_rates(name) < TOLD_APART}
     if not still:
-        return found
+        return named_columns
     none = np.zeros(len(data))
     stopped = channels.with_rates({name: none if name in still else v for name, v in channels.rates.items()})
     at_rest = model.columns(stopped, axis)
     return [
         (owner, column)
-        for (owner, column), (_, left) in zip(found, at_rest, strict=True)
-        if np.any(left.values) or model.held.of(axis, owner, column.name) is not None
+        for (owner, column), (_, column_at_rest) in zip(named_columns, at_rest, strict=True)
+        if np.any(column_at_rest.values) or model.held.of(axis, owner, column.name) is not None
     ]
 
 

@@ -16,9 +16,7 @@ from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.common_turn_error import with_common_error
-from labctl.fitting.estimation.held import considered, joint_covariance
-from labctl.fitting.estimation.reference_time import TimeErrors, time_errors
-from labctl.fitting.estimation.response import (
+from labctl.fitting.estimation.delay_and_bandwidth import (
     first_response,
     next_response,
     response_at,
@@ -26,6 +24,8 @@ from labctl.fitting.estimation.response import (
     with_response,
     without_response,
 )
+from labctl.fitting.estimation.held import considered, joint_covariance
+from labctl.fitting.estimation.reference_time import TimeErrors, time_errors
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.error_part import ErrorPart
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
@@ -77,7 +77,7 @@ class AxisSolutions:
     @property
     def turning(self) -> dict[str, Array]:
         """The Earth's rate that goes round with the table, axis -> cosine and sine per position, deg/s."""
-        return {axis: found.turning for axis, found in self.nuisance.items()}
+        return {axis: axis_nuisance.turning for axis, axis_nuisance in self.nuisance.items()}
 
 
 def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None = None) -> AxisSolutions:
@@ -88,12 +88,12 @@ def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] |
 
     Raises NotEnoughData where the data sets do not determine the coefficients.
     """
-    found = _solve_each(data, model, fixed)
-    if not any(each.angles_rad for each in found.nuisance.values()):
-        return found
-    rates = leaning(data, found.nuisance).channels.rates
+    solutions = _solve_each(data, model, fixed)
+    if not any(each.angles_rad for each in solutions.nuisance.values()):
+        return solutions
+    rates = leaning(data, solutions.nuisance).channels.rates
     again = _solve_each(replace(data, channels=data.channels.with_rates(rates)), model, fixed)
-    return replace(again, nuisance={axis: found.nuisance[axis].plus(each) for axis, each in again.nuisance.items()})
+    return replace(again, nuisance={axis: solutions.nuisance[axis].plus(each) for axis, each in again.nuisance.items()})
 
 
 def _solve_each(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None) -> AxisSolutions:
@@ -124,7 +124,7 @@ def leaning(data: FitData, nuisance: Mapping[str, Nuisance]) -> FitData:
     The angles are the fixture's and the table's: known from all data, they are no error of the model in a part that
     lacks the mountings which separate them.
     """
-    rates = leaning_rates(data.channels, {axis: found.angles_rad for axis, found in nuisance.items()})
+    rates = leaning_rates(data.channels, {axis: axis_nuisance.angles_rad for axis, axis_nuisance in nuisance.items()})
     return replace(data, channels=data.channels.with_rates(rates), angles_known=True)
 
 
@@ -176,10 +176,10 @@ def _solve_axis(
             f"{model.name} ({', '.join(model.effect_ids)}); record rates about the other axes of the unit too"
         )
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
-    known, random = data.scatter(axis), None
+    axis_scatter, random = data.scatter(axis), None
     if design.shifts or len(design.angles):
-        known = _with_white_noise(design, y, known)
-    columns, y, scatter = with_known_size(design.columns, design.turning, y, known, turning_size_dps(data.info))
+        axis_scatter = _with_white_noise(design, y, axis_scatter)
+    columns, y, scatter = with_known_size(design.columns, design.turning, y, axis_scatter, turning_size_dps(data.info))
     columns, y, scatter = with_prior(columns, design.angles.values, y, scatter, design.angles.size**2)
     if design.shifts:
         wide = np.array([KINDS[shift.kind].largest for shift in design.shifts])
@@ -208,9 +208,9 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
             f"mountings) and to estimate the error of the fit: at least {rank + 1} are needed; measure more data sets, "
             "or leave effects out"
         )
-    taken, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
-    left = y - columns @ taken
-    return replace(scatter, white_var=np.full(len(y), max(float(left @ left) / (len(y) - rank), 1e-20)))
+    coordinates, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
+    residual = y - columns @ coordinates
+    return replace(scatter, white_var=np.full(len(y), max(float(residual @ residual) / (len(y) - rank), 1e-20)))
 
 
 def _axis_fit(design: AxisDesign, solution: Solution, late: TimeErrors | None = None) -> AxisFit:
@@ -240,10 +240,10 @@ def residuals(fitted: FittedModel, data: FitData, nuisance: Mapping[str, Nuisanc
     if nuisance and not data.angles_known:
         data = leaning(data, nuisance)
     outputs = {a: v - nuisance[a].error_dps(data, a) if nuisance else v for a, v in data.outputs.items()}
-    seen = {axis: data.through(response_of(fitted.axes[axis])) for axis in outputs}
-    across_dps = next(iter(seen.values())).across_dps
+    delayed = {axis: data.through(response_of(fitted.axes[axis])) for axis in outputs}
+    across_dps = next(iter(delayed.values())).across_dps
     corrected = without_response(fitted).compensate(outputs, data.channels, across_dps)
-    return {axis: corrected[axis] - seen[axis].true_rate_dps(axis) for axis in outputs}
+    return {axis: corrected[axis] - delayed[axis].true_rate_dps(axis) for axis in outputs}
 
 
 def fit_turning(fitted: FittedModel, data: FitData) -> dict[str, Nuisance]:
@@ -251,11 +251,11 @@ def fit_turning(fitted: FittedModel, data: FitData) -> dict[str, Nuisance]:
 
     For judging a calibration on a recording that it was not fitted to: the direction of north is not known in advance.
     """
-    left = residuals(fitted, data)
-    found: dict[str, Nuisance] = {}
-    for axis, values in left.items():
+    residuals_dps = residuals(fitted, data)
+    by_axis: dict[str, Nuisance] = {}
+    for axis, values in residuals_dps.items():
         columns = turning_columns(data.info, data.channels, axis)
         independent = columns.shape[1] > 0 and rank_of(columns) == columns.shape[1]
         turning = np.asarray(np.linalg.lstsq(columns, values)[0] if independent else [], dtype=np.float64)
-        found[axis] = Nuisance(turning)
-    return found
+        by_axis[axis] = Nuisance(turning)
+    return by_axis

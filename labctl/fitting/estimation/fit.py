@@ -64,15 +64,15 @@ def errors_by_leg(data: FitData, preset: Preset, solutions: Mapping[str, Solutio
     up, down = legs > 0, legs < 0
     if min(int(up.sum()), int(down.sum())) < LEAST_SETS:
         return []
-    found = [
+    leg_errors = [
         _tested(data, preset, solutions, [(up, down)], ("heating", "cooling")),
         _tested(data, preset, solutions, [(down, up)], ("cooling", "heating")),
     ]
     numbers, counts = np.unique(legs[legs != 0], return_counts=True)
     if 2 < len(numbers) <= MOST_LEGS and counts.min() >= LEAST_SETS:
         pairs = [((legs != 0) & (legs != number), legs == number) for number in numbers]
-        found.append(_tested(data, preset, solutions, pairs, ("all legs but one", "each leg in turn")))
-    return found
+        leg_errors.append(_tested(data, preset, solutions, pairs, ("all legs but one", "each leg in turn")))
+    return leg_errors
 
 
 def _tested(
@@ -83,30 +83,30 @@ def _tested(
     errors: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
     tested = 0
     for fitted_to, left_out in pairs:
-        seen = data.take(fitted_to)
-        low, high = float(seen.temperature_c.min()) - BEYOND_K, float(seen.temperature_c.max()) + BEYOND_K
-        rest = data.take(left_out & (data.temperature_c >= low) & (data.temperature_c <= high))
-        if len(rest) == 0:
+        data_used = data.take(fitted_to)
+        low, high = float(data_used.temperature_c.min()) - BEYOND_K, float(data_used.temperature_c.max()) + BEYOND_K
+        data_tested = data.take(left_out & (data.temperature_c >= low) & (data.temperature_c <= high))
+        if len(data_tested) == 0:
             return _answer(names, None, 0, f"no data set of the {names[1]} is at a temperature of the {names[0]}")
-        lost = [a for a in BODY_AXES if seen.distinct_rates(a) < TOLD_APART <= data.distinct_rates(a)]
+        lost = [a for a in BODY_AXES if data_used.distinct_rates(a) < TOLD_APART <= data.distinct_rates(a)]
         if lost:
             return _answer(names, None, 0, f"the {names[0]} do not turn the unit about {' and '.join(lost)}")
         try:
-            model, rows = preset.build(seen)
-            used = seen.take(rows)
-            require_enough_data(used, model)
-            solved = solve_axes(used, model, solutions)
-            left = residuals(FittedModel(model, solved.fits), rest, solved.nuisance)
+            model, rows = preset.build(data_used)
+            training = data_used.take(rows)
+            require_enough_data(training, model)
+            solved = solve_axes(training, model, solutions)
+            residuals_dps = residuals(FittedModel(model, solved.fits), data_tested, solved.nuisance)
         except LabctlError as error:
             return _answer(names, None, 0, f"the {names[0]} alone does not determine the model: {error}")
-        tested += len(rest)
-        for axis, values in left.items():
+        tested += len(data_tested)
+        for axis, values in residuals_dps.items():
             errors[axis].append(values)
     return _answer(names, rms({axis: np.concatenate(parts) for axis, parts in errors.items()}), tested, "")
 
 
-def _answer(names: tuple[str, str], rms_dps: float | None, datasets: int, why: str) -> LegErrorJson:
-    return {"fitted": names[0], "tested": names[1], "rms_dps": rms_dps, "datasets": datasets, "why": why}
+def _answer(names: tuple[str, str], rms_dps: float | None, datasets: int, reason: str) -> LegErrorJson:
+    return {"fitted": names[0], "tested": names[1], "rms_dps": rms_dps, "datasets": datasets, "why": reason}
 
 
 #: Data sets at which regressors are compared, and rates, as shares of the fastest measured one.
@@ -138,11 +138,15 @@ def depends_on_rate(model: ErrorModel, data: FitData, *, held: bool = True) -> b
     rows = np.unique(np.linspace(0, len(data) - 1, min(len(data), MOST_ROWS)).astype(np.int64))
     channels = data.channels.take(rows)
     fastest = max(1.0, *(abs(end) for axis in data.outputs for end in data.covered.rate_dps[axis]))
-    seen = [_at_rate(channels, share * fastest) for share in SHARES]
+    channels_at_rates = [_at_rate(channels, share * fastest) for share in SHARES]
     for axis in data.outputs:
         first, *others = [
-            [c.values for owner, c in model.columns(each, axis) if held or model.held.of(axis, owner, c.name) is None]
-            for each in seen
+            [
+                c.values
+                for owner, c in model.columns(channels_at_rate, axis)
+                if held or model.held.of(axis, owner, c.name) is None
+            ]
+            for channels_at_rate in channels_at_rates
         ]
         for other in others:
             if len(other) != len(first) or not all(map(np.array_equal, first, other)):
@@ -166,24 +170,24 @@ def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solut
     if preset.inner_only:
         pairs = pairs[1:-1]
     errors: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
-    for seen, left_out in pairs:
-        if len(seen) == 0:
+    for data_used, left_out in pairs:
+        if len(data_used) == 0:
             return {}
         try:
-            model, rows = preset.build(seen)
-            require_enough_data(seen.take(rows), model)
-            found = solve_axes(seen.take(rows), model, solutions)
+            model, rows = preset.build(data_used)
+            require_enough_data(data_used.take(rows), model)
+            solved = solve_axes(data_used.take(rows), model, solutions)
         except NotEnoughData:
             return {}
         try:
-            left = residuals(FittedModel(model, found.fits), left_out, found.nuisance)
+            residuals_dps = residuals(FittedModel(model, solved.fits), left_out, solved.nuisance)
         except NotConverged as error:
             at_c = float(left_out.temperature_c.mean())
             raise NotConverged(
                 f"{error}; this fit left out the data sets near {at_c:.1f} deg C, to test the "
                 "model at a temperature that it was not fitted to"
             ) from None
-        for axis, values in left.items():
+        for axis, values in residuals_dps.items():
             errors[axis].append(values)
     return {axis: np.concatenate(parts) for axis, parts in errors.items() if parts}
 
@@ -215,43 +219,46 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     Raises NotEnoughData where the data sets do not determine the model, NotConverged where it cannot be inverted.
     """
     model, rows = preset.build(data)
-    used = data.take(rows)
-    require_enough_data(used, model)
-    found = solve_axes(used, model)
-    fitted = FittedModel(_with_shapes(model, found.fits, data.channels.history), found.fits)
-    residual = residuals(fitted, data, found.nuisance)
+    training = data.take(rows)
+    require_enough_data(training, model)
+    solved = solve_axes(training, model)
+    fitted = FittedModel(_with_shapes(model, solved.fits, data.channels.history), solved.fits)
+    residual = residuals(fitted, data, solved.nuisance)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
-    floor, leaned = data.noise_floor, leaning(data, found.nuisance)
+    floor, leaned = data.noise_floor, leaning(data, solved.nuisance)
     error = ErrorFigures(
-        rms(raw), rms(residual), rms(held_out_errors(leaned, preset, found.solutions)), floor.rms_dps, floor.source,
-        tuple(errors_by_leg(leaned, preset, found.solutions)),
+        rms(raw), rms(residual), rms(held_out_errors(leaned, preset, solved.solutions)), floor.rms_dps, floor.source,
+        tuple(errors_by_leg(leaned, preset, solved.solutions)),
     )  # fmt: skip
     return FitResult(
         fitted,
         error,
         data.covered.temperature_c,
         valid_rates_dps(fitted, data),
-        {axis: _noise_json(floor.axes[axis], solution) for axis, solution in found.solutions.items()},
-        _environment(data, found.turning),
+        {axis: _noise_json(floor.axes[axis], solution) for axis, solution in solved.solutions.items()},
+        _environment(data, solved.turning),
         residual,
         left_out_dps=_left_out_dps(fitted, data),
-        shapes=shapes_of(used, fitted, found.solutions),
-        joint=joint_findings(data, model, preset, found),
+        shapes=shapes_of(training, fitted, solved.solutions),
+        joint=joint_findings(data, model, preset, solved),
         mountings=mountings_of(data.channels),
-        angles_rad={axis: each.angles_rad for axis, each in found.nuisance.items() if each.angles_rad},
+        angles_rad={axis: each.angles_rad for axis, each in solved.nuisance.items() if each.angles_rad},
     )
 
 
 def _left_out_dps(fitted: FittedModel, data: FitData) -> dict[str, float]:
     """Return effect -> what it does to the data sets, root mean square deg/s, of the effects that are not exported."""
-    found = {}
+    by_effect = {}
     for term in fitted.model.terms:
         if not is_exported(term):
-            rest = without(fitted, term.effect)
+            without_effect = without(fitted, term.effect)
             channels = data.seen_by(fitted.model.argument)
-            parts = {axis: fitted.error_dps(channels, axis) - rest.error_dps(channels, axis) for axis in data.outputs}
-            found[term.effect] = rms(parts) or 0.0
-    return found
+            parts = {
+                axis: fitted.error_dps(channels, axis) - without_effect.error_dps(channels, axis)
+                for axis in data.outputs
+            }
+            by_effect[term.effect] = rms(parts) or 0.0
+    return by_effect
 
 
 def _with_shapes(model: ErrorModel, fits: Mapping[str, AxisFit], history: TemperatureHistory) -> ErrorModel:
@@ -280,18 +287,20 @@ def _noise_json(noise: AxisNoise, solution: Solution) -> AxisNoiseJson:
 def _environment(data: FitData, turning: Mapping[str, Array]) -> FitEnvironment:
     """Return which thermometer the fit went by and how the Earth's rate was treated, as JSON."""
     info = data.info
-    found: FitEnvironment = {}
+    environment_json: FitEnvironment = {}
     if is_chambers(data.channels.columns):
-        found["temperature"] = "the thermometer of the chamber, because the recording has no thermometer of the unit"
+        environment_json["temperature"] = (
+            "the thermometer of the chamber, because the recording has no thermometer of the unit"
+        )
     if info.latitude_deg is None:
-        return {**found, "earth_rate": "not subtracted: the latitude of the bench is not known"}
-    found |= {
+        return {**environment_json, "earth_rate": "not subtracted: the latitude of the bench is not known"}
+    environment_json |= {
         "earth_rate": "subtracted",
         "latitude_deg": info.latitude_deg,
         "along_table_axis_dps": up_rate_dps(info),
     }
     fitted = {a: np.hypot(c[0::2], c[1::2]).tolist() for a, c in turning.items() if len(c)}
     if fitted:
-        found["once_per_turn_dps"] = fitted
-        found["once_per_turn_expected_dps"] = turning_size_dps(info)
-    return found
+        environment_json["once_per_turn_dps"] = fitted
+        environment_json["once_per_turn_expected_dps"] = turning_size_dps(info)
+    return environment_json

@@ -59,11 +59,11 @@ class HeldColumns:
         self._spread: list[NDArray[np.float64]] = []
         self._held: list[HeldCoefficient] = []
 
-    def add(self, known: HeldCoefficient, spread: NDArray[np.float64], values: Array) -> None:
+    def add(self, coefficient: HeldCoefficient, spread: NDArray[np.float64], values: Array) -> None:
         """Add a held coefficient with its regressor (m,) and its `spread` (nodes, p)."""
         self._columns.append(values[:, None] * (self._basis @ spread))
         self._spread.append(spread)
-        self._held.append(known)
+        self._held.append(coefficient)
 
     def add_none(self) -> None:
         """Add a coefficient that is estimated."""
@@ -105,13 +105,13 @@ def considered(
 
 def _determined(columns: NDArray[np.float64], more: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return those of more columns (m, b) that the data determine beside columns (m, k), with a row to spare."""
-    kept = np.zeros((len(columns), 0))
+    independent = np.zeros((len(columns), 0))
     for column in more.T:
-        tried = np.column_stack([kept, column])
+        tried = np.column_stack([independent, column])
         whole = np.column_stack([columns, tried])
         if len(whole) > whole.shape[1] and rank_of(whole) == whole.shape[1]:
-            kept = tried
-    return kept
+            independent = tried
+    return independent
 
 
 def joint_covariance(
@@ -157,9 +157,9 @@ class Fixed:
 def refuse_fixed(info: RecordingInfo, fixed: Fixed | None) -> None:
     """Raise BadInput for coefficients to be held where nothing is fitted by data sets of known rate."""
     if fixed is not None and (info.kind == "coefficients" or info.motion == "poses"):
-        what = "is a table of coefficients" if info.kind == "coefficients" else "is of poses"
+        kind_text = "is a table of coefficients" if info.kind == "coefficients" else "is of poses"
         raise BadInput(
-            f"{fixed.name}: the recording of {info.serial} {what}, beside which no coefficient can be held; leave "
+            f"{fixed.name}: the recording of {info.serial} {kind_text}, beside which no coefficient can be held; leave "
             "--fixed out, or fit a recording of readings at known rates"
         )
 
@@ -186,11 +186,11 @@ def _resolved(data: FitData, model: ErrorModel, fixed: Fixed) -> Held:
         )
     channels = data.seen_by(model.argument)
     axes: dict[str, dict[str, HeldCoefficient]] = {}
-    for axis, given in fixed.axes.items():
+    for axis, axis_values in fixed.axes.items():
         if axis in data.outputs:
             if held := _of_axis(data, channels, model, axis, fixed):
                 axes[axis] = held
-        elif given and not fixed.only_of_model:
+        elif axis_values and not fixed.only_of_model:
             raise BadInput(
                 f"{fixed.name}, axis {axis}: the recording has only {', '.join(data.outputs)}; leave axis {axis} out"
             )
@@ -212,13 +212,14 @@ def _of_axis(
         if fixed.only_of_model and one.effect not in model.effect_ids:
             continue
         effect = one.effect or owners.get(name, "")
-        what = f"{fixed.name}, axis {axis}: {name} = {_shown(one)}"
+        value_text = f"{fixed.name}, axis {axis}: {name} = {_shown(one)}"
         if (effect, name) not in columns:
             raise BadInput(
-                f"{what}: model {model.name} has no such coefficient; choose from {', '.join(owners)} (parameters of "
+                f"{value_text}: model {model.name} has no such coefficient; choose from {', '.join(owners)} "
+                "(parameters of "
                 "the shape of an effect and derived coefficients cannot be held), or add its effect to the model"
             )
-        _check(what, replace(one, effect=effect), columns[effect, name], model)
+        _check(value_text, replace(one, effect=effect), columns[effect, name], model)
         held[name] = replace(one, effect=effect, unit=columns[effect, name])
     if held:
         _require_same_conversion(data, axis, fixed)
@@ -231,24 +232,31 @@ def _of_axis(
     return held
 
 
-def _check(what: str, one: HeldCoefficient, unit: str, model: ErrorModel) -> None:
-    if one.unit and one.unit != unit:
-        raise BadInput(f"{what}: the unit of this coefficient is {unit!r}, not {one.unit!r}; write value and u in it")
-    term = next(term for term in model.terms if term.effect == one.effect)
+def _check(quantity: str, coefficient: HeldCoefficient, unit: str, model: ErrorModel) -> None:
+    if coefficient.unit and coefficient.unit != unit:
+        raise BadInput(
+            f"{quantity}: the unit of this coefficient is {unit!r}, not {coefficient.unit!r}; write value and u in it"
+        )
+    term = next(term for term in model.terms if term.effect == coefficient.effect)
     if kind_of(term).parameters:
         shape = ", ".join(parameter.name for parameter in kind_of(term).parameters)
         raise BadInput(
-            f"{what}: the shape of effect {one.effect} is fitted ({shape}), so a coefficient of it cannot be held; "
+            f"{quantity}: the shape of effect {coefficient.effect} is fitted ({shape}), so a coefficient of it cannot "
+            "be held; "
             "leave the coefficient out"
         )
-    if not one.temperature_c:
+    if not coefficient.temperature_c:
         return
     nodes = model.temperature.nodes_c if isinstance(model.temperature, LagrangeTable) and not term.steady else ()
-    given = ", ".join(f"{t:.4g}" for t in one.temperature_c)
-    if len(nodes) != len(one.temperature_c) or np.abs(np.subtract(nodes, one.temperature_c)).max() > SAME_LEVEL_K:
+    temperatures_text = ", ".join(f"{t:.4g}" for t in coefficient.temperature_c)
+    if (
+        len(nodes) != len(coefficient.temperature_c)
+        or np.abs(np.subtract(nodes, coefficient.temperature_c)).max() > SAME_LEVEL_K
+    ):
         has = f"the temperatures {', '.join(f'{t:.4g}' for t in nodes)} deg C" if nodes else "one value for all"
         raise BadInput(
-            f"{what}: a table at {given} deg C, but here the model has {has}; a table is held only at the same "
+            f"{quantity}: a table at {temperatures_text} deg C, but here the model has {has}; a table is held only at "
+            "the same "
             f"temperatures, to {SAME_LEVEL_K:g} K: give a single value, or fit a model with these temperatures"
         )
 
@@ -270,8 +278,8 @@ def _require_reference(channels: Channels, model: ErrorModel, axis: str, fixed: 
     """Refuse coefficients without a reference temperature beside terms in temperature, which change their meaning."""
     if fixed.reference_temperature_c is not None:
         return
-    moved = replace(model, reference=Reference(model.reference.temperature_c + STEP_K))
-    pairs = zip(model.columns(channels, axis), moved.columns(channels, axis), strict=True)
+    shifted_model = replace(model, reference=Reference(model.reference.temperature_c + STEP_K))
+    pairs = zip(model.columns(channels, axis), shifted_model.columns(channels, axis), strict=True)
     centred = [effect for (effect, here), (_, there) in pairs if not np.array_equal(here.values, there.values)]
     if centred:
         raise BadInput(
@@ -280,7 +288,9 @@ def _require_reference(channels: Channels, model: ErrorModel, axis: str, fixed: 
         )
 
 
-def _shown(one: HeldCoefficient) -> str:
-    values = ", ".join(f"{value:g}" for value in one.value[:3]) + (", ..." if len(one.value) > 3 else "")
-    text = f"[{values}]" if one.temperature_c else values
-    return f"{text} {one.unit}".strip()
+def _shown(coefficient: HeldCoefficient) -> str:
+    values = ", ".join(f"{value:g}" for value in coefficient.value[:3]) + (
+        ", ..." if len(coefficient.value) > 3 else ""
+    )
+    text = f"[{values}]" if coefficient.temperature_c else values
+    return f"{text} {coefficient.unit}".strip()

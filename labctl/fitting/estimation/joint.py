@@ -71,20 +71,20 @@ def agreement_of(
             fits[number] = {axis: _estimated(fit, tuple(model.held.axes.get(axis, ()))) for axis, fit in solved.items()}
         except LabctlError as error:
             return [], f"recording {number} alone does not determine the model: {error}"
-    known = model.held.effects - {effect for one in fits.values() for fit in one.values() for effect in fit.effects}
-    ours = [term.effect for term in model.terms if is_exported(term) and term.effect not in known]
+    held_only = model.held.effects - {effect for one in fits.values() for fit in one.values() for effect in fit.effects}
+    ours = [term.effect for term in model.terms if is_exported(term) and term.effect not in held_only]
     return [_agreement(effect, data.outputs, list(fits.values()), len(ours)) for effect in ours], ""
 
 
 def _estimated(fit: AxisFit, held: tuple[str, ...]) -> AxisFit:
     """Return the coefficients of an axis without those that are held."""
-    kept = [k for k, name in enumerate(fit.names) if name not in held]
+    estimated = [k for k, name in enumerate(fit.names) if name not in held]
     flat = np.repeat([name not in held for name in fit.names], fit.values.shape[1])
     return AxisFit(
-        tuple(fit.effects[k] for k in kept),
-        tuple(fit.names[k] for k in kept),
-        tuple(fit.units[k] for k in kept),
-        fit.values[kept],
+        tuple(fit.effects[k] for k in estimated),
+        tuple(fit.names[k] for k in estimated),
+        tuple(fit.units[k] for k in estimated),
+        fit.values[estimated],
         fit.covariance[np.ix_(flat, flat)],
     )
 
@@ -141,13 +141,13 @@ def _scatter(parts: list[tuple[Array, NDArray[np.float64]]], shift: NDArray[np.f
     if keep.shape[1] == 0:
         return _Scatter()
     variances, vectors = np.linalg.eigh(sum(covariance for _, covariance in scaled))
-    known = vectors[:, variances > LEAST_VARIANCE * max(float(variances.max()), 1e-300)]
-    scaled = [(known.T @ v, known.T @ c @ known) for v, c in scaled]
+    seen_vectors = vectors[:, variances > LEAST_VARIANCE * max(float(variances.max()), 1e-300)]
+    scaled = [(seen_vectors.T @ v, seen_vectors.T @ c @ seen_vectors) for v, c in scaled]
     inverses = [np.linalg.pinv(covariance) for _, covariance in scaled]
     weight = sum(inverses)
     mean = np.linalg.solve(weight, sum(i @ v for i, (v, _) in zip(inverses, scaled, strict=True)))
     chi2 = sum(float((v - mean) @ i @ (v - mean)) for i, (v, _) in zip(inverses, scaled, strict=True))
-    return _Scatter(chi2, known.shape[1] * (len(parts) - 1))
+    return _Scatter(chi2, seen_vectors.shape[1] * (len(parts) - 1))
 
 
 def _beside(columns: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -162,13 +162,13 @@ SEEN = 0.01
 SMALLEST = 1e-12
 
 
-def joint_findings(data: FitData, model: ErrorModel, preset: Preset, found: AxisSolutions) -> JointJson | None:
-    """Return what several recordings say together; None for a single one. `found` is the fit to all of them."""
+def joint_findings(data: FitData, model: ErrorModel, preset: Preset, solutions: AxisSolutions) -> JointJson | None:
+    """Return what several recordings say together; None for a single one. `solutions` is the fit to all of them."""
     recordings = recordings_in(data.channels.columns)
     if len(recordings) < 2:
         return None
-    repeatability = {axis: _repeatability(data, axis, found) for axis in data.outputs}
-    agreement, not_compared = agreement_of(data, model, found.solutions)
+    repeatability = {axis: _repeatability(data, axis, solutions) for axis in data.outputs}
+    agreement, not_compared = agreement_of(data, model, solutions.solutions)
     held_out, pooled = _held_out(data, preset)
     return {
         "recordings": recordings,
@@ -181,9 +181,9 @@ def joint_findings(data: FitData, model: ErrorModel, preset: Preset, found: Axis
     }
 
 
-def _repeatability(data: FitData, axis: str, found: AxisSolutions) -> list[RepeatabilityJson]:
+def _repeatability(data: FitData, axis: str, solutions: AxisSolutions) -> list[RepeatabilityJson]:
     """Return the spread of each kind of shift of one axis, with the shifts themselves."""
-    shifts, solution = shifts_of(data.channels, axis), found.solutions[axis]
+    shifts, solution = shifts_of(data.channels, axis), solutions.solutions[axis]
     begin = len(solution.values) - len(shifts)
     u = np.sqrt(np.maximum(np.diag(solution.covariance)[begin:], 0.0))
     lines: list[RepeatabilityJson] = []
@@ -216,11 +216,11 @@ def _held_out(data: FitData, preset: Preset) -> tuple[list[HeldOutRecording], di
     of, lines = np.asarray(data.channels["recording"]), []
     pooled: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
     for number, left_out in of_each_recording(data).items():
-        seen = data.take(of != number)
+        data_used = data.take(of != number)
         try:
-            model, rows = preset.build(seen)
-            require_enough_data(seen.take(rows), model)
-            fitted = FittedModel(model, solve_axes(seen.take(rows), model).fits)
+            model, rows = preset.build(data_used)
+            require_enough_data(data_used.take(rows), model)
+            fitted = FittedModel(model, solve_axes(data_used.take(rows), model).fits)
             errors = residuals(fitted, left_out, fit_turning(fitted, left_out))
         except (NotEnoughData, NotConverged) as error:
             lines.append(HeldOutRecording(recording=number, rms_dps=None, why=str(error)))

@@ -28,16 +28,18 @@ def of_poses(recording: Recording, model: str | None, effects: list[str]) -> Fit
             f"{serial}: a recording of poses shows the direction of gravity before and after each turn, not the rate "
             f"during the turn; fit it with --model {POSES} and without added effects"
         )
-    found = fit_poses(recording)
-    error = ErrorFigures(found.raw_rms_dps, found.rms_dps, found.heldout_rms_dps, found.noise_floor_dps, FLOOR_SOURCE)
+    poses_fit = fit_poses(recording)
+    error = ErrorFigures(
+        poses_fit.raw_rms_dps, poses_fit.rms_dps, poses_fit.heldout_rms_dps, poses_fit.noise_floor_dps, FLOOR_SOURCE
+    )
     return FitResult(
-        found.fitted,
+        poses_fit.fitted,
         error,
-        found.temperature_c,
-        found.rate_dps,
-        {axis: _noise_json(solution) for axis, solution in found.solutions.items()},
+        poses_fit.temperature_c,
+        poses_fit.rate_dps,
+        {axis: _noise_json(solution) for axis, solution in poses_fit.solutions.items()},
         _environment(recording),
-        poses=found.poses,
+        poses=poses_fit.poses,
     )
 
 

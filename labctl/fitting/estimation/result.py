@@ -54,7 +54,7 @@ class FitResult:
         """Return what `labctl fit --json` gives of the model, besides serial and version."""
         model = self.fitted.model
         whole = model.to_dict()
-        found: FitResultJson = {
+        result_json: FitResultJson = {
             "model": {
                 "name": model.name,
                 "effects": model.effect_ids,
@@ -71,14 +71,14 @@ class FitResult:
             "reference_temperature_c": model.reference.temperature_c,
         }
         if "held" in whole:
-            found["model"]["held"] = whole["held"]
+            result_json["model"]["held"] = whole["held"]
         if self.shapes:
-            found["shapes"] = dict(self.shapes)
+            result_json["shapes"] = dict(self.shapes)
         if self.poses is not None:
-            found["poses"] = self.poses
+            result_json["poses"] = self.poses
         if self.joint is not None:
-            found["joint"] = self.joint
-        return found
+            result_json["joint"] = self.joint
+        return result_json
 
 
 def coefficients_json(model: ErrorModel, fit: AxisFit) -> Coefficients:

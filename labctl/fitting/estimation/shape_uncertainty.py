@@ -56,13 +56,13 @@ def shapes_of(
         ))  # fmt: skip
         information += rows.T @ rows
     u_log = _u(information)
-    found: dict[str, dict[str, Coefficient]] = {}
+    by_axis: dict[str, dict[str, Coefficient]] = {}
     for each, u in zip(moved, u_log.tolist(), strict=True):
         value = each.term.parameters[each.name]
-        found.setdefault(each.term.effect, {})[each.name] = {
+        by_axis.setdefault(each.term.effect, {})[each.name] = {
             "value": value, "u": value * u if np.isfinite(u) else None, "unit": each.unit,
         }  # fmt: skip
-    return found
+    return by_axis
 
 
 def _slope_dps(data: FitData, fitted: FittedModel, axis: str, moved: _Moved) -> Array:
@@ -71,7 +71,7 @@ def _slope_dps(data: FitData, fitted: FittedModel, axis: str, moved: _Moved) -> 
     for sign in (1.0, -1.0):
         value = moved.term.parameters[moved.name] * float(np.exp(sign * STEP))
         term = replace(moved.term, parameters={**moved.term.parameters, moved.name: value})
-        terms = tuple(term if known is moved.term else known for known in fitted.model.terms)
+        terms = tuple(term if own_term is moved.term else own_term for own_term in fitted.model.terms)
         model = FittedModel(fitted.model.with_terms(terms), fitted.axes)
         ends.append(model.error_dps(data.seen_by(fitted.model.argument), axis))
     return np.asarray((ends[0] - ends[1]) / (2 * STEP))
@@ -87,18 +87,18 @@ def _beside_base(
     rows = whitened(scatter, [solution.drift], white, np.column_stack([base, slopes]))[0][0]
     own, moved = rows[:, : base.shape[1]], rows[:, base.shape[1] :]
     size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
-    taken, *_ = np.linalg.lstsq(own / size, moved, rcond=1e-9)
-    left = moved - own / size @ taken
+    coordinates, *_ = np.linalg.lstsq(own / size, moved, rcond=1e-9)
+    residual = moved - own / size @ coordinates
     noise = float(np.sqrt(solution.scale)) if np.isfinite(solution.scale) else np.inf
-    return np.asarray(left / max(noise, 1e-300))
+    return np.asarray(residual / max(noise, 1e-300))
 
 
 def _u(information: NDArray[np.float64]) -> Array:
     """Return standard uncertainties from an information matrix (k, k); infinite where it has none."""
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    seen = size > LEAST
-    found = np.full(len(size), np.inf)
-    if seen.any():
-        scaled = information[np.ix_(seen, seen)] / np.outer(size[seen], size[seen])
-        found[seen] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(scaled, rcond=1e-10)), 0.0)) / size[seen]
-    return found
+    is_seen = size > LEAST
+    u = np.full(len(size), np.inf)
+    if is_seen.any():
+        scaled = information[np.ix_(is_seen, is_seen)] / np.outer(size[is_seen], size[is_seen])
+        u[is_seen] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(scaled, rcond=1e-10)), 0.0)) / size[is_seen]
+    return u

@@ -30,7 +30,11 @@ TOLERANCE, EVALUATIONS = 0.005, 60
 
 def quantities(kind: Effect) -> list[Parameter]:
     """Return the parameters that are found from the data: of an effect of the bias, and of one that remembers."""
-    return [each for each in kind.parameters if each.logarithmic] if kind.shows_at_rest or kind.remembers else []
+    return (
+        [parameter for parameter in kind.parameters if parameter.logarithmic]
+        if kind.shows_at_rest or kind.remembers
+        else []
+    )
 
 
 def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> Preset:
@@ -53,16 +57,16 @@ def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> 
         return preset
 
     def build(some: FitData) -> tuple[ErrorModel, Rows]:
-        made, rows = preset.build(some)
-        terms = (replace(t, parameters=shapes[t.effect].parameters) if t.effect in shapes else t for t in made.terms)
-        return made.with_terms(tuple(terms)), rows
+        built, rows = preset.build(some)
+        terms = (replace(t, parameters=shapes[t.effect].parameters) if t.effect in shapes else t for t in built.terms)
+        return built.with_terms(tuple(terms)), rows
 
     return Preset(preset.name, build, preset.inner_only)
 
 
-def _with_structure(data: FitData, model: ErrorModel, found: Sequence[Term]) -> Sequence[Term]:
+def _with_structure(data: FitData, model: ErrorModel, thermal_terms: Sequence[Term]) -> Sequence[Term]:
     """Return terms in their best shapes with the heat flows of the lags among them that the recording shows."""
-    shaped = {term.effect: term for term in found}
+    shaped = {term.effect: term for term in thermal_terms}
     lags = [lag.effect for lag in lags_of(model) if lag.effect in shaped and lag.effect not in model.held.effects]
     flows: list[str] = []
     for effect in lags:
@@ -93,10 +97,12 @@ def _found(data: FitData, model: ErrorModel, effects: Sequence[str]) -> list[Ter
         return [terms[name] for name in effects]
 
     def at(logarithms: Array) -> dict[str, Term]:
-        made = dict(terms)
+        shaped = dict(terms)
         for (name, parameter), value in zip(free, logarithms.tolist(), strict=True):
-            made[name] = replace(made[name], parameters={**made[name].parameters, parameter.name: float(np.exp(value))})
-        return made
+            shaped[name] = replace(
+                shaped[name], parameters={**shaped[name].parameters, parameter.name: float(np.exp(value))}
+            )
+        return shaped
 
     from scipy.optimize import minimize
 
@@ -106,8 +112,8 @@ def _found(data: FitData, model: ErrorModel, effects: Sequence[str]) -> list[Ter
         lambda x: search.left(at(x)), np.clip(begin, *np.array(bounds).T), method="Nelder-Mead", bounds=bounds,
         options={"xatol": TOLERANCE, "fatol": 0.01, "maxfev": EVALUATIONS * len(free)},
     )  # fmt: skip
-    made = at(np.asarray(best.x)) if best.fun < search.left(terms) else terms
-    return [made[name] for name in effects]
+    terms_found = at(np.asarray(best.x)) if best.fun < search.left(terms) else terms
+    return [terms_found[name] for name in effects]
 
 
 @dataclass(frozen=True)
@@ -129,6 +135,6 @@ class _Search:
             drift = self.data.noise_floor.axes[axis].drift
             rows = whitened(scatter, [drift], white, np.column_stack([design.columns, y]))[0][0]
             size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
-            taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
-            total += float(np.sum((rows[:, -1] - rows[:, :-1] / size @ taken) ** 2))
+            coordinates, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
+            total += float(np.sum((rows[:, -1] - rows[:, :-1] / size @ coordinates) ** 2))
         return total

@@ -40,9 +40,9 @@ def suggested_model(points: Recording) -> str:
 def _is_determined(data: FitData, name: str) -> bool:
     try:
         model, rows = preset_for(name, []).build(data)
-        used = data.take(rows)
-        require_enough_data(used, model)
-        designs = [axis_design(used, model, axis).columns for axis in used.outputs]
+        training = data.take(rows)
+        require_enough_data(training, model)
+        designs = [axis_design(training, model, axis).columns for axis in training.outputs]
     except NotEnoughData:
         return False
     return all(0 < rank_of(columns) == columns.shape[1] < len(columns) for columns in designs)

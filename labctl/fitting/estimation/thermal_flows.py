@@ -114,80 +114,80 @@ class LeftOut:
 class Axis:
     """One axis: the columns of the other effects, those of every time constant, and what is to be explained."""
 
-    def __init__(self, data: FitData, rest: ErrorModel, name: str, kind: Lag | None = None) -> None:
+    def __init__(self, data: FitData, base_model: ErrorModel, name: str, kind: Lag | None = None) -> None:
         self.data, self.name = data, name
         self.factor = (kind or ThermalLag()).factor(data.channels, name)
-        design = axis_design(data, rest, name)
+        design = axis_design(data, base_model, name)
         self.base = design.columns
         self.y = data.outputs[name] - data.true_rate_dps(name) - design.offset_dps
-        self.above_k = data.channels.temperature_c(name) - rest.reference.temperature_c
+        self.above_k = data.channels.temperature_c(name) - base_model.reference.temperature_c
         self._folds: dict[bytes, Projected] = {}
 
     @cached_property
     def lags(self) -> NDArray[np.float64]:
         """The columns of every time constant of the grid (m, .): of each part in turn, then of pairs of them."""
         behind = [self._behind_k(float(tau_s)) for tau_s in GRID_S]
-        made = [LagElement("", "", part, 0.0).values(lag, self.above_k) for part in PARTS for lag in behind]
+        lag_columns = [LagElement("", "", part, 0.0).values(lag, self.above_k) for part in PARTS for lag in behind]
         channels, (warming, cooling) = self.data.channels, GRID_S[PAIRS.T]
         both = channels.history.lags_two_ways_k(channels.columns, warming, cooling)
-        return np.column_stack([*made, both]) * self.factor[:, None]
+        return np.column_stack([*lag_columns, both]) * self.factor[:, None]
 
     def _behind_k(self, tau_s: float, cooling_tau_s: float | None = None) -> Array:
         return self.data.channels.history.lag_k(self.data.channels.columns, tau_s, cooling_tau_s)
 
     def columns(self, structure: Structure, taus_s: Mapping[str, float]) -> NDArray[np.float64]:
         """Return the columns (m, k) of a structure at time constants, s."""
-        made = (
+        elements = (
             LagElement("", "", part, 0.0).values(self._behind_k(taus_s[name], taus_s.get("cooling_tau")), self.above_k)
             for name, part in structure.columns
         )
-        return np.column_stack([np.zeros((len(self.y), 0)), *made]) * self.factor[:, None]
+        return np.column_stack([np.zeros((len(self.y), 0)), *elements]) * self.factor[:, None]
 
-    def projected(self, seen: NDArray[np.bool_]) -> Projected:
+    def projected(self, in_fit: NDArray[np.bool_]) -> Projected:
         """Return the time constants' columns beside the base, over the noise, of the data sets of a mask."""
-        key = seen.tobytes()
+        key = in_fit.tobytes()
         if key not in self._folds:
-            self._folds[key] = Projected(self, seen)
+            self._folds[key] = Projected(self, in_fit)
         return self._folds[key]
 
-    def over_noise(self, values: NDArray[np.float64], seen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def over_noise(self, values: NDArray[np.float64], in_fit: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return columns (m, k) of the data sets of a mask, whitened at the drift of the noise floor."""
-        scatter = self.data.take(seen).scatter(self.name)
-        white = scatter.white_var if scatter.white_var is not None else np.ones(int(seen.sum()))
-        return whitened(scatter, [self.data.noise_floor.axes[self.name].drift], white, values[seen])[0][0]
+        scatter = self.data.take(in_fit).scatter(self.name)
+        white = scatter.white_var if scatter.white_var is not None else np.ones(int(in_fit.sum()))
+        return whitened(scatter, [self.data.noise_floor.axes[self.name].drift], white, values[in_fit])[0][0]
 
-    def left_over_noise(self, added: NDArray[np.float64], seen: NDArray[np.bool_]) -> Array:
+    def left_over_noise(self, added: NDArray[np.float64], in_fit: NDArray[np.bool_]) -> Array:
         """Return what a fit of base and added columns (m, k) leaves of the data sets of a mask, whitened."""
-        rows = self.over_noise(np.column_stack([self.base, added, self.y]), seen)
+        rows = self.over_noise(np.column_stack([self.base, added, self.y]), in_fit)
         size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
-        return np.asarray(rows[:, -1] - rows[:, :-1] / size @ taken)
+        coordinates, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
+        return np.asarray(rows[:, -1] - rows[:, :-1] / size @ coordinates)
 
-    def errors(self, added: NDArray[np.float64], seen: NDArray[np.bool_], tested: NDArray[np.bool_]) -> Array:
+    def errors(self, added: NDArray[np.float64], in_fit: NDArray[np.bool_], tested: NDArray[np.bool_]) -> Array:
         """Return what a fit of base and added columns (m, k) to some data sets leaves of others, deg/s."""
         whole = np.concatenate([self.base, added], axis=1)
-        rows = self.over_noise(np.column_stack([whole, self.y]), seen)
+        rows = self.over_noise(np.column_stack([whole, self.y]), in_fit)
         size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
-        return np.asarray(self.y[tested] - whole[tested] @ (taken / size))
+        coordinates, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
+        return np.asarray(self.y[tested] - whole[tested] @ (coordinates / size))
 
 
 class Projected:
     """Normal equations of the time constants' columns of one axis, beside its base."""
 
-    def __init__(self, axis: Axis, seen: NDArray[np.bool_]) -> None:
-        rows = axis.over_noise(np.column_stack([axis.base, axis.lags, axis.y]), seen)
-        base, rest = rows[:, : axis.base.shape[1]], rows[:, axis.base.shape[1] :]
-        whole = (rest**2).sum(axis=0)
+    def __init__(self, axis: Axis, in_fit: NDArray[np.bool_]) -> None:
+        rows = axis.over_noise(np.column_stack([axis.base, axis.lags, axis.y]), in_fit)
+        base, other_columns = rows[:, : axis.base.shape[1]], rows[:, axis.base.shape[1] :]
+        whole = (other_columns**2).sum(axis=0)
         if base.shape[1]:
             directions, sizes, _ = np.linalg.svd(
                 base / np.maximum(np.linalg.norm(base, axis=0), 1e-300), full_matrices=False
             )
             directions = directions[:, sizes > 1e-9 * sizes[0]]
-            rest = rest - directions @ (directions.T @ rest)
-        alone = rest[:, : len(PARTS) * len(GRID_S)]  # columns that are also tried in twos
-        self._gram, self._pull = alone.T @ alone, rest[:, :-1].T @ rest[:, -1]
-        size = (rest[:, :-1] ** 2).sum(axis=0)
+            other_columns = other_columns - directions @ (directions.T @ other_columns)
+        alone = other_columns[:, : len(PARTS) * len(GRID_S)]  # columns that are also tried in twos
+        self._gram, self._pull = alone.T @ alone, other_columns[:, :-1].T @ other_columns[:, -1]
+        size = (other_columns[:, :-1] ** 2).sum(axis=0)
         self._kept = size > LEAST_LEFT * np.maximum(whole[:-1], 1e-300)
         self._single = self._pull**2 / np.where(self._kept, size, np.inf)
 
@@ -197,10 +197,10 @@ class Projected:
             return self._single[columns[:, 0]]
         i, j = columns.T
         a, b, c = self._gram[i, i], self._gram[j, j], self._gram[i, j]
-        left = a * b - c**2
-        good = self._kept[i] & self._kept[j] & (left > LEAST_LEFT * a * b)
+        determinant = a * b - c**2
+        good = self._kept[i] & self._kept[j] & (determinant > LEAST_LEFT * a * b)
         both = b * self._pull[i] ** 2 - 2 * c * self._pull[i] * self._pull[j] + a * self._pull[j] ** 2
-        return np.where(good, both / np.where(good, left, 1.0), np.maximum(self._single[i], self._single[j]))
+        return np.where(good, both / np.where(good, determinant, 1.0), np.maximum(self._single[i], self._single[j]))
 
 
 def _choices(structure: Structure) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -216,44 +216,44 @@ def _choices(structure: Structure) -> tuple[NDArray[np.int64], NDArray[np.int64]
         at = np.repeat(places, len(structure.columns), axis=1)
     else:
         first, second = np.indices((n, n)).reshape(2, -1)
-        kept = second >= first + APART
-        places = at = np.column_stack([first[kept], second[kept]])
+        is_apart = second >= first + APART
+        places = at = np.column_stack([first[is_apart], second[is_apart]])
     offsets = np.array([PARTS.index(part) * n for _, part in structure.columns])
     return at + offsets, places
 
 
-def best_taus(axes: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_], steps: int = FEW_STEPS) -> Taus:
+def best_taus(axes: Sequence[Axis], structure: Structure, in_fit: NDArray[np.bool_], steps: int = FEW_STEPS) -> Taus:
     """Return axis -> name -> time constant, s, for the data sets of a mask: the grid's best, and steps from there."""
     if not structure.columns:
         return {axis.name: {} for axis in axes}
     columns, places = _choices(structure)
-    gains = [axis.projected(seen).gains(columns) for axis in axes]
+    gains = [axis.projected(in_fit).gains(columns) for axis in axes]
     groups = [([axis], gain) for axis, gain in zip(axes, gains, strict=True)]
     if not structure.per_axis:
         groups = [(list(axes), np.sum(gains, axis=0))]
-    found: dict[str, Mapping[str, float]] = {}
+    tau_by_axis: dict[str, Mapping[str, float]] = {}
     for group, gain in groups:
         begin = np.log(GRID_S[places[int(np.argmax(gain))]])
-        logarithms = refined(partial(moved_around, group, structure, seen), begin, LOG_BOUNDS, steps)
-        found |= {axis.name: structure.taus_s(logarithms) for axis in group}
-    return found
+        logarithms = refined(partial(moved_around, group, structure, in_fit), begin, LOG_BOUNDS, steps)
+        tau_by_axis |= {axis.name: structure.taus_s(logarithms) for axis in group}
+    return tau_by_axis
 
 
 def moved_around(
-    group: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_], logarithms: Array
+    group: Sequence[Axis], structure: Structure, in_fit: NDArray[np.bool_], logarithms: Array
 ) -> list[Local]:
     """Return what is left of each axis at logarithms of time constants, and what each of them moves."""
     taus_s = structure.taus_s(logarithms)
-    found = []
+    neighbours = []
     for axis in group:
         own = axis.columns(structure, taus_s)
         moved = [
             (axis.columns(structure, {**taus_s, name: taus_s[name] * np.exp(STEP)}) - own) / STEP
             for name in structure.constants
         ]
-        rows = axis.over_noise(np.column_stack([axis.base, own, *moved, axis.y]), seen)
-        found.append(Local(rows, axis.base.shape[1], own.shape[1]))
-    return found
+        rows = axis.over_noise(np.column_stack([axis.base, own, *moved, axis.y]), in_fit)
+        neighbours.append(Local(rows, axis.base.shape[1], own.shape[1]))
+    return neighbours
 
 
 def left_out_by(
@@ -265,21 +265,21 @@ def left_out_by(
 
 def errors_of(axes: Sequence[Axis], structure: Structure, stretches: Sequence[Stretch]) -> Errors:
     """Return the same, axis by axis and stretch by stretch."""
-    found = []
-    for seen, tested in stretches:
-        taus_s = best_taus(axes, structure, seen)
-        found += [
-            (axis, tested, axis.errors(axis.columns(structure, taus_s[axis.name]), seen, tested)) for axis in axes
+    error_list = []
+    for in_fit, tested in stretches:
+        taus_s = best_taus(axes, structure, in_fit)
+        error_list += [
+            (axis, tested, axis.errors(axis.columns(structure, taus_s[axis.name]), in_fit, tested)) for axis in axes
         ]
-    return found
+    return error_list
 
 
 def pooled(errors: Errors) -> LeftOut:
     """Return the errors of stretches together: of an axis, the data sets that were tested, and their errors, deg/s."""
     chi2 = 0.0
-    for axis, tested, found in errors:
+    for axis, tested, axis_errors in errors:
         whole = np.zeros(len(tested))
-        whole[tested] = found
+        whole[tested] = axis_errors
         chi2 += float(np.sum(axis.over_noise(whole[:, None], tested) ** 2))
-    every = np.concatenate([found for *_, found in errors])
+    every = np.concatenate([axis_errors for *_, axis_errors in errors])
     return LeftOut(float(np.sqrt(np.mean(every**2))), chi2, len(every))

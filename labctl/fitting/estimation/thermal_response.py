@@ -67,22 +67,22 @@ def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalRes
     kind = kind_of(term)
     if not stretches or not isinstance(kind, Lag) or data.channels.missing(kind.channels):
         return None
-    rest = model.with_terms(tuple(t for t in model.terms if t.effect != term.effect))
-    axes = [Axis(data, rest, axis, kind) for axis in data.outputs]
+    model_left = model.with_terms(tuple(t for t in model.terms if t.effect != term.effect))
+    axes = [Axis(data, model_left, axis, kind) for axis in data.outputs]
     tried = [structure for structure in STRUCTURES if structure.id != "per_axis" or len(axes) > 1]
     errors = {structure.id: errors_of(axes, structure, stretches) for structure in (NONE, *tried)}
-    held_out = {name: pooled(found) for name, found in errors.items()}
+    held_out = {name: pooled(axis_errors) for name, axis_errors in errors.items()}
     every = np.ones(len(data), dtype=bool)
-    chosen, found = _told_apart(axes, tried, held_out, every)
+    chosen, axis_errors = _told_apart(axes, tried, held_out, every)
     structures = dict.fromkeys((axis.name for axis in axes), chosen)
     if len(axes) > 1:
         own = [_of_axis(axis, errors, stretches, every) for axis in axes]
         held_out[BY_AXIS] = pooled([each for part in own for each in part.errors])
         if len({part.structure.id for part in own}) > 1 and held_out[BY_AXIS].is_below(held_out[chosen.id]):
             structures = {part.name: part.structure for part in own}
-            found = {part.name: part.taus_s for part in own}
+            axis_errors = {part.name: part.taus_s for part in own}
             chosen = _by_axis(structures)
-    return ThermalResponse(_term_of(axes, term, structures, found), chosen, held_out)
+    return ThermalResponse(_term_of(axes, term, structures, axis_errors), chosen, held_out)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class _OfAxis:
 
 
 def _of_axis(
-    axis: Axis, errors: Mapping[str, Errors], stretches: Sequence[Stretch], every: NDArray[np.bool_]
+    axis: Axis, errors: Mapping[str, Errors], stretches: Sequence[Stretch], all_rows: NDArray[np.bool_]
 ) -> _OfAxis:
     """Return the structure of one axis by what was left out of it; of what each axis has by itself that is known."""
     tried, own = [], {}
@@ -104,51 +104,51 @@ def _of_axis(
         if structure is STRUCTURES[0]:  # on one axis the same as a time constant on each
             continue
         of_axis = structure.of_axis()
-        known = [each for each in errors.get(structure.id, ()) if each[0] is axis]
+        axis_errors = [each for each in errors.get(structure.id, ()) if each[0] is axis]
         tried.append(of_axis)
-        own[of_axis.id] = known if structure.per_axis else errors_of([axis], of_axis, stretches)
-    held_out = {name: pooled(left) for name, left in own.items()}
+        own[of_axis.id] = axis_errors if structure.per_axis else errors_of([axis], of_axis, stretches)
+    held_out = {name: pooled(axis_terms) for name, axis_terms in own.items()}
     while True:
-        structure, found = _told_apart([axis], tried, held_out, every)
-        taus_s = found[axis.name]
-        if structure is tried[0] or _is_seen(axis, structure, taus_s, tried[0], every):
+        structure, structure_errors = _told_apart([axis], tried, held_out, all_rows)
+        taus_s = structure_errors[axis.name]
+        if structure is tried[0] or _is_seen(axis, structure, taus_s, tried[0], all_rows):
             return _OfAxis(axis.name, structure, taus_s, own[structure.id])
         tried.remove(structure)
 
 
 def _is_seen(
-    axis: Axis, structure: Structure, taus_s: Mapping[str, float], simplest: Structure, every: NDArray[np.bool_]
+    axis: Axis, structure: Structure, taus_s: Mapping[str, float], simplest: Structure, all_rows: NDArray[np.bool_]
 ) -> bool:
     """Return whether a structure also leaves clearly less of all data of one axis than the simplest.
 
     Few stretches are left out of one axis, and the errors within one are those of one extrapolation: chance.
     """
-    simple_s = best_taus([axis], simplest, every, MOST_STEPS)[axis.name]
-    left, simple = (
-        float(np.sum(axis.left_over_noise(axis.columns(each, taus), every) ** 2))
+    simple_s = best_taus([axis], simplest, all_rows, MOST_STEPS)[axis.name]
+    full_chi2, simple = (
+        float(np.sum(axis.left_over_noise(axis.columns(each, taus), all_rows) ** 2))
         for each, taus in ((structure, taus_s), (simplest, simple_s))
     )
     more = structure.coefficients(1) - simplest.coefficients(1)
-    return simple - left > SEEN * max(more, 1) * max(left / len(every), 1.0)
+    return simple - full_chi2 > SEEN * max(more, 1) * max(full_chi2 / len(all_rows), 1.0)
 
 
 def _by_axis(structures: Mapping[str, Structure]) -> Structure:
     """Return what stands for structures that differ from axis to axis, in words and in what was not looked for."""
-    said = "; ".join(f"on {axis} {structure.sentence}" for axis, structure in structures.items())
+    sentence = "; ".join(f"on {axis} {structure.sentence}" for axis, structure in structures.items())
     fixed = {f"{name}_{axis}": tau_s for axis, each in structures.items() for name, tau_s in each.fixed.items()}
-    return Structure(BY_AXIS, said, fixed=fixed)
+    return Structure(BY_AXIS, sentence, fixed=fixed)
 
 
 def _told_apart(
-    axes: Sequence[Axis], structures: Sequence[Structure], held_out: Mapping[str, LeftOut], every: NDArray[np.bool_]
+    axes: Sequence[Axis], structures: Sequence[Structure], held_out: Mapping[str, LeftOut], all_rows: NDArray[np.bool_]
 ) -> tuple[Structure, Taus]:
     """Return the structure chosen, and its time constants, among those whose time constants are not the same."""
     tried = list(structures)
     while True:
         chosen = _chosen(tried, held_out)
-        found = best_taus(axes, chosen, every, MOST_STEPS)
-        if are_told_apart(axes, chosen, found, every):
-            return chosen, found
+        taus = best_taus(axes, chosen, all_rows, MOST_STEPS)
+        if are_told_apart(axes, chosen, taus, all_rows):
+            return chosen, taus
         tried.remove(chosen)
 
 
@@ -161,23 +161,23 @@ def _chosen(tried: Sequence[Structure], held_out: Mapping[str, LeftOut]) -> Stru
     return chosen
 
 
-def are_told_apart(axes: Sequence[Axis], structure: Structure, found: Taus, seen: NDArray[np.bool_]) -> bool:
+def are_told_apart(axes: Sequence[Axis], structure: Structure, taus: Taus, in_fit: NDArray[np.bool_]) -> bool:
     """Return whether the two time constants of a structure are not one and the same.
 
     Those of two flows on each axis: nearer ones are one flow. Those of warming and cooling on one axis at least, beyond
     `TOLD_APART` standard uncertainties of their ratio.
     """
     if structure.two_ways:
-        return any(_ways_differ(axis, structure, found[axis.name], seen) for axis in axes)
+        return any(_ways_differ(axis, structure, taus[axis.name], in_fit) for axis in axes)
     least = GRID_S[APART] / GRID_S[0]
-    both = [(taus_s["tau"], taus_s["second_tau"]) for taus_s in found.values() if "second_tau" in taus_s]
+    both = [(taus_s["tau"], taus_s["second_tau"]) for taus_s in taus.values() if "second_tau" in taus_s]
     return all(max(pair) >= least * min(pair) for pair in both)
 
 
-def _ways_differ(axis: Axis, structure: Structure, taus_s: Mapping[str, float], seen: NDArray[np.bool_]) -> bool:
+def _ways_differ(axis: Axis, structure: Structure, taus_s: Mapping[str, float], in_fit: NDArray[np.bool_]) -> bool:
     """Return whether warming and cooling have different time constants, by the curvature of what is left."""
     logarithms = np.log([taus_s[name] for name in structure.constants])
-    (part,) = moved_around([axis], structure, seen, logarithms)
+    (part,) = moved_around([axis], structure, in_fit, logarithms)
     freedom = max(len(part.residual) - axis.base.shape[1] - len(structure.columns) - len(logarithms), 1)
     information = part.slopes.T @ part.slopes / (part.chi2 / freedom)
     if np.linalg.cond(information) > MOST_CONDITION:
@@ -207,14 +207,14 @@ def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool
         others = {_rises(data, other) for other in whole if other is not part}
         pieces = np.array_split(np.flatnonzero(part), 1 if len(others) == 2 else 2)
         parts += [np.isin(np.arange(len(data)), piece) for piece in pieces]
-    found = []
+    stretches = []
     for part in parts:
-        seen, warm = ~part, data.temperature_c
-        low, high = float(warm[seen].min()) - BEYOND_K, float(warm[seen].max()) + BEYOND_K
-        tested = part & (warm >= low) & (warm <= high)
+        in_fit, temperature_c = ~part, data.temperature_c
+        low, high = float(temperature_c[in_fit].min()) - BEYOND_K, float(temperature_c[in_fit].max()) + BEYOND_K
+        tested = part & (temperature_c >= low) & (temperature_c <= high)
         if tested.sum() >= LEAST_SETS:
-            found.append((seen, tested))
-    return found if len(found) > 1 else []
+            stretches.append((in_fit, tested))
+    return stretches if len(stretches) > 1 else []
 
 
 def _rises(data: FitData, leg: NDArray[np.bool_]) -> bool:
@@ -223,17 +223,17 @@ def _rises(data: FitData, leg: NDArray[np.bool_]) -> bool:
     return bool(np.mean(second) > np.mean(first))
 
 
-def _term_of(axes: Sequence[Axis], term: Term, structures: Mapping[str, Structure], found: Taus) -> Term:
+def _term_of(axes: Sequence[Axis], term: Term, structures: Mapping[str, Structure], taus: Taus) -> Term:
     """Return the term with the time constants of the axes' structures, those of each axis or of all."""
     named = {name: value for name, value in term.parameters.items() if not name.endswith("_s")}
-    kept = {name: value for name, value in named.items() if not name.startswith("curved")}
+    parameters = {name: value for name, value in named.items() if not name.startswith("curved")}
     curved = [axis for axis, each in structures.items() if any(part == "curved" for _, part in each.columns)]
-    kept |= {"curved": 1.0} if len(curved) == len(axes) else {f"curved_{axis}": 1.0 for axis in curved}
+    parameters |= {"curved": 1.0} if len(curved) == len(axes) else {f"curved_{axis}": 1.0 for axis in curved}
     apart = any(structure.per_axis for structure in structures.values()) and len(axes) > 1
     for axis in axes if apart else axes[:1]:
         of_axis = f"_{axis.name}" if apart else ""
-        kept |= {f"{name}{of_axis}_s": value for name, value in found[axis.name].items()}
-    return replace(term, parameters=kept)
+        parameters |= {f"{name}{of_axis}_s": value for name, value in taus[axis.name].items()}
+    return replace(term, parameters=parameters)
 
 
 def lags_of(model: ErrorModel) -> list[Term]:

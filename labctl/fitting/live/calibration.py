@@ -56,24 +56,24 @@ class ReadingBuffer:
         Data set 1 is all of it.
         """
         n = len(columns["t_s"]) if "t_s" in columns else 0
-        given = {"dataset": np.ones(n, dtype=np.int64), **columns}
+        extended = {"dataset": np.ones(n, dtype=np.int64), **columns}
         serial = self._info.serial
         if not self._columns:
-            if absent := [name for name in needed(self._info) if name not in given]:
+            if absent := [name for name in needed(self._info) if name not in extended]:
                 raise BadInput(
                     f"{serial}: the stream has no {', '.join(absent)}; add rates and specific forces of all three axes"
                 )
-            self._columns = {name: np.zeros(FIRST, dtype=_type(name)) for name in given}
-        if set(given) != set(self._columns) or any(len(values) != n for values in given.values()):
+            self._columns = {name: np.zeros(FIRST, dtype=_type(name)) for name in extended}
+        if set(extended) != set(self._columns) or any(len(values) != n for values in extended.values()):
             raise BadInput(f"{serial}: a block has other columns than those before it; send the same columns each time")
         if n == 0:
             return
-        times = np.asarray(given["t_s"], dtype=np.float64)
+        times = np.asarray(extended["t_s"], dtype=np.float64)
         last = float(np.asarray(self._columns["t_s"])[self._n - 1]) if self._n else -np.inf
         if not np.all(np.diff(np.concatenate([[last], times])) > 0):
             raise BadInput(f"{serial}: t_s does not rise after {max(last, 0.0):.6f} s; send readings in order of time")
         self._grow(self._n + n)
-        for name, values in given.items():
+        for name, values in extended.items():
             self._columns[name][self._n : self._n + n] = values
         self._n += n
 
@@ -106,22 +106,22 @@ GOOD_TURN_DEG = (60.0, 150.0)
 OTHER_TURN = 0.3
 
 
-def next_pose(covered: tuple[bool, ...], wanted: int, here: Array | None, needs: Array) -> Direction:
+def next_pose(covered: tuple[bool, ...], poses: int, direction: Array | None, needs: Array) -> Direction:
     """Return the pose to ask for; `covered` says of each of DIRECTIONS whether a rest covers it.
 
-    `here` (3,) is gravity's direction in the last rest, None before the first; `needs` (3,) how much a turn about each
-    body axis would add. While some of the first `wanted` poses are missing it is one of them, else any.
+    `direction` (3,) is gravity's direction in the last rest, None before the first; `needs` (3,) how much a turn about
+    each body axis would add. While some of the first `poses` poses are missing it is one of them, else any.
     """
-    missing = [place for place in range(wanted) if not covered[place]]
+    missing = [place for place in range(poses) if not covered[place]]
     places = missing or list(range(len(DIRECTIONS)))
-    if here is None:
+    if direction is None:
         return DIRECTIONS[places[0]]
-    worth = [_worth(here, np.array(DIRECTIONS[place].up), needs) for place in places]
+    worth = [_worth(direction, np.array(DIRECTIONS[place].up), needs) for place in places]
     return DIRECTIONS[places[int(np.argmax(worth))]]
 
 
-def _worth(here: Array, there: Array, needs: Array) -> float:
-    axis, angle_deg = turn_between(here, there)
+def _worth(direction: Array, candidate: Array, needs: Array) -> float:
+    axis, angle_deg = turn_between(direction, candidate)
     shared = float(np.sum(axis**2 * needs))
     low, high = GOOD_TURN_DEG
     return shared * (1.0 if low <= angle_deg <= high else OTHER_TURN) * min(angle_deg, 90.0)
@@ -206,13 +206,13 @@ class LiveCalibration:
         try:
             readings = readings_of(recording)
             up = _up(readings)
-            found = self._rests(readings)
-            why = ""
+            rests = self._rests(readings)
+            reason = ""
         except NotEnoughData as error:
-            found, why = _Rests(np.zeros((0, 3)), 0, 0.0), self._plain(error)
-        if not why and (len(found.up) != self._fitted[0] or finally_):
-            self._fitted = (len(found.up), *self._fit(recording))
-        return self._state(recording, found, why, up)
+            rests, reason = _Rests(np.zeros((0, 3)), 0, 0.0), self._plain(error)
+        if not reason and (len(rests.up) != self._fitted[0] or finally_):
+            self._fitted = (len(rests.up), *self._fit(recording))
+        return self._state(recording, rests, reason, up)
 
     def _rests(self, readings: PoseReadings) -> _Rests:
         rests = find_rests(readings)
@@ -238,23 +238,26 @@ class LiveCalibration:
     def _plain(self, error: Exception) -> str:
         return str(error).removeprefix(f"{self.info.serial}: ")
 
-    def _state(self, recording: Recording, found: _Rests, why: str, up: tuple[float, float, float] | None) -> LiveState:
+    def _state(
+        self, recording: Recording, rests: _Rests, reason: str, up: tuple[float, float, float] | None
+    ) -> LiveState:
         target, (_, result, refused) = self.target, self._fitted
-        covers = covered(found.up)
+        covers = covered(rests.up)
         coefficients = () if result is None else tuple(coefficients_of(result, target))
         turns = 0 if result is None or result.poses is None else result.poses["moves"]["used"]
         absent = [each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if not has]
-        missing = [text for text in (_poses_text(absent, target), why or (refused if len(found.up) else "")) if text]
+        missing = [text for text in (_poses_text(absent, target), reason or (refused if len(rests.up) else "")) if text]
         missing += [
-            f"U of {each.name} of {each.axis} is {each.expanded:.2g}, above its limit of {each.limit:g} ({each.unit})"
-            for each in coefficients
-            if not each.is_met
+            f"U of {coefficient.name} of {coefficient.axis} is {coefficient.expanded:.2g}, above its limit of "
+            f"{coefficient.limit:g} ({coefficient.unit})"
+            for coefficient in coefficients
+            if not coefficient.is_met
         ]
-        request = PoseRequest(self._pose(found.up, covers, coefficients), target.rest_s) if missing else None
+        request = PoseRequest(self._pose(rests.up, covers, coefficients), target.rest_s) if missing else None
         t_s = recording.columns["t_s"]
         return LiveState(
             float(np.asarray(t_s, dtype=np.float64)[-1]) if len(t_s) else 0.0, len(recording), self._lost,
-            self._damaged, found.still_s, found.count,
+            self._damaged, rests.still_s, rests.count,
             tuple(each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if has),
             target.poses, coefficients, tuple(missing), request,
             turns_left(coefficients, turns), () if result is None else left_out_of(result), result, up,

@@ -83,15 +83,17 @@ class LiveState:
     @property
     def worst(self) -> LiveCoefficient | None:
         """The limited coefficient whose U is largest beside its limit; None before the first fit."""
-        limited = [each for each in self.coefficients if each.limit is not None]
+        limited = [coefficient for coefficient in self.coefficients if coefficient.limit is not None]
         return max(limited, key=lambda each: each.expanded / (each.limit or 1.0), default=None)
 
 
 def coefficients_of(result: FitResult, target: Target) -> Iterator[LiveCoefficient]:
     """Yield the coefficients of a fit in poses, axis by axis, with U and its limit."""
     for axis in AXES:
-        found = result.fitted.axes[axis]
-        for name, value, u, unit in zip(found.names, found.values[:, 0], found.u[:, 0], found.units, strict=True):
+        axis_fit = result.fitted.axes[axis]
+        for name, value, u, unit in zip(
+            axis_fit.names, axis_fit.values[:, 0], axis_fit.u[:, 0], axis_fit.units, strict=True
+        ):
             limit = target.u if name.startswith(_LIMITED) else target.bias_dps if name == "bias" else None
             yield LiveCoefficient(axis, name, float(value), NORMAL_K * float(u), unit, limit)
 
@@ -100,23 +102,27 @@ def left_out_of(result: FitResult) -> tuple[str, ...]:
     """Return the turns that a fit in poses could not use, and why, in words."""
     moves = () if result.poses is None else result.poses["moves"]["left_out"]
     return tuple(
-        f"the turn from {each['from_s']:.0f} s to {each['until_s']:.0f} s is not used: {each['why']}" for each in moves
+        f"the turn from {move['from_s']:.0f} s to {move['until_s']:.0f} s is not used: {move['why']}" for move in moves
     )
 
 
 def needs_of_fit(coefficients: tuple[LiveCoefficient, ...]) -> Array:
     """Return how much a turn about each axis would add, (3,): by the least certain coefficient that it tells."""
-    found = np.zeros(3)
-    for each in coefficients:
-        if each.name == "scale_factor" or each.name.startswith("misalignment"):
-            column = AXES.index(each.axis) if each.name == "scale_factor" else "xyz".index(each.name[-1])
-            found[column] = max(found[column], each.expanded / (each.limit or 1.0))
-    return found
+    missing = np.zeros(3)
+    for coefficient in coefficients:
+        if coefficient.name == "scale_factor" or coefficient.name.startswith("misalignment"):
+            column = (
+                AXES.index(coefficient.axis)
+                if coefficient.name == "scale_factor"
+                else "xyz".index(coefficient.name[-1])
+            )
+            missing[column] = max(missing[column], coefficient.expanded / (coefficient.limit or 1.0))
+    return missing
 
 
 def turns_left(coefficients: tuple[LiveCoefficient, ...], turns: int) -> int | None:
     """Return how many turns are still needed if U falls with the square root of their number; None before a fit."""
-    ratios = [each.expanded / each.limit for each in coefficients if each.limit is not None]
+    ratios = [coefficient.expanded / coefficient.limit for coefficient in coefficients if coefficient.limit is not None]
     if not ratios:
         return None
     return max(int(np.ceil(turns * (max(ratios) ** 2 - 1.0))), 0)

@@ -68,23 +68,23 @@ class _Seen:
 
 
 def align_field(
-    readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], found: Magnetometer
+    readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], magnetometer: Magnetometer
 ) -> FieldAlignment:
     """Return the alignment by a calibration by hand, and by the magnetometer's readings (n, 3), uT, with theirs.
 
     Raises NotEnoughData where rests and turns do not determine it.
     """
-    seen = _seen(readings, solved, field_ut, found)
-    turn = _start(seen)
-    dip = float(np.mean(np.sum(solved.accelerometer.up * (seen.direction @ turn.T), axis=1)))
+    field_seen = _seen(readings, solved, field_ut, magnetometer)
+    turn = _start(field_seen)
+    dip = float(np.mean(np.sum(solved.accelerometer.up * (field_seen.direction @ turn.T), axis=1)))
     change, place, extra = np.inf, 0.0, 0.0
     for _ in range(STEPS):
-        residual, jacobian, known, by_place = _equations(seen, turn, dip)
+        residual, jacobian, noise, by_place = _equations(field_seen, turn, dip)
         if change > SETTLED:
             place, extra = components(
-                jacobian, residual, known, by_place, lambda _: 0.0, float(np.mean(np.diag(known)))
+                jacobian, residual, noise, by_place, lambda _: 0.0, float(np.mean(np.diag(noise)))
             )
-        total = known + place * by_place + extra * np.eye(len(known))
+        total = noise + place * by_place + extra * np.eye(len(noise))
         step, covariance = gls(jacobian, residual, total)
         turn, dip = _rotation(-step[:3]) @ turn, dip - float(step[3])
         change = float(np.abs(step).max())
@@ -107,15 +107,15 @@ def align_field(
     return result
 
 
-def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], found: Magnetometer) -> _Seen:
+def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], magnetometer: Magnetometer) -> _Seen:
     rests = solved.rests
     means = np.array([field_ut[a:b].mean(axis=0) for a, b in zip(rests.begin, rests.end, strict=True)])
     variance = density_in_rests(field_ut, rests, readings.spacing_s) / rests.duration_s[:, None]
-    away = means - found.hard_iron_ut
-    field = away @ found.soft_iron
+    away = means - magnetometer.hard_iron_ut
+    field = away @ magnetometer.soft_iron
     direction = unit(field)
     across = (np.eye(3) - direction[:, :, None] * direction[:, None, :]) / np.linalg.norm(field, axis=1)[:, None, None]
-    by_reading = across @ found.soft_iron
+    by_reading = across @ magnetometer.soft_iron
     columns = [-by_reading]
     for i, j in PLACES:
         change = np.zeros_like(away)
@@ -125,16 +125,16 @@ def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64],
         columns.append(np.einsum("kab,kb->ka", across, change)[:, :, None])
     noise = np.einsum("kai,ki,kbi->kab", by_reading, variance, by_reading)
     return _Seen(
-        solved, direction, noise, np.concatenate(columns, axis=2), found.covariance[:9, :9],
+        solved, direction, noise, np.concatenate(columns, axis=2), magnetometer.covariance[:9, :9],
         of_readings(solved.moves.take(solved.gyro.used), solved.bias),
     )  # fmt: skip
 
 
-def _start(seen: _Seen) -> NDArray[np.float64]:
+def _start(parts: _Seen) -> NDArray[np.float64]:
     """Return the rotation (3, 3) from the magnetometer's to the body axes by the turns: linear in its elements."""
-    gyro, moves = seen.solved.gyro, seen.solved.moves
+    gyro, moves = parts.solved.gyro, parts.solved.moves
     rows = [
-        np.kron(seen.direction[k], turned.T) - np.kron(seen.direction[k + 1], np.eye(3))
+        np.kron(parts.direction[k], turned.T) - np.kron(parts.direction[k + 1], np.eye(3))
         for k, turned, used in zip(moves.before, gyro.equations.rotations.matrix, gyro.used, strict=True)
         if used
     ]
@@ -145,35 +145,35 @@ def _start(seen: _Seen) -> NDArray[np.float64]:
 
 
 def _equations(
-    seen: _Seen, turn: NDArray[np.float64], dip: float
+    field: _Seen, turn: NDArray[np.float64], dip: float
 ) -> tuple[Array, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return residuals (r,), derivatives (r, 4) by turn and dip, known noise (r, r), and that by 1 rad^2 per rest.
 
     One residual of each used rest, two of each used move.
     """
-    solved, k = seen.solved, len(seen.direction)
+    solved, k = field.solved, len(field.direction)
     accelerometer, gyro, moves = solved.accelerometer, solved.gyro, solved.moves
-    body = seen.direction @ turn.T
-    rest = np.flatnonzero(accelerometer.used)
+    body = field.direction @ turn.T
+    at_rest = np.flatnonzero(accelerometer.used)
     up = accelerometer.up
-    size = len(rest) + 2 * int(np.count_nonzero(gyro.used))
+    size = len(at_rest) + 2 * int(np.count_nonzero(gyro.used))
     residual, jacobian = np.zeros(size), np.zeros((size, 4))
     by_seen, by_tilt = np.zeros((size, k, 3)), np.zeros((size, k, 3))
     by_bias, by_gyro, by_force = np.zeros((size, k, 3)), np.zeros((size, 9)), np.zeros((size, 9))
-    here = np.arange(len(rest))
-    residual[here] = np.sum(up[rest] * body[rest], axis=1) - dip
-    jacobian[here, :3] = -np.einsum("ka,kab->kb", up[rest], cross_matrix(body[rest]))
+    here = np.arange(len(at_rest))
+    residual[here] = np.sum(up[at_rest] * body[at_rest], axis=1) - dip
+    jacobian[here, :3] = -np.einsum("ka,kab->kb", up[at_rest], cross_matrix(body[at_rest]))
     jacobian[here, 3] = -1.0
-    by_seen[here, rest] = up[rest] @ turn
-    by_tilt[here, rest] = np.einsum("ka,kab->kb", body[rest], level_by_reading(accelerometer)[rest])
-    by_force[here] = np.einsum("ka,kab->kb", body[rest], level_by_parameters(accelerometer)[rest])
+    by_seen[here, at_rest] = up[at_rest] @ turn
+    by_tilt[here, at_rest] = np.einsum("ka,kab->kb", body[at_rest], level_by_reading(accelerometer)[at_rest])
+    by_force[here] = np.einsum("ka,kab->kb", body[at_rest], level_by_parameters(accelerometer)[at_rest])
     own = np.zeros((size, size))
     before = moves.before[gyro.used]
     parts = gyro.equations.take(gyro.used).rotations
     start, end = body[before], body[before + 1]
     across, back = tangents(end), parts.matrix.transpose(0, 2, 1)
     turned = across @ change_of_direction(start, parts.matrix)
-    pairs = len(rest) + np.arange(size - len(rest)).reshape(-1, 2)
+    pairs = len(at_rest) + np.arange(size - len(at_rest)).reshape(-1, 2)
     residual[pairs] = np.einsum("mca,ma->mc", across, seen_at_end(start, parts.matrix) - end)
     jacobian[pairs, :3] = across @ (cross_matrix(end) - back @ cross_matrix(start))
     by_seen[pairs, before[:, None]] = across @ back @ turn
@@ -181,19 +181,19 @@ def _equations(
     by_bias[pairs, before[:, None]] = turned @ parts.by_bias_before
     by_bias[pairs, before[:, None] + 1] = turned @ parts.by_bias_after
     by_gyro[pairs] = turned @ parts.by_error
-    each = of_each_move(moves.take(gyro.used), parts.white, turned, seen.readings_u)
-    own[len(rest) :, len(rest) :] = block_diag(*each)
+    each = of_each_move(moves.take(gyro.used), parts.white, turned, field.readings_u)
+    own[len(at_rest) :, len(at_rest) :] = block_diag(*each)
 
     flat = by_seen.reshape(size, -1)
     tilt = (by_tilt * accelerometer.u_rest_g[:, None]).reshape(size, -1)
     drift = (by_bias * np.radians(solved.bias.u_rest_dps)).reshape(size, -1)
-    iron = np.einsum("rka,kab->rb", by_seen, seen.by_parameters)
-    known = (
-        own + flat @ block_diag(*seen.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
-        + iron @ seen.parameters @ iron.T + by_gyro @ gyro.covariance @ by_gyro.T
+    iron = np.einsum("rka,kab->rb", by_seen, field.by_parameters)
+    noise = (
+        own + flat @ block_diag(*field.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
+        + iron @ field.parameters @ iron.T + by_gyro @ gyro.covariance @ by_gyro.T
         + by_force @ accelerometer.covariance @ by_force.T
     )  # fmt: skip
-    return residual, jacobian, known, flat @ block_diag(*seen.across) @ flat.T
+    return residual, jacobian, noise, flat @ block_diag(*field.across) @ flat.T
 
 
 def _rotation(vector: Array) -> NDArray[np.float64]:

@@ -73,59 +73,62 @@ class Magnetometer:
         return "unexplained" if more or self.left_out_share > MOST_LEFT_OUT else "adequate"
 
 
-def calibrate_magnetometer(what: str, readings_ut: NDArray[np.float64], field_ut: float | None = None) -> Magnetometer:
+def calibrate_magnetometer(
+    subject: str, readings_ut: NDArray[np.float64], field_ut: float | None = None
+) -> Magnetometer:
     """Fit hard and soft iron to readings (n, 3), uT, in order of time, of turns in a constant field.
 
     `field_ut` is its size; without it the matrix has the determinant 1. Raises NotEnoughData, naming what to do.
     """
     if len(readings_ut) < LEAST_READINGS:
         raise NotEnoughData(
-            f"{what}: {len(readings_ut)} readings of a magnetometer; nine parameters need {LEAST_READINGS} and more: "
+            f"{subject}: {len(readings_ut)} readings of a magnetometer; nine parameters need {LEAST_READINGS} and "
+            "more: "
             "turn it slowly through all directions"
         )
-    found, used = _robust(what, readings_ut)
-    n, repetition = len(found.distance), _repetition(found.distance)
+    ellipsoid, used = _robust(subject, readings_ut)
+    n, repetition = len(ellipsoid.distance), _repetition(ellipsoid.distance)
     # as few independent readings as there are have given nine of them to the parameters, and so look quieter
     fewer = max(n - PARAMETERS, 1) / max(n - PARAMETERS * repetition, n / 10)
-    normal = np.linalg.inv(found.jacobian.T @ found.jacobian)
-    covariance = found.noise**2 * repetition * fewer * normal
-    values, by_parameter = _values(found.parameters, field_ut)
+    normal = np.linalg.inv(ellipsoid.jacobian.T @ ellipsoid.jacobian)
+    covariance = ellipsoid.noise**2 * repetition * fewer * normal
+    values, by_parameter = _values(ellipsoid.parameters, field_ut)
     total = by_parameter @ covariance @ by_parameter.T
     soft = np.zeros((3, 3))
     for value, (i, j) in zip(values[3:9], PLACES, strict=True):
         soft[i, j] = soft[j, i] = value
-    field = (readings_ut[used] - found.centre) @ found.matrix
+    field = (readings_ut[used] - ellipsoid.centre) @ ellipsoid.matrix
     gap, angle = largest_gap(field)
     size = np.linalg.norm(readings_ut[used], axis=1)
     result = Magnetometer(
         values[:3], soft, float(values[9]), total, used,
-        float(np.sqrt(np.mean(np.diff(found.distance) ** 2) / 2)), float(np.sqrt(np.mean(found.distance**2))),
-        _held_out(readings_ut[used], found), float(size.std()), repetition, angle, gap,
+        float(np.sqrt(np.mean(np.diff(ellipsoid.distance) ** 2) / 2)), float(np.sqrt(np.mean(ellipsoid.distance**2))),
+        _held_out(readings_ut[used], ellipsoid), float(size.std()), repetition, angle, gap,
     )  # fmt: skip
-    _require_determined(what, result)
+    _require_determined(subject, result)
     return result
 
 
-def _robust(what: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDArray[np.bool_]]:
-    used = np.ones(len(readings), dtype=np.bool_)
-    found: Ellipsoid | None = None
+def _robust(subject: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDArray[np.bool_]]:
+    is_used = np.ones(len(readings), dtype=np.bool_)
+    ellipsoid: Ellipsoid | None = None
     for _ in range(ROUNDS):
-        start = quadric(readings[used]) if found is None else (found.centre, found.matrix)
-        found = None if start is None else nearest_ellipsoid(readings[used], *start)
-        if found is None:
+        start = quadric(readings[is_used]) if ellipsoid is None else (ellipsoid.centre, ellipsoid.matrix)
+        ellipsoid = None if start is None else nearest_ellipsoid(readings[is_used], *start)
+        if ellipsoid is None:
             raise NotEnoughData(
-                f"{what}: the readings lie on no ellipsoid that they determine; turn the unit slowly through all "
+                f"{subject}: the readings lie on no ellipsoid that they determine; turn the unit slowly through all "
                 "directions (each axis up and down, and turned in each), away from iron and currents"
             )
-        every = at(readings, found.centre, found.matrix, found.noise).distance
-        usual = 1.4826 * float(np.median(np.abs(every[used])))
+        every = at(readings, ellipsoid.centre, ellipsoid.matrix, ellipsoid.noise).distance
+        usual = 1.4826 * float(np.median(np.abs(every[is_used])))
         right = np.abs(every) <= WRONG * max(usual, 1e-12)
-        if np.array_equal(right, used) or np.count_nonzero(right) < LEAST_READINGS:
+        if np.array_equal(right, is_used) or np.count_nonzero(right) < LEAST_READINGS:
             break
-        used = right
-    assert found is not None
-    last = nearest_ellipsoid(readings[used], found.centre, found.matrix)
-    return (found if last is None else last), used
+        is_used = right
+    assert ellipsoid is not None
+    last = nearest_ellipsoid(readings[is_used], ellipsoid.centre, ellipsoid.matrix)
+    return (ellipsoid if last is None else last), is_used
 
 
 def _repetition(distance: Array) -> float:
@@ -147,11 +150,11 @@ def _repetition(distance: Array) -> float:
 def _values(parameters: Array, field_ut: float | None) -> tuple[Array, NDArray[np.float64]]:
     """Return hard iron, soft iron and field, (10,), of centre and matrix, and their derivative (10, 9)."""
 
-    def of(given: Array) -> Array:
-        a, b, c, d, e, f = given[3:]
+    def of(values: Array) -> Array:
+        a, b, c, d, e, f = values[3:]
         determinant = a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)
         field = float(np.cbrt(1 / determinant)) if field_ut is None else field_ut
-        return np.concatenate([given[:3], given[3:] * field, [field]])
+        return np.concatenate([values[:3], values[3:] * field, [field]])
 
     return of(parameters), _derivative(of, parameters)
 
@@ -165,14 +168,14 @@ def _derivative(of: Callable[[Array], Array], at_parameters: Array) -> NDArray[n
     return np.column_stack(columns)
 
 
-def _held_out(readings: NDArray[np.float64], found: Ellipsoid) -> float:
+def _held_out(readings: NDArray[np.float64], ellipsoid: Ellipsoid) -> float:
     """Return the root mean square distance of each block of time from the ellipsoid of all others, uT."""
     squares = []
     for block in np.array_split(np.arange(len(readings)), BLOCKS):
         others = np.delete(readings, block, axis=0)
-        without = nearest_ellipsoid(others, found.centre, found.matrix)
+        without = nearest_ellipsoid(others, ellipsoid.centre, ellipsoid.matrix)
         if without is None:  # what only this block shows is not held out
-            without = found
+            without = ellipsoid
         squares.append(at(readings[block], without.centre, without.matrix, without.noise).distance ** 2)
     return float(np.sqrt(np.mean(np.concatenate(squares))))
 
@@ -198,7 +201,7 @@ def in_words(direction: Array) -> str:
     return " ".join(named)
 
 
-def _require_determined(what: str, result: Magnetometer) -> None:
+def _require_determined(subject: str, result: Magnetometer) -> None:
     # by the noise alone: what a disturbed field makes uncertain is no want of directions
     alone = min(result.noise_ut / max(result.residual_ut, 1e-300), 1.0) / np.sqrt(result.repetition)
     u = alone * np.concatenate([result.u[:3] / result.field_ut, result.u[3:9]])
@@ -208,7 +211,7 @@ def _require_determined(what: str, result: Magnetometer) -> None:
     names = [f"hard iron {axis} (over the field)" for axis in AXES]
     names += [f"soft iron {AXES[i]}{AXES[j]}" for i, j in PLACES]
     raise NotEnoughData(
-        f"{what}: the readings do not determine {names[worst]} (u = {u[worst]:.2g}, limit {LARGEST_U:g}); the field "
+        f"{subject}: the readings do not determine {names[worst]} (u = {u[worst]:.2g}, limit {LARGEST_U:g}); the field "
         f"was never nearer than {result.largest_gap_deg:.0f} deg to {in_words(result.gap)} of the sensor: turn that "
         "side "
         "into the field too"

@@ -50,14 +50,14 @@ def quadric(readings: NDArray[np.float64]) -> tuple[Array, NDArray[np.float64]] 
         return None
     x, y, z = ((readings - origin) / size).T
     columns = np.column_stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z, 2 * x, 2 * y, 2 * z])
-    found, _, rank, _ = np.linalg.lstsq(columns, np.ones(len(readings)), rcond=1e-8)
+    solution, _, rank, _ = np.linalg.lstsq(columns, np.ones(len(readings)), rcond=1e-8)
     if rank < PARAMETERS:
         return None
-    square = _symmetric(np.asarray(found[:6], dtype=np.float64))
+    square = _symmetric(np.asarray(solution[:6], dtype=np.float64))
     values = np.linalg.eigvalsh(square)
     if np.any(values == 0) or values[0] * values[-1] < 0:
         return None
-    centre = -np.linalg.solve(square, found[6:])
+    centre = -np.linalg.solve(square, solution[6:])
     level = 1 + centre @ square @ centre
     values, vectors = np.linalg.eigh(square / level)
     if not np.all(values > 0):
@@ -67,40 +67,42 @@ def quadric(readings: NDArray[np.float64]) -> tuple[Array, NDArray[np.float64]] 
 
 def nearest_ellipsoid(readings: NDArray[np.float64], centre: Array, matrix: NDArray[np.float64]) -> Ellipsoid | None:
     """Return the ellipsoid with the least squared distances from readings (n, 3), from a start; None: undetermined."""
-    found = at(readings, centre, matrix, 0.0)
+    best = at(readings, centre, matrix, 0.0)
     for _ in range(ROUNDS):
-        length = np.linalg.norm(found.jacobian, axis=0)
-        scaled = found.jacobian / length
+        length = np.linalg.norm(best.jacobian, axis=0)
+        scaled = best.jacobian / length
         if not np.linalg.cond(scaled) < LARGEST_CONDITION:
             return None
-        step = -np.linalg.lstsq(scaled, found.distance)[0] / length
-        u = found.noise * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / length
-        moved = found.parameters + step
-        matrix = _symmetric(moved[3:])
+        step = -np.linalg.lstsq(scaled, best.distance)[0] / length
+        u = best.noise * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / length
+        moved_parameters = best.parameters + step
+        matrix = _symmetric(moved_parameters[3:])
         if not np.all(np.linalg.eigvalsh(matrix) > 0):
             return None
-        found = at(readings, moved[:3], matrix, found.noise)
+        best = at(readings, moved_parameters[:3], matrix, best.noise)
         if np.all(np.abs(step) <= CONVERGED * u):
-            return found
+            return best
     return None
 
 
 def at(readings: NDArray[np.float64], centre: Array, matrix: NDArray[np.float64], noise: float) -> Ellipsoid:
     """Return an ellipsoid with the distances of readings (n, 3) that have noise, uT, in each component."""
-    off = readings - centre
-    inside = off @ matrix
+    from_centre = readings - centre
+    inside = from_centre @ matrix
     size = np.linalg.norm(inside, axis=1)
     along = inside / size[:, None]
     pull = along @ matrix
     slope = np.linalg.norm(pull, axis=1)
     longer = noise**2 * (np.sum(matrix**2) - slope**2) / 2
-    columns = [along[:, i] * off[:, j] + (along[:, j] * off[:, i] if i != j else 0.0) for i, j in PLACES]
+    columns = [
+        along[:, i] * from_centre[:, j] + (along[:, j] * from_centre[:, i] if i != j else 0.0) for i, j in PLACES
+    ]
     jacobian = np.column_stack([-pull, *columns]) / slope[:, None]
     return Ellipsoid(centre, matrix, jacobian, (size - 1 - longer) / slope)
 
 
 def _symmetric(parameters: Array) -> NDArray[np.float64]:
-    found = np.zeros((3, 3))
+    matrix = np.zeros((3, 3))
     for value, (i, j) in zip(parameters, PLACES, strict=True):
-        found[i, j] = found[j, i] = value
-    return found
+        matrix[i, j] = matrix[j, i] = value
+    return matrix

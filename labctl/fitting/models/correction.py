@@ -29,8 +29,8 @@ def correct_across(
     `across_dps` are true rates about axes without an output, axis -> (n,) deg/s; one that is absent is at rest.
     """
     n = len(raw)
-    warm = np.broadcast_to(temperature_c, (n,)) if temperature_c.ndim < 2 else temperature_c.mean(axis=1)
-    columns: dict[str, Array] = {"temperature_c": warm, **channels}
+    row_c = np.broadcast_to(temperature_c, (n,)) if temperature_c.ndim < 2 else temperature_c.mean(axis=1)
+    columns: dict[str, Array] = {"temperature_c": row_c, **channels}
     if temperature_c.ndim == 2:
         columns |= {f"temperature_{axis}_c": temperature_c[:, i] for i, axis in enumerate(axes)}
     outputs = {axis: raw[:, i] for i, axis in enumerate(axes)}
@@ -62,13 +62,13 @@ def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
     """Return the fastest exact way to apply a model: (rates (n, axes), temperatures) -> rates (n, axes)."""
     surface: Surface | None = surface_of(fitted, axes) or bias_surface_of(fitted, axes)
     if surface is not None:
-        return lambda raw, warm, _: surface.correct(raw, warm)
+        return lambda raw, temperature_c, _: surface.correct(raw, temperature_c)
     linear: Linear | None = linear_of(fitted, axes)
     if linear is not None:
-        return lambda raw, warm, _: linear.correct(raw, warm)
+        return lambda raw, temperature_c, _: linear.correct(raw, temperature_c)
 
     sine = sine_form_of(fitted, axes)
     if sine is not None:
-        return lambda raw, warm, _: sine.correct(raw, warm)
+        return lambda raw, temperature_c, _: sine.correct(raw, temperature_c)
 
     return partial(correct_across, fitted, axes, {})

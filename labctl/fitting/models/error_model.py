@@ -21,8 +21,8 @@ EXPORTED_ORIGINS = frozenset({"sensor", "package"})
 
 def is_exported(term: Term) -> bool:
     """Return whether an effect belongs to the unit and can be corrected where the unit is used."""
-    found = kind_of(term)
-    return found.origin in EXPORTED_ORIGINS and found.in_use
+    kind = kind_of(term)
+    return kind.origin in EXPORTED_ORIGINS and kind.in_use
 
 
 @dataclass(frozen=True)
@@ -74,12 +74,12 @@ class ErrorModel:
         """
         added = tuple(replace(term, steady=True) for term in terms)
         freed = {term.effect for term in added} & self.held.effects
-        kept = tuple(term for term in self.terms if term.effect not in freed)
-        return replace(self, terms=(*kept, *added), held=self.held.beside(tuple(freed)))
+        kept_terms = tuple(term for term in self.terms if term.effect not in freed)
+        return replace(self, terms=(*kept_terms, *added), held=self.held.beside(tuple(freed)))
 
     def to_dict(self) -> ErrorModelJson:
         """Return the model without coefficients, as JSON."""
-        found: ErrorModelJson = {
+        model_json: ErrorModelJson = {
             "name": self.name,
             "argument": self.argument,
             "terms": [_term_json(term) for term in self.terms],
@@ -87,8 +87,8 @@ class ErrorModel:
             "reference": {"temperature_c": self.reference.temperature_c},
         }
         if self.held.axes:
-            found["held"] = self.held.to_json()
-        return found
+            model_json["held"] = self.held.to_json()
+        return model_json
 
     @staticmethod
     def from_dict(record: ErrorModelJson) -> ErrorModel:
@@ -123,15 +123,15 @@ def _by_recording(term: Term, columns: list[Column], channels: Channels) -> list
     if len(parts) < 2 or kind_of(term).origin in EXPORTED_ORIGINS:
         return columns
     numbers = np.asarray(channels[RECORDING])
-    found: list[Column] = []
+    recording_columns: list[Column] = []
     for column in columns:
         split = [
             replace(column, name=f"{column.name}_of_{int(numbers[rows][0])}", values=np.where(rows, column.values, 0.0))
             for rows in parts
         ]
-        shown = [part for part in split if np.any(part.values)]
-        found += [column] if column.law is not None or len(shown) < 2 else shown
-    return found
+        split_parts = [part for part in split if np.any(part.values)]
+        recording_columns += [column] if column.law is not None or len(split_parts) < 2 else split_parts
+    return recording_columns
 
 
 def _term_json(term: Term) -> TermJson:

@@ -59,28 +59,29 @@ class ForceSensitivity:
     @property
     def not_measured(self) -> dict[str, list[str]]:
         """Gyro axis -> the body axes whose force its fit did not see."""
-        found = {
+        unmeasured = {
             axis: [body for body, value in zip(BODY_AXES, row, strict=True) if np.isnan(value)]
             for axis, row in zip(self.axes, self.per_g, strict=True)
         }
-        return {axis: bodies for axis, bodies in found.items() if bodies}
+        return {axis: bodies for axis, bodies in unmeasured.items() if bodies}
 
     def error_dps(self, specific_force_g: Array) -> Array:
         """Return the error, (n, axes) deg/s, of forces (n, 3) g; no number where a force is not finite."""
-        known = np.isfinite(specific_force_g).all(axis=1, keepdims=True)
-        force = np.where(known, specific_force_g, np.nan)
+        is_known = np.isfinite(specific_force_g).all(axis=1, keepdims=True)
+        force = np.where(is_known, specific_force_g, np.nan)
         own = force[:, [BODY_AXES.index(axis) for axis in self.axes]]
         return np.asarray(force @ self.known_per_g.T + self.known_per_g2 * own * own)
 
-    def forces(self, given: object, n: int) -> Array:
+    def forces(self, value: object, n: int) -> Array:
         """Return forces as (n, 3) g from (3,) or (n, 3); raises BadInput for another shape."""
-        found = np.asarray(given, dtype=np.float64)
-        if found.shape not in {(3,), (n, 3)}:
+        force_g = np.asarray(value, dtype=np.float64)
+        if force_g.shape not in {(3,), (n, 3)}:
             raise BadInput(
-                f"{INPUT} of shape {found.shape} given; give the specific force in g along body axes x, y and z: (3,), "
+                f"{INPUT} of shape {force_g.shape} given; give the specific force in g along body axes x, y and z: "
+                "(3,), "
                 f"or one row for each sample, ({n}, 3)"
             )
-        return np.broadcast_to(found, (n, 3))
+        return np.broadcast_to(force_g, (n, 3))
 
     def sentence(self) -> str:
         """Return what is not corrected without an accelerometer, with its size."""
@@ -90,18 +91,18 @@ class ForceSensitivity:
         return f"g-sensitivity is not corrected without {INPUT}; at 1 g at most: {sizes}"
 
     @staticmethod
-    def from_json(given: SpecificForceJson, axes: tuple[str, ...]) -> ForceSensitivity:
+    def from_json(document: SpecificForceJson, axes: tuple[str, ...]) -> ForceSensitivity:
         """Read the part of a calibration document; raises LookupError, TypeError or ValueError where it is not one."""
-        if given["input"] != INPUT:
-            raise ValueError(f"input {str(given['input'])[:80]!r} instead of {INPUT!r}")
+        if document["input"] != INPUT:
+            raise ValueError(f"input {str(document['input'])[:80]!r} instead of {INPUT!r}")
         per_g, per_g2 = np.full((len(axes), 3), np.nan), np.full(len(axes), np.nan)
         for row, axis in enumerate(axes):
-            for name, found in given["coefficients"][axis].items():
+            for name, coefficients in document["coefficients"][axis].items():
                 if name == SQUARED:
-                    per_g2[row] = float(found["value"])
+                    per_g2[row] = float(coefficients["value"])
                 else:
                     body = axis if name == OWN else name.removeprefix("g_")
-                    per_g[row, BODY_AXES.index(body)] = float(found["value"])
+                    per_g[row, BODY_AXES.index(body)] = float(coefficients["value"])
         return ForceSensitivity(axes, per_g, per_g2)
 
 
@@ -115,11 +116,11 @@ def specific_force_json(fitted: FittedModel) -> SpecificForceJson | None:
     changes = any(np.ptp(values) > 0 for fit in fitted.axes.values() for _, values in _rows(fit))
     if not terms or changes or not any(by_axis.values()):
         return None
-    found: SpecificForceJson = {"input": INPUT, "coefficients": by_axis, "at_1_g_dps": {}, "not_measured": {}}
-    whole = ForceSensitivity.from_json(found, tuple(by_axis))
-    found["at_1_g_dps"] = dict(zip(whole.axes, whole.at_1_g_dps.tolist(), strict=True))
-    found["not_measured"] = whole.not_measured
-    return found
+    force_json: SpecificForceJson = {"input": INPUT, "coefficients": by_axis, "at_1_g_dps": {}, "not_measured": {}}
+    whole = ForceSensitivity.from_json(force_json, tuple(by_axis))
+    force_json["at_1_g_dps"] = dict(zip(whole.axes, whole.at_1_g_dps.tolist(), strict=True))
+    force_json["not_measured"] = whole.not_measured
+    return force_json
 
 
 def _rows(fit: AxisFit) -> list[tuple[int, NDArray[np.float64]]]:

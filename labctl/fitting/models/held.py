@@ -48,8 +48,8 @@ class Held:
 
     def of(self, axis: str, effect: str, name: str) -> HeldCoefficient | None:
         """Return a held coefficient; None for one that is estimated."""
-        found = self.axes.get(axis, {}).get(name)
-        return found if found is not None and found.effect == effect else None
+        held_coefficient = self.axes.get(axis, {}).get(name)
+        return held_coefficient if held_coefficient is not None and held_coefficient.effect == effect else None
 
     @property
     def effects(self) -> frozenset[str]:
@@ -62,11 +62,11 @@ class Held:
 
     def beside(self, effects: tuple[str, ...]) -> Held:
         """Return what is held without the coefficients of some effects."""
-        kept = {
+        remaining = {
             axis: {name: one for name, one in names.items() if one.effect not in effects}
             for axis, names in self.axes.items()
         }
-        return Held({axis: names for axis, names in kept.items() if names}, self.source)
+        return Held({axis: names for axis, names in remaining.items() if names}, self.source)
 
     def as_exact(self) -> Held:
         """Return the same values without uncertainty, for what compares fits that all hold them."""
@@ -90,14 +90,14 @@ class Held:
         return Held(axes, record["source"])
 
 
-def _json(one: HeldCoefficient) -> HeldCoefficientJson:
-    us = [None if math.isnan(u) else u for u in one.u]
-    if one.temperature_c:
+def _json(coefficient: HeldCoefficient) -> HeldCoefficientJson:
+    us = [None if math.isnan(u) else u for u in coefficient.u]
+    if coefficient.temperature_c:
         return {
-            "effect": one.effect, "value": list(one.value), "u": us, "unit": one.unit,
-            "temperature_c": list(one.temperature_c),
+            "effect": coefficient.effect, "value": list(coefficient.value), "u": us, "unit": coefficient.unit,
+            "temperature_c": list(coefficient.temperature_c),
         }  # fmt: skip
-    return {"effect": one.effect, "value": one.value[0], "u": us[0], "unit": one.unit}
+    return {"effect": coefficient.effect, "value": coefficient.value[0], "u": us[0], "unit": coefficient.unit}
 
 
 def _read(record: HeldCoefficientJson) -> HeldCoefficient:

@@ -81,8 +81,8 @@ def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: s
     for _ in range(ROUNDS):
         before, outside = dict(rates), {}
         for axis, output in outputs.items():
-            found, outside[axis] = _bisected(output, error_dps, rates, axis)
-            rates = {**rates, axis: found}
+            rate, outside[axis] = _bisected(output, error_dps, rates, axis)
+            rates = {**rates, axis: rate}
         change = _largest_change(rates, before)
         if change < ROUND_STEP_DPS:
             _require_roots(outputs, outside, name)

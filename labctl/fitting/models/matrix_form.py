@@ -34,18 +34,18 @@ class Linear:
         b = np.column_stack([self.fitted.error_dps(Channels(channels, still), axis) for axis in self.axes])
         k = np.zeros((n, len(self.axes), len(self.axes)))
         for column, turning in enumerate(self.axes):
-            seen = Channels(channels, still | {turning: np.ones(n)})
+            delayed = Channels(channels, still | {turning: np.ones(n)})
             for row, axis in enumerate(self.axes):
-                k[:, row, column] = self.fitted.error_dps(seen, axis) - b[:, row] + (row == column)
+                k[:, row, column] = self.fitted.error_dps(delayed, axis) - b[:, row] + (row == column)
         return k, b
 
     def correct(self, raw: Array, temperature_c: Array) -> Array:
         """Return the true rates, (n, axes), of outputs (n, axes)."""
-        warm = np.broadcast_to(temperature_c, (len(raw),)) if temperature_c.ndim < 2 else temperature_c
+        row_c = np.broadcast_to(temperature_c, (len(raw),)) if temperature_c.ndim < 2 else temperature_c
         out = np.empty_like(raw)
         for start in range(0, len(raw), PIECE):
             piece = slice(start, start + PIECE)
-            k, b = self.k_and_b(warm[piece])
+            k, b = self.k_and_b(row_c[piece])
             out[piece] = np.linalg.solve(k, (raw[piece] - b)[:, :, None])[:, :, 0]
         return out
 

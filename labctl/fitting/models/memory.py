@@ -206,12 +206,12 @@ class RunningMemory:
         """Where the followers are; None before the first sample."""
         if self._last is None:
             return None
-        t_s, warm, places = self._last
-        at_c = (each.at_c(place, warm) for each, place in zip(self._followers, places, strict=True))
-        return MemoryState(t_s, warm, tuple(at_c))
+        t_s, temperature_c, places = self._last
+        at_c = (follower.at_c(place, temperature_c) for follower, place in zip(self._followers, places, strict=True))
+        return MemoryState(t_s, temperature_c, tuple(at_c))
 
     def reset(self) -> None:
-        """Forget all, as after the unit was switched off for long."""
+        """Clear the history, as after the unit was switched off for long."""
         self._last = None
 
     def start(self, state: MemoryState) -> None:
@@ -223,9 +223,11 @@ class RunningMemory:
                 f"temperature {state.temperature_c:g} deg C: this calibration has {len(self._followers)} followers, "
                 "and all values must be finite; hand over the `state` of a compensator of the same calibration"
             )
-        warm = state.temperature_c
-        places = (each.place(at_c, warm) for each, at_c in zip(self._followers, state.at_c, strict=True))
-        self._last = state.t_s, warm, tuple(places)
+        temperature_c = state.temperature_c
+        places = (
+            follower.place(at_c, temperature_c) for follower, at_c in zip(self._followers, state.at_c, strict=True)
+        )
+        self._last = state.t_s, temperature_c, tuple(places)
 
     @property
     def last_s(self) -> float | None:
@@ -237,46 +239,48 @@ class RunningMemory:
 
         A sample that is no number moves nothing.
         """
-        found = np.empty((len(t_s), self._sizes.shape[1]))
+        errors_dps = np.empty((len(t_s), self._sizes.shape[1]))
         for begin in range(0, len(t_s), BLOCK):
             block = slice(begin, begin + BLOCK)
-            self._block(t_s[block], temperature_c[block], found[block])
-        if found.shape[1] == self._axes:
-            return Remembered(found)
-        return Remembered(found[:, : self._axes], found[:, self._axes :])
+            self._block(t_s[block], temperature_c[block], errors_dps[block])
+        if errors_dps.shape[1] == self._axes:
+            return Remembered(errors_dps)
+        return Remembered(errors_dps[:, : self._axes], errors_dps[:, self._axes :])
 
-    def _block(self, t_s: Array, warm: Array, found: Array) -> None:
-        """Write the errors of some samples into `found`."""
-        known = np.isfinite(t_s)
-        known &= np.isfinite(warm)
-        if known.all():
-            self._known_block(t_s, warm, found)
+    def _block(self, t_s: Array, temperature_c: Array, errors: Array) -> None:
+        """Write the errors of some samples into `errors`."""
+        is_finite = np.isfinite(t_s)
+        is_finite &= np.isfinite(temperature_c)
+        if is_finite.all():
+            self._known_block(t_s, temperature_c, errors)
             return
-        found[:] = np.nan
-        if known.any():
-            of_known = np.empty((int(known.sum()), found.shape[1]))
-            self._known_block(t_s[known], warm[known], of_known)
-            found[known] = of_known
+        errors[:] = np.nan
+        if is_finite.any():
+            of_known = np.empty((int(is_finite.sum()), errors.shape[1]))
+            self._known_block(t_s[is_finite], temperature_c[is_finite], of_known)
+            errors[is_finite] = of_known
 
-    def _known_block(self, t_s: Array, warm: Array, found: Array) -> None:
+    def _known_block(self, t_s: Array, temperature_c: Array, errors: Array) -> None:
         if self._last is None:
-            self.start(MemoryState(float(t_s[0]), float(warm[0]), (float(warm[0]),) * len(self._followers)))
+            self.start(
+                MemoryState(float(t_s[0]), float(temperature_c[0]), (float(temperature_c[0]),) * len(self._followers))
+            )
         assert self._last is not None
         last_s, last_c, places = self._last
-        steps = Steps.of(t_s, warm, last_s, last_c)
+        steps = Steps.of(t_s, temperature_c, last_s, last_c)
         moved: dict[tuple[str, float, float | None], Array] = {}
         rows = []
-        for each, place in zip(self._followers, places, strict=True):
-            movement = each.movement
+        for follower, place in zip(self._followers, places, strict=True):
+            movement = follower.movement
             if movement not in moved:
-                moved[movement] = each.moved(steps, place)
-            rows.append(each.state(moved[movement], warm))
-        ends = tuple(float(moved[each.movement][-1]) for each in self._followers)
-        self._last = float(t_s[-1]), float(warm[-1]), ends
+                moved[movement] = follower.moved(steps, place)
+            rows.append(follower.state(moved[movement], temperature_c))
+        ends = tuple(float(moved[follower.movement][-1]) for follower in self._followers)
+        self._last = float(t_s[-1]), float(temperature_c[-1]), ends
         if self._sizes.shape == (1, 1):  # a product of matrices would cost as much as the state
-            np.multiply(rows[0], self._sizes[0, 0], out=found[:, 0])
+            np.multiply(rows[0], self._sizes[0, 0], out=errors[:, 0])
         else:
-            np.matmul(np.array(rows).T, self._sizes, out=found)
+            np.matmul(np.array(rows).T, self._sizes, out=errors)
 
 
 def check_order(running: RunningMemory, t_s: Array) -> None:
@@ -286,12 +290,13 @@ def check_order(running: RunningMemory, t_s: Array) -> None:
     if goes_on and np.all(t_s[1:] >= t_s[:-1]):
         return
     rows = np.flatnonzero(np.isfinite(t_s))  # one that is no number is left out
-    known = t_s[rows]
-    before = np.concatenate([known[:1] if last is None else [last], known[:-1]])
-    if np.any(back := known < before):
+    row_times_s = t_s[rows]
+    before = np.concatenate([row_times_s[:1] if last is None else [last], row_times_s[:-1]])
+    if np.any(back := row_times_s < before):
         k = int(np.argmax(back))
         raise BadInput(
-            f"sample {rows[k] + 1}: t_s = {known[k]:.9g} s is before {before[k]:.9g} s; give them in order of time"
+            f"sample {rows[k] + 1}: t_s = {row_times_s[k]:.9g} s is before {before[k]:.9g} s; give them in order of "
+            "time"
         )
 
 
@@ -304,13 +309,13 @@ def split_memory(fitted: FittedModel, axes: tuple[str, ...]) -> tuple[FittedMode
     remembering = [term.effect for term in fitted.model.terms if kind_of(term).remembers]
     if not remembering:
         return fitted, None
-    rest, part = fitted, fitted
+    without_memory, part = fitted, fitted
     for effect in fitted.model.effect_ids:
         if effect in remembering:
-            rest = without(rest, effect)
+            without_memory = without(without_memory, effect)
         else:
             part = without(part, effect)
-    return rest, Memory(part, axes)
+    return without_memory, Memory(part, axes)
 
 
 def state_json(fitted: FittedModel) -> StateJson | None:
@@ -319,4 +324,4 @@ def state_json(fitted: FittedModel) -> StateJson | None:
     if memory is None:
         return None
     more = SCALE_EQUATION.format(law=LAWS[fitted.model.argument]) if memory.has_scale else ""
-    return {"equation": STATE_EQUATION + more, "elements": [each.to_json() for each in memory.followers]}
+    return {"equation": STATE_EQUATION + more, "elements": [follower.to_json() for follower in memory.followers]}

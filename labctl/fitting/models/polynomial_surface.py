@@ -25,14 +25,14 @@ class Surface:
     def correct(self, raw: Array, temperature_c: Array) -> Array:
         """Return corrected rates, (n, axes), from outputs (n, axes) and temperatures (n,), (n, axes) or one for all."""
         out = np.empty_like(raw)
-        warm = np.asarray(temperature_c, dtype=np.float64)
+        row_c = np.asarray(temperature_c, dtype=np.float64)
         buffers = np.empty(PIECE), np.empty(PIECE), np.empty(PIECE)
         for start in range(0, len(raw), PIECE):  # all axes of a piece, as they lie between each other in memory
             piece = slice(start, start + PIECE)
             u, row, total = (buffer[: len(raw[piece])] for buffer in buffers)
             for axis, c in enumerate(self.coefficients):
-                if axis == 0 or warm.ndim == 2:
-                    of_axis = warm[piece, axis] if warm.ndim == 2 else warm[piece] if warm.ndim else warm
+                if axis == 0 or row_c.ndim == 2:
+                    of_axis = row_c[piece, axis] if row_c.ndim == 2 else row_c[piece] if row_c.ndim else row_c
                     np.subtract(of_axis, self.reference_c, out=u)
                 _sum(c, raw[piece, axis], u, row, total)
                 np.subtract(raw[piece, axis], total, out=out[piece, axis])
@@ -58,7 +58,7 @@ def surface_of(fitted: FittedModel, axes: tuple[str, ...]) -> Surface | None:
     """Return the polynomial of a direct model that is nothing but one; None for any other."""
     if fitted.model.argument != "output" or fitted.model.effect_ids != ["rate_temperature_surface"]:
         return None
-    found = []
+    surface_terms = []
     for axis in axes:
         powers = {
             tuple(int(part) for part in name.removeprefix("c_r").split("_t")): float(values[0])
@@ -67,8 +67,8 @@ def surface_of(fitted: FittedModel, axes: tuple[str, ...]) -> Surface | None:
         c = np.zeros((1 + max(i for i, _ in powers), 1 + max(j for _, j in powers)))
         for (i, j), value in powers.items():
             c[i, j] = value
-        found.append(c)
-    return Surface(np.stack(found), fitted.model.reference.temperature_c)
+        surface_terms.append(c)
+    return Surface(np.stack(surface_terms), fitted.model.reference.temperature_c)
 
 
 #: Effects that no rate changes: a polynomial of temperature, right for an argument of either kind.
@@ -81,8 +81,8 @@ def bias_surface_of(fitted: FittedModel, axes: tuple[str, ...]) -> Surface | Non
     if not isinstance(model.temperature, Constant) or not set(model.effect_ids) <= OF_TEMPERATURE or model.held.axes:
         return None
     powers = [
-        {int(name.removeprefix("bias_t")) if name != "bias" else 0: float(values[0]) for name, values in found}
-        for found in (zip(fitted.axes[axis].names, fitted.axes[axis].values, strict=True) for axis in axes)
+        {int(name.removeprefix("bias_t")) if name != "bias" else 0: float(values[0]) for name, values in coefficients}
+        for coefficients in (zip(fitted.axes[axis].names, fitted.axes[axis].values, strict=True) for axis in axes)
     ]
     c = np.zeros((len(axes), 1, 1 + max(1, *(max(each, default=0) for each in powers))))
     for axis, each in enumerate(powers):

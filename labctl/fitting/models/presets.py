@@ -111,8 +111,8 @@ def _rests_both_ways(data: FitData) -> bool:
     """Whether every body axis that is used rested pointing up, and pointing down: gravity then differs from bias."""
     still = data.channels.table_rate_dps() == 0
     position = np.asarray(data.channels["position"]).astype(np.str_)
-    used = {*data.info.axes, *np.char.lstrip(position, "-").tolist()}
-    return {sign + axis for axis in used for sign in ("", "-")} <= set(position[still].tolist())
+    used_axes = {*data.info.axes, *np.char.lstrip(position, "-").tolist()}
+    return {sign + axis for axis in used_axes for sign in ("", "-")} <= set(position[still].tolist())
 
 
 #: The model of a recording in poses; `labctl.fitting.poses` fits it, since no data set of it has a known rate.
@@ -197,14 +197,14 @@ def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ..
     What the model holds stays held, but for the effects that are added: their coefficients are estimated.
     """
     held = model.forward().held.beside((*remove, *(term.effect for term in add)))
-    kept = tuple(t for t in model.terms if t.effect not in {*remove, *(term.effect for term in add)})
+    kept_terms = tuple(t for t in model.terms if t.effect not in {*remove, *(term.effect for term in add)})
     name = model.name + "".join(f"+{t.effect}" for t in add) + "".join(f"-{effect_id}" for effect_id in remove)
 
     def build(data: FitData) -> tuple[ErrorModel, Rows]:
         table = model.temperature
         if isinstance(table, LagrangeTable):
             table = LagrangeTable(_nodes(data, table.points, model.name), table.points)
-        terms = (*kept, *(replace(term, steady=True) for term in add))
+        terms = (*kept_terms, *(replace(term, steady=True) for term in add))
         return replace(model.forward(), name=name, terms=terms, temperature=table, held=held), _all(data)
 
     return Preset(name, build, isinstance(model.temperature, LagrangeTable))

@@ -35,31 +35,31 @@ class SineForm:
         columns = []
         for i, axis in enumerate(self.linear.axes):
             fit = self.fitted.axes[axis]
-            warm = temperature_c if temperature_c.ndim == 1 else temperature_c[:, i]
+            axis_c = temperature_c if temperature_c.ndim == 1 else temperature_c[:, i]
             values = fit.values[fit.effects.index(SINE)] if SINE in fit.effects else np.zeros(fit.values.shape[1])
-            columns.append(self.fitted.model.temperature.basis(warm) @ values)
+            columns.append(self.fitted.model.temperature.basis(axis_c) @ values)
         return np.column_stack(columns)
 
     def correct(self, raw: Array, temperature_c: Array) -> Array:
         """Return the true rates, (n, axes), of outputs (n, axes), deg/s."""
-        warm = np.broadcast_to(temperature_c, (len(raw),)) if temperature_c.ndim < 2 else temperature_c
+        row_c = np.broadcast_to(temperature_c, (len(raw),)) if temperature_c.ndim < 2 else temperature_c
         out = np.empty_like(raw)
         for start in range(0, len(raw), PIECE):
             piece = slice(start, start + PIECE)
-            out[piece] = self._solved(raw[piece], warm[piece])
+            out[piece] = self._solved(raw[piece], row_c[piece])
         return out
 
-    def _solved(self, raw: Array, warm: Array) -> Array:
-        gain, bias = self.linear.k_and_b(warm)
-        squares = self.k_squared(warm)
+    def _solved(self, raw: Array, temperature_c: Array) -> Array:
+        gain, bias = self.linear.k_and_b(temperature_c)
+        squares = self.k_squared(temperature_c)
         diagonal = np.arange(raw.shape[1])
         rate = arcsine_dps(raw - bias, squares)
         for _ in range(STEPS):
             x = squares * np.deg2rad(rate) ** 2
-            left = np.einsum("nij,nj->ni", gain, rate) + bias + rate * (sine_ratio(x) - 1.0) - raw
+            residual = np.einsum("nij,nj->ni", gain, rate) + bias + rate * (sine_ratio(x) - 1.0) - raw
             slope = gain.copy()
             slope[:, diagonal, diagonal] += np.maximum(cosine_of_root(x), 1 - FOLLOWED) - 1.0
-            step = np.linalg.solve(slope, left[:, :, None])[:, :, 0]
+            step = np.linalg.solve(slope, residual[:, :, None])[:, :, 0]
             rate = rate - step
             if np.max(np.abs(step), initial=0.0) < 1e-12 * max(np.max(np.abs(rate), initial=0.0), 1.0):
                 break

@@ -13,21 +13,23 @@ from labctl.fitting.numeric.arrays import Array
 ROUNDS, CLOSE_DPS = 100, 1e-12
 
 
-def errors_at_true_rates(fitted: FittedModel, here: Channels) -> dict[str, Array]:
-    """Return the modelled error of every axis, axis -> (n,) deg/s, where `here` has the true rates.
+def errors_at_true_rates(fitted: FittedModel, channels: Channels) -> dict[str, Array]:
+    """Return the modelled error of every axis, axis -> (n,) deg/s, where `channels` has the true rates.
 
     For a law of the output these are the outputs that it corrects to the true rates, minus those. Raises NotConverged
     where there are none.
     """
     if fitted.model.argument == "rate":
-        return {axis: fitted.error_dps(here, axis) for axis in fitted.axes}
-    errors: dict[str, Array] = {axis: np.zeros(len(here)) for axis in fitted.axes}
-    fastest = max(float(np.max(np.abs(rate), initial=0.0)) for rate in here.rates.values())
+        return {axis: fitted.error_dps(channels, axis) for axis in fitted.axes}
+    errors: dict[str, Array] = {axis: np.zeros(len(channels)) for axis in fitted.axes}
+    fastest = max(float(np.max(np.abs(rate), initial=0.0)) for rate in channels.rates.values())
     for _ in range(ROUNDS):
-        seen = here.with_rates({**here.rates, **{axis: here.rates[axis] + errors[axis] for axis in errors}})
-        found = {axis: fitted.error_dps(seen, axis) for axis in errors}
-        change = max(float(np.max(np.abs(found[axis] - errors[axis]), initial=0.0)) for axis in errors)
-        errors = found
+        with_errors = channels.with_rates(
+            {**channels.rates, **{axis: channels.rates[axis] + errors[axis] for axis in errors}}
+        )
+        error_at_rate = {axis: fitted.error_dps(with_errors, axis) for axis in errors}
+        change = max(float(np.max(np.abs(error_at_rate[axis] - errors[axis]), initial=0.0)) for axis in errors)
+        errors = error_at_rate
         if change < CLOSE_DPS * max(1.0, fastest):
             return errors
     raise NotConverged(

@@ -55,9 +55,9 @@ def slow_trend(rate_dps: Array) -> Array | None:
     steps = np.diff(rate_dps[: size * PIECES].reshape(PIECES, size).mean(axis=1))
     if not np.any(steps):
         return None
-    where = (np.arange(PIECES) + 0.5) * size / len(rate_dps)
-    laws = [np.column_stack([where, where**2, where**3])]
-    laws += [np.column_stack([where, np.exp(-where / share)]) for share in SHARES]
+    centres = (np.arange(PIECES) + 0.5) * size / len(rate_dps)
+    laws = [np.column_stack([centres, centres**2, centres**3])]
+    laws += [np.column_stack([centres, np.exp(-centres / share)]) for share in SHARES]
     chances, fits = zip(*(_fit(np.diff(law, axis=0), steps) for law in laws), strict=True)
     best = int(np.argmin(chances))
     if chances[best] * len(laws) > FALSE_ALARM:
@@ -71,10 +71,10 @@ def slow_trend(rate_dps: Array) -> Array | None:
 def _fit(design: NDArray[np.float64], steps: Array) -> tuple[float, Array]:
     """Return the probability that random steps fit a design as well by chance, and its coefficients."""
     coefficients, *_ = np.linalg.lstsq(design, steps)
-    left = float(np.sum((steps - design @ coefficients) ** 2))
+    chi2 = float(np.sum((steps - design @ coefficients) ** 2))
     k, freedom = design.shape[1], len(steps) - design.shape[1]
-    gained = max(float(steps @ steps) - left, 0.0)
-    return float(fdtrc(k, freedom, gained / k / max(left / freedom, 1e-300))), np.asarray(
+    gained = max(float(steps @ steps) - chi2, 0.0)
+    return float(fdtrc(k, freedom, gained / k / max(chi2 / freedom, 1e-300))), np.asarray(
         coefficients, dtype=np.float64
     )
 
@@ -192,13 +192,13 @@ def allan(rate_dps: Array, period_s: float) -> Allan | None:
     step = hiding_step(rate_dps)
     fitted = _Octaves(still[:octaves], tau[:octaves], m[:octaves], n + 1.0).followed()
     bounds = largest_coefficients(variance, tau, m, n + 1.0, from_s=float(fitted.tau[0]), step=step or 0.0)
-    shown = np.flatnonzero(tau >= fitted.tau[0])
-    design = design_of(tau[shown], fitted.correlation_s)
+    is_shown = np.flatnonzero(tau >= fitted.tau[0])
+    design = design_of(tau[is_shown], fitted.correlation_s)
     freedom = np.empty(len(m))
-    freedom[shown] = freedom_of(design, fitted.terms, m[shown], n + 1.0)
-    freedom[: shown[0]] = np.maximum(KINDS[WHITE].freedom(n + 1.0, m[: shown[0]]), 1.0)
+    freedom[is_shown] = freedom_of(design, fitted.terms, m[is_shown], n + 1.0)
+    freedom[: is_shown[0]] = np.maximum(KINDS[WHITE].freedom(n + 1.0, m[: is_shown[0]]), 1.0)
     model = np.full(len(m), np.nan)
-    model[shown] = design @ fitted.terms + (0.0 if trend is None else _variances(trend, m[shown]))
+    model[is_shown] = design @ fitted.terms + (0.0 if trend is None else _variances(trend, m[is_shown]))
     tail = (1 - CONFIDENCE) / 2
     return Allan(
         tau,
@@ -256,12 +256,12 @@ class _Fitted:
         """Return whether the record cannot be explained without a term."""
         return bool(self.shows[self.columns(j)].any())
 
-    def is_followed(self, shown: NDArray[np.bool_]) -> bool:
+    def is_followed(self, is_shown: NDArray[np.bool_]) -> bool:
         """Return whether the fitted curve lies within the data's intervals at the octaves where a term shows."""
         tail = (1 - FAMILY_CONFIDENCE) / 2 / len(self.tau)
         ratio = self.freedom * self.variance / self.model
         inside = (ratio > chdtri(self.freedom, 1 - tail)) & (ratio < chdtri(self.freedom, tail))
-        return bool(np.all(inside[shown]))
+        return bool(np.all(inside[is_shown]))
 
 
 @dataclass(frozen=True)
@@ -292,8 +292,8 @@ class _Octaves:
         likeliest = likeliest_correlation(self.variance, self.tau, self.m, self.phases)
         later = (self.fit(k) for k in range(1, len(self.m) - LEAST_OCTAVES + 1))
         rivals = itertools.chain([self.fit(0, likeliest)], later)
-        found = (fit for fit in rivals if _shows_white(fit, PREVAILING_OCTAVES) and self._explained_before(fit))
-        return next(found, whole)
+        explained = (fit for fit in rivals if _shows_white(fit, PREVAILING_OCTAVES) and self._explained_before(fit))
+        return next(explained, whole)
 
     def _explained_before(self, fit: _Fitted) -> bool:
         before = slice(len(self.tau) - len(fit.tau) + 1)
@@ -303,10 +303,10 @@ class _Octaves:
 
 def _shows_white(fitted: _Fitted, octaves: int) -> bool:
     share = fitted.share(WHITE)
-    shown = share >= SHOWN_SHARE
+    is_shown = share >= SHOWN_SHARE
     prevails = int(np.sum(share >= 0.5)) >= octaves and share[0] >= 0.5
     is_white = fitted.is_shown(WHITE) and not fitted.is_smoothed_beyond
-    return is_white and prevails and fitted.is_followed(shown)
+    return is_white and prevails and fitted.is_followed(is_shown)
 
 
 def _variances(rate_dps: Array, m: Array) -> Array:
@@ -318,9 +318,9 @@ def _figure(j: int, fitted: _Fitted, bounds: Array, step: float | None) -> Figur
     value = float(np.sqrt(fitted.terms[fitted.columns(j)].sum()))
     bound = kind.scale * float(bounds[j])
     u = 0.0 if value == 0 else _u_squared(j, fitted) / (2 * value)
-    why = _why_unknown(j, fitted, step, value, u)
-    if why:
-        return Figure(None, None, kind.unit, bound, why)
+    reason = _why_unknown(j, fitted, step, value, u)
+    if reason:
+        return Figure(None, None, kind.unit, bound, reason)
     return Figure(kind.scale * value, kind.scale * u, kind.unit)
 
 
@@ -329,21 +329,21 @@ def _why_unknown(j: int, fitted: _Fitted, step: float | None, value: float, u: f
     kind = KINDS[j]
     span = f"averaging times of {fitted.tau[0]:.3g} to {fitted.tau[-1]:.3g} s"
     share = fitted.share(j)
-    shown = share >= SHOWN_SHARE
+    is_shown = share >= SHOWN_SHARE
     octaves = int(np.sum(share >= 0.5))
     slope = f"no {kind.region} {span}"
     short = f"slope +1/2 at fewer than {PREVAILING_OCTAVES} octaves of {span}: the record is too short to detect a"
     uncertain = f"{kind.scale * value:.3g} {kind.unit}, uncertain by {100 * u / max(value, 1e-300):.0f} %"
-    hidden = step is not None and bool(np.any(fitted.variance[shown] < step**2))
+    hidden = step is not None and bool(np.any(fitted.variance[is_shown] < step**2))
     reasons = (
-        (not (fitted.is_shown(j) and shown.any()), f"{slope}: masked by other noise"),
+        (not (fitted.is_shown(j) and is_shown.any()), f"{slope}: masked by other noise"),
         (hidden, f"the output has steps of {step or 0.0:.3g} deg/s, which hide noise smaller than that"),
         (j == WHITE and fitted.is_smoothed_beyond, f"{slope}: an output filter smooths the noise for longer"),
         (kind.letter == "K" and octaves < PREVAILING_OCTAVES, f"{short} random walk"),
-        (not fitted.is_followed(shown), f"{slope}: the deviation does not follow that slope"),
+        (not fitted.is_followed(is_shown), f"{slope}: the deviation does not follow that slope"),
         (value < KNOWN * u, f"no clear {kind.region} {span}: {uncertain}"),
     )
-    return next((why for holds, why in reasons if holds), "")
+    return next((reason for holds, reason in reasons if holds), "")
 
 
 def _u_squared(j: int, fitted: _Fitted) -> float:
@@ -352,10 +352,10 @@ def _u_squared(j: int, fitted: _Fitted) -> float:
     It is that beside the terms that are kept, and those that the record does not show and that may be there
     nevertheless.
     """
-    kept = kept_beside(fitted.terms, quantized=fitted.quantized)
-    columns = design_of(fitted.tau, fitted.correlation_s)[:, kept]
+    terms_used = kept_beside(fitted.terms, quantized=fitted.quantized)
+    columns = design_of(fitted.tau, fitted.correlation_s)[:, terms_used]
     weighted = columns * (np.sqrt(fitted.freedom / 2) / fitted.model)[:, None]
     size = np.linalg.norm(weighted, axis=0)
     covariance = np.linalg.pinv(weighted.T @ weighted / np.outer(size, size)) / np.outer(size, size)
-    of_term = np.isin(kept, fitted.columns(j)).astype(np.float64)
+    of_term = np.isin(terms_used, fitted.columns(j)).astype(np.float64)
     return NEIGHBOURS * float(np.sqrt(of_term @ covariance @ of_term))

@@ -27,12 +27,12 @@ def largest_coefficients(variance: Array, tau: Array, m: Array, phases: float, *
     """
     first = max(_unfiltered_from(variance, m, phases), int(np.searchsorted(tau, from_s * (1 - 1e-9))))
     lowered = 1 - LOWERED_SHARE * tau[first] / tau[first:]
-    found = []
+    bounds = []
     for kind in KINDS:
         freedom = np.maximum(kind.freedom(phases, m), 1.0)[first:]
         highest = np.sqrt(variance[first:] * freedom / chdtri(freedom, BOUND_CONFIDENCE)) + step / 2
-        found.append(float(np.min(highest / np.sqrt(lowered * kind.shape(tau[first:])))))
-    return np.array(found)
+        bounds.append(float(np.min(highest / np.sqrt(lowered * kind.shape(tau[first:])))))
+    return np.array(bounds)
 
 
 def _unfiltered_from(variance: Array, m: Array, phases: float) -> int:

@@ -149,34 +149,34 @@ def _fewest(design: NDArray[np.float64], variance: Array, freedom: Array, *, qua
         _pruned(design, variance, freedom, sorted([*every, first]))
         for first in ((QUANTIZATION, SMOOTHED) if quantized else (SMOOTHED,))
     ]
-    return min(rivals, key=lambda found: found[1])[0]
+    return min(rivals, key=lambda candidate: candidate[1])[0]
 
 
-def _pruned(design: NDArray[np.float64], variance: Array, freedom: Array, kept: list[int]) -> tuple[Array, float]:
+def _pruned(design: NDArray[np.float64], variance: Array, freedom: Array, terms_kept: list[int]) -> tuple[Array, float]:
     """Return the terms that are left, and their deviance with what each of them costs."""
-    terms, deviance = _fit(design, variance, freedom, kept)
-    while len(kept) > 1:
-        tried = [(_fit(design, variance, freedom, [j for j in kept if j != out]), out) for out in kept]
+    terms, deviance = _fit(design, variance, freedom, terms_kept)
+    while len(terms_kept) > 1:
+        tried = [(_fit(design, variance, freedom, [j for j in terms_kept if j != out]), out) for out in terms_kept]
         (fewer, without), out = min(tried, key=lambda pair: pair[0][1])
         if without - deviance > SHOWN_DEVIANCE:
             break
-        kept = [j for j in kept if j != out]
+        terms_kept = [j for j in terms_kept if j != out]
         terms, deviance = fewer, without
-    return terms, deviance + SHOWN_DEVIANCE * len(kept)
+    return terms, deviance + SHOWN_DEVIANCE * len(terms_kept)
 
 
-def _fit(design: NDArray[np.float64], variance: Array, freedom: Array, kept: list[int]) -> tuple[Array, float]:
+def _fit(design: NDArray[np.float64], variance: Array, freedom: Array, terms_kept: list[int]) -> tuple[Array, float]:
     """Return squared coefficients >= 0 that make chi-square distributed variances likeliest, and their deviance."""
     terms = np.zeros(design.shape[1])
     model = variance
     for _ in range(ROUNDS):
         weight = np.sqrt(freedom / 2) / model
-        columns = design[:, kept] * weight[:, None]
+        columns = design[:, terms_kept] * weight[:, None]
         size = np.linalg.norm(columns, axis=0)
-        found = nonnegative_least_squares(columns / size, variance * weight)
+        coefficients = nonnegative_least_squares(columns / size, variance * weight)
         before = model
-        model = np.maximum(design[:, kept] @ (found / size), 1e-12 * variance)
-        terms[kept] = found / size
+        model = np.maximum(design[:, terms_kept] @ (coefficients / size), 1e-12 * variance)
+        terms[terms_kept] = coefficients / size
         if np.all(np.abs(model - before) <= CONVERGED_VAR + CONVERGED * before):
             break
     ratio = variance / model

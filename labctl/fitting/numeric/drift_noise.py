@@ -72,8 +72,11 @@ def whitened(
     """
     order = np.lexsort((scatter.t_s, scatter.run))
     ordered = values[order]
-    kept, total, share = _filter(scatter, drifts, white_var, order)
-    before, own = kept * np.roll(share, 1, axis=1), kept * np.roll(1.0 - share, 1, axis=1)  # kept is 0 in the first row
+    remaining, total, share = _filter(scatter, drifts, white_var, order)
+    before, own = (
+        remaining * np.roll(share, 1, axis=1),
+        remaining * np.roll(1.0 - share, 1, axis=1),
+    )  # kept is 0 in the first row
     expect = _expected_of_one if len(drifts) == 1 else _expected_of_many
     expected = expect(ordered, before, own)
     np.subtract(ordered, expected, out=expected)
@@ -89,22 +92,22 @@ def _expected_of_one(
     band[1, :-1] = -own[0, 1:]
     pull = np.zeros_like(ordered, order="F")
     pull[1:] = before[0, 1:, None] * ordered[:-1]
-    found, _ = dtbtrs(band, pull, uplo="L", diag="U", overwrite_b=True)
-    return np.asarray(found)[None]
+    expected, _ = dtbtrs(band, pull, uplo="L", diag="U", overwrite_b=True)
+    return np.asarray(expected)[None]
 
 
 def _expected_of_many(
     ordered: NDArray[np.float64], before: NDArray[np.float64], own: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the same for many drifts, (drifts, m, k), row by row for all of them at once."""
-    found = np.empty((len(ordered), len(before), ordered.shape[1]))
-    found[0] = 0.0
-    np.multiply(before.T[1:, :, None], ordered[:-1, None, :], out=found[1:])
-    pull = np.empty(found.shape[1:])
-    for row, last, share in zip(found[1:], found[:-1], own.T[1:, :, None], strict=True):
+    expected = np.empty((len(ordered), len(before), ordered.shape[1]))
+    expected[0] = 0.0
+    np.multiply(before.T[1:, :, None], ordered[:-1, None, :], out=expected[1:])
+    pull = np.empty(expected.shape[1:])
+    for row, last, share in zip(expected[1:], expected[:-1], own.T[1:, :, None], strict=True):
         np.multiply(share, last, out=pull)
         np.add(row, pull, out=row)
-    return np.ascontiguousarray(found.transpose(1, 0, 2))
+    return np.ascontiguousarray(expected.transpose(1, 0, 2))
 
 
 def _filter(
@@ -117,19 +120,19 @@ def _filter(
     """
     size_var, tau_s, per_rate = np.array([(d.drift_dps**2, d.tau_s, d.per_rate) for d in drifts]).T[:, :, None]
     begins = np.concatenate([[True], np.diff(scatter.run[order]) != 0])
-    kept = np.where(begins, 0.0, np.exp(-np.diff(scatter.t_s[order], prepend=scatter.t_s[order[0]]) / tau_s))
+    decay = np.where(begins, 0.0, np.exp(-np.diff(scatter.t_s[order], prepend=scatter.t_s[order[0]]) / tau_s))
     white = white_var[order] + (per_rate * scatter.rate_dps[order]) ** 2
     size: Any = size_var[:, 0]
-    rows: Any = zip((kept**2).T, white.T, strict=True)
+    rows: Any = zip((decay**2).T, white.T, strict=True)
     if len(drifts) == 1:  # single numbers are faster than arrays of one
-        size, rows = float(size[0]), zip((kept[0] ** 2).tolist(), white[0].tolist(), strict=True)
+        size, rows = float(size[0]), zip((decay[0] ** 2).tolist(), white[0].tolist(), strict=True)
     variances, variance = [], size
     for part, noise in rows:
         before = size + part * (variance - size)
         variances.append(before)
         variance = before * noise / (before + noise)
     drift_var = np.array(variances).reshape(len(order), len(drifts)).T
-    return kept, drift_var + white, drift_var / (drift_var + white)
+    return decay, drift_var + white, drift_var / (drift_var + white)
 
 
 def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:

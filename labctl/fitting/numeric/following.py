@@ -90,38 +90,38 @@ class Steps:
         """
         start_k = behind_k
         cools = self.now_c < float(self.now_c[0] + self.fall_k[0]) + behind_k
-        found = np.empty_like(self.now_c)
+        lag_k = np.empty_like(self.now_c)
         begin = 0
         while True:
-            rest = slice(begin, None)
-            found[rest] = self._two_ways(warming_s, cooling_s, cools, begin, start_k)
-            cooled = np.empty_like(cools[rest])
+            after_begin = slice(begin, None)
+            lag_k[after_begin] = self._two_ways(warming_s, cooling_s, cools, begin, start_k)
+            cooled = np.empty_like(cools[after_begin])
             cooled[0] = start_k + self.fall_k[begin] > 0
-            np.greater(found[begin:-1] + self.fall_k[begin + 1 :], 0.0, out=cooled[1:])
-            changed = cooled != cools[rest]
+            np.greater(lag_k[begin:-1] + self.fall_k[begin + 1 :], 0.0, out=cooled[1:])
+            changed = cooled != cools[after_begin]
             first = int(np.argmax(changed))
             if not changed[first]:
-                return found
-            cools[rest] = cooled
+                return lag_k
+            cools[after_begin] = cooled
             begin += first
-            start_k = behind_k if begin == 0 else float(found[begin - 1])
+            start_k = behind_k if begin == 0 else float(lag_k[begin - 1])
 
     def _two_ways(
         self, warming_s: float, cooling_s: float, cools: NDArray[np.bool_], begin: int, behind_k: float
     ) -> Array:
         """Return the follower from a step on, where it is known which steps cool (n,)."""
         own = cools[begin:]
-        rest = Steps(
+        after_begin = Steps(
             self.step_s[begin:] if len(self.step_s) > 1 else self.step_s,
             self.passed_s[begin:] - (self.passed_s[begin - 1] if begin else 0.0),
             self.fall_k[begin:], self.now_c[begin:],
         )  # fmt: skip
         if own.all() or not own.any():
-            return rest.lagged(cooling_s if own[0] else warming_s, behind_k)
+            return after_begin.lagged(cooling_s if own[0] else warming_s, behind_k)
         per_s = np.where(own, 1.0 / cooling_s, 1.0 / warming_s)
-        ratios = rest.step_s * per_s
+        ratios = after_begin.step_s * per_s
         exponents = _decaying_sum(1.0, ratios.copy(), 0.0)
-        return _decayed(ratios, exponents, _means(ratios) * rest.fall_k, behind_k)
+        return _decayed(ratios, exponents, _means(ratios) * after_begin.fall_k, behind_k)
 
     def played(self, width_k: float, at_c: float) -> Array:
         """Return a follower that the temperature carries along at the edges of a play of this width, (n,) deg C.
@@ -142,18 +142,18 @@ class Steps:
 
 def _changes(values: Array, last: float) -> Array:
     """Return by how much each value, (n,), is more than the one before it, the first of them `last`."""
-    found = np.empty_like(values)
-    found[0] = values[0] - last
-    np.subtract(values[1:], values[:-1], out=found[1:])
-    return found
+    changes = np.empty_like(values)
+    changes[0] = values[0] - last
+    np.subtract(values[1:], values[:-1], out=changes[1:])
+    return changes
 
 
 def _falls(values: Array, last: float) -> Array:
     """Return by how much each value, (n,), is less than the one before it, the first of them `last`."""
-    found = np.empty_like(values)
-    found[0] = last - values[0]
-    np.subtract(values[:-1], values[1:], out=found[1:])
-    return found
+    falls = np.empty_like(values)
+    falls[0] = last - values[0]
+    np.subtract(values[:-1], values[1:], out=falls[1:])
+    return falls
 
 
 @lru_cache(maxsize=2)
@@ -174,12 +174,12 @@ def _means(ratios: Array) -> Array:
     terms = [1.0, -1.0 / 2]
     while abs(following := -terms[-1] / (len(terms) + 1)) * longest ** len(terms) > NEGLIGIBLE:
         terms.append(following)
-    found = ratios * terms[-1]
+    means = ratios * terms[-1]
     for term in terms[-2:0:-1]:
-        found += term
-        found *= ratios
-    found += 1.0
-    return found
+        means += term
+        means *= ratios
+    means += 1.0
+    return means
 
 
 def _decayed(ratios: Array, exponents: Array, pull: Array, start: float) -> Array:
@@ -192,9 +192,9 @@ def _decayed(ratios: Array, exponents: Array, pull: Array, start: float) -> Arra
         return _one_by_one(np.exp(-ratios), pull, start)
     weights = np.exp(exponents, out=exponents)
     pull *= weights
-    found = _decaying_sum(1.0, pull, start)
-    found /= weights
-    return found
+    decayed = _decaying_sum(1.0, pull, start)
+    decayed /= weights
+    return decayed
 
 
 def _decaying_sum(keep: float, values: Array, start: float) -> Array:
@@ -207,17 +207,17 @@ def _decaying_sum(keep: float, values: Array, start: float) -> Array:
     if n < FEW:
         return _one_by_one(keep, values, start)
     within, whole_lane = _lane(keep)
-    found = np.empty(n)
-    lanes = found[:whole].reshape(-1, LANE)
-    given = values[:whole].reshape(-1, LANE)
-    given[0, 0] += keep * start
-    ends = _decaying_sum(whole_lane, given[:-1] @ within[:, -1], 0.0)
-    given[1:, 0] += keep * ends
+    sums = np.empty(n)
+    lanes = sums[:whole].reshape(-1, LANE)
+    in_lanes = values[:whole].reshape(-1, LANE)
+    in_lanes[0, 0] += keep * start
+    ends = _decaying_sum(whole_lane, in_lanes[:-1] @ within[:, -1], 0.0)
+    in_lanes[1:, 0] += keep * ends
     for begin in range(0, len(lanes), LANES):
-        np.matmul(given[begin : begin + LANES], within, out=lanes[begin : begin + LANES])
+        np.matmul(in_lanes[begin : begin + LANES], within, out=lanes[begin : begin + LANES])
     if whole < n:
-        found[whole:] = _one_by_one(keep, values[whole:], float(found[whole - 1]))
-    return found
+        sums[whole:] = _one_by_one(keep, values[whole:], float(sums[whole - 1]))
+    return sums
 
 
 @lru_cache(maxsize=16)
@@ -233,4 +233,6 @@ def _one_by_one(keep: Array | float, pull: Array, start: float) -> Array:
     """Return x with x_k = keep_k x_(k-1) + pull_k, (n,), from `start`."""
     keeps = keep.tolist() if isinstance(keep, np.ndarray) else repeat(keep)
     steps = zip(keeps, pull.tolist(), strict=False)
-    return np.fromiter((start := kept * start + pulled for kept, pulled in steps), dtype=np.float64, count=len(pull))
+    return np.fromiter(
+        (start := factor * start + pulled for factor, pulled in steps), dtype=np.float64, count=len(pull)
+    )

@@ -108,8 +108,8 @@ def _by_normal_equations(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64]
     gram = rows.transpose(0, 2, 1) @ rows
     factor: NDArray[np.float64] = np.asarray(np.linalg.cholesky(gram[:, :-1, :-1]), dtype=np.float64)
     projected: Array = np.asarray(np.linalg.solve(factor, gram[:, :-1, -1:])[:, :, 0], dtype=np.float64)
-    left = np.maximum(gram[:, -1, -1] - np.sum(projected**2, axis=1), 0.0)
-    return factor.transpose(0, 2, 1), projected, np.asarray(left)
+    residual_squares = np.maximum(gram[:, -1, -1] - np.sum(projected**2, axis=1), 0.0)
+    return factor.transpose(0, 2, 1), projected, np.asarray(residual_squares)
 
 
 def rank_of(design: NDArray[np.float64]) -> int:
@@ -143,12 +143,12 @@ def solve(
     fits = _at(whole, y, scatter, [drift]) if drift is not None else _over_grid(whole, y, scatter)
     # the triangle of the first columns is that of a fit of them alone
     fits = replace(fits, r=fits.r[:, :k, :k], projected=fits.projected[:, :k])
-    found = _collect(fits, design, y, scatter)
+    solution = _collect(fits, design, y, scatter)
     if random is not None:
-        found = _with_random_effects(found, fits, design, y, random)
+        solution = _with_random_effects(solution, fits, design, y, random)
     if considered is None:
-        return found
-    return replace(found, along_held=_along(fits, design, scatter, considered.columns, _tightened(found, random)))
+        return solution
+    return replace(solution, along_held=_along(fits, design, scatter, considered.columns, _tightened(solution, random)))
 
 
 def drift_beside(columns: NDArray[np.float64], y: Array, scatter: Scatter) -> Drift:
@@ -177,7 +177,7 @@ def _at(
     design: NDArray[np.float64], y: Array, scatter: Scatter, drifts: Sequence[Drift], reduce: _Reduce = _by_qr
 ) -> _Fits:
     """Return the weighted fit and its restricted log likelihood at each drift."""
-    known = scatter.white_var is not None
+    has_white = scatter.white_var is not None
     white = scatter.white_var if scatter.white_var is not None else np.ones(len(y))
     m, k = design.shape
     rows, log_dets = drift_noise.whitened(scatter, drifts, white, np.column_stack([design, y]))
@@ -185,8 +185,8 @@ def _at(
     log_dets = log_dets + 2 * np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))).sum(axis=1)
     freedom = max(m - k, 1)
     # a chi2 above that of the noise is due to the model, and makes its coefficients as much less certain
-    scale = np.maximum(chi2 / freedom, 1.0) if known else np.maximum(chi2, 1e-300) / freedom
-    fit_terms = chi2 if known else freedom * np.log(np.maximum(chi2, 1e-300))
+    scale = np.maximum(chi2 / freedom, 1.0) if has_white else np.maximum(chi2, 1e-300) / freedom
+    fit_terms = chi2 if has_white else freedom * np.log(np.maximum(chi2, 1e-300))
     priors = np.array([drift_noise.log_prior(scatter, drift) for drift in drifts])
     return _Fits(drifts, r, projected, -0.5 * (log_dets + fit_terms) + priors, scale)
 
@@ -240,7 +240,7 @@ def _collect(fits: _Fits, design: NDArray[np.float64], y: Array, scatter: Scatte
 
 
 def _with_random_effects(
-    found: Solution, fits: _Fits, design: NDArray[np.float64], y: Array, random: RandomEffects
+    solution: Solution, fits: _Fits, design: NDArray[np.float64], y: Array, random: RandomEffects
 ) -> Solution:
     """Return a solution averaged also over the spread of the random effects, which so far is that of wide priors."""
     counting = np.flatnonzero(~(fits.weights() < NEGLIGIBLE_NOISE))
@@ -248,7 +248,7 @@ def _with_random_effects(
         Triangles(fits.r[counting], fits.projected[counting], fits.scale[counting], fits.log_evidence[counting]), random
     )
     return replace(
-        found,
+        solution,
         values=mixed.values,
         covariance=mixed.covariance,
         residual=y - design @ mixed.values,
@@ -256,11 +256,11 @@ def _with_random_effects(
     )
 
 
-def _tightened(found: Solution, random: RandomEffects | None) -> Array:
+def _tightened(solution: Solution, random: RandomEffects | None) -> Array:
     """Return what the found spread of each random effect adds to the root of its prior's precision, (q,)."""
     if random is None:
         return np.zeros(0)
-    spread = np.maximum(np.array([component.value for component in found.components])[random.kind], LEAST_SPREAD)
+    spread = np.maximum(np.array([component.value for component in solution.components])[random.kind], LEAST_SPREAD)
     return np.asarray(np.sqrt(np.maximum(spread**-2.0 - random.wide**-2.0, 0.0)))
 
 
@@ -274,11 +274,11 @@ def _along(
     below[:, k - q : k] = np.diag(tightened)
     weights = fits.weights()
     counting = np.flatnonzero(~(weights < NEGLIGIBLE_NOISE))
-    found = np.zeros((k, columns.shape[1]))
+    projected = np.zeros((k, columns.shape[1]))
     for point, share in zip(counting.tolist(), weights[counting] / weights[counting].sum(), strict=True):
         rows = drift_noise.whitened(scatter, [fits.drifts[point]], white, np.column_stack([design, columns]))[0][0]
         rows = np.vstack([rows, below])
         size = np.maximum(np.linalg.norm(rows[:, :k], axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(rows[:, :k] / size, rows[:, k:], rcond=1e-12)
-        found -= share * taken / size[:, None]
-    return found
+        coordinates, *_ = np.linalg.lstsq(rows[:, :k] / size, rows[:, k:], rcond=1e-12)
+        projected -= share * coordinates / size[:, None]
+    return projected

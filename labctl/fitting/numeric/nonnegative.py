@@ -14,26 +14,26 @@ def nonnegative_least_squares(columns: NDArray[np.float64], y: Array) -> Array:
     By active sets (Lawson and Hanson 1974, chapter 23). SciPy's takes longer to import than this takes altogether.
     """
     gram, inner = columns.T @ columns, columns.T @ y
-    found, kept = np.zeros(len(inner)), np.zeros(len(inner), dtype=np.bool_)
+    solution, is_positive = np.zeros(len(inner)), np.zeros(len(inner), dtype=np.bool_)
     tolerance = 10 * max(columns.shape) * np.finfo(np.float64).eps * float(np.abs(columns).sum(axis=0).max())
     for _ in range(3 * len(inner)):
-        slope = np.where(kept, -np.inf, inner - gram @ found)
+        slope = np.where(is_positive, -np.inf, inner - gram @ solution)
         if not slope.max() > tolerance:
             break
-        kept[np.argmax(slope)] = True
-        found = _feasible(gram, inner, found, kept)
-    return found
+        is_positive[np.argmax(slope)] = True
+        solution = _feasible(gram, inner, solution, is_positive)
+    return solution
 
 
-def _feasible(gram: NDArray[np.float64], inner: Array, found: Array, kept: NDArray[np.bool_]) -> Array:
-    """Return the solution of the columns that are kept, after leaving out of `kept` those it makes negative."""
+def _feasible(gram: NDArray[np.float64], inner: Array, solution: Array, is_free: NDArray[np.bool_]) -> Array:
+    """Return the solution of the columns that are kept, after leaving out of `is_free` those it makes negative."""
     while True:
-        wanted = np.zeros(len(found))
-        wanted[kept] = np.linalg.solve(gram[kept][:, kept], inner[kept])
-        negative = kept & (wanted <= 0)
+        step = np.zeros(len(solution))
+        step[is_free] = np.linalg.solve(gram[is_free][:, is_free], inner[is_free])
+        negative = is_free & (step <= 0)
         if not negative.any():
-            return wanted
-        share = found[negative] / (found[negative] - wanted[negative])
-        found = found + share.min() * (wanted - found)
-        kept[np.flatnonzero(negative)[share <= share.min()]] = False
-        found = np.where(kept, found, 0.0)
+            return step
+        share = solution[negative] / (solution[negative] - step[negative])
+        solution = solution + share.min() * (step - solution)
+        is_free[np.flatnonzero(negative)[share <= share.min()]] = False
+        solution = np.where(is_free, solution, 0.0)

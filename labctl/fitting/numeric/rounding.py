@@ -33,12 +33,12 @@ class Rounded:
 
 def rounded_to_uncertainty(value: float, uncertainty: float | None) -> Rounded:
     """Return a value rounded to its uncertainty; without a known one (None, 0 or not finite) to four digits."""
-    known = uncertainty is not None and math.isfinite(uncertainty) and uncertainty > 0
-    u = float(f"{uncertainty:.1e}") if known else 0.0  # two significant digits, so 0.0999 is 0.10
+    has_u = uncertainty is not None and math.isfinite(uncertainty) and uncertainty > 0
+    u = float(f"{uncertainty:.1e}") if has_u else 0.0  # two significant digits, so 0.0999 is 0.10
     largest = max(abs(value), u)
     size = math.floor(math.log10(largest)) if largest > 0 else 0
     exponent = size if size < LEAST_POWER or size > MOST_POWER else 0
-    if not known:
+    if not has_u:
         return Rounded(f"{float(f'{value / 10.0**exponent:.{DIGITS}g}'):.12g}", None, exponent)
     place = int(f"{u:.1e}".split("e")[1]) - exponent - 1  # of the second significant digit
     decimals, unit = min(max(-place, 0), MOST_DECIMALS), 10.0 ** max(place, 0)

@@ -90,6 +90,6 @@ def _weighted(time: Array, values: Array, variance: Array) -> tuple[float, float
     root = 1.0 / np.sqrt(variance)
     columns = np.column_stack([root, root * time])
     covariance: NDArray[np.float64] = np.asarray(np.linalg.pinv(columns.T @ columns), dtype=np.float64)
-    found = covariance @ (columns.T @ (root * values))
-    left = root * values - columns @ found
-    return float(found[0]), float(found[1]), covariance, float(left @ left)
+    coefficients = covariance @ (columns.T @ (root * values))
+    residual = root * values - columns @ coefficients
+    return float(coefficients[0]), float(coefficients[1]), covariance, float(residual @ residual)

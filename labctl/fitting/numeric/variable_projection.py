@@ -29,8 +29,8 @@ class Local:
         whole, y = rows[:, : base + own], rows[:, -1]
         size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
         directions, sizes, others = np.linalg.svd(whole / size, full_matrices=False)
-        kept = sizes > 1e-9 * sizes[0]
-        directions, inner = directions[:, kept], others[kept].T / sizes[kept]
+        is_estimable = sizes > 1e-9 * sizes[0]
+        directions, inner = directions[:, is_estimable], others[is_estimable].T / sizes[is_estimable]
         values = (inner @ (directions.T @ y)) / size
         moved = rows[:, base + own : -1].reshape(len(rows), -1, own) @ values[base:]
         #: What is left, (n,), and what each parameter moves beside the linear ones, (n, parameters).
@@ -48,7 +48,7 @@ def refined(
 ) -> Array:  # fmt: skip
     """Return the parameters (p,) at which the parts of the data leave least, all within the same bounds."""
     here, parts = begin, at(begin)
-    left = sum(part.chi2 for part in parts)
+    chi2 = sum(part.chi2 for part in parts)
     for _ in range(most_steps):
         curvature = sum((part.slopes.T @ part.slopes for part in parts), np.zeros((len(here), len(here))))
         pull = sum((part.slopes.T @ part.residual for part in parts), np.zeros(len(here)))
@@ -59,12 +59,12 @@ def refined(
             there = np.clip(here + step, *bounds)
             tried = at(there)
             less = sum(part.chi2 for part in tried)
-            if less < left:
+            if less < chi2:
                 break
             step = step / 2
         else:
             break
-        gained, here, parts, left = left - less, there, tried, less
-        if gained < DONE * left:
+        gained, here, parts, chi2 = chi2 - less, there, tried, less
+        if gained < DONE * chi2:
             break
     return here

@@ -82,16 +82,16 @@ class _Information:
     product: Array
 
 
-def mixture(found: Triangles, random: RandomEffects) -> Mixture:
+def mixture(triangles: Triangles, random: RandomEffects) -> Mixture:
     """Return the fit averaged over noise and over the standard deviations of the random effects."""
     q = len(random.kind)
-    k = found.r.shape[1] - q
-    at = [_information(found, d, k, random) for d in range(len(found.scale))]
-    best = int(np.argmax(found.log_evidence))
+    k = triangles.r.shape[1] - q
+    at = [_information(triangles, d, k, random) for d in range(len(triangles.scale))]
+    best = int(np.argmax(triangles.log_evidence))
     grid = _grid(at[best], random)
     log_weight = np.stack([_log_likelihood(each, grid) for each in at])
     wide = np.array([_log_likelihood(each, np.asarray(random.wide)[None, :])[0] for each in at])
-    log_weight += (np.asarray(found.log_evidence) - wide)[:, None]
+    log_weight += (np.asarray(triangles.log_evidence) - wide)[:, None]
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
     values, spreads, shares = [], [], []
@@ -102,9 +102,9 @@ def mixture(found: Triangles, random: RandomEffects) -> Mixture:
             continue
         inverse = np.linalg.inv(information.matrix + np.apply_along_axis(np.diag, 1, grid[chosen] ** -2.0))
         effects = inverse @ information.product
-        root = np.linalg.inv(found.r[d, :k, :k]) * np.sqrt(found.scale[d])
-        gain = np.linalg.solve(found.r[d, :k, :k], found.r[d, :k, k:])
-        fixed = np.linalg.solve(found.r[d, :k, :k], found.projected[d, :k]) - effects @ gain.T
+        root = np.linalg.inv(triangles.r[d, :k, :k]) * np.sqrt(triangles.scale[d])
+        gain = np.linalg.solve(triangles.r[d, :k, :k], triangles.r[d, :k, k:])
+        fixed = np.linalg.solve(triangles.r[d, :k, :k], triangles.projected[d, :k]) - effects @ gain.T
         lever = np.vstack([-gain, np.eye(q)])
         own = np.zeros((k + q, k + q))
         own[:k, :k] = root @ root.T
@@ -140,11 +140,11 @@ def half_width(
     return np.asarray((low + high) / 2)
 
 
-def _information(found: Triangles, d: int, k: int, random: RandomEffects) -> _Information:
+def _information(triangles: Triangles, d: int, k: int, random: RandomEffects) -> _Information:
     """Return the information on the random effects with the fixed coefficients eliminated and without the prior."""
-    block = found.r[d, k:, k:]
-    matrix = (block.T @ block - np.diag(np.asarray(random.wide) ** -2.0)) / found.scale[d]
-    return _Information((matrix + matrix.T) / 2, np.asarray(block.T @ found.projected[d, k:] / found.scale[d]))
+    block = triangles.r[d, k:, k:]
+    matrix = (block.T @ block - np.diag(np.asarray(random.wide) ** -2.0)) / triangles.scale[d]
+    return _Information((matrix + matrix.T) / 2, np.asarray(block.T @ triangles.projected[d, k:] / triangles.scale[d]))
 
 
 def _grid(information: _Information, random: RandomEffects) -> NDArray[np.float64]:
@@ -193,16 +193,18 @@ def _component(
     return Component(float(value), float(upper - lower) / 2, float(low), float(high), groups, p_value)
 
 
-def _scatter(information: _Information, here: NDArray[np.bool_], random: RandomEffects) -> tuple[float, int]:
+def _scatter(information: _Information, rows: NDArray[np.bool_], random: RandomEffects) -> tuple[float, int]:
     """Return chi2 of the effects of one kind with the others free, and its degrees of freedom."""
-    rest = ~here
-    matrix, product = information.matrix[np.ix_(here, here)], information.product[here]
-    if rest.any():
-        crossed = information.matrix[np.ix_(here, rest)]
-        others = information.matrix[np.ix_(rest, rest)] + np.diag(np.asarray(random.wide)[rest] ** -2.0)
+    other_rows = ~rows
+    matrix, product = information.matrix[np.ix_(rows, rows)], information.product[rows]
+    if other_rows.any():
+        crossed = information.matrix[np.ix_(rows, other_rows)]
+        others = information.matrix[np.ix_(other_rows, other_rows)] + np.diag(
+            np.asarray(random.wide)[other_rows] ** -2.0
+        )
         matrix = matrix - crossed @ np.linalg.solve(others, crossed.T)
-        product = product - crossed @ np.linalg.solve(others, information.product[rest])
+        product = product - crossed @ np.linalg.solve(others, information.product[other_rows])
     sizes, vectors = np.linalg.eigh(matrix)
-    known = sizes > 1e-6 * max(float(sizes.max()), 1e-300)
-    along = vectors[:, known].T @ product
-    return float(np.sum(along**2 / sizes[known])), int(known.sum())
+    is_seen = sizes > 1e-6 * max(float(sizes.max()), 1e-300)
+    along = vectors[:, is_seen].T @ product
+    return float(np.sum(along**2 / sizes[is_seen])), int(is_seen.sum())

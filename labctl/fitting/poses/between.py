@@ -36,7 +36,7 @@ def between_variance(jacobian: NDArray[np.float64], residual: Array, covariance:
 
 
 def components(
-    jacobian: NDArray[np.float64], residual: Array, known: NDArray[np.float64], by_first: NDArray[np.float64],
+    jacobian: NDArray[np.float64], residual: Array, covariance: NDArray[np.float64], by_first: NDArray[np.float64],
     information: Callable[[float], float], start: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Return two variances v1, v2, 0 or more, of measurements with covariance known + v1 by_first + v2 identity.
@@ -48,11 +48,11 @@ def components(
     """
     from scipy.optimize import minimize
 
-    unit = np.array([max(start, 1e-18), float(np.diag(known + start * by_first).mean())])
+    unit = np.array([max(start, 1e-18), float(np.diag(covariance + start * by_first).mean())])
 
     def unlikely(variances: Array) -> float:
         first, second = np.append(variances, 0.0)[:2] * unit
-        total = known + first * by_first + second * np.eye(len(residual))
+        total = covariance + first * by_first + second * np.eye(len(residual))
         return _restricted(jacobian, residual, total) + information(first)
 
     alone = minimize(unlikely, np.ones(1), method="L-BFGS-B", bounds=[(0.0, None)])
@@ -68,17 +68,17 @@ def _restricted(jacobian: NDArray[np.float64], residual: Array, covariance: NDAr
     weighted = cho_solve(factor, jacobian)
     normal = jacobian.T @ weighted
     step = np.linalg.solve(normal, weighted.T @ residual)
-    left = residual - jacobian @ step
+    residual_left = residual - jacobian @ step
     _, of_normal = np.linalg.slogdet(normal)
     of_covariance = 2 * np.sum(np.log(np.diag(factor[0])))
-    return float(of_covariance + of_normal + left @ cho_solve(factor, left)) / 2
+    return float(of_covariance + of_normal + residual_left @ cho_solve(factor, residual_left)) / 2
 
 
 def chi2_of(jacobian: NDArray[np.float64], residual: Array, covariance: NDArray[np.float64]) -> float:
     """Return the chi2 that generalised least squares leaves of residuals (m,)."""
     step, _ = gls(jacobian, residual, covariance)
-    left = residual - jacobian @ step
-    return float(left @ cho_solve(cho_factor(covariance), left))
+    residual_left = residual - jacobian @ step
+    return float(residual_left @ cho_solve(cho_factor(covariance), residual_left))
 
 
 def gls(

@@ -40,10 +40,10 @@ WRONG = "does not agree with the other moves"
 
 
 def describe(
-    readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, bias: Bias, every: Moves, moves: Moves,
+    readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, bias: Bias, all_moves: Moves, moves: Moves,
     gyro: Gyroscope, alignment: Alignment, applied_rms_dps: float,
 ) -> PosesJson:  # fmt: skip
-    """Return all that is said of a calibration; `moves` are those of `every` that can be used.
+    """Return all that is said of a calibration; `moves` are those of `all_moves` that can be used.
 
     `applied_rms_dps` is what the exported calibration leaves of the used ones.
     """
@@ -51,7 +51,7 @@ def describe(
         "rests": _rests(rests, accelerometer, bias),
         "accelerometer": accelerometer_json(accelerometer, known=readings.info.latitude_deg is not None),
         "alignment": alignment_json(alignment),
-        "moves": _moves(every, moves, gyro, applied_rms_dps),
+        "moves": _moves(all_moves, moves, gyro, applied_rms_dps),
         "held_out": _held_out(gyro),
         "not_determined": NOT_DETERMINED,
     }
@@ -103,33 +103,33 @@ def alignment_json(alignment: Alignment) -> AlignmentJson:
     }
 
 
-def alignment_text(found: AlignmentJson) -> str:
+def alignment_text(alignment: AlignmentJson) -> str:
     """Return an alignment in one sentence, with U = 2 u."""
-    angles = ", ".join(f"{each['value']:.3f} +- {2 * each['u']:.3f}" for each in found["axes"].values())
+    angles = ", ".join(f"{each['value']:.3f} +- {2 * each['u']:.3f}" for each in alignment["axes"].values())
     return f"Gyro triad turned from the accelerometer triad about x, y, z by {angles} deg (U, k = 2)."
 
 
-def _moves(every: Moves, moves: Moves, gyro: Gyroscope, applied_rms_dps: float) -> MovesJson:
-    used = gyro.used
-    left = gyro.equations.residual.reshape(-1, 2)[used]
-    known = np.diag(gyro.noise).reshape(-1, 2)[used]
-    rows = np.repeat(used, 2)
+def _moves(all_moves: Moves, moves: Moves, gyro: Gyroscope, applied_rms_dps: float) -> MovesJson:
+    is_used = gyro.used
+    residual = gyro.equations.residual.reshape(-1, 2)[is_used]
+    variances = np.diag(gyro.noise).reshape(-1, 2)[is_used]
+    rows = np.repeat(is_used, 2)
     return {
-        "count": len(every),
-        "used": int(np.count_nonzero(used)),
-        "left_out": _left_out(every, moves, gyro),
-        "turned_deg": {str(a): float(v) for a, v in zip(AXES, turned_deg(moves.take(used)), strict=True)},
-        "residual_deg": float(np.degrees(np.sqrt(np.mean(left**2)))),
+        "count": len(all_moves),
+        "used": int(np.count_nonzero(is_used)),
+        "left_out": _left_out(all_moves, moves, gyro),
+        "turned_deg": {str(a): float(v) for a, v in zip(AXES, turned_deg(moves.take(is_used)), strict=True)},
+        "residual_deg": float(np.degrees(np.sqrt(np.mean(residual**2)))),
         "applied_rms_dps": applied_rms_dps,
-        "known_deg": float(np.degrees(np.sqrt(np.mean(known)))),
+        "known_deg": float(np.degrees(np.sqrt(np.mean(variances)))),
         "extra_deg": float(np.degrees(gyro.extra_rad)),
         "condition": condition_of(gyro.equations.jacobian[rows], gyro.total_of_used),
         "jitter_s": float(np.median(moves.jitter_s)),
     }
 
 
-def _left_out(every: Moves, moves: Moves, gyro: Gyroscope) -> list[MoveLeftOutJson]:
-    reasons = dict(zip(every.before.tolist(), every.why_not, strict=True))
+def _left_out(all_moves: Moves, moves: Moves, gyro: Gyroscope) -> list[MoveLeftOutJson]:
+    reasons = dict(zip(all_moves.before.tolist(), all_moves.why_not, strict=True))
     for place in np.flatnonzero(~gyro.used):
         off = np.degrees(np.linalg.norm(gyro.held_out.error[place]))
         u = np.degrees(np.sqrt(np.trace(gyro.held_out.covariance[place]) / 2))
@@ -138,8 +138,8 @@ def _left_out(every: Moves, moves: Moves, gyro: Gyroscope) -> list[MoveLeftOutJs
             f"{u:.2g} deg"
         )
     return [
-        {"from_s": float(every.t_s[k, 0]), "until_s": float(every.t_s[k, 1]), "why": reasons[int(before)]}
-        for k, before in enumerate(every.before)
+        {"from_s": float(all_moves.t_s[k, 0]), "until_s": float(all_moves.t_s[k, 1]), "why": reasons[int(before)]}
+        for k, before in enumerate(all_moves.before)
         if reasons[int(before)]
     ]
 

@@ -26,10 +26,11 @@ def require_moves(serial: str, moves: Moves) -> None:
     usable = int(np.count_nonzero(moves.usable))
     if usable >= LEAST_MOVES:
         return
-    why = "; ".join(sorted({reason for reason in moves.why_not if reason}))
+    reasons = "; ".join(sorted({reason for reason in moves.why_not if reason}))
     raise NotEnoughData(
         f"{serial}: {usable} turns between rests can be used; nine coefficients of the gyro need at least {LEAST_MOVES}"
-        f"{f' ({len(moves) - usable} cannot: {why[:200]})' if why else ''}: turn the unit by 90 deg or more from "
+        f"{f' ({len(moves) - usable} cannot: {reasons[:200]})' if reasons else ''}: turn the unit by 90 deg or more "
+        "from "
         "rest to rest, about each axis, both ways"
     )
 
@@ -64,21 +65,21 @@ def require_determined(serial: str, moves: Moves, equations: Equations, noise: N
     turned = turned_deg(moves)
     column = int(np.argmin(turned)) if turned.min() < LEAST_TURN_DEG else int(np.argmax(u.max(axis=0)))
     row = int(np.argmax(u[:, column]))
-    what = f"scale_factor of {AXES[row]}" if row == column else f"misalignment_{AXES[column]} of {AXES[row]}"
-    known = (
+    term_name = f"scale_factor of {AXES[row]}" if row == column else f"misalignment_{AXES[column]} of {AXES[row]}"
+    reason = (
         f"in all moves together the unit turned about {AXES[column]} by only {turned[column]:.0f} deg"
         if turned[column] < LEAST_TURN_DEG
         else f"gravity changed too little in the turns about {AXES[column]}"
     )
     raise NotEnoughData(
-        f"{serial}: the recording does not determine {what} (u = {u[row, column]:.2g}, limit {LARGEST_U:g}), "
-        f"because {known}; turn about the {AXES[column]} axis too, by 90 deg or more with {AXES[column]} level "
+        f"{serial}: the recording does not determine {term_name} (u = {u[row, column]:.2g}, limit {LARGEST_U:g}), "
+        f"because {reason}; turn about the {AXES[column]} axis too, by 90 deg or more with {AXES[column]} level "
         "(a turn about the vertical does not change gravity and gives no information)"
     )
 
 
 def turned_deg(moves: Moves) -> Array:
     """Return the turns about each axis, without sign and added over all moves, (3,) deg."""
-    rest = np.median(moves.rate_dps[:, 0], axis=0)  # a move begins at rest
-    mean = (moves.rate_dps[:, :-1] + moves.rate_dps[:, 1:]) / 2 - rest
+    rest_rate_dps = np.median(moves.rate_dps[:, 0], axis=0)  # a move begins at rest
+    mean = (moves.rate_dps[:, :-1] + moves.rate_dps[:, 1:]) / 2 - rest_rate_dps
     return np.asarray(np.abs(np.einsum("mki,mk->mi", mean, moves.step_s)).sum(axis=0))

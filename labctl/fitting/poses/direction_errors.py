@@ -48,23 +48,23 @@ def move_errors(recording: Recording, correct: Correct) -> MoveErrors:
     every = moves_between(readings, rests, true)
     moves = every.take(every.usable)
     before, there = accelerometer.up[moves.before], accelerometer.up[moves.before + 1]
-    seen = gravity_at_end(moves, accelerometer)
-    found = _square_to(there, seen - there)
+    gravity_seen = gravity_at_end(moves, accelerometer)
+    error_across = _square_to(there, gravity_seen - there)
     # a small rotation by r turns gravity by r x up, so r = up x what gravity is off by
-    about = np.asarray(np.cross(there, np.einsum("mc,mca->ma", found, tangents(there))), dtype=np.float64)
+    about = np.asarray(np.cross(there, np.einsum("mc,mca->ma", error_across, tangents(there))), dtype=np.float64)
     counted = np.concatenate([[0], np.cumsum(outside)])
     within = np.searchsorted(readings.t_s, moves.t_s)
     return MoveErrors(
-        per_second(found, moves.duration_s),
+        per_second(error_across, moves.duration_s),
         per_second(about, moves.duration_s),
         moves.t_s,
         angle_between_deg(before, there),
-        angle_between_deg(before, seen),
-        angle_between_deg(there, seen),
+        angle_between_deg(before, gravity_seen),
+        angle_between_deg(there, gravity_seen),
         tuple(
-            f"move from {t[0]:.4g} to {t[1]:.4g} s: {why}"
-            for t, why in zip(every.t_s, every.why_not, strict=True)
-            if why
+            f"move from {t[0]:.4g} to {t[1]:.4g} s: {reason}"
+            for t, reason in zip(every.t_s, every.why_not, strict=True)
+            if reason
         ),
         counted[within[:, 1] + 1] > counted[within[:, 0]],
     )
@@ -88,8 +88,8 @@ def angle_between_deg(first: NDArray[np.float64], second: NDArray[np.float64]) -
     return np.asarray(np.degrees(2 * np.arctan2(apart, along)))
 
 
-def _square_to(there: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.einsum("mca,ma->mc", tangents(there), error))
+def _square_to(direction: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.einsum("mca,ma->mc", tangents(direction), error))
 
 
 def per_second(angle: NDArray[np.float64], seconds: Array) -> NDArray[np.float64]:

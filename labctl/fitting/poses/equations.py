@@ -44,9 +44,9 @@ def equations_of(moves: Moves, accelerometer: Accelerometer, bias: Bias, errors:
     up = accelerometer.up[moves.before]
     there = accelerometer.up[moves.before + 1]
     across = tangents(there)
-    found = np.einsum("mca,ma->mc", across, seen_at_end(up, rotations.matrix) - there)
+    residual = np.einsum("mca,ma->mc", across, seen_at_end(up, rotations.matrix) - there)
     by_turn = across @ change_of_direction(up, rotations.matrix)
-    return Equations(found.reshape(-1), (by_turn @ rotations.by_error).reshape(-1, 9), across, by_turn, rotations)
+    return Equations(residual.reshape(-1), (by_turn @ rotations.by_error).reshape(-1, 9), across, by_turn, rotations)
 
 
 def rate_without_bias(moves: Moves, bias: Bias) -> NDArray[np.float64]:

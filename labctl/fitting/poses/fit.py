@@ -103,16 +103,16 @@ def _result(readings: PoseReadings, solved: Solved) -> PosesFit:
     raw = uncorrected_errors(moves_between(readings, rests).take(every.usable), accelerometer)
     exported = corrected(readings.gyro_dps, gyro.errors, bias.mean_dps)
     applied = uncorrected_errors(moves_between(readings, rests, exported).take(every.usable), accelerometer)
-    warm = readings.temperature_c
-    span = (None, None) if warm is None else (float(warm.min()), float(warm.max()))
-    reference = Reference(NO_THERMOMETER_C if warm is None else float(np.round(warm.mean())))
-    known = np.diag(gyro.noise).reshape(-1, 2)[used]
+    temperature_c = readings.temperature_c
+    span = (None, None) if temperature_c is None else (float(temperature_c.min()), float(temperature_c.max()))
+    reference = Reference(NO_THERMOMETER_C if temperature_c is None else float(np.round(temperature_c.mean())))
+    variances = np.diag(gyro.noise).reshape(-1, 2)[used]
     return PosesFit(
         FittedModel(ErrorModel("poses", TERMS, "rate", reference=reference), _axes(bias, gyro)),
         rms_dps(raw[used], seconds),
         rms_dps(gyro.equations.residual.reshape(-1, 2)[used], seconds),
         rms_dps(gyro.held_out.error[used], seconds),
-        float(np.sqrt(np.mean(per_second(np.sqrt(known), seconds) ** 2))),
+        float(np.sqrt(np.mean(per_second(np.sqrt(variances), seconds) ** 2))),
         span,
         _rates(moves.take(used), bias, gyro.errors),
         dict(zip(AXES, bias.solutions, strict=True)),
@@ -132,21 +132,21 @@ def _axes(bias: Bias, gyro: Gyroscope) -> dict[str, AxisFit]:
 
     They are not quite: a bias also enters the moves beside it. What that makes of the matrix is in its covariance.
     """
-    found = {}
+    axis_fits = {}
     for i, axis in enumerate(AXES):
-        others = [j for j in range(3) if j != i]
-        solution, order = bias.solutions[i], [0, 1 + i, *(1 + j for j in others)]
-        row, places = gyro.errors[i], [3 * i + i, *(3 * i + j for j in others)]
-        rest = solution.covariance[np.ix_(order, order)]
+        other_axes = [j for j in range(3) if j != i]
+        solution, order = bias.solutions[i], [0, 1 + i, *(1 + j for j in other_axes)]
+        row, places = gyro.errors[i], [3 * i + i, *(3 * i + j for j in other_axes)]
+        covariance = solution.covariance[np.ix_(order, order)]
         matrix = gyro.covariance[np.ix_(places, places)]
-        values = _between(solution.values[order], row[[i, *others]])
-        whole = block_diag(rest[:1, :1], matrix, rest[1:, 1:])
-        whole[0, 4:] = whole[4:, 0] = rest[0, 1:]
-        matrix_names = ("scale_factor", *(f"misalignment_{AXES[j]}" for j in others))
-        names = ("bias", *matrix_names, "g_own", *(f"g_{AXES[j]}" for j in others))
-        found[str(axis)] = AxisFit(EFFECTS, names, UNITS, values[:, None], whole)
-    return found
+        values = _between(solution.values[order], row[[i, *other_axes]])
+        whole = block_diag(covariance[:1, :1], matrix, covariance[1:, 1:])
+        whole[0, 4:] = whole[4:, 0] = covariance[0, 1:]
+        matrix_names = ("scale_factor", *(f"misalignment_{AXES[j]}" for j in other_axes))
+        names = ("bias", *matrix_names, "g_own", *(f"g_{AXES[j]}" for j in other_axes))
+        axis_fits[str(axis)] = AxisFit(EFFECTS, names, UNITS, values[:, None], whole)
+    return axis_fits
 
 
-def _between(rest: Array, row: Array) -> Array:
-    return np.concatenate([rest[:1], row, rest[1:]])
+def _between(residual: Array, row: Array) -> Array:
+    return np.concatenate([residual[:1], row, residual[1:]])

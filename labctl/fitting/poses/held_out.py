@@ -39,23 +39,23 @@ def held_out_moves(equations: Equations, covariance: NDArray[np.float64], used: 
     """
     rows = np.repeat(used, 2)
     jacobian, residual = equations.jacobian[rows], equations.residual[rows]
-    known = covariance[np.ix_(rows, rows)]
-    inverse = cho_solve(cho_factor(known), np.eye(len(residual)))
+    move_covariance = covariance[np.ix_(rows, rows)]
+    inverse = cho_solve(cho_factor(move_covariance), np.eye(len(residual)))
     weighted = inverse @ jacobian
     normal = np.linalg.inv(jacobian.T @ weighted)
     gain = normal @ weighted.T  # from residuals to coefficients
-    left = inverse - weighted @ gain
+    residual_inverse = inverse - weighted @ gain
     error, spread = np.zeros((len(used), 2)), np.zeros((len(used), 2, 2))
     for place, move in enumerate(np.flatnonzero(used)):
         here = slice(2 * place, 2 * place + 2)
-        own = np.linalg.solve(left[here, here], left[here])
+        own = np.linalg.solve(residual_inverse[here, here], residual_inverse[here])
         without = -jacobian[here] @ (gain - normal @ weighted[here].T @ own)
         without[:, here] += np.eye(2)
-        error[move], spread[move] = without @ residual, without @ known @ without.T
+        error[move], spread[move] = without @ residual, without @ move_covariance @ without.T
     for move in np.flatnonzero(~used):
         both = np.array([2 * move, 2 * move + 1])
         predict = equations.jacobian[both] @ gain
         shared = covariance[np.ix_(both, np.flatnonzero(rows))] @ predict.T
         error[move] = equations.residual[both] - predict @ residual
-        spread[move] = covariance[np.ix_(both, both)] - shared - shared.T + predict @ known @ predict.T
+        spread[move] = covariance[np.ix_(both, both)] - shared - shared.T + predict @ move_covariance @ predict.T
     return HeldOut(error, spread)

@@ -39,7 +39,7 @@ class Moves:
     @cached_property
     def usable(self) -> NDArray[np.bool_]:
         """Which moves can be used, (m,)."""
-        return np.array([not why for why in self.why_not], dtype=np.bool_)
+        return np.array([not reason for reason in self.why_not], dtype=np.bool_)
 
     @property
     def duration_s(self) -> Array:
@@ -56,7 +56,7 @@ class Moves:
             step_s=self.step_s[rows],
             share=self.share[rows],
             jitter_s=self.jitter_s[rows],
-            why_not=tuple(why for why, keep in zip(self.why_not, rows, strict=True) if keep),
+            why_not=tuple(reason for reason, keep in zip(self.why_not, rows, strict=True) if keep),
         )
 
 
@@ -75,9 +75,9 @@ def moves_between(readings: PoseReadings, rests: Rests, gyro_dps: NDArray[np.flo
     for k, (begin, end) in enumerate(zip(first, last, strict=True)):
         rows = slice(int(begin), int(end) + 1)
         t_s, length = readings.t_s[rows], int(end - begin) + 1
-        why = _why_not(readings, rows, rails, rests.noise[3:])
-        why_not.append(why)
-        if why:
+        reasons = _why_not(readings, rows, rails, rests.noise[3:])
+        why_not.append(reasons)
+        if reasons:
             continue
         rate[k, :length] = gyro_dps[rows]
         rate[k, length:] = gyro_dps[end]

@@ -69,24 +69,24 @@ def readings_of(recording: Recording) -> PoseReadings:
             f"{serial}: the recording has {np.count_nonzero(valid)} valid readings; rests and turns need at least "
             f"{LEAST_READINGS}; record more"
         )
-    warm = temperature_of(columns)
+    temperature_c = temperature_of(columns)
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]
     return PoseReadings(
         info,
         t_s,
         np.column_stack([np.asarray(columns[f"accel_{a}_g"], dtype=np.float64)[valid] for a in AXES]),
         np.column_stack([recording.gyro_dps(a)[valid] for a in AXES]),
-        None if warm is None else warm[valid],
+        None if temperature_c is None else temperature_c[valid],
         _breaks(recording, valid, t_s),
     )
 
 
 def _breaks(recording: Recording, valid: NDArray[np.bool_], t_s: Array) -> NDArray[np.bool_]:
-    found = np.zeros(len(t_s), dtype=np.bool_)
+    is_break = np.zeros(len(t_s), dtype=np.bool_)
     steps = np.diff(t_s)
-    found[1:] = steps > GAP * float(np.median(steps))
+    is_break[1:] = steps > GAP * float(np.median(steps))
     for name in ("run", "mounting"):
         if name in recording.columns:
             values = np.asarray(recording.columns[name])[valid]
-            found[1:] |= values[1:] != values[:-1]
-    return found
+            is_break[1:] |= values[1:] != values[:-1]
+    return is_break

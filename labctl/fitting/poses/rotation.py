@@ -85,19 +85,19 @@ def integration_u(
 CONVERGENCE = (4.0, 16.0)
 
 
-def _coarse(true: NDArray[np.float64], step_s: NDArray[np.float64], every: int) -> NDArray[np.float64]:
+def _coarse(true: NDArray[np.float64], step_s: NDArray[np.float64], step: int) -> NDArray[np.float64]:
     """Return the rotations (m, 3, 3) by every so many readings of true rates (m, n, 3), and the last of each move."""
-    keep = np.unique(np.append(np.arange(0, true.shape[1], every), true.shape[1] - 1))
+    keep = np.unique(np.append(np.arange(0, true.shape[1], step), true.shape[1] - 1))
     longer_s = np.add.reduceat(step_s, keep[:-1], axis=1)
     last = np.maximum(np.count_nonzero(step_s, axis=1), 1)  # the reading at which a move ends, before it is filled up
-    rows, kept = np.arange(len(true)), true[:, keep].copy()
-    kept[rows, np.searchsorted(keep, last)] = true[rows, last]
-    vectors, _ = _steps(kept, longer_s)
+    rows, kept_rows = np.arange(len(true)), true[:, keep].copy()
+    kept_rows[rows, np.searchsorted(keep, last)] = true[rows, last]
+    vectors, _ = _steps(kept_rows, longer_s)
     steps = _matrices(vectors)
-    found = np.broadcast_to(np.eye(3), (len(true), 3, 3)).copy()
+    rotation = np.broadcast_to(np.eye(3), (len(true), 3, 3)).copy()
     for k in range(vectors.shape[1]):
-        found = found @ steps[:, k]
-    return found
+        rotation = rotation @ steps[:, k]
+    return rotation
 
 
 def _angle_between(first: NDArray[np.float64], second: NDArray[np.float64]) -> Array:

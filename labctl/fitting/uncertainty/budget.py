@@ -81,18 +81,18 @@ def budget_of(result: str, unit: str, lines: Sequence[BudgetLine], value: float 
     Each line is one source at this place; what its inputs have in common is included in it. A line of type A that is
     unknown leaves the result unknown; one that is not stated, as a standard, is listed and not in U.
     """
-    known = [line for line in lines if line.contribution is not None]
+    stated_lines = [line for line in lines if line.contribution is not None]
     if any(line.contribution is None and line.kind == "A" and line.is_stated for line in lines):
         return Budget(result, unit, value, tuple(lines), None, None, None, None)
-    sizes = [line.contribution or 0.0 for line in known]
+    sizes = [line.contribution or 0.0 for line in stated_lines]
     combined = combined_u(np.array(sizes))
-    freedom = effective_freedom(sizes, [line.freedom for line in known])
-    k = coverage_factor(sizes, [line.distribution for line in known], freedom)
-    expanded = half_width(k * combined, sum(line.uncorrected for line in known))
+    freedom = effective_freedom(sizes, [line.freedom for line in stated_lines])
+    k = coverage_factor(sizes, [line.distribution for line in stated_lines], freedom)
+    expanded = half_width(k * combined, sum(line.uncorrected for line in stated_lines))
     return Budget(result, unit, value, tuple(lines), combined, freedom, k, expanded)
 
 
 def without_repeatability(lines: Sequence[BudgetLine]) -> float | None:
     """Return the combined standard uncertainty within the power-on of the calibration; None where a part is unknown."""
-    others = [line for line in lines if line.source != "repeatability"]
-    return budget_of("same_run", "deg/s", others).combined
+    other_lines = [line for line in lines if line.source != "repeatability"]
+    return budget_of("same_run", "deg/s", other_lines).combined

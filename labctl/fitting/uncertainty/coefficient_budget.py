@@ -39,14 +39,14 @@ def coefficient_budgets(
 def _of_axis(
     fitted: FittedModel, axis: str, temperature_c: float, evidence: AxisEvidence | None, bench: BenchConditions | None
 ) -> dict[str, Budget]:
-    known = {
+    laws = {
         name: (unit, law)
         for name, (unit, law) in coefficients_of(axis).items()
         if np.any(law.gradient(fitted, temperature_c))
     }
-    values = {name: law.value(fitted, temperature_c) for name, (_, law) in known.items()}
-    found = {}
-    for name, (unit, law) in known.items():
+    values = {name: law.value(fitted, temperature_c) for name, (_, law) in laws.items()}
+    budgets = {}
+    for name, (unit, law) in laws.items():
         lines: list[BudgetLine] = [coefficient_line(fitted, law, temperature_c, evidence, unit)]
         if name == "bias":
             lines += [model_line(fitted, axis, evidence, {}, temperature_c), repeatability_line(fitted, evidence)]
@@ -56,8 +56,8 @@ def _of_axis(
         sensitivities = _sensitivities(name, values, law.temperature_slope(fitted, temperature_c), bench)
         sources = [*time_lines(fitted, [law], temperature_c, bench), *standard_lines(bench, sensitivities)]
         lines += [source.lines[0] for source in sources]
-        found[name] = budget_of(name, unit, lines, values[name])
-    return found
+        budgets[name] = budget_of(name, unit, lines, values[name])
+    return budgets
 
 
 def response_budgets(
@@ -67,17 +67,17 @@ def response_budgets(
 
     The time of the reference moves a delay in full. Empty where the coefficients have no uncertainty.
     """
-    found: dict[str, dict[str, Budget]] = {}
+    by_axis: dict[str, dict[str, Budget]] = {}
     for axis, fit in fitted.axes.items():
         for name in (name for name, owner in zip(fit.names, fit.effects, strict=True) if owner in response.IDS):
-            own, known = OwnCoefficient(axis, name), evidence.get(axis)
+            own, axis_evidence = OwnCoefficient(axis, name), evidence.get(axis)
             if not np.isfinite(fit.u_of(name)):
                 continue
             at_c = fitted.model.reference.temperature_c  # it is the same at all temperatures
-            lines = [coefficient_line(fitted, own, at_c, known, "s")]
+            lines = [coefficient_line(fitted, own, at_c, axis_evidence, "s")]
             lines += [source.lines[0] for source in time_lines(fitted, [own], at_c, bench)]
-            found.setdefault(axis, {})[name] = budget_of(name, "s", lines, fit.value_of(name))
-    return found
+            by_axis.setdefault(axis, {})[name] = budget_of(name, "s", lines, fit.value_of(name))
+    return by_axis
 
 
 def _sensitivities(

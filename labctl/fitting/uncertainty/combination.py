@@ -39,8 +39,10 @@ def effective_freedom(contributions: Sequence[float], freedom: Sequence[float | 
 
     `freedom` is None for a contribution that is exactly known; None is returned where all are.
     """
-    total = sum(one**2 for one in contributions) ** 2
-    estimated = sum(one**4 / nu for one, nu in zip(contributions, freedom, strict=True) if nu is not None)
+    total = sum(contribution**2 for contribution in contributions) ** 2
+    estimated = sum(
+        contribution**4 / nu for contribution, nu in zip(contributions, freedom, strict=True) if nu is not None
+    )
     return total / estimated if estimated > 0 and total > 0 else None
 
 

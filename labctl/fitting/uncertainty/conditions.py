@@ -33,15 +33,15 @@ class BenchConditions:
 
     def of(self, quantity: str) -> tuple[Standard, ...]:
         """Return the standards of a quantity."""
-        return tuple(each for each in self.standards if each.quantity == quantity)
+        return tuple(standard for standard in self.standards if standard.quantity == quantity)
 
     def angle_gains(self, axis: str) -> AngleGains:
         """Return how the misalignment towards a body axis follows the angles of its mountings; 1 where not stored.
 
         What a fit takes as a random effect of each mounting is in the u of its coefficients.
         """
-        found = angle_gains(self.mountings, axis, separates=self.separates)
-        return replace(found, mounting=0.0) if self.fits_placement(axis) else found
+        gains = angle_gains(self.mountings, axis, separates=self.separates)
+        return replace(gains, mounting=0.0) if self.fits_placement(axis) else gains
 
     def fits_placement(self, axis: str) -> bool:
         """Return whether the fit took into account how a unit is placed in each mounting with an axis up."""
@@ -50,16 +50,16 @@ class BenchConditions:
 
     def to_json(self) -> BenchConditionsJson:
         """Return this as JSON."""
-        found: BenchConditionsJson = {
+        conditions_json: BenchConditionsJson = {
             "used_on": self.used_on.isoformat(), "motion": self.motion, "thermometer": self.thermometer,
             "latitude_deg": self.latitude_deg, "turn_common_u": self.turn_common_u, "max_rate_dps": self.max_rate_dps,
-            "stated": [each.model_dump(mode="json") for each in self.standards],  # type: ignore[misc]
+            "stated": [standard.model_dump(mode="json") for standard in self.standards],  # type: ignore[misc]
         }  # fmt: skip
         if self.mountings:
-            found["mountings"] = dict(self.mountings)
+            conditions_json["mountings"] = dict(self.mountings)
         if self.angles_rad:
-            found["angles_rad"] = {axis: dict(named) for axis, named in self.angles_rad.items()}
-        return found
+            conditions_json["angles_rad"] = {axis: dict(named) for axis, named in self.angles_rad.items()}
+        return conditions_json
 
     @staticmethod
     def from_json(record: BenchConditionsJson) -> BenchConditions:

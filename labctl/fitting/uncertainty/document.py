@@ -48,20 +48,27 @@ def uncertainty_json(
     fitted: FittedModel, covered: Covered, evidence: Mapping[str, AxisEvidence], bench: BenchConditions
 ) -> UncertaintyJson | None:
     """Return what the document says; None where no uncertainty at a rate and a temperature alone is defined."""
-    name, warm = "calibration", covered.temperatures()
+    name, temperatures_c = "calibration", covered.temperatures()
     try:
         places = [
-            (rate, each, rate_uncertainty(fitted, rate, each, evidence=evidence, name=name, bench=bench))
-            for each in warm
+            (
+                rate,
+                temperature_c,
+                rate_uncertainty(fitted, rate, temperature_c, evidence=evidence, name=name, bench=bench),
+            )
+            for temperature_c in temperatures_c
             for rate in covered.rates(evidence)
         ]
-        at_c = warm[len(warm) // 2]
+        at_c = temperatures_c[len(temperatures_c) // 2]
         coefficients = coefficient_budgets(fitted, at_c, evidence=evidence, name=name, bench=bench)
         reach = covered.reach_dps(evidence)
-        vectors = vector_bounds(fitted, reach, warm, evidence=evidence, name=name, bench=bench)
+        vectors = vector_bounds(fitted, reach, temperatures_c, evidence=evidence, name=name, bench=bench)
     except (BadInput, NotEnoughData):
         return None
-    axes = {axis: _bound([(r, t, found[axis]) for r, t, found in places], coefficients[axis]) for axis in fitted.axes}
+    axes = {
+        axis: _bound([(r, t, uncertainty[axis]) for r, t, uncertainty in places], coefficients[axis])
+        for axis in fitted.axes
+    }
     for axis, bound in axes.items():
         bound["vector"], bound["cross_rates"] = vectors[axis], cross_rates(fitted, coefficients[axis])
     unstated = [source for one in axes.values() for source in one["budget"]["not_stated"]]
@@ -77,14 +84,14 @@ def uncertainty_json(
 def _bound(places: list[tuple[float, float, RateUncertainty]], coefficients: Mapping[str, Budget]) -> AxisBoundJson:
     """Return the place with the largest U; where it is unknown somewhere, the first such place and why."""
     unknown = next((place for place in places if place[2].expanded_dps is None), None)
-    rate, warm, found = unknown or max(places, key=lambda place: place[2].expanded_dps or 0.0)
+    rate, temperature_c, bound = unknown or max(places, key=lambda place: place[2].expanded_dps or 0.0)
     return {
-        "bound_dps": found.expanded_dps,
+        "bound_dps": bound.expanded_dps,
         "rate_dps": rate,
-        "temperature_c": warm,
-        "why": "; ".join(f"{part}: {why}" for part, why in found.unknown.items()),
-        "budget": found.budget.to_json(),
-        "coefficients": {name: _expanded(one) for name, one in coefficients.items()},
+        "temperature_c": temperature_c,
+        "why": "; ".join(f"{part}: {reason}" for part, reason in bound.unknown.items()),
+        "budget": bound.budget.to_json(),
+        "coefficients": {name: _expanded(coefficient) for name, coefficient in coefficients.items()},
     }
 
 

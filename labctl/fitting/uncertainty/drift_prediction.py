@@ -39,9 +39,9 @@ def of_item(rates_dps: Array) -> DriftPrediction:
     The drift to come has the root mean square of the past, and no sign: an interval is a degree of freedom. A steady
     drift is covered as well as one that changes from interval to interval. Each place has at least one interval.
     """
-    known = np.isfinite(rates_dps).sum(axis=0)
-    root = np.sqrt(np.nansum(np.square(rates_dps), axis=0) / known)
-    return DriftPrediction(np.zeros(rates_dps.shape[1]), root, known.astype(np.float64))
+    n_finite = np.isfinite(rates_dps).sum(axis=0)
+    root = np.sqrt(np.nansum(np.square(rates_dps), axis=0) / n_finite)
+    return DriftPrediction(np.zeros(rates_dps.shape[1]), root, n_finite.astype(np.float64))
 
 
 def of_type(rates_dps: Array, years: Array) -> DriftPrediction:
@@ -52,17 +52,17 @@ def of_type(rates_dps: Array, years: Array) -> DriftPrediction:
     units, that of their mean, and that between the intervals of one unit; the degrees of freedom are effective ones
     (Welch-Satterthwaite). What the calibrations measured wrongly is in these variances: it is taken for drift.
     """
-    known = np.isfinite(rates_dps)
-    time = np.where(known, years[:, :, np.newaxis], 0.0)
+    is_finite = np.isfinite(rates_dps)
+    time = np.where(is_finite, years[:, :, np.newaxis], 0.0)
     span = time.sum(axis=1, keepdims=True)
     share = np.divide(time, span, out=np.zeros_like(time), where=span > 0)
-    filled = np.where(known, rates_dps, 0.0)
+    filled = np.where(is_finite, rates_dps, 0.0)
     of_unit = (share * filled).sum(axis=1)  # change over the whole history by its length, (units, places)
     counted = span[:, 0] > 0
-    units, intervals = counted.sum(axis=0), known.sum(axis=1)
+    units, intervals = counted.sum(axis=0), is_finite.sum(axis=1)
     mean = of_unit.sum(axis=0) / units
     between = (np.where(counted, of_unit - mean, 0.0) ** 2).sum(axis=0) / (units - 1)
-    squares = (np.where(known, filled - of_unit[:, np.newaxis], 0.0) ** 2).sum(axis=(0, 1))
+    squares = (np.where(is_finite, filled - of_unit[:, np.newaxis], 0.0) ** 2).sum(axis=(0, 1))
     same = (share**2).sum(axis=1)  # variance of a unit's rate, of that of an interval
     expected = np.where(counted, intervals - 2 + intervals * same, 0.0).sum(axis=0)
     within = np.divide(squares, expected, out=np.zeros_like(squares), where=expected > 1e-9)

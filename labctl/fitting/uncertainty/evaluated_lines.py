@@ -23,7 +23,7 @@ from labctl.fitting.uncertainty.sensitivity import CoefficientFunction, u_of_fit
 from labctl.fitting.uncertainty.use import AxisEvidence
 
 
-def slope_error(left: LocalModelError, temperature_c: float, across: str | None = None) -> float | None:
+def slope_error(model_error: LocalModelError, temperature_c: float, across: str | None = None) -> float | None:
     """Return the standard error of a slope over the rate at a temperature, deg/s per deg/s; None if unknown.
 
     The slope is that over the rate about the axis itself, or about another body axis (`across`). An error of a slope
@@ -31,36 +31,38 @@ def slope_error(left: LocalModelError, temperature_c: float, across: str | None 
     readings' noise are fitted by a constant and one such term for each body axis, none of them negative. It is no
     smaller than what could be seen.
     """
-    if slope_unknown(left, temperature_c, across) is not None:
+    if slope_unknown(model_error, temperature_c, across) is not None:
         return None
     from scipy.optimize import nnls
 
-    known = np.isfinite(left.left_var)
-    rates = [left.rate_dps, *(left.across_dps or {}).values()]
-    squares = np.stack([np.ones(len(known)), *(each**2 for each in rates)], axis=1)[known]
-    weight = near_weights(left.warmth_away(temperature_c)[known])
+    is_finite = np.isfinite(model_error.left_var)
+    rates = [model_error.rate_dps, *(model_error.across_dps or {}).values()]
+    squares = np.stack([np.ones(len(is_finite)), *(rate**2 for rate in rates)], axis=1)[is_finite]
+    weight = near_weights(model_error.warmth_away(temperature_c)[is_finite])
     root, size = np.sqrt(weight / weight.sum()), np.maximum(squares.max(axis=0), np.finfo(float).tiny)
-    beyond = left.left_var[known] - left.white_var[known]
-    found = nnls(root[:, None] * (squares / size), root * beyond)[0] / size
-    column = 1 if across is None else 2 + list(left.across_dps or {}).index(across)
+    beyond = model_error.left_var[is_finite] - model_error.white_var[is_finite]
+    slope_variance = nnls(root[:, None] * (squares / size), root * beyond)[0] / size
+    column = 1 if across is None else 2 + list(model_error.across_dps or {}).index(across)
     turned = weight * (squares[:, column] > 0)
-    noise = float(weight @ left.white_var[known] / weight.sum()) + found[0]
+    noise = float(weight @ model_error.white_var[is_finite] / weight.sum()) + slope_variance[0]
     unseen = LEAST_SHARE * np.sqrt(2 / effective_number(turned)) * noise * turned.sum() / (turned @ squares[:, column])
-    return float(np.sqrt(max(found[column], unseen)))
+    return float(np.sqrt(max(slope_variance[column], unseen)))
 
 
-def slope_unknown(left: LocalModelError, temperature_c: float, across: str | None = None) -> str | None:
+def slope_unknown(model_error: LocalModelError, temperature_c: float, across: str | None = None) -> str | None:
     """Return why the error of a slope is unknown, in words; None where it is known."""
-    known = np.isfinite(left.left_var)
-    if not known.any():
+    is_finite = np.isfinite(model_error.left_var)
+    if not is_finite.any():
         return NONE_LEFT_OUT
-    if across is not None and left.across_dps is None:
+    if across is not None and model_error.across_dps is None:
         return NO_TURNED_AXES
-    rates = left.rate_dps if across is None else (left.across_dps or {}).get(across, np.zeros(len(known)))
-    turned = known & (rates != 0)
+    rates = (
+        model_error.rate_dps if across is None else (model_error.across_dps or {}).get(across, np.zeros(len(is_finite)))
+    )
+    turned = is_finite & (rates != 0)
     if not turned.any():
         return f"no data set in which the unit turned about {across or 'its own axis'} could be left out of the fit"
-    if left.warmth_away(temperature_c)[turned].min() > FARTHEST:
+    if model_error.warmth_away(temperature_c)[turned].min() > FARTHEST:
         return NONE_NEAR
     return None
 
@@ -87,14 +89,14 @@ def coefficient_line(
     """Return the line of the fitted coefficients: their uncertainty in the result of the law, in `unit`."""
     u = u_of_fit(law, fitted, temperature_c)
     held = fitted.model.held
-    why = PUBLISHED if u is None else BY_COVARIANCE
+    reason = PUBLISHED if u is None else BY_COVARIANCE
     if unstated := held.without_u(law.axis):
-        why = HELD_WITHOUT_U.format(", ".join(unstated))
+        reason = HELD_WITHOUT_U.format(", ".join(unstated))
     fit = fitted.axes[law.axis]
     estimated = [name for name, owner in zip(fit.names, fit.effects, strict=True) if not held.of(law.axis, owner, name)]
     count = len(estimated) * fit.values.shape[1]
     freedom = max(len(evidence.model_error.rate_dps) - count, 1) if evidence else None
-    return BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom, why=why)
+    return BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom, why=reason)
 
 
 def model_line(
@@ -110,8 +112,8 @@ def model_line(
     """
     own, across = rates_dps.get(axis, 0.0), {name: rate for name, rate in rates_dps.items() if name != axis}
     u = evidence.model_error.at(own, temperature_c, across) if evidence else None
-    why = evidence.model_error.unknown_at(own, temperature_c, across) if evidence else _lacking(fitted)
-    return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=why or BY_HELD_OUT)
+    reason = evidence.model_error.unknown_at(own, temperature_c, across) if evidence else _lacking(fitted)
+    return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=reason or BY_HELD_OUT)
 
 
 def slope_line(
@@ -124,21 +126,31 @@ def slope_line(
     """
     error = evidence.model_error if evidence else None
     u = slope_error(error, temperature_c, across) if error else None
-    why = slope_unknown(error, temperature_c, across) if error else _lacking(fitted)
+    reason = slope_unknown(error, temperature_c, across) if error else _lacking(fitted)
     return BudgetLine(
-        "model", "held-out data sets", "A", "normal", u, "1", 1.0, u, is_stated=u is not None, why=why or SLOPE_HELD_OUT
+        "model",
+        "held-out data sets",
+        "A",
+        "normal",
+        u,
+        "1",
+        1.0,
+        u,
+        is_stated=u is not None,
+        why=reason or SLOPE_HELD_OUT,
     )
 
 
 def repeatability_line(fitted: FittedModel, evidence: AxisEvidence | None) -> BudgetLine:
     """Return the line of a later power-on, deg/s."""
     if evidence is None or evidence.repeatability is None:
-        why = NO_POWER_ON if evidence else _lacking(fitted)
-        return BudgetLine("repeatability", "none", "A", "normal", None, "deg/s", 1.0, None, why=why)
-    known = evidence.repeatability
+        reason = NO_POWER_ON if evidence else _lacking(fitted)
+        return BudgetLine("repeatability", "none", "A", "normal", None, "deg/s", 1.0, None, why=reason)
+    repeatability = evidence.repeatability
     return BudgetLine(
-        "repeatability", known.name, "B" if known.source == "data sheet" else "A", known.distribution, known.u_dps,
-        "deg/s", 1.0, known.u_dps, known.freedom, why=known.text,
+        "repeatability", repeatability.name, "B" if repeatability.source == "data sheet" else "A",
+        repeatability.distribution, repeatability.u_dps,
+        "deg/s", 1.0, repeatability.u_dps, repeatability.freedom, why=repeatability.text,
     )  # fmt: skip
 
 

@@ -15,11 +15,11 @@ LEAST_SPAN_K = 1.0
 def grid_rates(low_dps: float, high_dps: float) -> list[float]:
     """Return zero, both limits and half of each, deg/s, as far as they are within the limits and apart, rising."""
     apart = RATES_APART * max(abs(low_dps), abs(high_dps))
-    found: list[float] = []
+    grid: list[float] = []
     for rate in (0.0, low_dps, high_dps, low_dps / 2, high_dps / 2):
-        if low_dps <= rate <= high_dps and all(abs(rate - other) > apart for other in found):
-            found.append(rate)
-    return sorted(found)
+        if low_dps <= rate <= high_dps and all(abs(rate - other) > apart for other in grid):
+            grid.append(rate)
+    return sorted(grid)
 
 
 def grid_temperatures(low_c: float, high_c: float) -> list[float]:

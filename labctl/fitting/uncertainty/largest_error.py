@@ -25,17 +25,25 @@ NORMAL_K = 2.0
 DRAWS, SEED = 20_000, 106
 
 
-def widening(found: Sequence[RateVectorUncertainty], seen: Sequence[Sequence[str]] | None = None) -> float:
+def widening(
+    uncertainties: Sequence[RateVectorUncertainty], outputs_by_place: Sequence[Sequence[str]] | None = None
+) -> float:
     """Return by which factor U at the worst place has to be widened to cover the largest error of all outputs.
 
-    `found` are the uncertainties at several rate vectors of one temperature; `seen` are the outputs that count at each
-    of them (default: all). At least 1; NaN where a covariance is unknown.
+    `uncertainties` are those at several rate vectors of one temperature; `outputs_by_place` are the outputs that count
+    at each of them (default: all). At least 1; NaN where a covariance is unknown.
     """
-    outputs = found[0].outputs
-    counts = np.array([[output in here for output in outputs] for here in seen or [outputs] * len(found)])
-    size = max((abs(rate) for each in found for rate in each.rates_dps.values()), default=0.0) or 1.0
-    terms = np.array([[1.0, *(each.rates_dps[axis] / size for axis in BODY_AXES)] for each in found])
-    covariance = np.array([each.covariance for each in found])
+    outputs = uncertainties[0].outputs
+    counts = np.array(
+        [[output in here for output in outputs] for here in outputs_by_place or [outputs] * len(uncertainties)]
+    )
+    size = (
+        max((abs(rate) for uncertainty in uncertainties for rate in uncertainty.rates_dps.values()), default=0.0) or 1.0
+    )
+    terms = np.array(
+        [[1.0, *(uncertainty.rates_dps[axis] / size for axis in BODY_AXES)] for uncertainty in uncertainties]
+    )
+    covariance = np.array([uncertainty.covariance for uncertainty in uncertainties])
     own = np.einsum("pii->pi", covariance)
     if not np.isfinite(own[counts]).all():
         return float("nan")

@@ -61,19 +61,21 @@ class LocalModelError:
         if not turned:
             return float(np.sqrt(own))
         away = self._away(0.0, temperature_c)
-        rest = own if _unknown(away) else self._variance(away)
-        beyond = (self._variance(self._away_across(axis, rate, temperature_c)) - rest for axis, rate in turned.items())
+        remaining = own if _unknown(away) else self._variance(away)
+        beyond = (
+            self._variance(self._away_across(axis, rate, temperature_c)) - remaining for axis, rate in turned.items()
+        )
         return float(np.sqrt(own + sum(max(each, 0.0) for each in beyond)))
 
-    def _variance(self, away: Array) -> float:
+    def _variance(self, distance: Array) -> float:
         """Return the variance left, (deg/s)^2, where the data sets with a known one are so far away, in widths."""
-        known, weight = np.isfinite(self.left_var), near_weights(away)
+        is_finite, weight = np.isfinite(self.left_var), near_weights(distance)
         near = effective_number(weight)
         weight /= weight.sum()
-        left = float(weight @ self.left_var[known])
-        noise = float(weight @ self.white_var[known])
-        unseen = LEAST_SHARE * np.sqrt(2 / near) * max(left, noise)
-        return float(max(left - noise, unseen))
+        residual_var = float(weight @ self.left_var[is_finite])
+        noise = float(weight @ self.white_var[is_finite])
+        unseen = LEAST_SHARE * np.sqrt(2 / near) * max(residual_var, noise)
+        return float(max(residual_var - noise, unseen))
 
     def thinned(self) -> LocalModelError:
         """Return the same with the means over groups of neighbouring data sets where there are more than are kept.
@@ -81,8 +83,8 @@ class LocalModelError:
         A group has neighbouring rates about one body axis at neighbouring temperatures; each of its members says as
         much as any other.
         """
-        known = np.flatnonzero(np.isfinite(self.left_var))
-        if len(self.left_var) <= MOST_KEPT or len(known) == 0:
+        finite_rows = np.flatnonzero(np.isfinite(self.left_var))
+        if len(self.left_var) <= MOST_KEPT or len(finite_rows) == 0:
             return self
         across = self.across_dps or {}
         rates = np.stack([self.rate_dps, *across.values()])
@@ -90,7 +92,9 @@ class LocalModelError:
         groups = [
             group
             for axis in range(len(rates))
-            for level in np.array_split(_sorted(known[about[known] == axis], self.temperature_c), TEMPERATURES)
+            for level in np.array_split(
+                _sorted(finite_rows[about[finite_rows] == axis], self.temperature_c), TEMPERATURES
+            )
             for group in np.array_split(_sorted(level, rates[axis]), MOST_KEPT // (10 * TEMPERATURES))
             if len(group)
         ]
@@ -110,11 +114,11 @@ class LocalModelError:
         away = self._away(rate_dps, temperature_c)
         if len(away) == 0:
             return NONE_LEFT_OUT
-        if (why := _unknown(away)) is not None:
-            return why
+        if (reason := _unknown(away)) is not None:
+            return reason
         for axis, rate in across_dps.items():
-            if rate and (why := self._unknown_across(axis, rate, temperature_c)) is not None:
-                return why
+            if rate and (reason := self._unknown_across(axis, rate, temperature_c)) is not None:
+                return reason
         return None
 
     def _unknown_across(self, axis: str, rate_dps: float, temperature_c: float) -> str | None:
@@ -126,8 +130,8 @@ class LocalModelError:
         away = self._away_across(axis, rate_dps, temperature_c)
         if len(away) == 0:
             return NONE_LEFT_OUT
-        why = _unknown(away)
-        return None if why is None else f"about {axis}, {why}"
+        reason = _unknown(away)
+        return None if reason is None else f"about {axis}, {reason}"
 
     def _away(self, rate_dps: float, temperature_c: float) -> Array:
         """Return how far a place is from each data set whose variance is known, in widths of the neighbourhood."""
@@ -148,11 +152,11 @@ class LocalModelError:
         return np.asarray(away[np.isfinite(self.left_var)])
 
 
-def _unknown(away: Array) -> str | None:
+def _unknown(distance: Array) -> str | None:
     """Return why nothing is known so far, in widths, from the data sets; None where something is."""
-    if away.min() > FARTHEST:
+    if distance.min() > FARTHEST:
         return NONE_NEAR
-    if effective_number(near_weights(away)) < LEAST_NEAR:
+    if effective_number(near_weights(distance)) < LEAST_NEAR:
         return f"fewer than {LEAST_NEAR:g} data sets were measured near there"
     return None
 
@@ -161,10 +165,10 @@ def _sorted(rows: NDArray[np.int64], by: Array) -> NDArray[np.int64]:
     return rows[np.argsort(by[rows], kind="stable")]
 
 
-def near_weights(away: Array) -> Array:
+def near_weights(distance: Array) -> Array:
     """Return the weights of data sets so far away, in widths: of the narrowest neighbourhood with enough of them."""
     for factor in WIDENED:
-        weight = np.exp(-0.5 * (away / factor) ** 2)
+        weight = np.exp(-0.5 * (distance / factor) ** 2)
         if effective_number(weight) >= LEAST_NEAR:
             break
     return np.asarray(weight)

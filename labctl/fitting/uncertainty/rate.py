@@ -50,24 +50,24 @@ def rate_uncertainty(
     It is that of `rate_vector_uncertainty` where the unit turns about the axis of the output alone; where it turns
     about others, U is larger. Arguments and errors raised are the same.
     """
-    found = {}
+    by_axis = {}
     for axis in fitted.axes:
         at = rate_vector_uncertainty(fitted, {axis: rate_dps}, temperature_c, evidence=evidence, name=name, bench=bench)
-        found[axis] = of_budget(at.budgets[axis], evidence.get(axis))
-    return found
+        by_axis[axis] = of_budget(at.budgets[axis], evidence.get(axis))
+    return by_axis
 
 
 def of_budget(budget: Budget, evidence: AxisEvidence | None) -> RateUncertainty:
     """Return the parts of one output's budget of a corrected rate."""
     evaluated = {line.source: line for line in budget.lines if line.source in EVALUATED}
     standards = [line for line in budget.lines if line.source not in {*EVALUATED, CROSS_RATES}]
-    known = [line.contribution for line in standards if line.contribution is not None]
+    contributions = [line.contribution for line in standards if line.contribution is not None]
     return RateUncertainty(
         evaluated["coefficients"].contribution,
         evaluated["model"].contribution,
         evaluated["repeatability"].contribution,
         evidence.repeatability.source if evidence and evidence.repeatability else "none",
-        combined_u(np.array(known)) if known else None,
+        combined_u(np.array(contributions)) if contributions else None,
         without_repeatability(budget.lines),
         None if budget.expanded is None else budget.expanded / COVERAGE,
         budget.expanded,

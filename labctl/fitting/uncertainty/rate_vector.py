@@ -96,10 +96,10 @@ def rate_vector_uncertainty(
     evaluated = place.evaluated(evidence)
     evaluated += place.of_time(bench)
     sensitivities = place.sensitivities(bench)
-    stated = standard_lines(bench, sensitivities)
+    stated_lines = standard_lines(bench, sensitivities)
     aligned = standard_lines(bench, replace(sensitivities, angles=place.mounting_angles(bench, aligned=True)))
     return RateVectorUncertainty(
-        place.rates_dps, temperature_c, place.outputs, (*evaluated, *stated), (*evaluated, *aligned)
+        place.rates_dps, temperature_c, place.outputs, (*evaluated, *stated_lines), (*evaluated, *aligned)
     )
 
 
@@ -124,9 +124,9 @@ def _require_numbers(rates_dps: Mapping[str, float], temperature_c: float) -> No
             f"rate about {', '.join(sorted(strange))}: a unit has the body axes x, y and z; name one of them"
         )
     numbers = [(f"rate_dps about {axis}", rate, "deg/s") for axis, rate in rates_dps.items()]
-    for what, value, unit in [*numbers, ("temperature_c", temperature_c, "deg C")]:
+    for name, value, unit in [*numbers, ("temperature_c", temperature_c, "deg C")]:
         if not abs(value) <= LARGEST:  # also false for NaN
-            raise BadInput(f"{what} = {value} {unit}: give a number between {-LARGEST:g} and {LARGEST:g} {unit}")
+            raise BadInput(f"{name} = {value} {unit}: give a number between {-LARGEST:g} and {LARGEST:g} {unit}")
 
 
 @dataclass(frozen=True)
@@ -153,21 +153,21 @@ class _Place:
 
     def evaluated(self, evidence: Mapping[str, AxisEvidence]) -> list[SourceLines]:
         """Return the lines that come from the recording, and that of rates which the user does not know."""
-        fitted, warm, alone = self.fitted, self.temperature_c, np.eye(len(self.outputs))
+        fitted, temperature_c, alone = self.fitted, self.temperature_c, np.eye(len(self.outputs))
         related = _correlation(self.outputs, evidence)
         coefficients = [
-            coefficient_line(fitted, error_at(axis, self.rates_dps), warm, evidence.get(axis), "deg/s")
+            coefficient_line(fitted, error_at(axis, self.rates_dps), temperature_c, evidence.get(axis), "deg/s")
             for axis in self.outputs
         ]
-        model = [model_line(fitted, axis, evidence.get(axis), self.rates_dps, warm) for axis in self.outputs]
+        model = [model_line(fitted, axis, evidence.get(axis), self.rates_dps, temperature_c) for axis in self.outputs]
         later = [repeatability_line(fitted, evidence.get(axis)) for axis in self.outputs]
-        found = [
+        evaluations = [
             _propagated(coefficients, related, self.gain),
             _propagated(model, related, alone),
             _propagated(later, alone, alone),
         ]
         unread = [axis for axis in BODY_AXES if axis not in self.outputs and self.rates_dps[axis]]
-        return [*found, self._cross_rates(unread)] if unread else found
+        return [*evaluations, self._cross_rates(unread)] if unread else evaluations
 
     def of_time(self, bench: BenchConditions | None) -> list[SourceLines]:
         """Return the lines of the time of a reference rate that changed."""
@@ -182,11 +182,11 @@ class _Place:
             for axis in self.outputs
         ]
         about = " and ".join(unread)
-        why = f"the unit has no output about {about}, so the correction cannot take it off"
+        reason = f"the unit has no output about {about}, so the correction cannot take it off"
         lines = tuple(
             BudgetLine(
                 CROSS_RATES, f"rate about {about}", "B", "normal", None, "deg/s", None, 0.0, uncorrected=float(error),
-                why=why,
+                why=reason,
             )
             for error in self.gain @ np.array(added)
         )  # fmt: skip
@@ -215,7 +215,7 @@ class _Place:
         `aligned` is without what a rotation of the frame takes off: of two outputs the mean of both parts is left, and
         of the part about an axis without output nothing. What the mountings with one axis up separate is not in it.
         """
-        found: dict[str, list[Array]] = {quantity: [] for quantity in ANGLE_QUANTITIES}
+        columns_by_quantity: dict[str, list[Array]] = {quantity: [] for quantity in ANGLE_QUANTITIES}
         gains = {axis: AngleGains() if bench is None else bench.angle_gains(axis) for axis in BODY_AXES}
         for up, towards in permutations(BODY_AXES, 2):
             each = np.zeros(len(self.outputs))
@@ -226,9 +226,9 @@ class _Place:
             elif up in self.outputs:
                 each[self.outputs.index(towards)] = self.rates_dps[up] / 2
                 each[self.outputs.index(up)] = self.rates_dps[towards] / 2
-            for quantity, columns in found.items():
+            for quantity, columns in columns_by_quantity.items():
                 columns.append(each * gains[up].of(quantity))
-        return {quantity: np.column_stack(columns) for quantity, columns in found.items()}
+        return {quantity: np.column_stack(columns) for quantity, columns in columns_by_quantity.items()}
 
 
 def _budget(sources: Sequence[SourceLines], row: int) -> Budget:
@@ -249,22 +249,22 @@ def _correlation(outputs: Sequence[str], evidence: Mapping[str, AxisEvidence]) -
     Outputs that were measured together have the same noise and drift in the same data sets, so that their coefficients
     are correlated as these are.
     """
-    found = np.eye(len(outputs))
+    matrix = np.eye(len(outputs))
     for row, axis in enumerate(outputs):
         if axis in evidence:
             for other, value in evidence[axis].correlation.items():
                 if other in outputs:
-                    found[row, outputs.index(other)] = value
-    return found
+                    matrix[row, outputs.index(other)] = value
+    return matrix
 
 
 def _propagated(lines: Sequence[BudgetLine], correlation: Array, gain: Array) -> SourceLines:
     """Return lines of the outputs' errors as they are in the corrected rates (GUM eq. 16)."""
     u = np.array([np.nan if line.u is None else line.u for line in lines])
-    known = np.nan_to_num(u)
-    covariance = gain @ (np.outer(known, known) * correlation) @ gain.T
-    found = tuple(
+    finite_u = np.nan_to_num(u)
+    covariance = gain @ (np.outer(finite_u, finite_u) * correlation) @ gain.T
+    propagated = tuple(
         line if line.u is None else replace(line, u=float(s), contribution=float(s))
         for line, s in zip(lines, np.sqrt(np.maximum(np.diag(covariance), 0.0)), strict=True)
     )
-    return SourceLines(found, covariance)
+    return SourceLines(propagated, covariance)

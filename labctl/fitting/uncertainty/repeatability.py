@@ -47,18 +47,18 @@ def repeatability_of(
     axes; two or three runs say little of a standard deviation, which Student's t answers for.
     """
     between = _between_runs(data, residual_dps)
-    found: dict[str, Repeatability | None] = {}
+    by_axis: dict[str, Repeatability | None] = {}
     for axis in residual_dps:
         measured = instability_dps.get(axis)
         if between is not None:
-            found[axis] = between
+            by_axis[axis] = between
         elif sheet := _by_datasheet(data):
-            found[axis] = sheet
+            by_axis[axis] = sheet
         elif measured:
-            found[axis] = Repeatability(OF_TWO * DRIFT_OVER_INSTABILITY * measured, "static record")
+            by_axis[axis] = Repeatability(OF_TWO * DRIFT_OVER_INSTABILITY * measured, "static record")
         else:
-            found[axis] = None
-    return found
+            by_axis[axis] = None
+    return by_axis
 
 
 def _by_datasheet(data: FitData) -> Repeatability | None:

@@ -48,8 +48,8 @@ class LawFunction:
 
     def temperature_slope(self, fitted: FittedModel, temperature_c: float) -> float:
         """Return its derivative over temperature, per K."""
-        warm, cold = (self.value(fitted, temperature_c + sign * STEP_K) for sign in (1, -1))
-        return (warm - cold) / (2 * STEP_K)
+        above, below = (self.value(fitted, temperature_c + sign * STEP_K) for sign in (1, -1))
+        return (above - below) / (2 * STEP_K)
 
     def gradient(self, fitted: FittedModel, temperature_c: float) -> Array:
         """Return its derivative along the coefficients of the axis, (k*m,), temperature functions running fastest."""
@@ -76,9 +76,9 @@ class OwnCoefficient:
 
     def gradient(self, fitted: FittedModel, temperature_c: float) -> Array:  # noqa: ARG002  it is the same at each
         """Return its derivative along the coefficients of the axis, (k*m,)."""
-        found = np.zeros_like(fitted.axes[self.axis].values)
-        found[fitted.axes[self.axis].names.index(self.name), 0] = 1.0
-        return found.ravel()
+        derivatives = np.zeros_like(fitted.axes[self.axis].values)
+        derivatives[fitted.axes[self.axis].names.index(self.name), 0] = 1.0
+        return derivatives.ravel()
 
 
 def u_of_fit(law: CoefficientFunction, fitted: FittedModel, temperature_c: float) -> float | None:

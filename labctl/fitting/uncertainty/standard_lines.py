@@ -102,8 +102,10 @@ def standard_lines(bench: BenchConditions | None, s: Sensitivities) -> list[Sour
     n = len(s.angle_squared)
     if bench is None:
         return [_of_all(_unknown("standards", NOT_KEPT), n)]
-    stated = [_of_standard(each, bench, s) for each in bench.standards if _matters(each.quantity, bench)]
-    return [*stated, *(_of_all(line, n) for line in _missing(bench))]
+    stated_lines = [
+        _of_standard(standard, bench, s) for standard in bench.standards if _matters(standard.quantity, bench)
+    ]
+    return [*stated_lines, *(_of_all(line, n) for line in _missing(bench))]
 
 
 def standards_u(bench: BenchConditions, s: Sensitivities) -> float:
@@ -123,10 +125,10 @@ def _matters(quantity: str, bench: BenchConditions) -> bool:
 
 
 def _of_standard(standard: Standard, bench: BenchConditions, s: Sensitivities) -> SourceLines:
-    sensitivity, why = _sensitivity(standard, bench, s)
+    sensitivity, reason = _sensitivity(standard, bench, s)
     n, u = len(s.angle_squared), standard.standard_u
     if sensitivity is None:
-        line = _line(standard, bench, None, None, why)
+        line = _line(standard, bench, None, None, reason)
         return SourceLines((line,) * n, np.zeros((n, n)))
     second = np.zeros(n)
     if standard.quantity in ANGLE_QUANTITIES:
@@ -138,7 +140,7 @@ def _of_standard(standard: Standard, bench: BenchConditions, s: Sensitivities) -
             bench,
             _size(sensitivity[row]),
             math.sqrt(covariance[row, row]),
-            why or SECOND * int(second[row] > 0),
+            reason or SECOND * int(second[row] > 0),
         )
         for row in range(n)
     )
@@ -151,12 +153,12 @@ def _sensitivity(standard: Standard, bench: BenchConditions, s: Sensitivities) -
         return np.zeros_like(s.temperature), OWN_THERMOMETER
     if standard.quantity == "turn_angle" and bench.turn_common_u is not None:
         return np.zeros_like(s.relative_rate), IN_COEFFICIENTS
-    if standard.quantity in ANGLE_QUANTITIES and (why := _why_less(standard.quantity, bench)):
-        return _SENSITIVITY[standard.quantity, standard.unit_name](s, bench), why
-    found = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)
-    if found is None:
+    if standard.quantity in ANGLE_QUANTITIES and (reason := _why_less(standard.quantity, bench)):
+        return _SENSITIVITY[standard.quantity, standard.unit_name](s, bench), reason
+    sensitivity = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)
+    if sensitivity is None:
         return None, NO_SENSITIVITY if standard.quantity == "supply" else NO_LATITUDE
-    return found, ""
+    return sensitivity, ""
 
 
 def _why_less(quantity: str, bench: BenchConditions) -> str:
@@ -174,7 +176,7 @@ def _size(sensitivity: Array) -> float:
 
 
 def _line(
-    standard: Standard, bench: BenchConditions, sensitivity: float | None, contribution: float | None, why: str
+    standard: Standard, bench: BenchConditions, sensitivity: float | None, contribution: float | None, reason: str
 ) -> BudgetLine:
     return BudgetLine(
         source=standard.quantity,
@@ -190,7 +192,7 @@ def _line(
         is_common=standard.quantity in COMMON,
         is_overdue=standard.is_overdue(bench.used_on),
         due=None if standard.due is None else standard.due.isoformat(),
-        why=why,
+        why=reason,
     )
 
 
@@ -211,7 +213,9 @@ def _missing(bench: BenchConditions) -> list[BudgetLine]:
     if bench.thermometer != "unit":
         quantities += ["thermometer", "chamber_gradient"]
     quantities += ["level"] if bench.motion != "poses" else []
-    if any(Position.of(each).turned_deg for each in bench.mountings):  # then little else is left of these angles
+    if any(
+        Position.of(mounting).turned_deg for mounting in bench.mountings
+    ):  # then little else is left of these angles
         quantities.append("mounting_repeatability")
     missing = [name for name in quantities if not bench.of(name)]
     lines = [
@@ -225,8 +229,8 @@ def _missing(bench: BenchConditions) -> list[BudgetLine]:
 _UNITS = {"standards": "", "clock": "ppm", "thermometer": "deg C", "chamber_gradient": "deg C", "earth_rate": "deg/s"}
 
 
-def _unknown(source: str, why: str) -> BudgetLine:
+def _unknown(source: str, reason: str) -> BudgetLine:
     return BudgetLine(
         source, source, "B", "", None, _UNITS.get(source, "deg"), None, None, is_common=source in COMMON,
-        is_stated=False, why=why,
+        is_stated=False, why=reason,
     )  # fmt: skip

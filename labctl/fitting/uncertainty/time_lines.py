@@ -62,18 +62,18 @@ def time_lines(
     """
     n = len(laws)
     gain = np.eye(n) if gain is None else gain
-    found = []
+    source_lines = []
     for source in KINDS:
         parts = [_part(fitted, law.axis, source) for law in laws]
-        if (known := next((part for part in parts if part is not None), None)) is None:
+        if (part_stated := next((part for part in parts if part is not None), None)) is None:
             continue
         changes = np.array([
-            np.zeros(known.root.shape[1]) if part is None else law.gradient(fitted, temperature_c) @ part.root
+            np.zeros(part_stated.root.shape[1]) if part is None else law.gradient(fitted, temperature_c) @ part.root
             for part, law in zip(parts, laws, strict=True)
         ])  # fmt: skip
-        found.append(_lines(known, np.asarray(gain @ changes)))
-    if found or bench is None or bench.motion != "profile":
-        return found
+        source_lines.append(_lines(part_stated, np.asarray(gain @ changes)))
+    if source_lines or bench is None or bench.motion != "profile":
+        return source_lines
     line = BudgetLine(TIME, TIME, "B", "", None, "s", None, None, is_common=True, is_stated=False, why=NOT_STATED)
     return [SourceLines((line,) * n, np.zeros((n, n)))]
 

@@ -44,21 +44,21 @@ def left_variance(data: FitData, preset: Preset) -> dict[str, Array]:
     Raises NotEnoughData where the data sets do not determine the model.
     """
     model, rows = preset.build(data)
-    found = solve_axes(data.take(rows), model)
-    inside = residuals(FittedModel(model, found.fits), data, found.nuisance)
-    data = leaning(data, found.nuisance)
+    axis_solutions = solve_axes(data.take(rows), model)
+    inside = residuals(FittedModel(model, axis_solutions.fits), data, axis_solutions.nuisance)
+    data = leaning(data, axis_solutions.nuisance)
     by_temperature = data.folds
     if preset.inner_only:
         by_temperature = by_temperature[1:-1]
-    outside = [_left_out(data, preset, masks, found.solutions) for masks in (by_temperature, rate_folds(data))]
-    left = {}
+    outside = [_left_out(data, preset, masks, axis_solutions.solutions) for masks in (by_temperature, rate_folds(data))]
+    residual_var = {}
     for axis, values in inside.items():
         within = within_runs(data, values)
         products = np.stack([within * within_runs(data, without[axis]) for without in outside])
-        known = np.isfinite(products)
-        total = np.where(known, products, 0.0).sum(axis=0)
-        left[axis] = np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
-    return left
+        is_finite = np.isfinite(products)
+        total = np.where(is_finite, products, 0.0).sum(axis=0)
+        residual_var[axis] = np.where(is_finite.any(axis=0), total / np.maximum(is_finite.sum(axis=0), 1), np.nan)
+    return residual_var
 
 
 def within_runs(data: FitData, values: Array) -> Array:
@@ -67,11 +67,11 @@ def within_runs(data: FitData, values: Array) -> Array:
     numbers = np.unique(runs)
     if len(numbers) < 2:
         return values
-    left = values.copy()
+    residuals_within = values.copy()
     for number in numbers:
         here = (runs == number) & np.isfinite(values)
-        left[here] -= values[here].mean() if here.any() else 0.0
-    return left
+        residuals_within[here] -= values[here].mean() if here.any() else 0.0
+    return residuals_within
 
 
 def rate_folds(data: FitData) -> list[NDArray[np.bool_]]:
@@ -88,21 +88,21 @@ def _left_out(
     data: FitData, preset: Preset, masks: list[NDArray[np.bool_]], solutions: Mapping[str, Solution]
 ) -> dict[str, Array]:
     """Return axis -> (m,) residuals of each data set by the fit without its fold, NaN where there is none."""
-    found = {axis: np.full(len(data), np.nan) for axis in data.outputs}
+    residual_dps = {axis: np.full(len(data), np.nan) for axis in data.outputs}
     for mask in masks:
-        seen = data.take(~mask)
+        data_used = data.take(~mask)
         if mask.all():
             continue
         try:
-            model, rows = preset.build(seen)
-            require_enough_data(seen.take(rows), model)
-            solved = solve_axes(seen.take(rows), model, solutions)
+            model, rows = preset.build(data_used)
+            require_enough_data(data_used.take(rows), model)
+            solved = solve_axes(data_used.take(rows), model, solutions)
             without = residuals(FittedModel(model, solved.fits), data.take(mask), solved.nuisance)
         except LabctlError:  # too little is left, or a law that cannot be inverted: this fold says nothing
             continue
         for axis, values in without.items():
-            found[axis][mask] = values
-    return found
+            residual_dps[axis][mask] = values
+    return residual_dps
 
 
 #: Of a calibration that an earlier version of labctl has made.
@@ -120,7 +120,7 @@ class AxisEvidence:
     def to_json(self) -> AxisEvidenceJson:
         """Return this as JSON, the variances in (deg/s)^2."""
         local = self.model_error
-        found: AxisEvidenceJson = {
+        evidence_json: AxisEvidenceJson = {
             "rate_dps": local.rate_dps.tolist(),
             "temperature_c": local.temperature_c.tolist(),
             "left_var": plain_list(local.left_var),
@@ -130,30 +130,34 @@ class AxisEvidence:
             "repeatability_source": self.repeatability.source if self.repeatability else "none",
         }
         if self.repeatability and self.repeatability.convention:
-            found["repeatability_convention"] = self.repeatability.convention
-            found["repeatability_text"] = self.repeatability.text
+            evidence_json["repeatability_convention"] = self.repeatability.convention
+            evidence_json["repeatability_text"] = self.repeatability.text
         if local.across_dps is not None:
-            found["across_dps"] = {axis: rates.tolist() for axis, rates in local.across_dps.items()}
+            evidence_json["across_dps"] = {axis: rates.tolist() for axis, rates in local.across_dps.items()}
         if self.correlation:
-            found["correlation"] = dict(self.correlation)
-        return found
+            evidence_json["correlation"] = dict(self.correlation)
+        return evidence_json
 
     @staticmethod
     def from_json(record: AxisEvidenceJson) -> AxisEvidence:
         """Return what `to_json` described."""
         columns = (record["rate_dps"], record["temperature_c"], record["left_var"], record["white_var"])
-        rate, warm, left, white = (np.asarray(column, dtype=np.float64) for column in columns)
-        kept = record.get("across_dps")
-        across = None if kept is None else {axis: np.asarray(each, dtype=np.float64) for axis, each in kept.items()}
-        local = LocalModelError(rate, warm, left, white, across)
+        rate, temperature_c, residual_var, white = (np.asarray(column, dtype=np.float64) for column in columns)
+        across_values = record.get("across_dps")
+        across = (
+            None
+            if across_values is None
+            else {axis: np.asarray(across_value, dtype=np.float64) for axis, across_value in across_values.items()}
+        )
+        local = LocalModelError(rate, temperature_c, residual_var, white, across)
         u_dps, correlation = record["repeatability_dps"], record.get("correlation", {})
         if u_dps is None:
             return AxisEvidence(local, None, correlation)
         source = record["repeatability_source"]
         text = record.get("repeatability_text", HALVED if source == "data sheet" else "")
         convention = record.get("repeatability_convention")
-        known = Repeatability(u_dps, source, record["repeatability_freedom"], text, convention)
-        return AxisEvidence(local, known, correlation)
+        repeatability = Repeatability(u_dps, source, record["repeatability_freedom"], text, convention)
+        return AxisEvidence(local, repeatability, correlation)
 
 
 @single_threaded
@@ -166,9 +170,9 @@ def use_evidence(
     determine the model.
     """
     model, rows = preset.build(data)
-    found = solve_axes(data.take(rows), model)
-    left = left_variance(data, preset)
-    inside = residuals(FittedModel(model, found.fits), data, found.nuisance)
+    solutions = solve_axes(data.take(rows), model)
+    residual_var = left_variance(data, preset)
+    inside = residuals(FittedModel(model, solutions.fits), data, solutions.nuisance)
     repeatability = repeatability_of(data, inside, instability_dps or {})
     correlation = _correlation({axis: within_runs(data, values) for axis, values in inside.items()})
     return {
@@ -176,7 +180,7 @@ def use_evidence(
             LocalModelError(
                 data.true_rate_dps(axis),
                 data.channels.temperature_c(axis),
-                left[axis],
+                residual_var[axis],
                 data.white_var[axis] if data.white_var is not None else np.zeros(len(data)),
                 _turned_across(data, axis),
             ).thinned(),
@@ -195,13 +199,13 @@ def _turned_across(data: FitData, axis: str) -> dict[str, Array]:
 
 def _correlation(residual_dps: Mapping[str, Array]) -> dict[str, dict[str, float]]:
     """Return axis -> other axis -> correlation coefficient of their residuals, where both scatter."""
-    found: dict[str, dict[str, float]] = {axis: {} for axis in residual_dps}
+    by_pair: dict[str, dict[str, float]] = {axis: {} for axis in residual_dps}
     for one, other in permutations(residual_dps, 2):
-        known = np.isfinite(residual_dps[one]) & np.isfinite(residual_dps[other])
-        pair = np.array([residual_dps[one][known], residual_dps[other][known]])
+        in_both = np.isfinite(residual_dps[one]) & np.isfinite(residual_dps[other])
+        pair = np.array([residual_dps[one][in_both], residual_dps[other][in_both]])
         if np.all(np.ptp(pair, axis=1) > 0):
-            found[one][other] = float(np.atleast_2d(np.corrcoef(pair))[0, 1])
-    return found
+            by_pair[one][other] = float(np.atleast_2d(np.corrcoef(pair))[0, 1])
+    return by_pair
 
 
 def evidence_of(

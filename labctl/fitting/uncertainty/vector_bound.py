@@ -44,25 +44,25 @@ def vector_bounds(
         {axis: reach_dps * part for axis, part in zip(BODY_AXES, place, strict=True)}
         for place in (PLACES if reach_dps else PLACES[:1])
     ]
-    found = [
-        rate_vector_uncertainty(fitted, rates, warm, evidence=evidence, name=name, bench=bench)
-        for warm in temperatures_c
+    bounds = [
+        rate_vector_uncertainty(fitted, rates, temperature_c, evidence=evidence, name=name, bench=bench)
+        for temperature_c in temperatures_c
         for rates in vectors
     ]
-    return {axis: _bound(axis, found, reach_dps) for axis in fitted.axes}
+    return {axis: _bound(axis, bounds, reach_dps) for axis in fitted.axes}
 
 
-def _bound(axis: str, found: Sequence[RateVectorUncertainty], reach_dps: float) -> VectorBoundJson:
-    unknown = next((each for each in found if each.budgets[axis].expanded is None), None)
-    place = unknown or max(found, key=lambda each: each.budgets[axis].expanded or 0.0)
-    aligned = [each.aligned_budgets[axis].expanded or 0.0 for each in found]
+def _bound(axis: str, uncertainties: Sequence[RateVectorUncertainty], reach_dps: float) -> VectorBoundJson:
+    unknown = next((uncertainty for uncertainty in uncertainties if uncertainty.budgets[axis].expanded is None), None)
+    place = unknown or max(uncertainties, key=lambda uncertainty: uncertainty.budgets[axis].expanded or 0.0)
+    aligned = [uncertainty.aligned_budgets[axis].expanded or 0.0 for uncertainty in uncertainties]
     return {
         "bound_dps": None if unknown else place.budgets[axis].expanded,
         "aligned_bound_dps": None if unknown else max(aligned),
         "reach_dps": reach_dps,
         "rates_dps": dict(place.rates_dps),
         "temperature_c": place.temperature_c,
-        "why": "; ".join(f"{part}: {why}" for part, why in place.unknown[axis].items()),
+        "why": "; ".join(f"{part}: {reason}" for part, reason in place.unknown[axis].items()),
     }
 
 
@@ -75,13 +75,15 @@ def cross_rates(fitted: FittedModel, coefficients: Mapping[str, Budget]) -> Cros
     unread = [other for other in BODY_AXES if other not in fitted.axes]
     if not unread:
         return None
-    known = {other: coefficients.get(f"misalignment_{other}") for other in unread}
-    expanded = {other: budget.expanded for other, budget in known.items() if budget is not None and budget.expanded}
+    misalignments = {other: coefficients.get(f"misalignment_{other}") for other in unread}
+    expanded = {
+        other: budget.expanded for other, budget in misalignments.items() if budget is not None and budget.expanded
+    }
     if missing := [other for other in unread if other not in expanded]:
-        why = (
+        reason = (
             f"the misalignment towards {' and '.join(missing)} is not known: measure the unit with this axis up too, "
             "and fit misalignment"
         )
-        return {"about": unread, "per_dps": None, "why": why}
-    size = math.hypot(*(budget.value or 0.0 for budget in known.values() if budget is not None))
+        return {"about": unread, "per_dps": None, "why": reason}
+    size = math.hypot(*(budget.value or 0.0 for budget in misalignments.values() if budget is not None))
     return {"about": unread, "per_dps": half_width(max(expanded.values()), size), "why": ""}

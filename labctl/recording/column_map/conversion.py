@@ -50,12 +50,12 @@ def converted(target: str, mapped: MappedColumn, column: RawColumn, problems: Pr
     unit = find_unit(quantity, name) if name else None
     if unit is None:
         implied = temperature_unit(column.values).why if quantity == "deg C" and not name else ""
-        given = f"unit {name!r} is not known" if name else "no unit is given" + (f" ({implied})" if implied else "")
-        problems.add(_unknown_unit(target, column, quantity, given))
+        reason = f"unit {name!r} is not known" if name else "no unit is given" + (f" ({implied})" if implied else "")
+        problems.add(_unknown_unit(target, column, quantity, reason))
         return None
-    found = mapped.sign * (unit.factor * values + unit.zero)
-    _refuse_impossible(target, column, found, quantity, problems)
-    return found
+    converted_values = mapped.sign * (unit.factor * values + unit.zero)
+    _refuse_impossible(target, column, converted_values, quantity, problems)
+    return converted_values
 
 
 def output_of(mapped: MappedColumn, column: RawColumn) -> tuple[Array, OutputUnit | None]:
@@ -76,11 +76,13 @@ def output_of(mapped: MappedColumn, column: RawColumn) -> tuple[Array, OutputUni
     return mapped.sign * (unit.factor if unit is not None else 1.0) * values, None
 
 
-def _unknown_unit(target: str, column: RawColumn, quantity: str, why: str) -> str:
+def _unknown_unit(target: str, column: RawColumn, quantity: str, reason: str) -> str:
     finite = column.values[np.isfinite(column.values)]
     span = f" ({finite.min():.4g} to {finite.max():.4g})" if len(finite) else ""
-    where = f"[units] or [columns.{target}]"
-    return f"column {column.name!r}{span} for {target}: {why}; write its unit in {where}: one of {names_of(quantity)}"
+    place = f"[units] or [columns.{target}]"
+    return (
+        f"column {column.name!r}{span} for {target}: {reason}; write its unit in {place}: one of {names_of(quantity)}"
+    )
 
 
 def _refuse_impossible(target: str, column: RawColumn, values: Array, quantity: str, problems: Problems) -> None:

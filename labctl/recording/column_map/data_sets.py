@@ -31,7 +31,9 @@ class Division:
         return {number: column_map.parts[name] for number, name in self.names.items() if name in column_map.parts}
 
 
-def divide(table: RawTable, column_map: ColumnMap, t_s: Array, found: Movement | None, problems: Problems) -> Division:
+def divide(
+    table: RawTable, column_map: ColumnMap, t_s: Array, movement: Movement | None, problems: Problems
+) -> Division:
     """Return the data sets of a log by the rule of its map."""
     rule, n = column_map.datasets, table.rows
     if column_map.kind == "points":
@@ -46,8 +48,8 @@ def divide(table: RawTable, column_map: ColumnMap, t_s: Array, found: Movement |
         steps = np.diff(t_s)
         limit = rule.gap_s or GAP_STEPS * float(np.median(steps))
         return Division(np.concatenate([[1], 1 + np.cumsum(steps > limit)]).astype(np.int64))
-    if rule.by == "rests" and found is not None:
-        return _by_rests(found, t_s, leave_moves=column_map.motion in {None, "rest"})
+    if rule.by == "rests" and movement is not None:
+        return _by_rests(movement, t_s, leave_moves=column_map.motion in {None, "rest"})
     return Division(np.ones(n, dtype=np.int64))
 
 
@@ -92,10 +94,10 @@ def _by_rows(column_map: ColumnMap, n: int, problems: Problems) -> Division:
     return Division(numbers, names)
 
 
-def _by_rests(found: Movement, t_s: Array, *, leave_moves: bool) -> Division:
+def _by_rests(movement: Movement, t_s: Array, *, leave_moves: bool) -> Division:
     numbers, number = np.zeros(len(t_s), dtype=np.int64), 0
     resting = np.zeros(len(t_s), dtype=np.bool_)
-    for first, after in rests(found, t_s):
+    for first, after in rests(movement, t_s):
         resting[first:after] = True
     for first, after, still in stretches(resting):
         if leave_moves and not still:

@@ -53,18 +53,18 @@ def instants(words: Sequence[str], unit: str) -> Instants:
 
 
 def _iso(word: str) -> datetime:
-    found = datetime.fromisoformat(word)
-    return found.astimezone(UTC).replace(tzinfo=None) if found.tzinfo else found
+    parsed = datetime.fromisoformat(word)
+    return parsed.astimezone(UTC).replace(tzinfo=None) if parsed.tzinfo else parsed
 
 
 def _day_first(words: Sequence[str]) -> bool:
     """Return whether the day comes first: a number above 12 is no month, and with points the day is always first."""
-    found = [each for each in map(_YEAR_LAST.fullmatch, words) if each is not None]
-    if not found:
+    matches = [each for each in map(_YEAR_LAST.fullmatch, words) if each is not None]
+    if not matches:
         raise ValueError(f"{words[0][:40] if words else ''!r} is no date")
-    if found[0]["sep"] == ".":
+    if matches[0]["sep"] == ".":
         return True
-    first, second = (max(int(each[key]) for each in found) for key in "ab")
+    first, second = (max(int(match[key]) for match in matches) for key in "ab")
     if (first > 12) == (second > 12):
         raise ValueError(
             f"{words[0][:40]!r} has the day first or the month first; write unit = 'date-time d/m/y' or unit = "
@@ -74,41 +74,41 @@ def _day_first(words: Sequence[str]) -> bool:
 
 
 def _parts(word: str, form: re.Pattern[str], *, day_first: bool) -> datetime:
-    found = form.fullmatch(word)
-    if found is None:
+    match = form.fullmatch(word)
+    if match is None:
         raise ValueError(f"{word[:40]!r} is no date like the others")
-    a, b = int(found["a"]), int(found["b"])
+    a, b = int(match["a"]), int(match["b"])
     month, day = (b, a) if day_first else (a, b)
     try:
-        return datetime(int(found["y"]), month, day) + _clock(found)  # noqa: DTZ001  as the file has it, UTC
+        return datetime(int(match["y"]), month, day) + _clock(match)  # noqa: DTZ001  as the file has it, UTC
     except ValueError as error:
         raise ValueError(f"{word[:40]!r}: {error}") from error
 
 
-def _clock(found: re.Match[str]) -> timedelta:
-    hour, half = int(found["h"]), (found["half"] or "").lower()
+def _clock(match: re.Match[str]) -> timedelta:
+    hour, half = int(match["h"]), (match["half"] or "").lower()
     if half and not 1 <= hour <= 12:
-        raise ValueError(f"{found[0][:40]!r} is no time of day")
+        raise ValueError(f"{match[0][:40]!r} is no time of day")
     if half:
         hour = hour % 12 + 12 * (half == "pm")
-    minute, second = int(found["min"]), int(found["s"] or 0)
+    minute, second = int(match["min"]), int(match["s"] or 0)
     if hour > 23 or minute > 59 or second > 60:
-        raise ValueError(f"{found[0][:40]!r} is no time of day")
-    return timedelta(hours=hour, minutes=minute, seconds=second, microseconds=int(f"{found['f'] or 0:0<6}"[:6]))
+        raise ValueError(f"{match[0][:40]!r} is no time of day")
+    return timedelta(hours=hour, minutes=minute, seconds=second, microseconds=int(f"{match['f'] or 0:0<6}"[:6]))
 
 
 def _times_of_day(words: Sequence[str]) -> Instants:
     """Return the times since the first; after midnight they go on."""
-    found = []
+    seconds_of_day = []
     for word in words:
         each = _OF_DAY.fullmatch(word)
         if each is None:
             raise ValueError(f"{word[:40]!r} is no time of day like the others")
-        found.append(_clock(each) / timedelta(seconds=1))
-    t_s = np.unwrap(np.array(found), period=_DAY.total_seconds())
+        seconds_of_day.append(_clock(each) / timedelta(seconds=1))
+    t_s = np.unwrap(np.array(seconds_of_day), period=_DAY.total_seconds())
     return Instants(t_s - t_s[0], None)
 
 
-def _since_first(found: Sequence[datetime]) -> Instants:
-    naive = np.array(found, dtype="datetime64[us]")
-    return Instants((naive - naive[0]) / np.timedelta64(1, "s"), found[0].replace(tzinfo=UTC))
+def _since_first(moments: Sequence[datetime]) -> Instants:
+    naive = np.array(moments, dtype="datetime64[us]")
+    return Instants((naive - naive[0]) / np.timedelta64(1, "s"), moments[0].replace(tzinfo=UTC))

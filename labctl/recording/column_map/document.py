@@ -43,14 +43,14 @@ def checked_map(document: object, name: str = "map") -> ColumnMap:
     except ValidationError as error:
         # a misspelt key is both unknown and missing: the unknown one is what a person looks for
         each = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-        raise BadInput(f"{name}: {'; '.join(_line(found) for found in each[:5])}; correct the map") from error
+        raise BadInput(f"{name}: {'; '.join(_line(problem) for problem in each[:5])}; correct the map") from error
 
 
 def _line(error: Any) -> str:
     place = ".".join(str(part) for part in error["loc"])[:LONGEST_PLACE]
     text = error["msg"].removeprefix("Value error, ")
-    given = "" if error["type"] in {"missing", "value_error"} else f" (is {shown(error['input'])})"
-    return f"{place}: {text}{given}" if place else f"{text}{given}"
+    value_text = "" if error["type"] in {"missing", "value_error"} else f" (is {shown(error['input'])})"
+    return f"{place}: {text}{value_text}" if place else f"{text}{value_text}"
 
 
 def map_document(column_map: ColumnMap) -> dict[str, JsonValue]:

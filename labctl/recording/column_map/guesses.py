@@ -83,18 +83,18 @@ def temperature_unit(values: Array) -> Guess:
         return Guess()
     low, high = float(finite.min()), float(finite.max())
     usual = (float(finite[0]), float(np.median(finite)))
-    said = f"{low:.4g} to {high:.4g}"
+    range_text = f"{low:.4g} to {high:.4g}"
     if _KELVIN[0] <= low and high <= _KELVIN[1] and _any_within(_ROOM_K, usual) and not _whole(finite):
-        return Guess("K", said)
+        return Guess("K", range_text)
     if not (_CELSIUS[0] <= low and high <= 180.0 * 9 / 5 + 32):
         return Guess()  # words of a converter, say, which a recording can do without
     is_celsius = high <= _CELSIUS[1] and (
         high <= _NO_FAHRENHEIT or (_any_within(_ROOM_C, usual) and not _any_within(_ROOM_F, usual))
     )
     if is_celsius:
-        return Guess("deg C", said)
+        return Guess("deg C", range_text)
     low_c, high_c = ((each - 32.0) / 1.8 for each in (low, high))
-    return Guess("", f"{said} deg C and {said} degF ({low_c:.3g} to {high_c:.3g} deg C) are both possible")
+    return Guess("", f"{range_text} deg C and {range_text} degF ({low_c:.3g} to {high_c:.3g} deg C) are both possible")
 
 
 def _any_within(limits: tuple[float, float], values: tuple[float, ...]) -> bool:
@@ -106,13 +106,13 @@ def force_unit(force: Array, still: NDArray[np.bool_]) -> tuple[str, float | Non
     if not still.any():
         return "", None, ""
     size = float(np.nanmedian(np.linalg.norm(force[still], axis=1)))
-    said = f"{size:.5g} at rest is gravity"
+    evidence = f"{size:.5g} at rest is gravity"
     for gravity, unit in ((1.0, "g"), (STANDARD_GRAVITY, "m/s2"), (1000.0, "mg")):
         if abs(size / gravity - 1) < _GRAVITY_WITHIN and not (unit == "mg" and _whole(force)):
-            return unit, None, said
+            return unit, None, evidence
     for words in _WORDS_PER_G:
         if _whole(force) and abs(size / words - 1) < _GRAVITY_WITHIN:
-            return "LSB", words, said
+            return "LSB", words, evidence
     return "", None, ""
 
 

@@ -16,15 +16,15 @@ _SHOWN = 12
 
 def idle_entries(table: RawTable, column_map: ColumnMap) -> list[str]:
     """Return a line for each entry of a map that changes nothing in what becomes of a file."""
-    found = [*_units(table, column_map), *_data_sets(column_map), *_constants(column_map)]
+    entries = [*_units(table, column_map), *_data_sets(column_map), *_constants(column_map)]
     for target, mapped in column_map.columns.items():
-        found += _column(target, mapped)
+        entries += _column(target, mapped)
     layout = column_map.file.model_dump(exclude_none=True)
     if layout and table.layout is None:
-        found.append(
+        entries.append(
             f"[file] {', '.join(layout)}: the file is no text, so this changes nothing; leave [file] out of the map"
         )
-    return found
+    return entries
 
 
 def _units(table: RawTable, column_map: ColumnMap) -> Iterator[str]:
@@ -32,10 +32,10 @@ def _units(table: RawTable, column_map: ColumnMap) -> Iterator[str]:
         begins = QUANTITY_COLUMNS[quantity]
         targets = [target for target in column_map.columns if target.startswith(begins)]
         if not targets:
-            left = ", ".join(repr(name) for name in unused(table, column_map)[:_SHOWN]) or "none"
+            unused_text = ", ".join(repr(name) for name in unused(table, column_map)[:_SHOWN]) or "none"
             yield (
                 f"[units] {quantity} changes nothing: no column of the map is {begins}...; write which of the file's "
-                f"columns these are in [columns] (not used: {left}), or leave the entry out"
+                f"columns these are in [columns] (not used: {unused_text}), or leave the entry out"
             )
         elif all(column_map.columns[target].unit != keys.unit for target in targets):
             yield (
@@ -61,8 +61,8 @@ def _column(target: str, mapped: MappedColumn) -> Iterator[str]:
 
 
 def _own_unit(target: str) -> str:
-    known = BY_NAME.get(target)
-    return known.unit if known is not None else target.rpartition("_")[2]
+    column_spec = BY_NAME.get(target)
+    return column_spec.unit if column_spec is not None else target.rpartition("_")[2]
 
 
 def _data_sets(column_map: ColumnMap) -> Iterator[str]:
@@ -77,10 +77,10 @@ def _data_sets(column_map: ColumnMap) -> Iterator[str]:
 
 
 def _constants(column_map: ColumnMap) -> Iterator[str]:
-    both = sorted(set(column_map.constants.constants()) & set(column_map.columns))
-    if both:
+    in_both = sorted(set(column_map.constants.constants()) & set(column_map.columns))
+    if in_both:
         yield (
-            f"[constants] {', '.join(both)}: the map also fills this from a column of the file, which would change "
+            f"[constants] {', '.join(in_both)}: the map also fills this from a column of the file, which would change "
             "nothing; leave one of the two out"
         )
     if column_map.constants.rows is not None or column_map.constants.skip:

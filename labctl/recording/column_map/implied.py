@@ -34,13 +34,13 @@ def steepest_k_s(t_s: Array, temperature_c: Array) -> float:
     at = np.add.reduceat(t_s, edges[:-1]) / counts
     means = np.add.reduceat(temperature_c, edges[:-1]) / counts
     noise = float(np.median(np.abs(np.diff(temperature_c)))) + 1e-12
-    found = 0.0
+    steepest = 0.0
     for width in (1, blocks - 1):
         change = np.abs(means[width:] - means[:-width])
         counted = (change > LEAST_CHANGE_K) & (change > _TIMES_NOISE * noise / np.sqrt(counts.min()))
         steep = change[counted] / np.maximum((at[width:] - at[:-width])[counted], 1e-12)
-        found = max(found, float(steep.max(initial=0.0)))
-    return found
+        steepest = max(steepest, float(steep.max(initial=0.0)))
+    return steepest
 
 
 def too_steep(t_s: Array, temperature_c: Array) -> bool:

@@ -22,7 +22,7 @@ LEAST_POSES = 6
 MOST_NAMED = 3
 
 
-def motion_of(columns: Columns, kind: str, found: Movement, t_s: Array) -> Motion | None:
+def motion_of(columns: Columns, kind: str, movement: Movement, t_s: Array) -> Motion | None:
     """Return what moved the unit; None where it moved and nothing in the columns says how."""
     if "turn_deg" in columns:
         return "turns"
@@ -33,22 +33,23 @@ def motion_of(columns: Columns, kind: str, found: Movement, t_s: Array) -> Motio
         valid = np.ones(len(rate), dtype=np.bool_)
         change = rate_change(np.asarray(columns["dataset"], dtype=np.int64), rate, valid)
         return "rates" if change is None else "profile"
-    if found.is_rest:
+    if movement.is_rest:
         return "rest"
-    return "poses" if _poses(columns, found, t_s) >= LEAST_POSES else None
+    return "poses" if _poses(columns, movement, t_s) >= LEAST_POSES else None
 
 
-def free_motion(columns: Columns, found: Movement, t_s: Array, at_rest: Sequence[Finding]) -> str:
+def free_motion(columns: Columns, movement: Movement, t_s: Array, at_rest: Sequence[Finding]) -> str:
     """Return why a log of a unit that moved cannot be used, and what would do instead, as one sentence.
 
     `at_rest` is what an inspection of the readings finds if the unit is taken to rest.
     """
-    n = _poses(columns, found, t_s)
-    seen = f"; its accelerometer shows {n} poses at rest, {LEAST_POSES} are needed" if n else ""
-    spread = f"its output varies by {found.spread_dps:.3g} deg/s"
+    n = _poses(columns, movement, t_s)
+    poses_text = f"; its accelerometer shows {n} poses at rest, {LEAST_POSES} are needed" if n else ""
+    spread = f"its output varies by {movement.spread_dps:.3g} deg/s"
     return (
-        f"the unit moves in {100 * found.share:.0f} % of the time ({spread}) and no column gives the rate or the "
-        f"angle{seen}: free motion without a reference cannot calibrate a gyro; add a column with the table's rate "
+        f"the unit moves in {100 * movement.share:.0f} % of the time ({spread}) and no column gives the rate or the "
+        f"angle{poses_text}: free motion without a reference cannot calibrate a gyro; add a column with the table's "
+        "rate "
         "(table_rate_dps), the angle of each turn (turn_deg), an accelerometer with rests in at least "
         f"{LEAST_POSES} poses (accel_x_g, accel_y_g, accel_z_g), or a log at rest; if the unit was to rest, write "
         f'motion = "rest" in a map{_named(at_rest)}'
@@ -56,9 +57,9 @@ def free_motion(columns: Columns, found: Movement, t_s: Array, at_rest: Sequence
 
 
 def _named(findings: Sequence[Finding]) -> str:
-    shown = "; ".join(f"{each.what}: {each.where}: {each.said}" for each in findings[:MOST_NAMED])
+    findings_text = "; ".join(f"{finding.what}: {finding.where}: {finding.said}" for finding in findings[:MOST_NAMED])
     more = f"; and {len(findings) - MOST_NAMED} more" if len(findings) > MOST_NAMED else ""
-    return f". Taken to rest, its readings have this wrong: {shown}{more}" if findings else ""
+    return f". Taken to rest, its readings have this wrong: {findings_text}{more}" if findings else ""
 
 
 def missing_columns(info: RecordingInfo, columns: Columns) -> list[str]:
@@ -76,8 +77,8 @@ def missing_columns(info: RecordingInfo, columns: Columns) -> list[str]:
     return lines
 
 
-def _poses(columns: Columns, found: Movement, t_s: Array) -> int:
+def _poses(columns: Columns, movement: Movement, t_s: Array) -> int:
     names = [f"accel_{axis}_g" for axis in "xyz"]
     if any(name not in columns for name in names):
         return 0
-    return poses(found, t_s, np.column_stack([np.asarray(columns[name], dtype=np.float64) for name in names]))
+    return poses(movement, t_s, np.column_stack([np.asarray(columns[name], dtype=np.float64) for name in names]))

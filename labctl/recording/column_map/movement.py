@@ -64,22 +64,22 @@ def movement(rates_dps: Array, t_s: Array) -> Movement:
     return Movement(still, float(np.average(moves, weights=counts)), float((high - low).max()))
 
 
-def stretches(same: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
+def stretches(is_same: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
     """Return runs of equal values as (first row, row after the last, value), rows from 0."""
-    edges = np.flatnonzero(np.concatenate([[True], same[1:] != same[:-1], [True]]))
-    return [(int(a), int(b), bool(same[a])) for a, b in pairwise(edges)]
+    edges = np.flatnonzero(np.concatenate([[True], is_same[1:] != is_same[:-1], [True]]))
+    return [(int(a), int(b), bool(is_same[a])) for a, b in pairwise(edges)]
 
 
-def rests(found: Movement, t_s: Array) -> list[tuple[int, int]]:
+def rests(log_movement: Movement, t_s: Array) -> list[tuple[int, int]]:
     """Return the rests that last long enough, as (first row, row after the last)."""
-    runs = stretches(found.still)
+    runs = stretches(log_movement.still)
     return [(a, b) for a, b, still in runs if still and t_s[b - 1] - t_s[a] >= SHORTEST_REST_S]
 
 
-def poses(found: Movement, t_s: Array, accel_g: Array) -> int:
+def poses(log_movement: Movement, t_s: Array, accel_g: Array) -> int:
     """Return in how many poses that gravity distinguishes the unit rested, from the specific force (n, 3)."""
     directions: list[Array] = []
-    for a, b in rests(found, t_s):
+    for a, b in rests(log_movement, t_s):
         mean = np.nanmean(accel_g[a:b], axis=0)
         size = float(np.linalg.norm(mean))
         if size == 0 or not np.isfinite(size):

@@ -80,7 +80,7 @@ class NameSays:
 def folded(name: str) -> str:
     """Return a name in lower case, words apart: `GyroX` and `gyro_x` are `gyro x`, `angular_velocity.x` too."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.strip())
-    apart = re.sub(r"\[([012])\]", lambda found: " " + _INDEX[found[1]], apart)
+    apart = re.sub(r"\[([012])\]", lambda match: " " + _INDEX[match[1]], apart)
     return re.sub(r"[\s_.\-:/]+", " ", apart).strip().lower()
 
 
@@ -126,15 +126,15 @@ def in_unit(name: str, unit: str) -> NameSays:
 
 def _divided(name: str) -> list[tuple[str, str]]:
     """Return how a name may divide into what it means and its unit, the surest first; the last is without a unit."""
-    found: list[tuple[str, str]] = []
+    pairs: list[tuple[str, str]] = []
     if (brackets := _BRACKETS.match(name)) is not None and brackets[2] not in _INDEX:
-        found.append((brackets[1], _plain_unit(brackets[2])))
+        pairs.append((brackets[1], _plain_unit(brackets[2])))
     lower = name.lower()
     for ending in _ENDINGS:
         stem = name[: len(name) - len(ending)]
         if lower.endswith(ending) and stem and (stem[-1] in "_ .-/" or len(ending) > 3):
-            found.append((stem.rstrip("_ .-/"), _plain_unit(ending)))
-    return [*found, (name, "")]
+            pairs.append((stem.rstrip("_ .-/"), _plain_unit(ending)))
+    return [*pairs, (name, "")]
 
 
 def _plain_unit(text: str) -> str:
@@ -151,6 +151,6 @@ def _is_unit_of(target: str, unit: str) -> bool:
 def _target(stem: str) -> str:
     text = folded(stem)
     for pattern, target in _COMPILED:
-        if (found := pattern.fullmatch(text)) is not None:
-            return target.format(axis=found.groupdict().get("axis", ""))
+        if (match := pattern.fullmatch(text)) is not None:
+            return target.format(axis=match.groupdict().get("axis", ""))
     return ""

@@ -41,10 +41,10 @@ class Problems:
 
 def rows_text(wrong: NDArray[np.bool_] | Sequence[int], total: int | None = None) -> str:
     """Return rows, given as a mask or as numbers from 1, as words: `row 3`, or `rows 3, 7, 9 and 12 more`."""
-    found = (np.flatnonzero(wrong) + 1).tolist() if isinstance(wrong, np.ndarray) else list(wrong)
-    n = len(found) if total is None else total
+    wrong_rows = (np.flatnonzero(wrong) + 1).tolist() if isinstance(wrong, np.ndarray) else list(wrong)
+    n = len(wrong_rows) if total is None else total
     if n == 1:
-        return f"row {found[0]}"
-    shown = found[:MOST_ROWS]
-    more = n - len(shown)
-    return f"rows {', '.join(map(str, shown))}" + (f" and {more} more" if more > 0 else "")
+        return f"row {wrong_rows[0]}"
+    shown_rows = wrong_rows[:MOST_ROWS]
+    more = n - len(shown_rows)
+    return f"rows {', '.join(map(str, shown_rows))}" + (f" and {more} more" if more > 0 else "")

@@ -46,45 +46,45 @@ class Proposal:
     guesses: list[str] = field(default_factory=list)
 
 
-def propose(table: RawTable, serial: str | None = None, stated: Units | None = None) -> Proposal:
+def propose(table: RawTable, serial: str | None = None, units_given: Units | None = None) -> Proposal:
     """Return a map of a log, as far as the file shows it; what it cannot show stays open and is a problem later.
 
-    What `stated` says of the units of a quantity is not guessed.
+    What `units_given` says of the units of a quantity is not guessed.
     """
     guesses: list[str] = []
-    stated = stated or {}
+    units_given = units_given or {}
     columns = {target: MappedColumn.of(name) for name, target in table.targets.items() if name in table.columns}
     if not columns:
-        columns = _by_names(table, guesses, stated)
-    columns = {target: _in_stated(target, mapped, stated) for target, mapped in columns.items()}
-    found = {target: table.columns[str(mapped.source)] for target, mapped in columns.items()}
+        columns = _by_names(table, guesses, units_given)
+    columns = {target: _in_stated(target, mapped, units_given) for target, mapped in columns.items()}
+    sources_by_target = {target: table.columns[str(mapped.source)] for target, mapped in columns.items()}
     kind = "samples" if "t_s" in columns or "table_rate_dps" not in columns else "points"
-    _guess_force(columns, found, guesses)
+    _guess_force(columns, sources_by_target, guesses)
     proposed = ColumnMap(
         serial=serial or serial_of(table),
         kind="points" if kind == "points" else "samples",
         file=_file_keys(table),
         columns=columns,
-        datasets=_data_sets(table, columns, found) if kind == "samples" else DataSets(),
+        datasets=_data_sets(table, columns, sources_by_target) if kind == "samples" else DataSets(),
     )
     return Proposal(proposed, guesses)
 
 
-def completed(table: RawTable, given: ColumnMap) -> Proposal:
+def completed(table: RawTable, column_map: ColumnMap) -> Proposal:
     """Return a map that was given, with what it leaves to the file: columns where it names none, units by [units]."""
-    if given.columns:
+    if column_map.columns:
         columns = {
-            target: mapped if mapped.unit else _in_stated(target, mapped, given.units)
-            for target, mapped in given.columns.items()
+            target: mapped if mapped.unit else _in_stated(target, mapped, column_map.units)
+            for target, mapped in column_map.columns.items()
         }
-        return Proposal(given.model_copy(update={"columns": columns}))
-    proposal = propose(table, given.serial, given.units)
-    kept = {"kind": proposal.column_map.kind, "datasets": proposal.column_map.datasets}
-    changes: dict[str, Any] = {key: value for key, value in kept.items() if key not in given.model_fields_set}
+        return Proposal(column_map.model_copy(update={"columns": columns}))
+    proposal = propose(table, column_map.serial, column_map.units)
+    base_map = {"kind": proposal.column_map.kind, "datasets": proposal.column_map.datasets}
+    changes: dict[str, Any] = {key: value for key, value in base_map.items() if key not in column_map.model_fields_set}
     columns = proposal.column_map.columns
-    if given.sample_rate_hz is not None and "t_s" in columns and _is_open(table, columns["t_s"]):
+    if column_map.sample_rate_hz is not None and "t_s" in columns and _is_open(table, columns["t_s"]):
         columns = {target: mapped for target, mapped in columns.items() if target != "t_s"}
-    return Proposal(given.model_copy(update={**changes, "columns": columns}), proposal.guesses)
+    return Proposal(column_map.model_copy(update={**changes, "columns": columns}), proposal.guesses)
 
 
 def _is_open(table: RawTable, mapped: MappedColumn) -> bool:
@@ -92,24 +92,26 @@ def _is_open(table: RawTable, mapped: MappedColumn) -> bool:
     return not (mapped.unit or table.columns[str(mapped.source)].unit)
 
 
-def stated_units(target: str, stated: Units) -> UnitKeys | None:
+def stated_units(target: str, units_given: Units) -> UnitKeys | None:
     """Return what [units] of a map says of a column of a recording; None for nothing."""
-    return next((keys for name, keys in stated.items() if target.startswith(QUANTITY_COLUMNS[name])), None)
+    return next((keys for name, keys in units_given.items() if target.startswith(QUANTITY_COLUMNS[name])), None)
 
 
-def _in_stated(target: str, mapped: MappedColumn, stated: Units) -> MappedColumn:
-    keys = stated_units(target, stated)
+def _in_stated(target: str, mapped: MappedColumn, units_given: Units) -> MappedColumn:
+    keys = stated_units(target, units_given)
     return mapped if keys is None else mapped.model_copy(update=keys.model_dump(exclude_unset=True))
 
 
-def _by_names(table: RawTable, guesses: list[str], stated: Units) -> dict[str, MappedColumn]:
+def _by_names(table: RawTable, guesses: list[str], units_given: Units) -> dict[str, MappedColumn]:
     columns: dict[str, MappedColumn] = {}
-    said = {name: _name_says(table, name) for name in table.columns}
-    for name in sorted(said, key=lambda each: said[each].target == "t_s"):  # a thermometer tests the unit of time
-        column, says = table.columns[name], said[name]
+    guesses_by_name = {name: _name_says(table, name) for name in table.columns}
+    for name in sorted(
+        guesses_by_name, key=lambda each: guesses_by_name[each].target == "t_s"
+    ):  # a thermometer tests the unit of time
+        column, says = table.columns[name], guesses_by_name[name]
         if not says.target or says.target == "dataset" or _is_counter(says.target, column):
             continue
-        keys = stated_units(says.target, stated)
+        keys = stated_units(says.target, units_given)
         unit = keys.unit if keys is not None else column.unit or says.unit
         held = columns.get(says.target)
         if held is not None and (_has_unit(says.target, held) or not unit):
@@ -117,8 +119,8 @@ def _by_names(table: RawTable, guesses: list[str], stated: Units) -> dict[str, M
         if keys is not None and column.is_number:
             columns[says.target] = MappedColumn.of(name)  # what was stated is filled in later
             continue
-        warm = columns.get("temperature_c")
-        mapped = _with_unit(name, says.target, unit, column, guesses, _celsius(table, warm))
+        temperature_column = columns.get("temperature_c")
+        mapped = _with_unit(name, says.target, unit, column, guesses, _celsius(table, temperature_column))
         if mapped is not None:
             columns[says.target] = mapped
     order = list(table.columns)
@@ -186,29 +188,29 @@ def _is_counter(target: str, column: RawColumn) -> bool:
     return COUNTERS.fullmatch(name) is not None and bool(len(steps)) and bool((steps == 1).mean() > 0.9)
 
 
-def _guess_force(columns: dict[str, MappedColumn], found: dict[str, RawColumn], guesses: list[str]) -> None:
+def _guess_force(columns: dict[str, MappedColumn], sources_by_target: dict[str, RawColumn], guesses: list[str]) -> None:
     """Fill in the unit of the accelerometer by gravity; without one its columns are left out."""
     names = [f"accel_{axis}_g" for axis in "xyz"]
     there = [name for name in names if name in columns]
-    if not there or all(columns[name].unit or found[name].unit for name in there):
+    if not there or all(columns[name].unit or sources_by_target[name].unit for name in there):
         return
     unit, scale = "", None
     if len(there) == len(names):
-        force = np.column_stack([found[name].values for name in names])
-        unit, scale, why = force_unit(force, _still(found, len(force)))
+        force = np.column_stack([sources_by_target[name].values for name in names])
+        unit, scale, evidence = force_unit(force, _still(sources_by_target, len(force)))
         if unit:
             scaled = f", {scale:g} words per g" if scale else ""
-            guesses.append(f"accelerometer: unit taken for {unit}{scaled} ({why})")
+            guesses.append(f"accelerometer: unit taken for {unit}{scaled} ({evidence})")
     for name in there:
         if unit:
             columns[name] = columns[name].model_copy(update={"unit": unit, "scale": scale})
         else:
-            del columns[name], found[name]
+            del columns[name], sources_by_target[name]
 
 
-def _still(found: dict[str, RawColumn], n: int) -> NDArray[np.bool_]:
+def _still(sources_by_target: dict[str, RawColumn], n: int) -> NDArray[np.bool_]:
     """Return when the unit was still, from its accelerometer: its spread knows no unit."""
-    force = np.column_stack([found[f"accel_{axis}_g"].values for axis in "xyz"])
+    force = np.column_stack([sources_by_target[f"accel_{axis}_g"].values for axis in "xyz"])
     size = float(np.nanmedian(np.linalg.norm(np.nan_to_num(force), axis=1))) or 1.0
     # a share of gravity of 1 % counts as 1 deg/s of a gyro: both are ten times the noise of a common sensor
     still: Movement = movement(100.0 * force / size, np.arange(n) / 100.0)
@@ -217,8 +219,8 @@ def _still(found: dict[str, RawColumn], n: int) -> NDArray[np.bool_]:
 
 def serial_of(table: RawTable) -> str:
     """Return the serial number that a file states, else its name as one."""
-    given = table.facts.get("serial")
-    text = str(given) if given else table.path.name.partition(".")[0]
+    stated_serial = table.facts.get("serial")
+    text = str(stated_serial) if stated_serial else table.path.name.partition(".")[0]
     cleaned = re.sub(r"[^A-Za-z0-9._+# -]", "-", text)[:64].lstrip("._+# -")
     return cleaned or "unit"
 
@@ -233,21 +235,21 @@ def _file_keys(table: RawTable) -> FileKeys:
     return FileKeys(separator=separator, decimal=decimal, header=layout.header, data=layout.data, encoding=encoding)
 
 
-def _data_sets(table: RawTable, columns: dict[str, MappedColumn], found: dict[str, RawColumn]) -> DataSets:
+def _data_sets(table: RawTable, columns: dict[str, MappedColumn], sources_by_target: dict[str, RawColumn]) -> DataSets:
     """Return the rule for data sets: a column that numbers or names them, steps of the table's rate, or bursts."""
     for name, column in table.columns.items():
         if PARTS.fullmatch(folded(name)) and _long_stretches(column):
             return DataSets(by="column", column=name)
-    rate = found.get("table_rate_dps")
+    rate = sources_by_target.get("table_rate_dps")
     if rate is not None and _long_stretches(rate):
         return DataSets(by="column", column=rate.name)
-    times = found.get("t_s")
+    times = sources_by_target.get("t_s")
     if times is not None and not times.is_text and len(times.values) > 2:
         steps = np.diff(times.values)
         unit = find_unit("s", columns["t_s"].unit or times.unit)
         long = GAP_S / unit.factor if unit is not None else np.inf
         gaps = (steps > max(GAP_STEPS * float(np.median(steps)), long)).sum()
-        if gaps >= 2 and "table_rate_dps" not in found:
+        if gaps >= 2 and "table_rate_dps" not in sources_by_target:
             return DataSets(by="gaps")
     return DataSets()
 

@@ -45,25 +45,25 @@ def fill_between(columns: dict[str, NDArray[np.generic]], t_s: Array, problems: 
     Before the first and after the last reading the nearest one stands. A problem where readings are too few or too far
     apart: what the temperature did between them is then not known.
     """
-    said = []
+    filled = []
     for name in filter(is_thermometer, columns):
         values = np.asarray(columns[name], dtype=np.float64)
-        known = np.isfinite(values)
-        n = int((~known).sum())
+        is_finite = np.isfinite(values)
+        n = int((~is_finite).sum())
         if n == 0:
             continue
-        if known.sum() < LEAST_KNOWN:
+        if is_finite.sum() < LEAST_KNOWN:
             problems.add(
                 f"{name}: {n} of {len(values)} cells are empty; leave the column out of the map, or fill it in"
             )
             continue
-        order = np.argsort(t_s[known], kind="stable")
-        at, read = t_s[known][order], values[known][order]
+        order = np.argsort(t_s[is_finite], kind="stable")
+        at, read = t_s[is_finite][order], values[is_finite][order]
         after = np.searchsorted(at, t_s)
         before_s = t_s - at[np.maximum(after - 1, 0)]
         after_s = at[np.minimum(after, len(at) - 1)] - t_s
         apart_s = np.where((after > 0) & (after < len(at)), before_s + after_s, np.abs(np.maximum(before_s, after_s)))
-        far = ~known & (apart_s > LONGEST_S)
+        far = ~is_finite & (apart_s > LONGEST_S)
         if far.any():
             problems.add(
                 f"{name}, {rows_text(far)}: empty, and the thermometer was not read for "
@@ -71,13 +71,13 @@ def fill_between(columns: dict[str, NDArray[np.generic]], t_s: Array, problems: 
                 "these rows"
             )
             continue
-        columns[name] = np.where(known, values, np.interp(t_s, at, read))
-        longest_s = float(apart_s[~known].max())
-        said.append(
+        columns[name] = np.where(is_finite, values, np.interp(t_s, at, read))
+        longest_s = float(apart_s[~is_finite].max())
+        filled.append(
             f"{name}: {n} of {len(values)} cells are empty and were filled in by straight lines between the "
             f"thermometer's readings, at most {longest_s:.3g} s apart"
         )
-    return "; ".join(said)
+    return "; ".join(filled)
 
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
     problems = Problems(table.path)
     for line in (*table.problems, *idle_entries(table, column_map)):
         problems.add(line)
-    found = sources(table, column_map, problems)
+    raw_columns = sources(table, column_map, problems)
     if table.rows < LEAST_ROWS:
         problems.add(f"{table.rows} row of readings; a recording needs at least {LEAST_ROWS}, of one unit in one run")
     if not column_map.axes:
@@ -118,19 +118,19 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
             "no column is known to be the output of a gyro (it has "
             f"{', '.join(repr(name[:40]) for name in list(table.columns)[:20])}); write [columns.gyro_x], _y or _z"
         )
-    valid = found.get("valid")
-    for target, column in found.items():
+    valid = raw_columns.get("valid")
+    for target, column in raw_columns.items():
         if target == "t_s" and column.is_text and _is_date(column_map, column):
             continue
         if column.is_boolean or not _holds_text(target):
             allowed = valid is not None and target.startswith("gyro_")
             allowed |= column_map.kind == "samples" and is_thermometer(target)  # these are filled in, or refused, below
             refuse_wrong_cells(column, target, problems, empty_allowed=allowed)
-    times = _times(column_map, found.get("t_s"), table.rows, problems)
+    times = _times(column_map, raw_columns.get("t_s"), table.rows, problems)
     if column_map.kind == "points" and times is None and "t_s" not in column_map.columns:
         problems.lines = [line for line in problems.lines if not line.startswith("no column of time")]
         times = TimeAxis(np.arange(table.rows, dtype=np.float64), None)
-    usable = {target: column for target, column in found.items() if _is_usable(target, column)}
+    usable = {target: column for target, column in raw_columns.items() if _is_usable(target, column)}
     columns = _columns(column_map, usable, problems)
     problems.raise_if_any()
     assert times is not None  # else a problem was raised
@@ -158,10 +158,10 @@ def _holds_text(target: str) -> bool:
     return target in BY_NAME and BY_NAME[target].kind == "text"
 
 
-def _columns(column_map: ColumnMap, found: dict[str, RawColumn], problems: Problems) -> dict[str, Any]:
+def _columns(column_map: ColumnMap, sources_by_target: dict[str, RawColumn], problems: Problems) -> dict[str, Any]:
     """Return every column but time in the unit of the recording's, the gyro's in deg/s."""
     columns: dict[str, Any] = {}
-    for target, column in found.items():
+    for target, column in sources_by_target.items():
         if target == "t_s":
             continue
         if _holds_text(target):
@@ -176,7 +176,7 @@ def _columns(column_map: ColumnMap, found: dict[str, RawColumn], problems: Probl
 
 
 def _assembled(
-    table: RawTable, column_map: ColumnMap, found: dict[str, RawColumn], columns: dict[str, Any], times: TimeAxis,
+    table: RawTable, column_map: ColumnMap, raw_columns: dict[str, RawColumn], columns: dict[str, Any], times: TimeAxis,
     problems: Problems,
 ) -> MappedLog:  # fmt: skip
     if column_map.kind == "samples" and (filled := fill_between(columns, times.t_s, problems)):
@@ -203,19 +203,19 @@ def _assembled(
     output: dict[str, OutputUnit] = {}
     for axis in column_map.axes:
         name = f"gyro_{axis}"
-        columns[name], unit = output_of(column_map.columns[name], found[name])
+        columns[name], unit = output_of(column_map.columns[name], raw_columns[name])
         if unit is not None:
             output[axis] = unit
     info = _info(table, column_map, motion, output, times, problems)
     if info is not None:
         for line in missing_columns(info, columns):
             problems.add(line)
-    kept = division.numbers > 0
-    if not kept.any():
+    in_data_set = division.numbers > 0
+    if not in_data_set.any():
         problems.add("no row is left in any data set; correct [datasets] and [parts]")
     problems.raise_if_any()
     assert info is not None
-    whole = {name: values[kept] for name, values in columns.items()} if not kept.all() else columns
+    whole = {name: values[in_data_set] for name, values in columns.items()} if not in_data_set.all() else columns
     return MappedLog(Recording(info, whole), motion, unused(table, column_map))
 
 
@@ -263,10 +263,11 @@ def _info(
     table: RawTable, column_map: ColumnMap, motion: Motion, output: dict[str, OutputUnit], times: TimeAxis,
     problems: Problems,
 ) -> RecordingInfo | None:  # fmt: skip
-    taken = sorted(_TAKEN & set(column_map.info))
-    if taken:
+    reserved = sorted(_TAKEN & set(column_map.info))
+    if reserved:
         problems.add(
-            f"[info] {taken[0]}: this key belongs at the top level of a map, or comes from the file; leave it out here"
+            f"[info] {reserved[0]}: this key belongs at the top level of a map, or comes from the file; leave it out "
+            "here"
         )
         return None
     started = column_map.started_at or _dated(times.started_at) or _dated(table.started_at)

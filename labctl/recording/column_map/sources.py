@@ -13,41 +13,41 @@ from labctl.recording.columns import holds_flags
 from labctl.recording.raw_table import RawColumn, RawTable
 
 
-def source(table: RawTable, named: str | int) -> RawColumn | None:
+def source(table: RawTable, column_name: str | int) -> RawColumn | None:
     """Return the column of a file by its name or its number from 1; None where there is none."""
-    if isinstance(named, int):
+    if isinstance(column_name, int):
         by_number = list(table.columns.values())
-        exact = table.columns.get(f"column {named}")
-        return exact or (by_number[named - 1] if 1 <= named <= len(by_number) else None)
-    found = table.columns.get(named)
-    if found is not None:
-        return found
-    loose = [column for name, column in table.columns.items() if name.strip().lower() == named.strip().lower()]
+        exact = table.columns.get(f"column {column_name}")
+        return exact or (by_number[column_name - 1] if 1 <= column_name <= len(by_number) else None)
+    raw_column = table.columns.get(column_name)
+    if raw_column is not None:
+        return raw_column
+    loose = [column for name, column in table.columns.items() if name.strip().lower() == column_name.strip().lower()]
     return loose[0] if len(loose) == 1 else None
 
 
 def sources(table: RawTable, column_map: ColumnMap, problems: Problems) -> dict[str, RawColumn]:
     """Return the file's column behind each of a recording's; what is not there, or occurs twice, is a problem."""
-    found: dict[str, RawColumn] = {}
+    raw_columns: dict[str, RawColumn] = {}
     used = defaultdict(list)
     for target, mapped in column_map.columns.items():
         column = source(table, mapped.source)
         if column is None:
             problems.add(_not_there(table, mapped.source, target))
             continue
-        found[target] = column
+        raw_columns[target] = column
         used[column.name].append(target)
     for name, targets in used.items():
         if len(targets) > 1 and any(target.startswith(("gyro_", "accel_")) for target in targets):
             problems.add(f"column {name!r} is mapped to {' and '.join(targets)}; each needs a column of its own")
-    return found
+    return raw_columns
 
 
 def unused(table: RawTable, column_map: ColumnMap) -> list[str]:
     """Return the columns of a file that a map does not use, in the file's order."""
     named = [mapped.source for mapped in column_map.columns.values()]
     named += [column_map.datasets.column] if column_map.datasets.column is not None else []
-    used = {found.name for each in named if (found := source(table, each)) is not None}
+    used = {column.name for each in named if (column := source(table, each)) is not None}
     return [name for name in table.columns if name not in used]
 
 
@@ -80,10 +80,10 @@ def refuse_wrong_cells(column: RawColumn, target: str, problems: Problems, *, em
         )
 
 
-def _not_there(table: RawTable, named: str | int, target: str) -> str:
+def _not_there(table: RawTable, column_name: str | int, target: str) -> str:
     names = list(table.columns)
-    near = difflib.get_close_matches(str(named), names, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(str(column_name), names, n=1, cutoff=0.6)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     listed = ", ".join(repr(name[:40]) for name in names[:20]) + (" ..." if len(names) > 20 else "")
-    what = f"number {named}" if isinstance(named, int) else repr(named[:60])
-    return f"column {what} (for {target}) is not in the file{hint} (it has {listed})"
+    column_text = f"number {column_name}" if isinstance(column_name, int) else repr(column_name[:60])
+    return f"column {column_text} (for {target}) is not in the file{hint} (it has {listed})"

@@ -53,9 +53,9 @@ def spread_between(t_s: Array) -> Spread | str | None:
             "taken at one rate, leave the column out of the map and write sample_rate_hz = readings per second"
         )
     rate = (edges[-1] - edges[0]) / (stamps[-1] - stamps[0])
-    found = stamps[0] + (np.arange(len(t_s)) - edges[0]) / rate
+    spread_s = stamps[0] + (np.arange(len(t_s)) - edges[0]) / rate
     return Spread(
-        found,
+        spread_s,
         f"times between stamps {apart:g} s apart are interpolated: {rate:.6g} readings a second, at one rate",
     )
 

@@ -65,35 +65,36 @@ def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, proble
     if unit.is_epoch or (len(values) and EPOCH_S[0] <= counted[0] <= EPOCH_S[1]):
         started = _instant(column, float(counted[0]), problems)
         counted = (values - values[0]) * unit.factor
-    found = _finer(column, TimeAxis(counted, started), problems)
-    _refuse_backwards(column, values, found.t_s, problems, wraps=mapped.wrap_bits is None)
-    _refuse_impossible(column, unit, found.t_s, column_map.sample_rate_hz, problems)
-    return found
+    axis = _finer(column, TimeAxis(counted, started), problems)
+    _refuse_backwards(column, values, axis.t_s, problems, wraps=mapped.wrap_bits is None)
+    _refuse_impossible(column, unit, axis.t_s, column_map.sample_rate_hz, problems)
+    return axis
 
 
 def _unknown(column: RawColumn, rows: int) -> str:
     readable = rows > 1 and not column.is_text
     step = float(np.median(np.diff(column.values))) if readable else float("nan")
     implied = time_unit(column.values).why if readable else ""
-    shown = f"; {implied}" if implied else ""
-    where = "[units] or [columns.t_s] of the column map"
+    implied_text = f"; {implied}" if implied else ""
+    location = "[units] or [columns.t_s] of the column map"
     return (
-        f"column {column.name!r} for t_s: no unit is given (its typical step is {step:g}{shown}); write its unit in "
-        f"{where}: one of {names_of('s').rpartition(',')[0]}"
+        f"column {column.name!r} for t_s: no unit is given (its typical step is {step:g}{implied_text}); write its "
+        "unit in "
+        f"{location}: one of {names_of('s').rpartition(',')[0]}"
     )
 
 
-def _finer(column: RawColumn, found: TimeAxis, problems: Problems) -> TimeAxis:
+def _finer(column: RawColumn, axis_read: TimeAxis, problems: Problems) -> TimeAxis:
     """Return the times of the readings where the stamps are coarser, such as whole seconds, or of their arrival."""
-    between = spread_between(found.t_s) or spread_packets(found.t_s)
+    between = spread_between(axis_read.t_s) or spread_packets(axis_read.t_s)
     if isinstance(between, str):
         problems.add(f"column {column.name!r} (time): {between}")
     if not isinstance(between, Spread):
-        return found
-    zero_s = float(between.t_s[0] - found.t_s[0]) if found.started_at is not None else 0.0
-    started = None if found.started_at is None else found.started_at + timedelta(seconds=zero_s)
-    said = f"column {column.name!r}: {between.said}"
-    return TimeAxis(between.t_s - (between.t_s[0] if started is not None else 0.0), started, said)
+        return axis_read
+    zero_s = float(between.t_s[0] - axis_read.t_s[0]) if axis_read.started_at is not None else 0.0
+    started = None if axis_read.started_at is None else axis_read.started_at + timedelta(seconds=zero_s)
+    reason = f"column {column.name!r}: {between.said}"
+    return TimeAxis(between.t_s - (between.t_s[0] if started is not None else 0.0), started, reason)
 
 
 def _instant(column: RawColumn, epoch_s: float, problems: Problems) -> datetime | None:
@@ -114,10 +115,10 @@ def _dates(column: RawColumn, unit: str, rate_hz: float | None, problems: Proble
     except ValueError as error:
         problems.add(f"column {column.name!r} for t_s: {error}; expected {EXPECTED}")
         return None
-    found = _finer(column, TimeAxis(read.t_s, read.first), problems)
-    _refuse_backwards(column, found.t_s, found.t_s, problems, wraps=False)
-    _refuse_impossible(column, None, found.t_s, rate_hz, problems)
-    return found
+    axis = _finer(column, TimeAxis(read.t_s, read.first), problems)
+    _refuse_backwards(column, axis.t_s, axis.t_s, problems, wraps=False)
+    _refuse_impossible(column, None, axis.t_s, rate_hz, problems)
+    return axis
 
 
 def _refuse_backwards(column: RawColumn, raw: Array, t_s: Array, problems: Problems, *, wraps: bool) -> None:
@@ -159,10 +160,10 @@ def _refuse_impossible(
                 f"{rate_hz:g}; correct the unit of the column, or leave sample_rate_hz or the column out of the map"
             )
     elif not SHORTEST_STEP_S < usual <= LONGEST_STEP_S:
-        said = "" if unit is None else f" in {unit.name}"
+        unit_text = "" if unit is None else f" in {unit.name}"
         fits = "" if unit is None else time_unit(column.values).unit
         hint = f"; {fits!r} would fit" if fits and unit is not None and fits != unit.name else ""
         problems.add(
-            f"column {column.name!r} (time): the usual step would be {usual:g} s{said} ({SHORTEST_STEP_S:g} to "
+            f"column {column.name!r} (time): the usual step would be {usual:g} s{unit_text} ({SHORTEST_STEP_S:g} to "
             f"{LONGEST_STEP_S:g} s are possible); check the column's unit{hint}"
         )

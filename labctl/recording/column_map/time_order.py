@@ -13,8 +13,8 @@ from labctl.recording.column_map.stamps import spread_between
 from labctl.recording.column_map.units import find_unit
 from labctl.recording.raw_table import RawTable
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.clock import check_clock, rows_in_order
 from labctl.recording.sanity.readings.series import Series, rows_in_words
+from labctl.recording.sanity.readings.time_stamps import check_clock, rows_in_order
 
 
 def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, Finding | None]:
@@ -37,27 +37,27 @@ def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, 
         (values - values[0]) * (unit.factor if unit is not None else 1.0), np.ones(n, dtype=np.int64), None,
         np.zeros(n, dtype=bool), {}, {}, {}, "rest",
     )  # fmt: skip
-    kept = rows_in_order(values)
+    in_order = rows_in_order(values)
     columns = {
-        name: replace(each, values=each.values[kept], words=None if each.words is None else each.words[kept])
+        name: replace(each, values=each.values[in_order], words=None if each.words is None else each.words[in_order])
         for name, each in table.columns.items()
     }
-    found = _twice(table, values, kept) or next((marked.finding for marked in check_clock(series)), None)
-    return replace(table, columns=columns, rows=int(kept.sum()), first_rows=()), found
+    problem = _twice(table, values, in_order) or next((marked.finding for marked in check_clock(series)), None)
+    return replace(table, columns=columns, rows=int(in_order.sum()), first_rows=()), problem
 
 
-def _twice(table: RawTable, values: NDArray[np.float64], kept: NDArray[np.bool_]) -> Finding | None:
+def _twice(table: RawTable, values: NDArray[np.float64], is_used: NDArray[np.bool_]) -> Finding | None:
     """Return the finding about rows that repeat an earlier row with its time, (n,) times; None where others are out."""
     order = np.argsort(values, kind="stable")
     same = values[order[1:]] == values[order[:-1]]
-    for each in table.columns.values():
-        cells = each.values if each.is_number else each.words
+    for column in table.columns.values():
+        cells = column.values if column.is_number else column.words
         if cells is not None and len(cells) == len(values):
             same &= cells[order[1:]] == cells[order[:-1]]
     again = np.zeros(len(values), dtype=np.bool_)
     again[order[1:][same]] = True
     n = int(again.sum())
-    if not n or n != int((~kept).sum()):
+    if not n or n != int((~is_used).sum()):
         return None
     return Finding(
         "time_back", "certain", f"t_s, {rows_in_words(again)}",

@@ -90,18 +90,18 @@ def unit_of_target(target: str) -> str:
     """Return the unit of a recording's column; empty where it has none. A gyro's output counts as deg/s."""
     if target.startswith("gyro_"):
         return "deg/s"
-    known = BY_NAME.get(target)
-    return known.unit if known else ""
+    column_spec = BY_NAME.get(target)
+    return column_spec.unit if column_spec else ""
 
 
 def find_unit(quantity: str, text: str) -> Unit | None:
     """Return the unit that a text names among those of a quantity; None for none."""
     units = QUANTITIES.get(quantity, ())
-    given = text.strip()
+    unit_text = text.strip()
     for unit in units:
-        if given == unit.name:
+        if unit_text == unit.name:
             return unit
-    folded = _folded(given)
+    folded = _folded(unit_text)
     for unit in units:
         if folded == _folded(unit.name) or folded in {_folded(alias) for alias in unit.aliases}:
             return unit

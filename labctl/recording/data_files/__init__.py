@@ -35,12 +35,12 @@ def write_table(columns: Columns, path: Path) -> None:
     table: Any = pa.table({name: pa.array(values) for name, values in columns.items()})
     if path.suffix == ".parquet":
         floats = [name for name in table.column_names if pa.types.is_floating(table.schema.field(name).type)]
-        others = [name for name in table.column_names if name not in floats]
+        other_columns = [name for name in table.column_names if name not in floats]
         pq.write_table(
             table,
             path,
             compression="zstd",
-            use_dictionary=others,
+            use_dictionary=other_columns,
             use_byte_stream_split=floats,
             write_page_checksum=True,
         )

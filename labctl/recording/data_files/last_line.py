@@ -30,11 +30,11 @@ def cut_last_line(path: Path, encoding: str, separator: str) -> Unread | None:
         return None
     fields = _fields(last, separator)
     others = [_fields(line, separator) for line in before]
-    shortest = min(len(each[-1]) for each in others)
+    shortest = min(len(other[-1]) for other in others)
     if len(fields) == len(others[-1]) and (len(fields[-1]) >= shortest or not all(map(_is_number, [fields, *others]))):
         return None
-    said = f"the last line has no line break and ends after {last[-20:]!r} (byte {size})"
-    return Unread(len(last) / max(size, 1), (said,), is_cut=True)
+    reason = f"the last line has no line break and ends after {last[-20:]!r} (byte {size})"
+    return Unread(len(last) / max(size, 1), (reason,), is_cut=True)
 
 
 def _is_number(fields: list[str]) -> bool:

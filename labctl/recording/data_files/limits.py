@@ -61,8 +61,8 @@ def checked_names(path: Path, names: Sequence[str]) -> None:
         raise BadRecording(
             f"{path}: {len(names)} columns, but at most {MOST_COLUMNS} are allowed; remove those that are not needed"
         )
-    seen: set[str] = set()
+    names_seen: set[str] = set()
     for name in names:
-        if name in seen:
+        if name in names_seen:
             raise BadRecording(f"{path}: column {name[:80]!r} is repeated in the header; remove or rename one")
-        seen.add(name)
+        names_seen.add(name)

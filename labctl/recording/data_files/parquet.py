@@ -38,8 +38,12 @@ def read_parquet(path: Path, accept: Callable[[pa.Schema], None] | None = None) 
 def refuse_booleans(path: Path, schema: pa.Schema) -> None:
     """Raise BadRecording for a column of a recording whose readings are true and false instead of numbers."""
     for field in schema:
-        known = BY_NAME.get(field.name)
-        if known is not None and not (known.kind == "text" or holds_flags(known.name)) and is_boolean(field.type):
+        column_spec = BY_NAME.get(field.name)
+        if (
+            column_spec is not None
+            and not (column_spec.kind == "text" or holds_flags(column_spec.name))
+            and is_boolean(field.type)
+        ):
             raise _of_another_type(path, field)
 
 
@@ -103,11 +107,15 @@ def _refuse_type(path: Path, field: pa.Field) -> None:
 
 def _of_another_type(path: Path, field: pa.Field) -> BadRecording:
     kind = field.type.value_type if pa.types.is_dictionary(field.type) else field.type
-    known = BY_NAME.get(field.name)
-    wanted = "text" if known and known.kind == "text" else f"numbers{f', {known.unit}' if known and known.unit else ''}"
-    advice = "write such a column so" if known else "leave the column out, or write it so"
+    column_spec = BY_NAME.get(field.name)
+    wanted_type = (
+        "text"
+        if column_spec and column_spec.kind == "text"
+        else f"numbers{f', {column_spec.unit}' if column_spec and column_spec.unit else ''}"
+    )
+    advice = "write such a column so" if column_spec else "leave the column out, or write it so"
     return BadRecording(
-        f"{path}: column {field.name[:80]!r} holds {str(kind)[:80]}; expected {wanted}; {advice}"
+        f"{path}: column {field.name[:80]!r} holds {str(kind)[:80]}; expected {wanted_type}; {advice}"
         + ("; an instant is the seconds since started_at" if pa.types.is_temporal(kind) else "")
     )
 

@@ -49,10 +49,10 @@ def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
         ) from error
     if rows == 0:
         raise BadRecording(f"{path}: no rows below the header; expected at least one")
-    found = {column.name: column.whole() for column in columns}
+    columns_read = {column.name: column.whole() for column in columns}
     if (cut := cut_last_line(path, "utf-8", ",")) is not None:
         raise BadRecording(f"{path}: {cut.text}; write the file again or remove its last line")
-    return found
+    return columns_read
 
 
 def _header(path: Path) -> list[str]:

@@ -118,10 +118,10 @@ class ColumnValues:
         bad = (values > LARGEST_WHOLE) | (values < -LARGEST_WHOLE)
         if bad.any():
             row = int(np.argmax(bad))
-            given = f"{values[row]:d}" if values.dtype.kind in "iu" else repr(float(values[row]))
+            value_text = f"{values[row]:d}" if values.dtype.kind in "iu" else repr(float(values[row]))
             raise self._wrong(
                 row,
-                f"{given} is beyond +-{LARGEST_WHOLE} (2^53 - 1), the largest whole number that is stored "
+                f"{value_text} is beyond +-{LARGEST_WHOLE} (2^53 - 1), the largest whole number that is stored "
                 "exactly; count from 1",
             )
         return values.astype(np.int64)

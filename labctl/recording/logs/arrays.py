@@ -46,24 +46,26 @@ def read(path: Path, _: TableOptions) -> RawTable:
     refuse_large(path, MOST_LOG_BYTES)
     kind, arrays = reader
     with parsed_by_library(path, kind, "write it again, or write its arrays as CSV"):
-        found = arrays(path)
+        arrays_read = arrays(path)
     columns: dict[int, list[RawColumn]] = defaultdict(list)
-    for name, (values, unit) in found.items():
+    for name, (values, unit) in arrays_read.items():
         for column in _columns(name, values, unit):
             columns[len(column.values)].append(column)
     lengths = sorted((n for n in columns if n > 1), key=lambda n: (not _has_gyro(_without_prefix(columns[n])), -n))
     if not lengths:
-        has = ", ".join(f"{name} {values.shape}" for name, (values, _) in list(found.items())[:_SHOWN]) or "nothing"
+        has = (
+            ", ".join(f"{name} {values.shape}" for name, (values, _) in list(arrays_read.items())[:_SHOWN]) or "nothing"
+        )
         raise BadRecording(f"{path}: no array of numbers with more than one row (it has {has}); write them as CSV")
     if len(lengths) > 1 and _has_gyro(_without_prefix(columns[lengths[1]])):
         both = " and ".join(f"{columns[n][0].name} ({n} rows)" for n in lengths[:2])
         raise BadRecording(f"{path}: arrays of two lengths are outputs of a gyro: {both}; write one of them per file")
-    rows, kept = lengths[0], _without_prefix(columns[lengths[0]])
-    refuse_too_many(path, rows, len(kept))
-    checked_names(path, [column.name for column in kept])
-    left = [f"{column.name} ({n})" for n in lengths[1:] for column in columns[n]][:_SHOWN]
-    facts = {"notes": f"arrays of other lengths are left out: {', '.join(left)}"} if left else {}
-    return RawTable(path, {column.name: column for column in kept}, rows, facts=facts)
+    rows, main_columns = lengths[0], _without_prefix(columns[lengths[0]])
+    refuse_too_many(path, rows, len(main_columns))
+    checked_names(path, [column.name for column in main_columns])
+    other_columns = [f"{column.name} ({n})" for n in lengths[1:] for column in columns[n]][:_SHOWN]
+    facts = {"notes": f"arrays of other lengths are left out: {', '.join(other_columns)}"} if other_columns else {}
+    return RawTable(path, {column.name: column for column in main_columns}, rows, facts=facts)
 
 
 def _has_gyro(columns: list[RawColumn]) -> bool:
@@ -74,9 +76,9 @@ def _without_prefix(columns: list[RawColumn]) -> list[RawColumn]:
     """Return columns of one struct, group or record by the names that they have within it."""
     parts = [column.name.split(".") for column in columns]
     shared = 0
-    while all(len(each) > shared + 1 and each[shared] == parts[0][shared] for each in parts):
+    while all(len(part) > shared + 1 and part[shared] == parts[0][shared] for part in parts):
         shared += 1
-    return [replace(column, name=".".join(each[shared:])) for column, each in zip(columns, parts, strict=True)]
+    return [replace(column, name=".".join(part[shared:])) for column, part in zip(columns, parts, strict=True)]
 
 
 def _columns(name: str, values: NDArray[Any], unit: str) -> Iterator[RawColumn]:
@@ -134,14 +136,14 @@ def _npy(path: Path) -> _Arrays:
 def _npz(path: Path) -> _Arrays:
     with zipfile.ZipFile(path) as archive:
         refuse_too_large(path, sum(each.file_size for each in archive.infolist()))
-    found: _Arrays = {}
+    arrays_read: _Arrays = {}
     with np.load(path, allow_pickle=False) as archive:
         for name in archive.files:
             try:
-                found[name] = (archive[name], "")
+                arrays_read[name] = (archive[name], "")
             except ValueError:  # an array of Python objects, which is code that would be run
                 continue
-    return found
+    return arrays_read
 
 
 def _mat5(path: Path) -> _Arrays:
@@ -150,26 +152,26 @@ def _mat5(path: Path) -> _Arrays:
     shapes = whosmat(str(path))
     refuse_too_large(path, sum(8 * int(np.prod(shape)) for _, shape, _ in shapes))
     opaque = [name for name, _, kind in shapes if kind in {"opaque", "unknown", "object"}]
-    found: _Arrays = {}
+    arrays_read: _Arrays = {}
     variables = [name for name, _, kind in shapes if kind not in {"opaque", "unknown", "object", "function"}]
     for name, value in loadmat(str(path), squeeze_me=True, struct_as_record=False, variable_names=variables).items():
         if not name.startswith("__"):
-            _flatten(name, value, found)
-    if not found and opaque:
+            _flatten(name, value, arrays_read)
+    if not arrays_read and opaque:
         raise BadRecording(
             f"{path}: {', '.join(opaque[:_SHOWN]) or 'its content'} is a MATLAB table or object, which only MATLAB "
             "reads; write it as CSV in MATLAB: writetable(NAME, 'FILE.csv') (timetable2table first for a timetable)"
         )
-    return found
+    return arrays_read
 
 
-def _flatten(name: str, value: Any, found: _Arrays) -> None:
+def _flatten(name: str, value: Any, arrays: _Arrays) -> None:
     """Add the arrays of a variable, those of a struct as NAME.FIELD."""
     if isinstance(value, np.ndarray):
-        found[name] = (value, "")
+        arrays[name] = (value, "")
     elif fields := getattr(value, "_fieldnames", None):
         for field in fields:
-            _flatten(f"{name}.{field}", getattr(value, field), found)
+            _flatten(f"{name}.{field}", getattr(value, field), arrays)
 
 
 def _hdf5(path: Path) -> _Arrays:
@@ -180,21 +182,21 @@ def _hdf5(path: Path) -> _Arrays:
             f"{path}: this is an HDF5 or MATLAB 7.3 file, and h5py, which reads it, is not installed; install it "
             f"with `{INSTALL}`; in MATLAB, save FILE.mat -v7 writes a file that needs no package"
         ) from error
-    found: _Arrays = {}
+    arrays_read: _Arrays = {}
     with h5py.File(path, "r") as file:
         sets: list[tuple[str, Any]] = []
         file.visititems(lambda name, each: sets.append((name, each)) if isinstance(each, h5py.Dataset) else None)
         usable = [(name, each) for name, each in sets if _is_table(name, each)]
         refuse_too_large(path, sum(8 * each.size * max(len(each.dtype.names or ()), 1) for _, each in usable))
         for name, each in usable:
-            found[name.replace("/", ".")] = (each[()], _unit_of(each.attrs))
-    return found
+            arrays_read[name.replace("/", ".")] = (each[()], _unit_of(each.attrs))
+    return arrays_read
 
 
 def _is_table(name: str, each: Any) -> bool:
     """Whether a data set of an HDF5 file is of numbers; MATLAB keeps words and references as numbers too."""
-    said = each.attrs.get("MATLAB_class", b"")
-    is_word = said in {b"char", b"cell", "char", "cell"} or name.startswith("#")
+    class_name = each.attrs.get("MATLAB_class", b"")
+    is_word = class_name in {b"char", b"cell", "char", "cell"} or name.startswith("#")
     return not is_word and each.shape is not None and (each.dtype.kind in "iufb" or bool(each.dtype.names))
 
 

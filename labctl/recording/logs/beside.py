@@ -22,7 +22,7 @@ MOST_STEPS = 5.0
 _NAMELESS = "column "
 
 
-def joined(table: RawTable, others: Sequence[RawTable], column_map: ColumnMap | None) -> RawTable:
+def joined(table: RawTable, tables: Sequence[RawTable], column_map: ColumnMap | None) -> RawTable:
     """Return a log with the columns of other files at its times, interpolated where their times are others.
 
     A column keeps its name; one without, or with a name that is taken, is called "STEM: NAME" by its file. The time
@@ -31,32 +31,32 @@ def joined(table: RawTable, others: Sequence[RawTable], column_map: ColumnMap | 
     """
     columns = dict(table.columns)
     problems = list(table.problems)
-    for other in others:
+    for other in tables:
         problems += [f"{other.path.name}: {line}" for line in other.problems]
         time = _time(table, column_map, None)
         theirs = _time(other, column_map, time)
         for name, column in _at(table, time, other, theirs).items():
             if theirs is not None and name == theirs.name:
                 continue
-            taken = name in columns or name.startswith(_NAMELESS)
-            called = f"{other.path.stem}: {name}" if taken else name
+            is_taken = name in columns or name.startswith(_NAMELESS)
+            called = f"{other.path.stem}: {name}" if is_taken else name
             if called in columns:
                 raise _refused(
                     other,
                     f"another file has the same name and gives column {called!r} too; give the files different names",
                 )
             columns[called] = replace(column, name=called)
-    unread = of_several([table.unread, *(other.unread for other in others)])
-    made = replace(table, columns=columns, problems=tuple(problems), first_rows=(), unread=unread)
-    return made if others else table
+    unread = of_several([table.unread, *(other.unread for other in tables)])
+    joined_table = replace(table, columns=columns, problems=tuple(problems), first_rows=(), unread=unread)
+    return joined_table if tables else table
 
 
 def _time(table: RawTable, column_map: ColumnMap | None, main: RawColumn | None) -> RawColumn | None:
     """Return the column of time of a file: that of the map or of the main file, else the one that its name shows."""
     mapped = column_map.columns.get("t_s") if column_map is not None else None
     for named in (mapped.source if mapped is not None else None, main.name if main is not None else None):
-        if named is not None and (found := source(table, named)) is not None and found.is_number:
-            return found
+        if named is not None and (raw_column := source(table, named)) is not None and raw_column.is_number:
+            return raw_column
     by_target = [name for name, target in table.targets.items() if target == "t_s"]
     named_so = [name for name, column in table.columns.items() if name_says(name).target == "t_s" and column.is_number]
     return table.columns[(by_target + named_so)[0]] if by_target + named_so else None

@@ -65,8 +65,8 @@ class TextStream:
                 break
             self._ready += piece
         size = len(self._ready) if size < 0 else size
-        given, self._ready = self._ready[:size], self._ready[size:]
-        return given
+        chunk, self._ready = self._ready[:size], self._ready[size:]
+        return chunk
 
     def readable(self) -> bool:
         """Whether it can be read."""

@@ -52,33 +52,33 @@ class Header:
     units: list[str]
 
 
-def layout_of(path: Path, head: bytes, given: FileKeys) -> tuple[FileLayout, Header]:
-    """Return how a file is divided and what its header says; what `given` says is not looked for."""
-    encoding = given.encoding or encoding_of(path, head)
+def layout_of(path: Path, head: bytes, file_keys: FileKeys) -> tuple[FileLayout, Header]:
+    """Return how a file is divided and what its header says; what `file_keys` says is not looked for."""
+    encoding = file_keys.encoding or encoding_of(path, head)
     lines = lines_of(path, head, encoding)
     if not any(line.strip() for line in lines):
         raise BadRecording(f"{path}: only empty lines; expected a header and readings")
-    separator = SEPARATORS[given.separator] if given.separator else _separator(lines)
+    separator = SEPARATORS[file_keys.separator] if file_keys.separator else _separator(lines)
     cells = [split(line, separator) for line in lines]
-    data = given.data or _first_data(path, lines, cells)
-    header = _header(lines, cells, data) if given.header is None else given.header
-    stated = _units_row(cells, header, data)
-    if given.header is None and stated == header:
-        header = _header(lines, cells, stated) or header
+    data = file_keys.data or _first_data(path, lines, cells)
+    header = _header(lines, cells, data) if file_keys.header is None else file_keys.header
+    units_row = _units_row(cells, header, data)
+    if file_keys.header is None and units_row == header:
+        header = _header(lines, cells, units_row) or header
     below = [row for line, row in zip(lines[data - 1 :], cells[data - 1 :], strict=True) if line.strip()]
     width = Counter(len(row) for row in below).most_common(1)[0][0] if below else 0
     if width == 0:
         raise BadRecording(
             f"{path}: no row of readings below the header; check that the file is complete, or give another file"
         )
-    decimal = given.decimal or _decimal(below, separator)
+    decimal = file_keys.decimal or _decimal(below, separator)
     if header > len(lines):
         raise BadRecording(
             f"{path}: header = {header} is beyond the {len(lines)} lines at the beginning of the "
             "file that labctl reads; correct header in [file]"
         )
     names = _names(cells[header - 1] if header else [], width)
-    units = [_bare(cell) for cell in cells[stated - 1][:width]] if 0 < stated != header else []
+    units = [_bare(cell) for cell in cells[units_row - 1][:width]] if 0 < units_row != header else []
     return FileLayout(encoding, separator, decimal, header, data), Header(names, units + [""] * (width - len(units)))
 
 
@@ -98,8 +98,11 @@ def is_number(cell: str) -> bool:
 
 
 def _separator(lines: list[str]) -> str:
-    found = [_division(lines, separator) for separator in SEPARATORS.values()]
-    best = max(found, key=lambda each: (each.score > 0, each.width > 1, round(each.score, 1), each.width))
+    divisions = [_division(lines, separator) for separator in SEPARATORS.values()]
+    best = max(
+        divisions,
+        key=lambda division: (division.score > 0, division.width > 1, round(division.score, 1), division.width),
+    )
     return best.separator
 
 

@@ -70,21 +70,21 @@ def with_damaged_times(
     damaged: NDArray[np.bool_], at_ns: NDArray[np.int64], arrived_ns: NDArray[np.int64], values: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Return which messages are damaged, (n,): also those whose time is none, or whose values, (n, 6), are all 0."""
-    found = damaged | ((at_ns == 0) & (np.median(at_ns) != 0))
+    is_wrong = damaged | ((at_ns == 0) & (np.median(at_ns) != 0))
     empty = ~values.any(axis=1)
     if np.mean(empty) < 0.5:  # else the unit has no other output
-        found |= empty
+        is_wrong |= empty
     if len(at_ns) >= NEIGHBOURS:
         late_s = (at_ns - arrived_ns) / NS
         padded = np.pad(late_s, NEIGHBOURS // 2, mode="edge")
         usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
-        found |= np.abs(late_s - usual) > MOST_APART_S
-    return found
+        is_wrong |= np.abs(late_s - usual) > MOST_APART_S
+    return is_wrong
 
 
-def unread_messages(damaged: NDArray[np.bool_], arrived_ns: NDArray[np.int64], stated: int) -> Unread | None:
-    """Return what of the `stated` messages of a topic was not found or is damaged; None where nothing is."""
-    lost = max(stated - len(damaged), 0)
+def unread_messages(damaged: NDArray[np.bool_], arrived_ns: NDArray[np.int64], n_stated: int) -> Unread | None:
+    """Return what of the `n_stated` messages of a topic was not found or is damaged; None where nothing is."""
+    lost = max(n_stated - len(damaged), 0)
     if not lost and not damaged.any():
         return None
     t_s = (arrived_ns - arrived_ns[0]) / NS if len(arrived_ns) else np.zeros(0)
@@ -94,13 +94,13 @@ def unread_messages(damaged: NDArray[np.bool_], arrived_ns: NDArray[np.int64], s
         for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     ]
     if lost:
-        place = f"{lost} of the {stated} messages that its index states are not there"
+        place = f"{lost} of the {n_stated} messages that its index states are not there"
         if len(t_s) > 1:
             gap = int(np.argmax(np.diff(t_s)))
             place += f"; the longest gap is from {t_s[gap]:.3f} s to {t_s[gap + 1]:.3f} s"
             place += f", the last message at {t_s[-1]:.3f} s"
         places.append(place)
-    return Unread((lost + int(damaged.sum())) / max(stated, len(damaged), 1), tuple(places))
+    return Unread((lost + int(damaged.sum())) / max(n_stated, len(damaged), 1), tuple(places))
 
 
 ROS1 = b"#ROSBAG V2.0"
@@ -153,7 +153,7 @@ def read(path: Path, options: BagOptions) -> RawTable:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """Give the reader of a bag; raises BadRecording for whatever broken bytes lead it to."""
+    """Yield the reader of a bag; raises BadRecording for whatever broken bytes lead it to."""
     from rosbags.highlevel import AnyReader  # noqa: PLC0415  0.3 s that only bags need
     from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  as above
 
@@ -165,15 +165,15 @@ def _opened(path: Path) -> Iterator[Any]:
         yield bag
 
 
-def _topic(path: Path, bag: Any, asked: str | None, kind: str, option: str) -> str | None:
+def _topic(path: Path, bag: Any, topic: str | None, kind: str, option: str) -> str | None:
     """Return the topic of a kind of message; None where the bag has no temperature."""
     there = sorted(name for name, info in bag.topics.items() if info.msgtype == kind)
-    if asked is not None:
-        if asked not in there:
+    if topic is not None:
+        if topic not in there:
             raise BadInput(
-                f"{path}: the bag has no topic {asked!r} of {kind}; choose one of {', '.join(there) or 'none'}"
+                f"{path}: the bag has no topic {topic!r} of {kind}; choose one of {', '.join(there) or 'none'}"
             )
-        return asked
+        return topic
     if len(there) == 1:
         return str(there[0])
     if kind == TEMPERATURE:

@@ -57,26 +57,26 @@ def read(path: Path, options: SheetOptions) -> RawTable:
         sheets = {name: book.get_sheet_by_name(name) for name in book.sheet_names}
         rows = sheets[_chosen(path, sheets, options.sheet)].to_python(skip_empty_area=False)
     with tempfile.TemporaryDirectory(prefix="labctl-sheet-") as folder:
-        made = Path(folder) / "sheet.csv"
-        with made.open("w", encoding="utf-8", newline="") as file:
+        csv_file = Path(folder) / "sheet.csv"
+        with csv_file.open("w", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows([_text(cell) for cell in row] for row in rows)
         if not rows:
             raise BadRecording(f"{path}: the sheet is empty; expected readings of a gyro")
         try:
-            found = read_text(made, TextOptions.model_validate({**options.model_dump(exclude={"sheet"})}))
+            table = read_text(csv_file, TextOptions.model_validate({**options.model_dump(exclude={"sheet"})}))
         except BadRecording as error:
-            raise BadRecording(str(error).replace(str(made), str(path))) from error
-    return replace(found, path=path, layout=None)
+            raise BadRecording(str(error).replace(str(csv_file), str(path))) from error
+    return replace(table, path=path, layout=None)
 
 
-def _chosen(path: Path, sheets: dict[str, Any], wanted: str | None) -> str:
-    if wanted is not None and wanted not in sheets:
-        raise BadRecording(f"{path}: there is no sheet {wanted!r}; choose one of {', '.join(map(repr, sheets))}")
+def _chosen(path: Path, sheets: dict[str, Any], sheet_name: str | None) -> str:
+    if sheet_name is not None and sheet_name not in sheets:
+        raise BadRecording(f"{path}: there is no sheet {sheet_name!r}; choose one of {', '.join(map(repr, sheets))}")
     filled = [name for name, sheet in sheets.items() if sheet.total_height > 1]
-    if wanted is None and len(filled) > 1:
+    if sheet_name is None and len(filled) > 1:
         listed = ", ".join(map(repr, filled[:10]))
         raise BadRecording(f"{path}: the sheets {listed} hold rows; choose one with --option sheet=NAME")
-    return wanted or (filled or list(sheets))[0]
+    return sheet_name or (filled or list(sheets))[0]
 
 
 def _text(cell: Any) -> str:

@@ -39,8 +39,8 @@ def column_of(name: str, pieces: Sequence[pa.Array], decimal: str, unit: str = "
     wrong: list[tuple[int, str]] = []
     numbers, n_wrong, row = [], 0, 0
     for piece in pieces:
-        values, found, count = _numbers(piece, decimal)
-        wrong += [(row + index + 1, text) for index, text in found[: MOST_WRONG - len(wrong)]]
+        values, wrong_cells, count = _numbers(piece, decimal)
+        wrong += [(row + index + 1, text) for index, text in wrong_cells[: MOST_WRONG - len(wrong)]]
         numbers.append(values)
         n_wrong += count
         row += len(piece)

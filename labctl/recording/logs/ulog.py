@@ -112,20 +112,20 @@ def sound_bytes(content: bytes) -> tuple[bytes, Unread | None]:
 
     The message before a gap is left out where it holds data: its end may be damaged too.
     """
-    kept, gaps = list[tuple[int, int]](), list[Gap]()
+    sound_parts, gaps = list[tuple[int, int]](), list[Gap]()
     for start, end, gap in _runs(content):
-        kept.append((start, end))
+        sound_parts.append((start, end))
         if gap is not None:
             gaps.append(gap)
     if not gaps:
         return content, None
-    body = b"".join(content[start:end] for start, end in kept)
+    body = b"".join(content[start:end] for start, end in sound_parts)
     size = int.from_bytes(body[:2], "little")
     if body[2:3] == bytes([FLAGS]):  # the places of appended data that it states are others now
         body = body[MESSAGE + size :]
-    lost = sum(gap.end - gap.start for gap in gaps)
+    lost_bytes = sum(gap.end - gap.start for gap in gaps)
     cut = gaps[-1].end == len(content)
-    return content[:HEADER] + body, Unread(lost / len(content), tuple(map(_said, gaps)), is_cut=cut)
+    return content[:HEADER] + body, Unread(lost_bytes / len(content), tuple(map(_said, gaps)), is_cut=cut)
 
 
 def _runs(content: bytes) -> Iterator[tuple[int, int, Gap | None]]:
@@ -140,13 +140,13 @@ def _runs(content: bytes) -> Iterator[tuple[int, int, Gap | None]]:
             continue
         if last >= start and content[last + 2] == DATA:
             at, walk.last_us = last, before_us
-        found = walk.goes_on(at + 1 if at != last else at + MESSAGE)
-        gap = Gap(at, found, walk.last_us, None)
-        if found < len(content):
-            walk.take(found)
-            gap = Gap(at, found, gap.before_us, walk.last_us)
+        next_at = walk.goes_on(at + 1 if at != last else at + MESSAGE)
+        gap = Gap(at, next_at, walk.last_us, None)
+        if next_at < len(content):
+            walk.take(next_at)
+            gap = Gap(at, next_at, gap.before_us, walk.last_us)
         yield start, at, gap
-        start = at = found
+        start = at = next_at
         last = -1
     if at > start:
         yield start, at, None
@@ -323,13 +323,13 @@ _TARGETS = {
 
 
 def _table(
-    path: Path, log: Any, taken: str, columns: dict[str, Array], started: datetime | None, unread: Unread | None
+    path: Path, log: Any, message_name: str, columns: dict[str, Array], started: datetime | None, unread: Unread | None
 ) -> RawTable:
     damaged = "; damaged in places, which are left out" if log.file_corruption or unread else ""
-    facts: dict[str, object] = {"notes": f"PX4 ULog, {taken}{damaged}"}
+    facts: dict[str, object] = {"notes": f"PX4 ULog, {message_name}{damaged}"}
     uid = log.msg_info_dict.get("sys_uuid", "")
     if isinstance(uid, str) and uid.isalnum() and uid.isascii():
-        facts["serial"] = f"{uid[-16:]}-{taken.split(' ')[1]}"
+        facts["serial"] = f"{uid[-16:]}-{message_name.split(' ')[1]}"
     raw = {name: RawColumn(name, values, unit=_TARGETS[name][1]) for name, values in columns.items()}
     targets = {name: _TARGETS[name][0] for name in raw}
     return RawTable(
@@ -344,9 +344,9 @@ def _booted(data: Mapping[tuple[str, int], Any]) -> datetime | None:
         if source is None or "time_utc_usec" not in source:
             continue
         utc_us = np.asarray(source["time_utc_usec"], dtype=np.float64)
-        known = np.flatnonzero(utc_us > EARLIEST_US)
-        if len(known):
-            boot_us = float(utc_us[known[0]]) - float(source["timestamp"][known[0]])
+        synchronised = np.flatnonzero(utc_us > EARLIEST_US)
+        if len(synchronised):
+            boot_us = float(utc_us[synchronised[0]]) - float(source["timestamp"][synchronised[0]])
             with suppress(OverflowError, ValueError):
                 return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=boot_us)
     return None

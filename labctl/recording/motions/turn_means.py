@@ -32,19 +32,19 @@ def turned_points(
     t_s = np.asarray(rows["t_s"], dtype=np.float64)
     sets = [slice(int(begin), int(begin + n)) for begin, n in zip(starts, counts, strict=True)]
     length = np.array([t_s[here][-1] - t_s[here][0] for here in sets])
-    known = np.maximum(length, 1e-12)
+    lasting_s = np.maximum(length, 1e-12)
     turn = np.asarray(points["turn_deg"], dtype=np.float64)
-    found: dict[str, NDArray[np.generic]] = {
+    point_recording: dict[str, NDArray[np.generic]] = {
         "duration_s": length,
-        "table_rate_dps": np.where(turn != 0, turn / known, 0.0),
+        "table_rate_dps": np.where(turn != 0, turn / lasting_s, 0.0),
     }
     for name, values in rows.items():
         if not name.startswith("gyro_"):
             continue
         readings = np.asarray(values, dtype=np.float64)
-        found[name] = np.array([trapezoidal_mean(t_s[here], readings[here]) for here in sets])
-        found[f"{name}{TIME}"] = np.array([_time_std(t_s[here], readings[here]) for here in sets])
-    return found
+        point_recording[name] = np.array([trapezoidal_mean(t_s[here], readings[here]) for here in sets])
+        point_recording[f"{name}{TIME}"] = np.array([_time_std(t_s[here], readings[here]) for here in sets])
+    return point_recording
 
 
 def trapezoidal_mean(t_s: NDArray[np.float64], values: NDArray[np.float64]) -> float:
@@ -76,9 +76,9 @@ def rates_as_turned(recording: Recording) -> NDArray[np.float64]:
     """
     columns = recording.columns
     rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
-    found, position = rate.copy(), np.asarray(columns["position"]).astype(np.str_)
+    turned_dps, position = rate.copy(), np.asarray(columns["position"]).astype(np.str_)
     for axis in recording.info.axes:
         output = recording.gyro_dps(axis)
-        found[position == axis] = output[position == axis]
-        found[position == f"-{axis}"] = -output[position == f"-{axis}"]
-    return np.where(rate == 0, 0.0, found)
+        turned_dps[position == axis] = output[position == axis]
+        turned_dps[position == f"-{axis}"] = -output[position == f"-{axis}"]
+    return np.where(rate == 0, 0.0, turned_dps)

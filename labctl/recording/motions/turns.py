@@ -79,12 +79,12 @@ def mean_rate_dps(info: RecordingInfo, columns: Columns) -> NDArray[np.float64]:
         return np.asarray(turn / np.asarray(columns["duration_s"], dtype=np.float64))
     starts, ends, _ = _data_sets(columns)
     t_s, valid = np.asarray(columns["t_s"], dtype=np.float64), _valid(columns)
-    found = np.zeros(len(turn))
+    rates_dps = np.zeros(len(turn))
     for begin, end in zip(starts, ends, strict=True):
-        known = t_s[begin:end][valid[begin:end]]
-        if len(known) >= LEAST:
-            found[begin:end] = turn[begin:end] / (known[-1] - known[0])
-    return found
+        times_s = t_s[begin:end][valid[begin:end]]
+        if len(times_s) >= LEAST:
+            rates_dps[begin:end] = turn[begin:end] / (times_s[-1] - times_s[0])
+    return rates_dps
 
 
 def _data_sets(columns: Columns) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

@@ -72,16 +72,16 @@ def white_std_of_profile(columns: Columns, output: NDArray[np.float64]) -> NDArr
     """
     rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
     starts = stretch_starts(columns)
-    found, sizes = np.full(len(rate), np.nan), np.diff(np.append(starts, len(rate)))
+    white_std_dps, sizes = np.full(len(rate), np.nan), np.diff(np.append(starts, len(rate)))
     for begin, size in zip(starts.tolist(), sizes.tolist(), strict=True):
         for first in range(begin, begin + size, PIECE):
             here = slice(first, min(first + PIECE, begin + size))
             if here.stop - here.start >= LEAST_FOR_SPECTRUM + 6 * LAGS:
-                found[here] = white_std(_not_followed(rate[here], output[here]))
-    known = np.isfinite(found)
-    if not known.any():
+                white_std_dps[here] = white_std(_not_followed(rate[here], output[here]))
+    is_finite = np.isfinite(white_std_dps)
+    if not is_finite.any():
         return None
-    return np.where(known, found, np.sqrt(np.mean(found[known] ** 2)))
+    return np.where(is_finite, white_std_dps, np.sqrt(np.mean(white_std_dps[is_finite] ** 2)))
 
 
 def _not_followed(rate: NDArray[np.float64], output: NDArray[np.float64]) -> NDArray[np.float64]:

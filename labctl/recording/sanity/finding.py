@@ -32,13 +32,17 @@ class Finding:
 
     def to_json(self) -> FindingJson:
         """Return the finding as JSON, with its sentence."""
-        found: FindingJson = {
+        finding_json: FindingJson = {
             "what": self.what, "severity": self.severity, "where": self.where, "said": self.said, "value": self.value,
             "unit": self.unit, "expected": self.expected, "do": self.do, "text": self.text, "part": self.part,
         }  # fmt: skip
         if self.n is not None:
-            found["channel"], found["n"], found["may_leave_out"] = self.channel, self.n, self.may_leave_out
-        return found
+            finding_json["channel"], finding_json["n"], finding_json["may_leave_out"] = (
+                self.channel,
+                self.n,
+                self.may_leave_out,
+            )
+        return finding_json
 
 
 def certain(findings: Iterable[Finding]) -> list[Finding]:
@@ -48,7 +52,7 @@ def certain(findings: Iterable[Finding]) -> list[Finding]:
 
 def numbers_in_words(numbers: Iterable[int], most: int = 6) -> str:
     """Return "data set 7" or "data sets 1, 2, 3 and 40 more" for the numbers of data sets."""
-    known = [int(number) for number in numbers]
-    shown = ", ".join(str(number) for number in known[:most])
-    more = f" and {len(known) - most} more" if len(known) > most else ""
-    return f"data set{'s' if len(known) > 1 else ''} {shown}{more}"
+    whole_numbers = [int(number) for number in numbers]
+    listed = ", ".join(str(number) for number in whole_numbers[:most])
+    more = f" and {len(whole_numbers) - most} more" if len(whole_numbers) > most else ""
+    return f"data set{'s' if len(whole_numbers) > 1 else ''} {listed}{more}"

@@ -46,11 +46,11 @@ FACTORS = (
 )
 
 
-def check_responses(summary: Summary, found: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
+def check_responses(summary: Summary, responses_by_axis: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
     """Yield what is wrong with known responses."""
     own: dict[str, list[tuple[str, Response]]] = {}
     crossed: dict[str, str] = {}  # position -> the output that follows the table instead
-    for position, outputs in found.items():
+    for position, outputs in responses_by_axis.items():
         axis = Position.of(position).axis
         if axis not in outputs:
             continue
@@ -58,14 +58,14 @@ def check_responses(summary: Summary, found: Mapping[str, Mapping[str, Response]
             crossed[position] = other
         else:
             own.setdefault(axis, []).append((position, outputs[axis]))
-    yield from _crossed(crossed, found)
-    for axis, known in own.items():
-        yield from _of_axis(summary, axis, known)
+    yield from _crossed(crossed, responses_by_axis)
+    for axis, own_response in own.items():
+        yield from _of_axis(summary, axis, own_response)
 
 
 def _follower(axis: str, outputs: Mapping[str, Response]) -> str | None:
     """Return the output that follows the table where the axis that should does not; None where all is well."""
-    others = {name: one for name, one in outputs.items() if name != axis and one.is_known}
+    others = {name: output for name, output in outputs.items() if name != axis and output.is_known}
     if not others:
         return None
     name, strongest = max(others.items(), key=lambda item: abs(item[1].gain))
@@ -73,7 +73,7 @@ def _follower(axis: str, outputs: Mapping[str, Response]) -> str | None:
     return name if is_response and abs(outputs[axis].gain) < CROSSED_SHARE * abs(strongest.gain) else None
 
 
-def _crossed(crossed: Mapping[str, str], found: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
+def _crossed(crossed: Mapping[str, str], responses_by_axis: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
     reported: set[frozenset[str]] = set()
     for position, other in crossed.items():
         axis = Position.of(position).axis
@@ -81,30 +81,31 @@ def _crossed(crossed: Mapping[str, str], found: Mapping[str, Mapping[str, Respon
         exchanged = {Position.of(p).axis for p in mutual} == {axis, other}
         if exchanged and (pair := frozenset((axis, other))) not in reported:
             reported.add(pair)
-            where, do = (
+            place_text, do = (
                 f"axes {min(pair)} and {max(pair)}",
                 f"exchange columns gyro_{min(pair)} and gyro_{max(pair)}, or the positions",
             )
         elif exchanged:
             continue
         else:
-            where = f"position {position}"
+            place_text = f"position {position}"
             do = (
                 f"mark these data sets with the position in which the unit was mounted ({other}?), or correct the "
                 "columns' order"
             )
-        gain = found[position][other].gain
+        gain = responses_by_axis[position][other].gain
         yield Finding(
-            "axes", "certain", where,
-            f"while axis {axis} is along the table's axis, output {axis} has gain {found[position][axis].gain:.3g} "
+            "axes", "certain", place_text,
+            f"while axis {axis} is along the table's axis, output {axis} has gain "
+            f"{responses_by_axis[position][axis].gain:.3g} "
             f"and output {other} has gain {gain:.3g}",
             gain, "1", f"output {axis} to follow", do,
         )  # fmt: skip
 
 
-def _of_axis(summary: Summary, axis: str, known: list[tuple[str, Response]]) -> Iterator[Finding]:
-    signed = [(position, -one.gain if Position.of(position).sign < 0 else one.gain, one) for position, one in known]
-    for position, one in known:
+def _of_axis(summary: Summary, axis: str, responses: list[tuple[str, Response]]) -> Iterator[Finding]:
+    signed = [(position, -one.gain if Position.of(position).sign < 0 else one.gain, one) for position, one in responses]
+    for position, one in responses:
         if (finding := _unsigned(summary, position, one)) is not None:
             yield finding
             return
@@ -114,8 +115,8 @@ def _of_axis(summary: Summary, axis: str, known: list[tuple[str, Response]]) -> 
     gains = [gain for _, gain, _ in signed]
     negative = [position for position, gain, one in signed if gain < -SIGNIFICANT * one.u]
     if negative and len(negative) < len(signed):
-        where = f"axis {axis}, position {', '.join(negative)}"
-        yield _sign(where, min(gains), f"mark these data sets as position {_turned(negative[0])}")
+        place_text = f"axis {axis}, position {', '.join(negative)}"
+        yield _sign(place_text, min(gains), f"mark these data sets as position {_turned(negative[0])}")
     elif negative and POSSIBLE[0] <= abs(float(np.median(gains))) <= POSSIBLE[1]:
         scale = _output_unit(summary, axis).scale
         do = f"give [output.{axis}] scale = {-scale:.6g}, or correct the sign of the table's rate or the position"
@@ -124,8 +125,8 @@ def _of_axis(summary: Summary, axis: str, known: list[tuple[str, Response]]) -> 
 
 
 def _sign(where: str, gain: float, do: str) -> Finding:
-    said = f"the output decreases when the table turns faster: gain {gain:.3g} (output rate divided by table rate)"
-    return Finding("sign", "certain", where, said, gain, "1", "a gain near 1", do)
+    text = f"the output decreases when the table turns faster: gain {gain:.3g} (output rate divided by table rate)"
+    return Finding("sign", "certain", where, text, gain, "1", "a gain near 1", do)
 
 
 def _output_unit(summary: Summary, axis: str) -> OutputUnit:
@@ -142,34 +143,34 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
     size = abs(gain)
     if USUAL[0] <= size <= USUAL[1]:
         return
-    where = f"axis {axis}" if len(signed) == 1 else f"axis {axis}, position {position}"
+    place_text = f"axis {axis}" if len(signed) == 1 else f"axis {axis}, position {position}"
     if size < max(SIGNIFICANT * one.u, 1e-9):
-        said = (
+        text = (
             f"the output does not follow the table: gain {gain:.3g} (output rate divided by table rate), u = "
             f"{one.u:.2g}"
         )
         do = "check that the table turned, that this axis is along it, and which column is the output"
-        yield Finding("no_response", "certain", where, said, gain, "1", EXPECTED, do)
+        yield Finding("no_response", "certain", place_text, text, gain, "1", EXPECTED, do)
         return
     output = _output_unit(summary, axis)
     right = f"with [output.{axis}] scale = {output.scale * gain:.6g} the gain is 1"
     cause = next((f.cause for f in FACTORS if abs(size / f.gain - 1) < NEAR_FACTOR), None)
     if cause is not None:
-        said = f"the gain (output rate divided by table rate) is {gain:.4g}, near {cause}"
+        text = f"the gain (output rate divided by table rate) is {gain:.4g}, near {cause}"
         yield Finding(
-            "unit", "certain", where, said, gain, "1", EXPECTED, f"correct the unit in recording.toml; {right}"
+            "unit", "certain", place_text, text, gain, "1", EXPECTED, f"correct the unit in recording.toml; {right}"
         )
         return
     odd = POSSIBLE[0] <= size <= POSSIBLE[1]
-    said = f"gain {gain:.4g}" + ("" if odd else ": the output is not in the unit that recording.toml gives")
+    text = f"gain {gain:.4g}" + ("" if odd else ": the output is not in the unit that recording.toml gives")
     do = f"give unit and scale of the output (raw counts, mV?); {right}"
-    yield Finding("scale", "likely" if odd else "certain", where, said, gain, "1", EXPECTED, do)
+    yield Finding("scale", "likely" if odd else "certain", place_text, text, gain, "1", EXPECTED, do)
 
 
-def _unsigned(summary: Summary, position: str, one: Response) -> Finding | None:
+def _unsigned(summary: Summary, position: str, response: Response) -> Finding | None:
     """Return a finding where the table's rates have lost their sign: the outputs have two, the rates one."""
-    rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)[one.rows]
-    output = summary.of_axis("mean", one.output)[one.rows]
+    rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)[response.rows]
+    output = summary.of_axis("mean", response.output)[response.rows]
     fast = np.abs(rate) > 0.1 * np.abs(rate).max()
     if not (np.all(rate >= 0) or np.all(rate <= 0)) or fast.sum() < 4:
         return None
@@ -182,7 +183,7 @@ def _unsigned(summary: Summary, position: str, one: Response) -> Finding | None:
     opposite = int(min(np.sum(signs > 0), np.sum(signs < 0)))
     return Finding(
         "sign", "certain", f"column table_rate_dps, position {position}",
-        f"all rates have the same sign, but output {one.output} has the opposite sign in {opposite} of "
+        f"all rates have the same sign, but output {response.output} has the opposite sign in {opposite} of "
         f"{int(fast.sum())} data sets",
         float(opposite), "data sets", "signed rates", "give the table's rates with their sign",
     )  # fmt: skip

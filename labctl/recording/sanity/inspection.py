@@ -60,9 +60,9 @@ def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
     ):
         unit = next((name for name, per_s in UNITS.items() if abs(np.log(max(ratio, 1e-12) / per_s)) < NEAR_UNIT), None)
         if unit is not None:
-            said = f"the time stamps are in {unit}: {evidence}"
+            text = f"the time stamps are in {unit}: {evidence}"
             do = f"divide column t_s by {UNITS[unit]:g}"
-            yield Finding("time_unit", "certain", "column t_s", said, ratio, "per s", "seconds", do)
+            yield Finding("time_unit", "certain", "column t_s", text, ratio, "per s", "seconds", do)
             return
     span = float(summary["t_end_s"][-1] - summary["t_begin_s"][0])
     slow = (
@@ -70,12 +70,12 @@ def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
         and float(np.median(np.asarray(summary["n"], dtype=np.float64))) >= LEAST_READINGS
     )  # fmt: skip
     if slow or span > LONG_S:
-        said = (
+        text = (
             f"a reading every {usual:.4g} s" if slow else f"the recording lasts {span:.3g} s ({span / 86400:.0f} days)"
         )
         do = "if the time stamps are in ms or us, divide column t_s by 1e3 or 1e6; if not, give sample_rate_hz"
         value = usual if slow else span
-        yield Finding("time_unit", "likely", "column t_s", said, value, "s", "seconds", do)
+        yield Finding("time_unit", "likely", "column t_s", text, value, "s", "seconds", do)
 
 
 def _whole(summary: Summary) -> bool:
@@ -109,14 +109,14 @@ def _by_environment(summary: Summary, environment: Columns | None) -> float:
 def _origin(summary: Summary, first_s: float) -> Iterator[Finding]:
     if abs(first_s) <= LATE_S:
         return
-    said = (
+    text = (
         f"the first reading is at {first_s:.6g} s: the time stamps count from another instant, such as 1970, not "
         "from started_at"
     )
     begun = summary.info.measured_at
     instant = f"the instant of started_at ({begun:%Y-%m-%d %H:%M} UTC)" if begun else "the time of the first reading"
     do = f"subtract {instant} from column t_s"
-    yield Finding("time_origin", "likely", "column t_s", said, first_s, "s", "seconds since started_at", do)
+    yield Finding("time_origin", "likely", "column t_s", text, first_s, "s", "seconds since started_at", do)
 
 
 # Gross faults of the rates of data sets, where few sets tell: an output that wraps round, a rate ten times too small.
@@ -154,17 +154,18 @@ def _of_position(sets: Summary, along: Position) -> Iterator[Finding]:
         yield wrapped
         return
     apart = rate - (output - float(np.median(output - rate)))
-    off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * fast)
-    agreeing = int((~off).sum())
-    if not off.any() or agreeing < LEAST_AGREEING or agreeing < AGREEING_SHARE * len(off):
+    is_off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * fast)
+    agreeing = int((~is_off).sum())
+    if not is_off.any() or agreeing < LEAST_AGREEING or agreeing < AGREEING_SHARE * len(is_off):
         return
-    for row in np.flatnonzero(off):
-        given, shown = float(rate[row]), float(rate[row] - apart[row])
+    for row in np.flatnonzero(is_off):
+        stated_dps, shown_dps = float(rate[row]), float(rate[row] - apart[row])
         yield Finding(
             "one_data_set", "likely", f"data set {int(numbers[row])}, axis {along.axis}",
-            f"the rate is given as {along.sign * given:.6g} deg/s, but the output shows {along.sign * shown:.4g} "
+            f"the rate is given as {along.sign * stated_dps:.6g} deg/s, but the output shows "
+            f"{along.sign * shown_dps:.4g} "
             f"deg/s, where {agreeing} other data sets agree with their rate",
-            along.sign * shown, "deg/s", f"{along.sign * given:.6g} deg/s",
+            along.sign * shown_dps, "deg/s", f"{along.sign * stated_dps:.6g} deg/s",
             "correct the rate, its sign or the number of the data set, or leave the data set out",
         )  # fmt: skip
 
@@ -175,17 +176,17 @@ def _wrapped(along: Position, numbers: Array, rate: Array, output: Array, bias_d
     `bias_dps` is that of the slow data sets: of the fast ones most may be wrapped.
     """
     apart = rate - (output - bias_dps)
-    off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * float(np.abs(rate).max()))
-    if off.sum() < 2 or (~off).sum() < LEAST_AGREEING:
+    is_off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * float(np.abs(rate).max()))
+    if is_off.sum() < 2 or (~is_off).sum() < LEAST_AGREEING:
         return None
-    jump = float(np.median(np.abs(apart[off])))
+    jump = float(np.median(np.abs(apart[is_off])))
     top = float(np.abs(output).max())
-    one_jump = bool(np.all(np.abs(np.abs(apart[off]) / jump - 1) < SAME_JUMP))
-    outward = bool(np.all(np.sign(apart[off]) == np.sign(rate[off])))
+    one_jump = bool(np.all(np.abs(np.abs(apart[is_off]) / jump - 1) < SAME_JUMP))
+    outward = bool(np.all(np.sign(apart[is_off]) == np.sign(rate[is_off])))
     if not (one_jump and outward and jump / 2 > (1 - SAME_JUMP) * top):
         return None
     return Finding(
-        "wrapped", "certain", f"axis {along.axis}, {numbers_in_words(numbers[off])}",
+        "wrapped", "certain", f"axis {along.axis}, {numbers_in_words(numbers[is_off])}",
         f"the output is {jump:.6g} deg/s from the rate, always towards the other end of its range, and never "
         f"beyond {top:.6g} deg/s: its number wraps round there",
         jump, "deg/s", "an output that follows the rate",
@@ -214,16 +215,16 @@ def check_reference(summary: Summary) -> list[Finding]:
     )
     usable = np.isfinite(turning) & (np.abs(rate) >= LEAST_DPS)
     ways = {"forwards": usable & (rate > 0), "backwards": usable & (rate < 0)}
-    found = {
+    deviations = {
         way: 1e6 * np.array(_deviation(rate[here], turning[here], u[here]))
         for way, here in ways.items()
         if np.count_nonzero(here) >= (LEAST_SETS if np.isnan(u[here]).any() else 1)
     }
-    off = [way for way, (ppm, u_ppm) in found.items() if max(NO_PPM, COVERAGE * u_ppm) < abs(ppm)]
-    if not off or max(abs(ppm) for ppm, _ in found.values()) > LARGEST_PPM:
+    off = [way for way, (ppm, u_ppm) in deviations.items() if max(NO_PPM, COVERAGE * u_ppm) < abs(ppm)]
+    if not off or max(abs(ppm) for ppm, _ in deviations.values()) > LARGEST_PPM:
         return []
-    each = ", ".join(f"{ppm:+.0f} ppm {way} (u {u_ppm:.0f} ppm)" for way, (ppm, u_ppm) in found.items())
-    worst_ppm = max((float(found[way][0]) for way in off), key=abs)
+    each = ", ".join(f"{ppm:+.0f} ppm {way} (u {u_ppm:.0f} ppm)" for way, (ppm, u_ppm) in deviations.items())
+    worst_ppm = max((float(deviations[way][0]) for way in off), key=abs)
     return [
         Finding(
             "table_rate_ratio", "likely", "column table_rate_dps",
@@ -240,10 +241,10 @@ def _deviation(rate: NDArray[np.float64], turning: NDArray[np.float64], u: NDArr
     """Return the ratio of two rates (m,) less 1, and its standard uncertainty: the scatter, or what is known of it."""
     weight = rate**2
     off = float(np.sum(rate * (turning - rate)) / np.sum(weight))
-    left = turning - (1 + off) * rate
-    scatter = float(np.sqrt(left @ left / (len(rate) - 1) / weight.sum())) if len(rate) >= LEAST_SETS else 0.0
-    known = float(np.sqrt(np.sum((rate * np.nan_to_num(u)) ** 2)) / np.sum(weight))
-    return off, max(scatter, known)
+    residual = turning - (1 + off) * rate
+    scatter = float(np.sqrt(residual @ residual / (len(rate) - 1) / weight.sum())) if len(rate) >= LEAST_SETS else 0.0
+    u_mean = float(np.sqrt(np.sum((rate * np.nan_to_num(u)) ** 2)) / np.sum(weight))
+    return off, max(scatter, u_mean)
 
 
 def check_damage(info: RecordingInfo) -> Iterator[Finding]:
@@ -273,27 +274,29 @@ def findings_of(
     if len(summary) == 0:
         return sorted(of_readings, key=_order)
     aside = np.asarray(summary[VERIFICATION], dtype=np.bool_)
-    found = list(check_damage(summary.info))
+    findings = list(check_damage(summary.info))
     if not aside.all():
-        found += _findings(summary.take(~aside), environment)
+        findings += _findings(summary.take(~aside), environment)
     if aside.any():
         of_part = _findings(summary.take(aside), None)
-        found += [replace(each, part="verification", where=f"verification part, {each.where}") for each in of_part]
-    return sorted([*found, *_not_said(of_readings, found)], key=_order)
+        findings += [replace(each, part="verification", where=f"verification part, {each.where}") for each in of_part]
+    return sorted([*findings, *_not_said(of_readings, findings)], key=_order)
 
 
-def _not_said(of_readings: Sequence[Finding], found: Sequence[Finding]) -> Iterator[Finding]:
+def _not_said(of_readings: Sequence[Finding], findings: Sequence[Finding]) -> Iterator[Finding]:
     """Yield findings of readings but those that the data sets' figures say too, with what they leave in the means."""
-    said = {(each.what, each.channel) for each in found if each.channel}
-    yield from (each for each in of_readings if (each.what, each.channel) not in said)
+    stated_findings = {(finding.what, finding.channel) for finding in findings if finding.channel}
+    yield from (finding for finding in of_readings if (finding.what, finding.channel) not in stated_findings)
 
 
-def _with_gross(found: Sequence[Finding], gross: Sequence[Finding]) -> list[Finding]:
+def _with_gross(findings: Sequence[Finding], gross: Sequence[Finding]) -> list[Finding]:
     """Return findings of rates and the gross ones: what wraps explains all else of its axis; none is said twice."""
     wrapped = {each.where.partition(",")[0] for each in gross if each.what == "wrapped"}
-    said = {each.where for each in found} | {"of a whole axis" for each in found if each.what in OF_AXIS}
-    added = [each for each in gross if each.what == "wrapped" or not {each.where, "of a whole axis"} & said]
-    return [*(each for each in found if not wrapped & set(each.where.split(", "))), *added]
+    places = {finding.where for finding in findings} | {
+        "of a whole axis" for finding in findings if finding.what in OF_AXIS
+    }
+    added = [each for each in gross if each.what == "wrapped" or not {each.where, "of a whole axis"} & places]
+    return [*(finding for finding in findings if not wrapped & set(finding.where.split(", "))), *added]
 
 
 def _order(finding: Finding) -> bool:

@@ -40,7 +40,7 @@ class Response:
 def responses(summary: Summary) -> dict[str, dict[str, Response]]:
     """Return position -> output axis -> response, where the table's rates determine one."""
     position = np.asarray(summary["position"]).astype(np.str_)
-    found: dict[str, dict[str, Response]] = {}
+    by_axis: dict[str, dict[str, Response]] = {}
     for there in dict.fromkeys(position.tolist()):
         rows = position == there
         rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)[rows]
@@ -49,22 +49,22 @@ def responses(summary: Summary) -> dict[str, dict[str, Response]]:
             continue
         fast = float(np.abs(rate).max())
         design = _design(rate / fast, np.asarray(summary["temperature_c"], dtype=np.float64)[rows])
-        found[there] = {
+        by_axis[there] = {
             axis: _response(there, axis, rows, design, summary.of_axis("mean", axis)[rows], fast)
             for axis in summary.info.axes
         }
-    return found
+    return by_axis
 
 
-def _design(share: NDArray[np.float64], warm: NDArray[np.float64]) -> NDArray[np.float64]:
+def _design(share: NDArray[np.float64], temperature_c: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the columns of a mean, (n, k), for rates as shares of the fastest (n,) and temperatures (n,).
 
     The rate comes first, then a constant, and temperature where there are data for it.
     """
     columns = [share, np.ones_like(share)]
-    span = float(np.ptp(warm)) if np.isfinite(warm).all() else 0.0
+    span = float(np.ptp(temperature_c)) if np.isfinite(temperature_c).all() else 0.0
     if span > LEAST_WARMTH_K:
-        u = 2.0 * (warm - warm.mean()) / span
+        u = 2.0 * (temperature_c - temperature_c.mean()) / span
         more = [u, u * share, u**2, u**3]
         columns += more[: max(len(share) // SETS_PER_COLUMN - len(columns), 0)]
     return np.column_stack(columns)

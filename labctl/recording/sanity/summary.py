@@ -73,15 +73,18 @@ def level_change(values: NDArray[np.float64], noise: float) -> Change:
     means = block_means(values, blocks)
     noise_of_block = noise / np.sqrt(len(values) / blocks)
     at = np.arange(2, blocks)
-    left, right = np.concatenate([at, at[:-1]]), np.concatenate([at, at[:-1] + 1])  # with and without a block between
+    left_columns, right = (
+        np.concatenate([at, at[:-1]]),
+        np.concatenate([at, at[:-1] + 1]),
+    )  # with and without a block between
     sums, squares = (np.concatenate([[0.0], np.cumsum((means - means[0]) ** power)]) for power in (1, 2))
     after = blocks - right
-    low, high = sums[left] / left, (sums[-1] - sums[right]) / after
-    scatter = squares[left] - left * low**2 + squares[-1] - squares[right] - after * high**2
-    rests = np.sqrt(np.maximum(scatter, 0.0) / (left + after - 2))
+    low, high = sums[left_columns] / left_columns, (sums[-1] - sums[right]) / after
+    scatter = squares[left_columns] - left_columns * low**2 + squares[-1] - squares[right] - after * high**2
+    rests = np.sqrt(np.maximum(scatter, 0.0) / (left_columns + after - 2))
     k = int(np.argmin(rests))
     best_rest = float(rests[k])
-    best = Change(float(high[k] - low[k]), int((left[k] + right[k]) / 2 * len(values) / blocks))
+    best = Change(float(high[k] - low[k]), int((left_columns[k] + right[k]) / 2 * len(values) / blocks))
     still = best_rest <= max(STILL_NOISES * noise_of_block, STILL_SHARE * abs(best.size))
     large = abs(best.size) > CHANGE_RATIO * max(best_rest, noise_of_block)
     return best if still and large else NO_CHANGE
@@ -99,14 +102,14 @@ def wander(values: NDArray[np.float64], temperature_c: NDArray[np.float64] | Non
     at = np.linspace(-1.0, 1.0, blocks)
     columns = [at**power for power in range(4)] + [np.exp(-np.arange(blocks) / decay) for decay in DECAYS]
     if temperature_c is not None:
-        warm = block_means(temperature_c, blocks)
-        span = float(np.ptp(warm))
+        block_c = block_means(temperature_c, blocks)
+        span = float(np.ptp(block_c))
         if span > 0.1:
-            columns += [((warm - warm.mean()) / span) ** power for power in (1, 2, 3)]
+            columns += [((block_c - block_c.mean()) / span) ** power for power in (1, 2, 3)]
     design = np.column_stack(columns)
     q, _ = np.linalg.qr(design)
-    left = means - q @ (q.T @ means)
-    square = float(np.sum(left**2)) / (blocks - design.shape[1])
+    residual = means - q @ (q.T @ means)
+    square = float(np.sum(residual**2)) / (blocks - design.shape[1])
     return float(np.sqrt(max(square - noise**2 * blocks / len(values), 0.0)))
 
 
@@ -181,10 +184,10 @@ def summarise(recording: Recording) -> Summary:
 
 def joined(info: RecordingInfo, parts: Sequence[Summary]) -> Summary:
     """Return the summaries of parts of a recording, in order, as one."""
-    known = [part for part in parts if len(part)]
-    if not known:
+    not_empty = [part for part in parts if len(part)]
+    if not not_empty:
         return Summary(info, {"dataset": np.zeros(0, dtype=np.int64)})
-    return Summary(info, {name: np.concatenate([part[name] for part in known]) for name in known[0].columns})
+    return Summary(info, {name: np.concatenate([part[name] for part in not_empty]) for name in not_empty[0].columns})
 
 
 def _of_readings(recording: Recording) -> Summary:
@@ -209,50 +212,54 @@ def _of_readings(recording: Recording) -> Summary:
 
 
 def _one_set(
-    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], here: slice
+    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], set_rows: slice
 ) -> dict[str, Any]:
-    t_s = np.asarray(rows["t_s"], dtype=np.float64)[here]
+    t_s = np.asarray(rows["t_s"], dtype=np.float64)[set_rows]
     rate = (
-        np.asarray(rows["table_rate_dps"], dtype=np.float64)[here] if "table_rate_dps" in rows else np.zeros(len(t_s))
+        np.asarray(rows["table_rate_dps"], dtype=np.float64)[set_rows]
+        if "table_rate_dps" in rows
+        else np.zeros(len(t_s))
     )
-    warm = temperature_of(rows)
-    found: dict[str, Any] = {
-        **_place(info, rows, here.start),
+    temperature_c = temperature_of(rows)
+    summary_row: dict[str, Any] = {
+        **_place(info, rows, set_rows.start),
         "n": len(rate),
         "table_rate_dps": float(rate.mean()),
         "rate_low_dps": float(rate.min()),
         "rate_high_dps": float(rate.max()),
-        **_temperatures(_NONE if warm is None else warm[here]),
+        **_temperatures(_NONE if temperature_c is None else temperature_c[set_rows]),
         **_times(t_s),
-        "turning_dps": _turning(rows, here, t_s),
-        "turning_u_dps": float(rows["encoder_rate_u_dps"][here.start]) if "encoder_rate_u_dps" in rows else np.nan,
+        "turning_dps": _turning(rows, set_rows, t_s),
+        "turning_u_dps": float(rows["encoder_rate_u_dps"][set_rows.start]) if "encoder_rate_u_dps" in rows else np.nan,
     }
     if info.motion == "turns":
-        as_turned = np.asarray(rows["rate_as_turned_dps"], dtype=np.float64)[here]
-        found |= {**_turn(rows, here.start), "duration_s": float(t_s[-1] - t_s[0])}
-        found |= {"rate_low_dps": float(as_turned.min()), "rate_high_dps": float(as_turned.max())}
+        as_turned = np.asarray(rows["rate_as_turned_dps"], dtype=np.float64)[set_rows]
+        summary_row |= {**_turn(rows, set_rows.start), "duration_s": float(t_s[-1] - t_s[0])}
+        summary_row |= {"rate_low_dps": float(as_turned.min()), "rate_high_dps": float(as_turned.max())}
     for axis, values in outputs.items():
-        figures = _output(values[here], None if warm is None else warm[here], at_rest=not rate.any())
-        found |= {f"{name}_{axis}": value for name, value in figures.items()}
-    return found
+        figures = _output(
+            values[set_rows], None if temperature_c is None else temperature_c[set_rows], at_rest=not rate.any()
+        )
+        summary_row |= {f"{name}_{axis}": value for name, value in figures.items()}
+    return summary_row
 
 
 def _stretches(
-    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], whole: slice
+    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], all_rows: slice
 ) -> list[dict[str, Any]]:
     """Return stretches of a data set whose rate changes, with the output as if it were not late."""
-    rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)[whole]
-    here = {name: values[whole] for name, values in rows.items()}
+    rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)[all_rows]
+    here = {name: values[all_rows] for name, values in rows.items()}
     place = _place(info, here, 0)
     axis = Position.of(place["position"]).axis
     steps = np.diff(np.asarray(here["t_s"], dtype=np.float64))
     lag = lag_of(
-        rate, outputs.get(axis, next(iter(outputs.values())))[whole], float(np.median(steps)) if len(steps) else 1.0
+        rate, outputs.get(axis, next(iter(outputs.values())))[all_rows], float(np.median(steps)) if len(steps) else 1.0
     )
     n = len(rate) - abs(lag)
     early, late = max(-lag, 0), max(lag, 0)
     here = {name: values[early : early + n] for name, values in here.items()}
-    moved = {name: values[whole][late : late + n] for name, values in outputs.items()}
+    moved = {name: values[all_rows][late : late + n] for name, values in outputs.items()}
     ends = {"rate_low_dps": float(rate.min()), "rate_high_dps": float(rate.max())}
     return [{**_one_set(info, here, moved, part), **ends} for part in stretches(n)]
 
@@ -268,18 +275,18 @@ def _place(info: RecordingInfo, rows: Columns, row: int) -> dict[str, Any]:
 
 def _turn(columns: Columns, row: int) -> dict[str, Any]:
     """Return what is said of the turn of the data set that begins at a row."""
-    turn, known = float(columns["turn_deg"][row]), "turn_u_deg" in columns
-    u_deg = float(columns["turn_u_deg"][row]) if known else USUAL_U_DEG
-    return {"turn_deg": turn, "turn_u_deg": u_deg if turn else 0.0, "turn_u_known": known}
+    turn, has_u = float(columns["turn_deg"][row]), "turn_u_deg" in columns
+    u_deg = float(columns["turn_u_deg"][row]) if has_u else USUAL_U_DEG
+    return {"turn_deg": turn, "turn_u_deg": u_deg if turn else 0.0, "turn_u_known": has_u}
 
 
-def _temperatures(warm: NDArray[np.float64]) -> dict[str, float]:
-    if len(warm) == 0:
+def _temperatures(temperature_c: NDArray[np.float64]) -> dict[str, float]:
+    if len(temperature_c) == 0:
         return dict.fromkeys(("temperature_c", "temperature_low_c", "temperature_high_c"), np.nan)
     return {
-        "temperature_c": float(warm.mean()),
-        "temperature_low_c": float(warm.min()),
-        "temperature_high_c": float(warm.max()),
+        "temperature_c": float(temperature_c.mean()),
+        "temperature_low_c": float(temperature_c.min()),
+        "temperature_high_c": float(temperature_c.max()),
     }
 
 
@@ -293,11 +300,11 @@ def _times(t_s: NDArray[np.float64]) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _turning(rows: Columns, here: slice, t_s: NDArray[np.float64]) -> float:
+def _turning(rows: Columns, set_rows: slice, t_s: NDArray[np.float64]) -> float:
     """Return the rate at which the logged table angle turns over the data set, degrees per unit of `t_s`."""
     if "table_angle_deg" not in rows or len(t_s) < 2 or t_s[-1] <= t_s[0]:
         return np.nan
-    angle = np.asarray(rows["table_angle_deg"], dtype=np.float64)[here]
+    angle = np.asarray(rows["table_angle_deg"], dtype=np.float64)[set_rows]
     return float((angle[-1] - angle[0]) / (t_s[-1] - t_s[0]))
 
 
@@ -307,14 +314,16 @@ def _encoder(rows: Columns, m: int) -> dict[str, NDArray[np.generic]]:
     return {name: np.asarray(rows.get(column, np.full(m, np.nan)), dtype=np.float64) for name, column in names.items()}
 
 
-def _output(values: NDArray[np.float64], warm: NDArray[np.float64] | None, *, at_rest: bool) -> dict[str, float]:
+def _output(
+    values: NDArray[np.float64], temperature_c: NDArray[np.float64] | None, *, at_rest: bool
+) -> dict[str, float]:
     codes = codes_of(values)
     noise = min(noise_of_reading(values), codes.std)
     change = level_change(values, noise)
     return {
         "mean": float(values.mean()), "std": codes.std, "noise": noise,
         "code": codes.code, "code_step": codes.step, "white_std": codes.white_std,
-        "wander": wander(values, warm, noise) if at_rest else np.nan,
+        "wander": wander(values, temperature_c, noise) if at_rest else np.nan,
         "change": change.size, "change_row": change.row,
     }  # fmt: skip
 
@@ -322,25 +331,25 @@ def _output(values: NDArray[np.float64], warm: NDArray[np.float64] | None, *, at
 def _of_means(recording: Recording) -> Summary:
     rows, m, info = recording.columns, len(recording), recording.info
     rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)
-    warm = temperature_of(rows)
-    warm = np.full(m, np.nan) if warm is None else warm
+    temperature_c = temperature_of(rows)
+    temperature_c = np.full(m, np.nan) if temperature_c is None else temperature_c
     t_s = np.asarray(rows["t_s"], dtype=np.float64) if "t_s" in rows else np.full(m, np.nan)
     unknown = np.full(m, np.nan)
-    found: dict[str, NDArray[np.generic]] = {
+    columns: dict[str, NDArray[np.generic]] = {
         "dataset": np.asarray(rows["dataset"]) if "dataset" in rows else np.arange(1, m + 1),
         "position": np.asarray(rows["position"]).astype(np.str_) if "position" in rows else np.full(m, info.axes[0]),
         "run": np.asarray(rows["run"]) if "run" in rows else np.ones(m, dtype=np.int64),
         "n": np.asarray(rows["n"]) if "n" in rows else np.ones(m, dtype=np.int64),
         VERIFICATION: is_marked(recording),
         "table_rate_dps": rate, "rate_low_dps": rate, "rate_high_dps": rate,
-        "temperature_c": warm, "temperature_low_c": warm, "temperature_high_c": warm,
+        "temperature_c": temperature_c, "temperature_low_c": temperature_c, "temperature_high_c": temperature_c,
         "t_begin_s": t_s, "t_end_s": t_s, **_encoder(rows, m),
         **dict.fromkeys(("step_s", "gap_s", "lost_s"), unknown),
     }  # fmt: skip
     if info.motion == "turns":
         turns = [_turn(rows, row) for row in range(m)]
-        found |= {name: np.array([turn[name] for turn in turns]) for name in turns[0]}
-        found["duration_s"] = np.asarray(rows["duration_s"], dtype=np.float64)
+        columns |= {name: np.array([turn[name] for turn in turns]) for name in turns[0]}
+        columns["duration_s"] = np.asarray(rows["duration_s"], dtype=np.float64)
     for axis in info.axes:
         output = info.output.get(axis)
         scale = abs(output.scale) if output else 1.0
@@ -353,5 +362,5 @@ def _of_means(recording: Recording) -> Summary:
             "change": np.full(m, NO_CHANGE.size),
         }
         figures |= {"change_row": np.full(m, NO_CHANGE.row), **dict.fromkeys(("wander", "code", "code_step"), unknown)}
-        found |= {f"{name}_{axis}": values for name, values in figures.items()}
-    return Summary(info, found)
+        columns |= {f"{name}_{axis}": values for name, values in figures.items()}
+    return Summary(info, columns)

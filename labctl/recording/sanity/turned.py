@@ -50,7 +50,7 @@ def off_turns(summary: Summary) -> list[OffTurn]:
     turn, u_deg = (np.asarray(summary[name], dtype=np.float64) for name in ("turn_deg", "turn_u_deg"))
     ratio = _ratios(summary, turned)
     axis = np.char.lstrip(np.asarray(summary["position"]).astype(np.str_), "-")
-    found = []
+    turns = []
     for row in np.flatnonzero(np.isfinite(ratio)):
         expected, allowed = _expected(ratio, axis, int(row))
         if expected is None:
@@ -59,34 +59,34 @@ def off_turns(summary: Summary) -> list[OffTurn]:
         tolerance = max(allowed, UNCERTAINTIES * u_deg[row] / abs(turn[row]))
         if abs(share - 1) > tolerance:
             certain = allowed < OFF_ALONE and abs(share - 1) > CERTAIN_SHARE
-            said = float(turn[row])
-            found.append(OffTurn(int(row), said, float(share) * said, tolerance * abs(said), certain))
-    return found
+            stated_deg = float(turn[row])
+            turns.append(OffTurn(int(row), stated_deg, float(share) * stated_deg, tolerance * abs(stated_deg), certain))
+    return turns
 
 
 def _ratios(summary: Summary, turned: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the integral of each turn over its stated angle, (m,); NaN at rest and where its axis has no output."""
     position = np.asarray(summary["position"]).astype(np.str_)
     turn, duration_s = (np.asarray(summary[name], dtype=np.float64) for name in ("turn_deg", "duration_s"))
-    found = np.full(len(summary), np.nan)
+    ratios = np.full(len(summary), np.nan)
     for axis in summary.info.axes:
         mean = summary.of_axis("mean", axis)
         for there, sign in ((axis, 1.0), (f"-{axis}", -1.0)):
             rows = turned & (position == there)
             rests = ~turned & (position == there) if np.any(~turned & (position == there)) else ~turned
             bias = float(np.median(mean[rests])) if rests.any() else 0.0
-            found[rows] = (mean[rows] - bias) * duration_s[rows] / (sign * turn[rows])
-    return found
+            ratios[rows] = (mean[rows] - bias) * duration_s[rows] / (sign * turn[rows])
+    return ratios
 
 
 def _expected(ratio: NDArray[np.float64], axis: NDArray[np.str_], row: int) -> tuple[float, float] | tuple[None, float]:
     """Return the ratio that a turn should have, and by which share it may be off."""
-    known = np.isfinite(ratio)
-    same = ratio[known & (axis == axis[row])]
+    is_finite = np.isfinite(ratio)
+    same = ratio[is_finite & (axis == axis[row])]
     if len(same) >= ENOUGH:
         return _consensus(same), OFF_SAME
-    if known.sum() >= PAIR:
-        return _consensus(ratio[known]), OFF_OTHERS
+    if is_finite.sum() >= PAIR:
+        return _consensus(ratio[is_finite]), OFF_OTHERS
     return (1.0, OFF_ALONE) if UNIT_SHARE[0] <= abs(ratio[row]) <= UNIT_SHARE[1] else (None, OFF_ALONE)
 
 
@@ -98,14 +98,14 @@ def _consensus(ratios: NDArray[np.float64]) -> float:
     return float(np.median(ratios[group])) if group.any() else 1.0
 
 
-def check_turned(summary: Summary, off: list[OffTurn]) -> Iterator[Finding]:
+def check_turned(summary: Summary, turns: list[OffTurn]) -> Iterator[Finding]:
     """Yield the turns whose integral differs from the stated angle, and uncertainties that are not stated."""
-    for each in off:
-        number, position = summary["dataset"][each.row], summary["position"][each.row]
+    for turn in turns:
+        number, position = summary["dataset"][turn.row], summary["position"][turn.row]
         yield Finding(
-            "turn", "certain" if each.certain else "likely", f"data set {number}, axis {str(position).lstrip('-')}",
-            turn_in_words(each), each.came_deg, "deg", f"{each.said_deg:g} +- {each.tolerance_deg:.2g} deg",
-            what_to_do(each),
+            "turn", "certain" if turn.certain else "likely", f"data set {number}, axis {str(position).lstrip('-')}",
+            turn_in_words(turn), turn.came_deg, "deg", f"{turn.said_deg:g} +- {turn.tolerance_deg:.2g} deg",
+            what_to_do(turn),
         )  # fmt: skip
     if is_turned(summary).any() and not bool(np.all(summary["turn_u_known"])):
         yield Finding(
@@ -116,15 +116,15 @@ def check_turned(summary: Summary, off: list[OffTurn]) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def turn_in_words(off: OffTurn) -> str:
+def turn_in_words(turn: OffTurn) -> str:
     """Return the integral of a turn, in words."""
-    came = round(off.came_deg)
-    only = "only " if 0 <= off.came_deg / off.said_deg < 1 else ""
-    return f"the integral of the output is {only}{came:d} deg instead of {off.said_deg:g} deg"
+    came = round(turn.came_deg)
+    only = "only " if 0 <= turn.came_deg / turn.said_deg < 1 else ""
+    return f"the integral of the output is {only}{came:d} deg instead of {turn.said_deg:g} deg"
 
 
-def what_to_do(off: OffTurn) -> str:
+def what_to_do(turn: OffTurn) -> str:
     """Return what to do about a turn whose integral differs from the stated angle."""
-    if off.came_deg * off.said_deg < 0:
+    if turn.came_deg * turn.said_deg < 0:
         return "correct the sign of turn_deg or of the position, or turn again"
     return "repeat the turn, or correct turn_deg"

@@ -63,14 +63,14 @@ def check_changes(summary: Summary) -> Iterator[Finding]:
     rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)
     for axis in summary.info.axes:
         change, row = summary.of_axis("change", axis), summary.of_axis("change_row", axis)
-        size, found = np.abs(change), with_two_rates(summary, axis)
-        if not found.any():
+        size, two_rates = np.abs(change), with_two_rates(summary, axis)
+        if not two_rates.any():
             continue
-        worst = int(np.argmax(np.where(found, size, 0.0)))
+        worst = int(np.argmax(np.where(two_rates, size, 0.0)))
         sure = size[worst] > CHANGED_DPS + CHANGED_SHARE * abs(rate[worst])
         yield Finding(
             "rate_changes", "certain" if sure else "likely",
-            f"axis {axis}, {numbers_in_words(summary['dataset'][found])}",
+            f"axis {axis}, {numbers_in_words(summary['dataset'][two_rates])}",
             f"the output changes by {change[worst]:.4g} deg/s at reading {int(row[worst]) + 1} of data set "
             f"{summary['dataset'][worst]}, whose rate is given as {rate[worst]:.6g} deg/s",
             float(change[worst]), "deg/s", "one rate per data set",
@@ -119,12 +119,12 @@ def check_codes(summary: Summary) -> Iterator[Finding]:
         step, u = steps_of(summary, axis)
         if step is None:
             continue
-        shown = u > SHOWN_SHARE * step
-        if not shown.any():
+        is_shown = u > SHOWN_SHARE * step
+        if not is_shown.any():
             continue
-        noise = float(np.median(summary.of_axis("std", axis)[shown]))
+        noise = float(np.median(summary.of_axis("std", axis)[is_shown]))
         yield Finding(
-            "quantised", "likely", f"axis {axis}, {numbers_in_words(summary['dataset'][shown])}",
+            "quantised", "likely", f"axis {axis}, {numbers_in_words(summary['dataset'][is_shown])}",
             f"the output changes in steps of {step:.4g} deg/s, the readings of these data sets spread by {noise:.2g} "
             f"deg/s, and their mean has an uncertainty of u = {float(u.max()):.2g} deg/s",
             step, "deg/s", "a step below twice the noise", "log the output with more digits or a finer converter",

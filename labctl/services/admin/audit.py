@@ -34,9 +34,9 @@ def verify_audit(store: Store, anchor: str | None = None) -> AuditVerificationRe
     broken = store.audit.first_broken(anchor_of(anchor) if anchor else None)
     head = store.audit.head()
     rows = head.length if head is not None else 0
-    shown = f"{head.length}:{head.hash}" if head is not None and head.length else None
+    anchor_text = f"{head.length}:{head.hash}" if head is not None and head.length else None
     if broken is None:
-        return AuditVerificationResponse(ok=True, rows=rows, anchor=shown)
+        return AuditVerificationResponse(ok=True, rows=rows, anchor=anchor_text)
     return AuditVerificationResponse(
         ok=False, rows=rows, anchor=None, row=broken.row, text=f"row {broken.row}: {broken.what}"
     )

@@ -43,10 +43,12 @@ class KeyMemory:
 
     def read(self) -> None:
         """Read the keys. Raises StoreError."""
-        found: Digests = {row.digest: (row.name, row.role) for row in self._store.keys.all() if row.revoked_at is None}
-        if found != self._digests:
-            self._digests = found
-            self._on_change(found)
+        digests: Digests = {
+            row.digest: (row.name, row.role) for row in self._store.keys.all() if row.revoked_at is None
+        }
+        if digests != self._digests:
+            self._digests = digests
+            self._on_change(digests)
 
     def _keep(self) -> None:
         while not self._over.is_set():
@@ -66,18 +68,18 @@ class KeyMemory:
 
         Raises NotIdentified for a key that is not in force.
         """
-        known = self._known(authorization)
-        if known is None:
+        known_caller = self._known(authorization)
+        if known_caller is None:
             await self._read_again()
-            known = self._known(authorization)
-        if known is None:
+            known_caller = self._known(authorization)
+        if known_caller is None:
             raise unknown_key()
-        return known
+        return known_caller
 
     def _known(self, authorization: str) -> Caller | None:
         scheme, _, key = authorization.partition(" ")
-        found = self._digests.get(digest_of(key.strip())) if scheme.lower() == SCHEME else None
-        return None if found is None else Caller(found[0], Role(found[1]), "key")
+        known_key = self._digests.get(digest_of(key.strip())) if scheme.lower() == SCHEME else None
+        return None if known_key is None else Caller(known_key[0], Role(known_key[1]), "key")
 
     async def _read_again(self) -> None:
         """Wait until the thread has read the keys once more, however many requests wait for that, or `NEW_KEY_S`."""

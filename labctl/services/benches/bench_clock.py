@@ -25,7 +25,7 @@ def has_simulated_instrument(bench: JsonObject) -> bool:
 def _links(bench: JsonObject, sections: tuple[str, ...]) -> Iterator[str]:
     """Yield the ports and hosts of the devices in sections of a bench."""
     for name in sections:
-        given = bench.get(name)
-        for device in given if isinstance(given, list | tuple) else (given,):
+        section = bench.get(name)
+        for device in section if isinstance(section, list | tuple) else (section,):
             if isinstance(device, Mapping):
                 yield from (str(device[key]) for key in ("port", "host") if device.get(key) is not None)

@@ -50,7 +50,7 @@ def check_on_wire(bench: BenchFile, clock: Clock, wire: Wire) -> list[DeviceRepo
 
 def said_of(reports: Sequence[DeviceReport]) -> list[str]:
     """Return every finding of a check as a line, to compare two checks."""
-    return [f"{each.device}: {one.what}: {one.text} ({one.state})" for each in reports for one in each.findings]
+    return [f"{report.device}: {one.what}: {one.text} ({one.state})" for report in reports for one in report.findings]
 
 
 def checked(bench: BenchFile, source: str, clock: Clock, simulation: Simulation | None = None) -> BenchCheckResponse:
@@ -62,7 +62,7 @@ def response_of(bench: BenchFile, source: str, reports: Sequence[DeviceReport]) 
     """Return the reports on the instruments of a bench as a response, dated now."""
     devices = [_device(report, bench) for report in reports]
     return BenchCheckResponse(
-        bench=source, ok=all(each.ok for each in devices), checked_at=WallClock().utc(), devices=devices
+        bench=source, ok=all(device.ok for device in devices), checked_at=WallClock().utc(), devices=devices
     )
 
 
@@ -95,7 +95,7 @@ def _device(report: DeviceReport, bench: BenchFile) -> DeviceCheck:
         kind=report.kind,
         state=report.state,
         address=report.address,
-        findings=[FindingResponse(**asdict(each)) for each in report.findings],
+        findings=[FindingResponse(**asdict(finding)) for finding in report.findings],
         reported=report.reported,
         **bench.drivers[report.device].model_dump(),
     )
@@ -108,14 +108,16 @@ def clock_of(bench: BenchFile) -> Clock:
 
 def shipped() -> list[ShippedBench]:
     """Return the benches that come with labctl: name, and what stands on them."""
-    found = []
+    benches = []
     for name, path in shipped_benches().items():
         bench = load_bench(str(path))
         units = ", ".join(f"{gyro.serial} ({gyro.driver})" for gyro in bench.gyros)
-        found.append(
-            ShippedBench(name=name, text=", ".join([*(each.driver for each in bench.instruments.values()), units]))
+        benches.append(
+            ShippedBench(
+                name=name, text=", ".join([*(instrument.driver for instrument in bench.instruments.values()), units])
+            )
         )
-    return found
+    return benches
 
 
 def serve_simulator(

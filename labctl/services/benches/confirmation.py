@@ -110,7 +110,7 @@ class SafeStateRetry:
 
 
 def describe_safe_state(bench: str, unconfirmed: str) -> str:
-    """Say how a bench was left whose safe state was tried just now, and what to do where it is not confirmed."""
+    """Describe how a bench was left whose safe state was tried just now, and what to do where it is not confirmed."""
     if not unconfirmed:
         return f"bench {bench} is safe"
     return (
@@ -119,7 +119,7 @@ def describe_safe_state(bench: str, unconfirmed: str) -> str:
 
 
 def describe_bench(row: BenchRow) -> str:
-    """Say how a bench stands, and what a person has to do."""
+    """Describe the state of a bench and what a person has to do."""
     if row.confirmed_at is None:
         return describe_safe_state(row.name, row.unconfirmed)
     return (

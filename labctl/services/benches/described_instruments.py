@@ -36,8 +36,10 @@ def read_description(source: str) -> Described:
     try:
         document = read_toml(path)
     except FileNotFoundError:
-        known = ", ".join(shipped_descriptions())
-        raise BadInput(f"{source!r} is neither a file nor a description that ships with labctl ({known})") from None
+        names = ", ".join(shipped_descriptions())
+        raise BadInput(
+            f"{source!r} is neither a file nor a description that ships with labctl; name a file, or one of {names}"
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
         raise BadInput(f"description {source}: not TOML: {error}; correct it") from error
     kind = document.get("kind")
@@ -84,7 +86,7 @@ def check_description(
             checks.append(each)
             if done is not None:
                 done(each)
-        keep = any(each.problem for each in checks)
+        keep = any(check.problem for check in checks)
     except ValidationError as error:
         raise BadInput(f"description {source}: {error.errors()[0]['msg']}; correct the address or the file") from error
     finally:
@@ -93,7 +95,7 @@ def check_description(
             file = None
     return DescriptionTestResponse(
         file=source, name=description.name, kind=description.kind, address=port or host,
-        ok=not any(each.problem for each in checks), checks=checks, wire_log=None if file is None else str(file),
+        ok=not any(check.problem for check in checks), checks=checks, wire_log=None if file is None else str(file),
     )  # fmt: skip
 
 
@@ -122,9 +124,9 @@ def _found(
 
 
 def _complaint(place: tuple[str | int, ...], message: str, kind: str, given: object) -> str:
-    where = ".".join(str(part) for part in place) or "the whole file"
+    place_text = ".".join(str(part) for part in place) or "the whole file"
     value = "" if kind == "missing" or not place else f" (is {shown(given)})"
-    return f"{where}: {message.removeprefix('Value error, ')}{value}"
+    return f"{place_text}: {message.removeprefix('Value error, ')}{value}"
 
 
 def _address(port: str | None, host: str | None) -> dict[str, object] | None:

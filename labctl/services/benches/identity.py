@@ -25,12 +25,12 @@ _REPORTED = TypeAdapter(dict[str, dict[str, str]])
 
 def reported_of(bench: BenchFile, said: Reported) -> dict[str, dict[str, str]]:
     """Return device -> what it says of itself, with the USB adapter of each device on a serial port."""
-    found: dict[str, dict[str, str]] = {}
+    identities: dict[str, dict[str, str]] = {}
     for name, section in bench.sections.items():
         adapter = adapter_of(section.port)
-        if known := dict(said.get(name, {})) | ({ADAPTER: adapter} if adapter else {}):
-            found[name] = known
-    return found
+        if identity := dict(said.get(name, {})) | ({ADAPTER: adapter} if adapter else {}):
+            identities[name] = identity
+    return identities
 
 
 def reported_in(campaign: CampaignRow) -> dict[str, dict[str, str]]:
@@ -51,9 +51,10 @@ def pinned(bench: BenchFile, reported: Reported) -> BenchFile:
 def refuse_otherwise_set(bench: BenchFile, reported: Reported) -> None:
     """Raise Conflict where a unit is not set as its bench file states."""
     for gyro in bench.gyros:
-        if said := not_as_stated(gyro.configuration, reported.get(gyro.name, {})):
+        if difference := not_as_stated(gyro.configuration, reported.get(gyro.name, {})):
             raise Conflict(
-                f"{gyro.name}: unit {gyro.serial} is not set as the bench file states: {'; '.join(said)}; set the unit "
+                f"{gyro.name}: unit {gyro.serial} is not set as the bench file states: {'; '.join(difference)}; set "
+                "the unit "
                 "so, or correct `configuration` in its section of the bench file"
             )
 
@@ -66,9 +67,9 @@ def refuse_changed(store: Store, bench: BenchFile, reported: Reported) -> None:
             continue
         then = _reported_then(before, _name_then(before, gyro.serial))
         now = reported.get(gyro.name, {})
-        if (was := then.get(OWN)) and (found := now.get(OWN)):
-            if found not in {was, gyro.own_serial}:
-                raise Conflict(_other_unit(gyro.name, gyro.serial, (was, found), before))
+        if (was := then.get(OWN)) and (own_identity := now.get(OWN)):
+            if own_identity not in {was, gyro.own_serial}:
+                raise Conflict(_other_unit(gyro.name, gyro.serial, (was, own_identity), before))
         elif before.bench_name == bench.name:
             _refuse_other_adapter(gyro.name, gyro, then, now, before)
         if then.get(OWN) == now.get(OWN):
@@ -84,12 +85,12 @@ def refuse_changed(store: Store, bench: BenchFile, reported: Reported) -> None:
 def _refuse_other_settings(
     gyro: GyroSettings, then: Mapping[str, str], now: Mapping[str, str], before: CampaignRow
 ) -> None:
-    found = {name: both for name, both in changed(then, now).items() if name not in gyro.configuration}
-    if found:
-        said = ", ".join(f"{name} was {was} and is {new}" for name, (was, new) in found.items())
-        stated = ", ".join(f'{name} = "{new}"' for name, (_, new) in found.items())
+    changes = {name: both for name, both in changed(then, now).items() if name not in gyro.configuration}
+    if changes:
+        text = ", ".join(f"{name} was {was} and is {new}" for name, (was, new) in changes.items())
+        stated = ", ".join(f'{name} = "{new}"' for name, (_, new) in changes.items())
         raise Conflict(
-            f"{gyro.name}: unit {gyro.serial} is set otherwise than in campaign {before.id}: {said}. Its calibration "
+            f"{gyro.name}: unit {gyro.serial} is set otherwise than in campaign {before.id}: {text}. Its calibration "
             "may not hold so. Set the unit as it was; or, if this is meant, state it in the section of the unit in the "
             f"bench file: configuration = {{ {stated} }}"
         )
@@ -98,33 +99,35 @@ def _refuse_other_settings(
 def _refuse_other_adapter(
     name: str, section: DeviceSettings, then: Mapping[str, str], now: Mapping[str, str], before: CampaignRow
 ) -> None:
-    was, found = then.get(ADAPTER, ""), now.get(ADAPTER, "")
-    if not was or not found or was == found or section.adapter is not None:  # a named one is checked when it is opened
+    was, adapter = then.get(ADAPTER, ""), now.get(ADAPTER, "")
+    if (
+        not was or not adapter or was == adapter or section.adapter is not None
+    ):  # a named one is checked when it is opened
         return
-    owner = _owner(before, ADAPTER, found)
+    owner = _owner(before, ADAPTER, adapter)
     swapped = f", which {owner} was on: two adapters may be exchanged" if owner else ""
     raise Conflict(
-        f"{name}: port {section.port} is on USB adapter {found}{swapped}; in campaign {before.id} the adapter "
+        f"{name}: port {section.port} is on USB adapter {adapter}{swapped}; in campaign {before.id} the adapter "
         f"was {was}. Give the correct port by its path in /dev/serial/by-id, or, if the adapter was replaced, "
-        f"set adapter = '{found}' in the section of the instrument in the bench file"
+        f"set adapter = '{adapter}' in the section of the instrument in the bench file"
     )
 
 
 def _other_unit(name: str, serial: str, own: tuple[str, str], before: CampaignRow) -> str:
-    was, found = own
-    owner = _owner(before, OWN, found)
+    was, other_serial = own
+    owner = _owner(before, OWN, other_serial)
     swapped = f", which {owner} had: the two are exchanged" if owner and owner != name else ""
     return (
-        f"{name}: the unit reports serial number {found}{swapped}, but in campaign {before.id} unit {serial} "
+        f"{name}: the unit reports serial number {other_serial}{swapped}, but in campaign {before.id} unit {serial} "
         f"reported {was}. Connect the right unit; or, for another unit, give it a different `serial`; or, if "
-        f"this is the right unit, set own_serial = '{found}' in the bench file"
+        f"this is the right unit, set own_serial = '{other_serial}' in the bench file"
     )
 
 
 def _owner(before: CampaignRow, what: str, value: str) -> str:
     """Return the device that reported a value in a campaign; empty for none."""
     then = reported_in(before)
-    return next((name for name, said in then.items() if said.get(what) == value), "")
+    return next((name for name, identity in then.items() if identity.get(what) == value), "")
 
 
 def _name_then(before: CampaignRow, serial: str) -> str:

@@ -68,42 +68,42 @@ class BenchHold:
 
     def take(self) -> None:
         """Take the bench. Raises Conflict naming the holder; waits a term for one that may be dead."""
-        found = self._store.leases.holder(self._bench)
-        if found is not None and not self._gone(found):
-            raise Conflict(f"{described(found)}; wait until that process ends, or stop that process")
+        holder = self._store.leases.holder(self._bench)
+        if holder is not None and not self._gone(holder):
+            raise Conflict(f"{described(holder)}; wait until that process ends, or stop that process")
         begun_s, now = self._clock.now_s(), self._clock.utc()
         mine = LeaseRow(
             self._bench, self._owner, socket.gethostname(), this_machine(), os.getpid(), since=now,
-            beat=1 if found is None else found.beat + 1, beat_at=now, expires_at=now + timedelta(seconds=TERM_S),
+            beat=1 if holder is None else holder.beat + 1, beat_at=now, expires_at=now + timedelta(seconds=TERM_S),
             url=self._store.leases.address.url, calls=self._store.leases.address.calls,
         )  # fmt: skip
-        if not self._store.leases.claim(mine, replacing=found):
+        if not self._store.leases.claim(mine, replacing=holder):
             raise Conflict(f"bench {self._bench}: another process has just reserved the bench; try again")
         _HELD_HERE.add(self._owner)
         self._renewed_s, self._why_lost = begun_s, ""
-        log.info("lease.taken", bench=self._bench, instead_of="" if found is None else described(found))
+        log.info("lease.taken", bench=self._bench, instead_of="" if holder is None else described(holder))
 
-    def _gone(self, found: LeaseRow) -> bool:
+    def _gone(self, lease: LeaseRow) -> bool:
         """Return whether a holder can no longer drive the bench."""
-        if found.owner in _HELD_HERE:
+        if lease.owner in _HELD_HERE:
             return False
-        if self._store.is_sole_writer or _is_dead(found):
+        if self._store.is_sole_writer or _is_dead(lease):
             return True
         now = self._clock.utc()
         # An expiry further ahead than a lease lasts was written by a clock that is wrong.
-        if now < found.expires_at <= now + timedelta(seconds=2 * TERM_S):
+        if now < lease.expires_at <= now + timedelta(seconds=2 * TERM_S):
             return False
-        return self._is_silent(found)
+        return self._is_silent(lease)
 
-    def _is_silent(self, found: LeaseRow) -> bool:
+    def _is_silent(self, lease: LeaseRow) -> bool:
         """Watch a lease for a term; returns whether it stayed as it was."""
         until_s = self._clock.now_s() + TERM_S
         while self._clock.now_s() < until_s:
             self._clock.sleep(RENEW_S)
             if self._over.is_set():
                 return False
-            seen = self._store.leases.holder(self._bench)
-            if seen is not None and (seen.owner, seen.beat) != (found.owner, found.beat):
+            holder = self._store.leases.holder(self._bench)
+            if holder is not None and (holder.owner, holder.beat) != (lease.owner, lease.beat):
                 return False
         return True
 
@@ -117,8 +117,10 @@ class BenchHold:
                 self._renewed_s = begun_s
             else:
                 self._renewed_s = None
-                found = self._store.leases.holder(self._bench)
-                self._note_loss(described(found) if found else "another process has taken its reservation of the bench")
+                holder = self._store.leases.holder(self._bench)
+                self._note_loss(
+                    described(holder) if holder else "another process has taken its reservation of the bench"
+                )
         except Exception as error:  # noqa: BLE001  the next try may do better; until then `held` counts the time
             self._note_loss(str(error) or type(error).__name__)
 
@@ -171,7 +173,7 @@ def hold_bench(store: Store, bench: BenchFile, clock: Clock | None = None) -> Be
 
 @contextmanager
 def holding(store: Store, bench: BenchFile) -> Iterator[Control]:
-    """Hold a bench for one campaign; gives the campaign's control. Raises Conflict naming who has it."""
+    """Hold the lease on a bench for one campaign; yields the campaign's control. Raises Conflict naming who has it."""
     hold = hold_bench(store, bench)
     try:
         yield Control() if hold is None else hold.control()
@@ -185,12 +187,12 @@ def open_for(bench: BenchFile, location: str) -> Iterator[Store]:
     """Open a database to run a campaign on a bench. Raises Conflict naming who holds the database, and the bench."""
     try:
         opened = Store(Database(location, write=True))
-    except Conflict as taken:
+    except Conflict as lease:
         with open_store(location, write=False) as store:
             holder = store.leases.holder(bench.name)
         if holder is None:
             raise
-        raise Conflict(f"{described(holder)}. {taken}") from taken
+        raise Conflict(f"{described(holder)}. {lease}") from lease
     try:
         opened.imports.discard_unfinished()
         yield opened
@@ -200,12 +202,12 @@ def open_for(bench: BenchFile, location: str) -> Iterator[Store]:
 
 def driver_of(store: Store, bench_name: str, now: datetime) -> LeaseRow | None:
     """Return the lease of the process that drives a bench now; None where no process does."""
-    found = store.leases.holder(bench_name)
-    return None if found is None or found.expires_at <= now or _is_dead(found) else found
+    holder = store.leases.holder(bench_name)
+    return None if holder is None or holder.expires_at <= now or _is_dead(holder) else holder
 
 
 def described(lease: LeaseRow) -> str:
-    """Say who holds a bench."""
+    """Return a sentence that names the holder of a bench."""
     who = f"process {lease.pid} on {lease.host} since {lease.since:%Y-%m-%d %H:%M:%S} UTC"
     if lease.url is not None:
         who = f"the service at {lease.url}, {who}"
@@ -221,12 +223,12 @@ def this_machine() -> str:
         return ""
 
 
-def _is_dead(found: LeaseRow) -> bool:
+def _is_dead(lease: LeaseRow) -> bool:
     """Return whether a holder is known to have ended: a process of this very machine that is no more."""
-    if not found.machine or found.machine != this_machine():
+    if not lease.machine or lease.machine != this_machine():
         return False
     try:
-        os.kill(found.pid, 0)
+        os.kill(lease.pid, 0)
     except ProcessLookupError:
         return True
     except OSError:

@@ -43,17 +43,17 @@ def new_bench(
     if file.exists() and not force:
         raise BadInput(f"{file} exists already and was not changed; give another name, or --force to replace the file")
     clock = SystemClock()
-    found, lines = [], []
+    findings, lines = [], []
     for info, each in search(request.ports, request.hosts, clock):
-        found.append((info, each))
+        findings.append((info, each))
         text = each.recognised.text if each.recognised is not None else each.why_not
         lines.append(FoundResponse(address=each.address, kind=each.kind, driver=each.driver, text=text))
         seen(lines[-1])
-    sections = sections_of(found)
+    sections = sections_of(findings)
     complete(sections, request.settings, clock, ask)
-    made = document(request.name, request.latitude_deg, sections)
-    write(file, made, sections)
-    return NewBenchResponse.model_validate({"file": str(file), "found": lines, "bench": made})
+    bench_document = document(request.name, request.latitude_deg, sections)
+    write(file, bench_document, sections)
+    return NewBenchResponse.model_validate({"file": str(file), "found": lines, "bench": bench_document})
 
 
 def search(ports: Sequence[str], hosts: Sequence[str], clock: Clock) -> Iterator[tuple[PortInfo | None, Found]]:
@@ -67,26 +67,26 @@ def search(ports: Sequence[str], hosts: Sequence[str], clock: Clock) -> Iterator
         yield None, find_on_host(name, int(number or MODBUS_PORT), clock)
 
 
-def sections_of(found: Sequence[tuple[PortInfo | None, Found]]) -> list[Section]:
+def sections_of(recognised: Sequence[tuple[PortInfo | None, Found]]) -> list[Section]:
     """Return the sections of what was recognised: one table, one chamber and the gyros. Raises BadInput."""
-    made: list[Section] = []
-    for info, each in found:
+    sections: list[Section] = []
+    for info, each in recognised:
         if each.recognised is None:
             continue
-        if each.kind != "gyro" and (other := next((one for one in made if one.kind == each.kind), None)):
+        if each.kind != "gyro" and (other := next((one for one in sections if one.kind == each.kind), None)):
             raise BadInput(
                 f"two {each.kind}s answer, at {other.found.address} and {each.address}, but a bench has only "
                 f"one {each.kind}; name the ports of this bench with --port and --host"
             )
-        section = Section(_name(each, made), each.kind, each, dict(each.recognised.settings))
+        section = Section(_name(each, sections), each.kind, each, dict(each.recognised.settings))
         section.values = {"driver": each.driver, **_address(each, info), **section.values}
-        made.append(section)
-    if not any(section.kind == "gyro" for section in made):
+        sections.append(section)
+    if not any(section.kind == "gyro" for section in sections):
         raise BadInput(
             "no gyro was recognised, and a bench needs one: check power and cables, name the port of the gyro with "
             f"--port, or copy and edit {shipped_benches()['example-real']}"
         )
-    return made
+    return sections
 
 
 def complete(sections: Sequence[Section], settings: Mapping[str, object], clock: Clock, ask: Ask) -> None:
@@ -98,36 +98,40 @@ def complete(sections: Sequence[Section], settings: Mapping[str, object], clock:
     for section in sections:
         for key, value in ask_itself(section.name, section.values, clock).items():
             section.values.setdefault(key, value)
-        given = {key.rpartition(".")[2]: value for key, value in settings.items() if key.startswith(f"{section.name}.")}
-        section.values |= given
+        stated = {
+            key.rpartition(".")[2]: value for key, value in settings.items() if key.startswith(f"{section.name}.")
+        }
+        section.values |= stated
         assert section.found.recognised is not None
-        for key, what in section.found.recognised.to_confirm.items():
-            if key not in given and (value := ask(section.name, key, what, section.values.get(key))) is not None:
+        for key, question in section.found.recognised.to_confirm.items():
+            if key not in stated and (value := ask(section.name, key, question, section.values.get(key))) is not None:
                 section.values[key] = value
 
 
 def document(name: str, latitude_deg: float | None, sections: Sequence[Section]) -> dict[str, object]:
     """Return the bench file as a document, checked by the models of its drivers. Raises BadInput."""
-    made: dict[str, object] = {"name": name}
+    bench_document: dict[str, object] = {"name": name}
     if latitude_deg is not None:
-        made["latitude_deg"] = latitude_deg
-    made |= {section.kind: section.values for section in sections if section.kind != "gyro"}
-    made["gyros"] = [{"name": section.name, **section.values} for section in sections if section.kind == "gyro"]
+        bench_document["latitude_deg"] = latitude_deg
+    bench_document |= {section.kind: section.values for section in sections if section.kind != "gyro"}
+    bench_document["gyros"] = [
+        {"name": section.name, **section.values} for section in sections if section.kind == "gyro"
+    ]
     try:
-        resolve(BenchFile.model_validate(made))
+        resolve(BenchFile.model_validate(bench_document))
     except ValidationError as error:
         first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
+        place_text = ".".join(str(part) for part in first["loc"])
         raise BadInput(
-            f"the bench file would not be valid: {where}: {first['msg']}; give it with --set SECTION.KEY=VALUE"
+            f"the bench file would not be valid: {place_text}: {first['msg']}; give it with --set SECTION.KEY=VALUE"
         ) from error
-    return made
+    return bench_document
 
 
 def write(path: Path, made: Mapping[str, object], sections: Sequence[Section]) -> None:
     """Write a bench file; raises BadInput."""
-    said = [f"#   {s.name}: {s.found.recognised.text} at {s.found.address}" for s in sections if s.found.recognised]
-    head = [f"# Written by `labctl bench new` at {WallClock().utc():%Y-%m-%d %H:%M} UTC. What answered:", *said]
+    header = [f"#   {s.name}: {s.found.recognised.text} at {s.found.address}" for s in sections if s.found.recognised]
+    head = [f"# Written by `labctl bench new` at {WallClock().utc():%Y-%m-%d %H:%M} UTC. What answered:", *header]
     foot = "# `labctl bench check` asks every instrument; nothing moves. Keys: docs/reference/instruments.md."
     try:
         path.write_text("\n".join([*head, foot, tomli_w.dumps(dict(made))]), encoding="utf-8")
@@ -146,15 +150,15 @@ def parse_setting(text: str) -> tuple[str, object]:
         return key.strip(), value
 
 
-def _name(found: Found, made: Sequence[Section]) -> str:
-    if found.kind != "gyro":
-        return found.kind
-    same = sum(section.found.driver == found.driver for section in made)
-    return f"{found.driver}-{same + 1}" if same else found.driver
+def _name(recognised: Found, made: Sequence[Section]) -> str:
+    if recognised.kind != "gyro":
+        return recognised.kind
+    same = sum(section.found.driver == recognised.driver for section in made)
+    return f"{recognised.driver}-{same + 1}" if same else recognised.driver
 
 
-def _address(found: Found, info: PortInfo | None) -> dict[str, object]:
+def _address(recognised: Found, info: PortInfo | None) -> dict[str, object]:
     if info is not None:
         return {"port": info.path, **({"adapter": info.adapter} if info.adapter else {})}
-    host, _, number = found.address.rpartition(":")
+    host, _, number = recognised.address.rpartition(":")
     return {"host": host, **({} if int(number) == MODBUS_PORT else {"tcp_port": int(number)})}

@@ -27,8 +27,8 @@ def asked_speed(clock: Clock) -> float | None:
 
 def reached_speed(clock: Clock) -> float | None:
     """Return the speed that simulated time reaches, to 4 figures; None for real time, and before it is known."""
-    found = clock.reached_speed if isinstance(clock, PacedClock) else None
-    return None if found is None else float(f"{found:.4g}")
+    speed = clock.reached_speed if isinstance(clock, PacedClock) else None
+    return None if speed is None else float(f"{speed:.4g}")
 
 
 class PaceWatch:

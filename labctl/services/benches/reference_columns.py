@@ -22,25 +22,25 @@ def reference_channels(bench: Bench, bench_file: BenchFile) -> tuple[RawChannelJ
 
     Raises BadInput for two of one name, and for a chosen instrument that measures no temperature.
     """
-    found: list[RawChannelJson] = []
+    raw_channels: list[RawChannelJson] = []
     for settings in bench_file.references:
         channels = [raw_channel(channel) for channel in bench.references[settings.name].channels]
-        refuse_doubled_columns(settings.name, tuple(channels), tuple(found))
+        refuse_doubled_columns(settings.name, tuple(channels), tuple(raw_channels))
         if settings.is_temperature:
-            warm = next((each for each in channels if each["unit"] == "deg C"), None)
-            if warm is None:
+            temperature_channel = next((each for each in channels if each["unit"] == "deg C"), None)
+            if temperature_channel is None:
                 raise BadInput(
                     f"{settings.name}: is_temperature is set, but this instrument measures no temperature; set "
                     "is_temperature for a thermometer"
                 )
-            warm["stands_for"] = TEMPERATURE
-        found += channels
-    return tuple(found)
+            temperature_channel["stands_for"] = TEMPERATURE
+        raw_channels += channels
+    return tuple(raw_channels)
 
 
 def refuse_doubled_columns(name: str, channels: tuple[RawChannelJson, ...], others: tuple[RawChannelJson, ...]) -> None:
     """Raise BadInput where a column would have two sources."""
-    if doubled := {each["name"] for each in channels} & {each["name"] for each in others}:
+    if doubled := {channel["name"] for channel in channels} & {other["name"] for other in others}:
         column = min(doubled)
         raise BadInput(
             f"{name}: column {column} has another source already; set columns = "
@@ -50,17 +50,17 @@ def refuse_doubled_columns(name: str, channels: tuple[RawChannelJson, ...], othe
 
 def temperature_instrument(bench: BenchFile) -> str:
     """Return the name of the reference instrument by whose temperature the units are fitted; empty: their own."""
-    return next((each.name for each in bench.references if each.is_temperature), "")
+    return next((reference.name for reference in bench.references if reference.is_temperature), "")
 
 
 def reference_notes(bench: BenchFile) -> str:
     """Return what a recording says about the instrument whose temperature it is fitted by; empty for the unit's own."""
-    for each in bench.references:
-        if each.is_temperature:
-            parts = [f"temperature_c is by {each.name}", each.model_dump().get("model", ""), each.serial]
-            if each.certificate:
-                parts.append(f"certificate {each.certificate}")
-            if each.u_c is not None:
-                parts.append(f"standard uncertainty {each.u_c:g} K")
+    for reference in bench.references:
+        if reference.is_temperature:
+            parts = [f"temperature_c is by {reference.name}", reference.model_dump().get("model", ""), reference.serial]
+            if reference.certificate:
+                parts.append(f"certificate {reference.certificate}")
+            if reference.u_c is not None:
+                parts.append(f"standard uncertainty {reference.u_c:g} K")
             return ", ".join(part for part in parts if part)
     return ""

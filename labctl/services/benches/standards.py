@@ -19,7 +19,7 @@ DEMANDED_RATE = "rate_u_ppm of [table]"
 
 def standards_of(bench: BenchFile) -> tuple[Standard, ...]:
     """Return the reference standards of a bench whose sections are by the models of their drivers."""
-    stated = {each.quantity for each in bench.standards}
+    stated = {standard.quantity for standard in bench.standards}
     derived = [each for each in _of_table(bench) if each.name == MEASURED_STEP_CLOCK or each.quantity not in stated]
     if "thermometer" not in stated:
         derived += _of_references(bench)
@@ -54,9 +54,9 @@ def _expected_of_runs(reply_u_s: float | None, clock_run_s: float) -> tuple[floa
 def _of_references(bench: BenchFile) -> list[Standard]:
     """Return the reference thermometer by which the units are fitted, where its uncertainty is stated."""
     return [
-        Standard(quantity="thermometer", name=each.name, u=each.u_c, certificate=each.certificate)
-        for each in bench.references
-        if each.is_temperature and each.u_c is not None
+        Standard(quantity="thermometer", name=reference.name, u=reference.u_c, certificate=reference.certificate)
+        for reference in bench.references
+        if reference.is_temperature and reference.u_c is not None
     ]
 
 
@@ -70,14 +70,15 @@ def overdue_events(standards: Sequence[Standard], on: date) -> tuple[Event, ...]
     return tuple(
         Event(
             "standard_overdue",
-            f"standard {each.label} was due on {each.due}, {(on - each.due).days} days ago; have it calibrated: a "
+            f"standard {standard.label} was due on {standard.due}, {(on - standard.due).days} days ago; have it "
+            "calibrated: a "
             "certificate of what is measured now is refused",
             level="warning",
-            device=each.quantity,
-            value=float((on - each.due).days),
+            device=standard.quantity,
+            value=float((on - standard.due).days),
             limit=0.0,
             unit="d",
         )
-        for each in standards
-        if each.due is not None and each.is_overdue(on)
+        for standard in standards
+        if standard.due is not None and standard.is_overdue(on)
     )

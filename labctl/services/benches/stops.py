@@ -105,7 +105,7 @@ class BenchStops:
             self.carried_out(stops, text)
 
     def refuse_moving(self, by: str | None, known: frozenset[str]) -> None:
-        """Let the bench move again in the name of a person; None: no person asks for it.
+        """Return why the bench must not move again yet; `None` as the person: no person asks for it.
 
         `known`: the stops that had been asked for when the person asked. One that came later was not meant to be taken
         back. Raises BenchBusy while a stop is not carried out, without a person while one holds, and for a later one.

@@ -74,7 +74,7 @@ def wiggle_units(bench: BenchFile, source: str, opened: Bench, clock: Clock, say
             test.await_rest()
     finally:
         opened.close()
-    units = [_unit(bench, name, found, moved) for name, found in moved.items()]
+    units = [_unit(bench, name, rates, moved) for name, rates in moved.items()]
     return WiggleResponse(bench=source, ok=all(unit.ok for unit in units), units=units)
 
 
@@ -120,8 +120,8 @@ class _Test:
             if not begun and max(largest.values()) > 1.0:
                 begun, end_s = True, self._clock.now_s() + FOLLOW_S
         fastest = max(largest.values())
-        found = [name for name, share in largest.items() if share > max(1.0, ALSO_SHARE * fastest)]
-        return sorted(found, key=lambda name: -largest[name])
+        moved_units = [name for name, share in largest.items() if share > max(1.0, ALSO_SHARE * fastest)]
+        return sorted(moved_units, key=lambda name: -largest[name])
 
     def await_rest(self) -> None:
         """Wait until all units are at rest again, at most as long as for a movement."""
@@ -131,20 +131,20 @@ class _Test:
 
     def _read(self) -> dict[str, Rates]:
         """Return the rates (n, axes) of each unit since the last call, deg/s."""
-        found = {}
+        rates = {}
         for name, gyro in self._gyros.items():
             readings = gyro.read(max(BLOCK_S / len(self._gyros), 1.5 / gyro.sample_rate_hz))
-            found[name] = _rates(readings, self._outputs[name])
-        return found
+            rates[name] = _rates(readings, self._outputs[name])
+        return rates
 
     def _shares(self, rates: Mapping[str, Rates]) -> dict[str, float]:
         """Return the root mean square of each unit's rates, less those at rest, as a share of its limit."""
         return {
-            name: float(np.sqrt(np.mean(np.sum((each - self._rest[name].mean_dps) ** 2, axis=1))))
+            name: float(np.sqrt(np.mean(np.sum((rate - self._rest[name].mean_dps) ** 2, axis=1))))
             / self._rest[name].limit_dps
-            if len(each)
+            if len(rate)
             else 0.0
-            for name, each in rates.items()
+            for name, rate in rates.items()
         }
 
 
@@ -152,24 +152,26 @@ def _rates(readings: Readings, outputs: Mapping[str, Nominal]) -> Rates:
     return np.column_stack([output.rate_dps(readings.raw[output.channel.name]) for output in outputs.values()])
 
 
-def _said(asked: str, found: list[str]) -> str:
-    return f"unit {asked} was to be turned; {' and '.join(found) or 'nothing'} moved"
+def _said(asked: str, moved_units: list[str]) -> str:
+    return f"unit {asked} was to be turned; {' and '.join(moved_units) or 'nothing'} moved"
 
 
-def _unit(bench: BenchFile, name: str, found: list[str], moved: Mapping[str, list[str]]) -> WiggleUnit:
+def _unit(bench: BenchFile, name: str, moved_units: list[str], moved: Mapping[str, list[str]]) -> WiggleUnit:
     settings = {gyro.name: gyro for gyro in bench.gyros}
     port = settings[name].port or settings[name].host or ""
-    if found == [name]:
+    if moved_units == [name]:
         text = f"the unit is on {port}"
-    elif not found:
+    elif not moved_units:
         text = (
             f"no unit moved within {WITHIN_S:g} s: turn the unit by more than a quarter turn, and check its port {port}"
         )
-    elif len(found) > 1:
-        text = f"{' and '.join(found)} moved: turn only the named unit, and start again"
+    elif len(moved_units) > 1:
+        text = f"{' and '.join(moved_units)} moved: turn only the named unit, and start again"
     else:
-        (other,) = found
+        (other,) = moved_units
         there = settings[other].port or settings[other].host
         exchanged = "the two ports are exchanged" if moved.get(other) == [name] else "the ports do not fit the names"
         text = f"{other} moved instead, so {exchanged}: set port = '{there}' for {name} in the bench file"
-    return WiggleUnit(unit=name, serial=settings[name].serial, port=port, moved=found, ok=found == [name], text=text)
+    return WiggleUnit(
+        unit=name, serial=settings[name].serial, port=port, moved=moved_units, ok=moved_units == [name], text=text
+    )

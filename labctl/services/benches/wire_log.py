@@ -49,14 +49,14 @@ def recording(
         raise BadInput(
             f"--wire-log {path}: the file cannot be written ({error.strerror}); name a file in a folder that exists"
         ) from error
-    found = SessionLog(WireRecorder(file, clock))
+    session_log = SessionLog(WireRecorder(file, clock))
     try:
-        yield found
+        yield session_log
     except BaseException as error:
-        found.result.ended_by = f"{type(error).__name__}: {error}"
+        session_log.result.ended_by = f"{type(error).__name__}: {error}"
         raise
     finally:
-        file.close(clock.now_s(), found.result.model_dump(exclude_defaults=True))
+        file.close(clock.now_s(), session_log.result.model_dump(exclude_defaults=True))
         if file.failure or file.left_out:
             log.warning(
                 "wire_log.incomplete", file=str(path), reason=file.failure or "the disk was too slow",

@@ -78,8 +78,8 @@ def _specific_force(compensator: Compensator, columns: Mapping[str, Column]) -> 
     if lacking:
         return None, f"column {', '.join(lacking)} is missing: {force.sentence()}"
     n = len(next(iter(columns.values())))
-    found = [_floats(columns[f"accel_{axis}_g"]) if axis in force.needs else np.zeros(n) for axis in BODY_AXES]
-    return np.column_stack(found), ""
+    force_columns = [_floats(columns[f"accel_{axis}_g"]) if axis in force.needs else np.zeros(n) for axis in BODY_AXES]
+    return np.column_stack(force_columns), ""
 
 
 def _floats(column: Column) -> Array:

@@ -97,10 +97,10 @@ def _of_verdict(criticism: CriticismResponse | None) -> Iterator[Objection]:
             f"make the measurement that distinguishes these effects (labctl criticise {version}), add the right one "
             "and certify the new version"
         )
-    said = (
+    text = (
         f"the verdict on recording {criticism.recording} is {criticism.verdict!r} ({figures}): {_sentence(criticism)}"
     )
-    yield Objection(what="verdict", text=said.rstrip("."), do=do)
+    yield Objection(what="verdict", text=text.rstrip("."), do=do)
 
 
 def _lacks_something(criticism: CriticismResponse) -> bool:
@@ -109,7 +109,7 @@ def _lacks_something(criticism: CriticismResponse) -> bool:
     Of an ambiguous verdict: whether its leader takes off a share of the excess over noise, 0 where there is no excess.
     """
     if criticism.verdict == "ambiguous":
-        leader = [each for each in criticism.suspects if each["effect"] in criticism.named[:1]]
+        leader = [suspect for suspect in criticism.suspects if suspect["effect"] in criticism.named[:1]]
         return all(each["share_removed"] > 0 for each in leader)
     return criticism.verdict in {"missing", "unexplained"}
 
@@ -130,8 +130,8 @@ def _of_errors(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
             continue
         worse = worse_than_version(_errors(other), own)
         if worse:
-            said = f"{worse} of version {version}, {role}, on the same recording"
-            yield Objection(what="worse", text=said, do=f"certify version {version}, or improve this version")
+            text = f"{worse} of version {version}, {role}, on the same recording"
+            yield Objection(what="worse", text=text, do=f"certify version {version}, or improve this version")
 
 
 def _errors(row: CalibrationRecord) -> CertifiedErrors:
@@ -147,6 +147,6 @@ def _of_data(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
         (n, w) for n in row.recordings for w in inspect_stored(store, store.recordings.get(n)).warnings
     ):
         if warning.severity == "certain":
-            said = f"recording {number}: {warning.where}: {warning.said} (expected {warning.expected})"
+            text = f"recording {number}: {warning.where}: {warning.said} (expected {warning.expected})"
             again = "fit again" if warning.part == "fitted" else "measure the verification part again"
-            yield Objection(what="data", text=said, do=f"{warning.do}, and {again}")
+            yield Objection(what="data", text=text, do=f"{warning.do}, and {again}")

@@ -25,12 +25,12 @@ def versions_apart(
     Of versions that lie closer together than `least`, or share a recording with the one before, the first counts. A
     version without a date of its measurements is left out, and alone where it is the last.
     """
-    earlier = [each for each in versions if each.version != last.version]
-    kept: list[CertifiedVersion] = []
+    earlier = [version for version in versions if version.version != last.version]
+    apart: list[CertifiedVersion] = []
     for _, _, each in sorted((one.measured_at, one.version, one) for one in earlier if one.measured_at is not None):
-        if (not kept or _is_apart(kept[-1], each, least)) and _is_apart(each, last, least):
-            kept.append(each)
-    return [*kept, last]
+        if (not apart or _is_apart(apart[-1], each, least)) and _is_apart(each, last, least):
+            apart.append(each)
+    return [*apart, last]
 
 
 def _is_apart(before: CertifiedVersion, after: CertifiedVersion, least: timedelta) -> bool:
@@ -41,17 +41,18 @@ def _is_apart(before: CertifiedVersion, after: CertifiedVersion, least: timedelt
 
 def calibrations_of(store: Store, versions: Sequence[CertifiedVersion]) -> dict[int, Calibration]:
     """Return number of a calibration -> its content. Raises BadCalibrationFile, which names unit and version."""
-    documents = store.certified_versions.documents([each.id for each in versions])
-    found = {}
-    for each in versions:
+    documents = store.certified_versions.documents([version.id for version in versions])
+    calibrations = {}
+    for version in versions:
         try:
-            found[each.id] = read_calibration(documents[each.id])
+            calibrations[version.id] = read_calibration(documents[version.id])
         except BadCalibrationFile as error:
             raise BadCalibrationFile(
-                f"{each.serial} version {each.version}, which the drift until the due date is computed from: {error}; "
+                f"{version.serial} version {version.version}, which the drift until the due date is computed from: "
+                f"{error}; "
                 "run `labctl check`"
             ) from error
-    return found
+    return calibrations
 
 
 def rates_of(
@@ -61,7 +62,7 @@ def rates_of(
 
     NaN where one of the versions is not valid; an interval between versions that cannot be compared is left out.
     """
-    errors = [grid.errors_dps(calibrations[each.id]) for each in versions]
+    errors = [grid.errors_dps(calibrations[version.id]) for version in versions]
     rates, years = [], []
     for (before, old), (after, new) in pairwise(zip(versions, errors, strict=True)):
         if old is not None and new is not None and before.measured_at and after.measured_at:

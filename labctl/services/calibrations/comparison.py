@@ -35,14 +35,14 @@ def worse_than_raw(error: Errors, *, late: bool = False) -> list[Finding]:
 
     With `late`, of a fit without delay and bandwidth to rates that change, these are the likely cause.
     """
-    raw, left = error.raw_rms_dps, error.rms_dps
-    if raw is None or left is None or not left > (1.0 + ROUNDING) * raw:
+    raw, residual_dps = error.raw_rms_dps, error.rms_dps
+    if raw is None or residual_dps is None or not residual_dps > (1.0 + ROUNDING) * raw:
         return []
     return [
         Finding(
             "worse", "likely" if late else "certain", "fit",
-            f"the residual of the model on the data of the fit is {left:.4g} deg/s RMS, but the error without "
-            f"correction is only {raw:.4g} deg/s", left, "deg/s", f"less than {raw:.4g} deg/s",
+            f"the residual of the model on the data of the fit is {residual_dps:.4g} deg/s RMS, but the error without "
+            f"correction is only {raw:.4g} deg/s", residual_dps, "deg/s", f"less than {raw:.4g} deg/s",
             "add time_delay and bandwidth to the effects" if late
             else "check sign, unit and axes of the output, or choose another model",
         )
@@ -51,16 +51,16 @@ def worse_than_raw(error: Errors, *, late: bool = False) -> list[Finding]:
 
 def worse_than_before(before: Errors, after: Errors) -> list[Finding]:
     """Return findings where a changed model is worse than the one it was made from, or predicts no better."""
-    found = worse_than_raw(after)
+    findings = worse_than_raw(after)
     first, second = before.rms_dps, after.rms_dps
     if first is not None and second is not None and second > WORSE * first:
-        found.append(_of_change(f"the RMS error rises from {first:.4g} to {second:.4g} deg/s", first, second))
+        findings.append(_of_change(f"the RMS error rises from {first:.4g} to {second:.4g} deg/s", first, second))
     first, second = before.heldout_rms_dps, after.heldout_rms_dps
     if first is not None and second is not None and second >= first:
         rises = second > (1.0 + ROUNDING) * first
-        said = f"the held-out RMS error {'rises' if rises else 'does not fall'}: {first:.4g} deg/s before, "
-        found.append(_of_change(f"{said}{second:.4g} deg/s after", first, second))
-    return found
+        text = f"the held-out RMS error {'rises' if rises else 'does not fall'}: {first:.4g} deg/s before, "
+        findings.append(_of_change(f"{text}{second:.4g} deg/s after", first, second))
+    return findings
 
 
 def _of_change(said: str, first: float, second: float) -> Finding:
@@ -79,6 +79,6 @@ def worse_than_version(other: Errors, own: Errors) -> str:
         ("RMS", other.rms_dps, own.rms_dps),
     ):
         if first is not None and second is not None:
-            said = f"the version's {name} error, {second:.4g} deg/s, is larger than the {first:.4g} deg/s"
-            return said if second > WORSE_VERSION * first else ""
+            text = f"the version's {name} error, {second:.4g} deg/s, is larger than the {first:.4g} deg/s"
+            return text if second > WORSE_VERSION * first else ""
     return ""

@@ -57,10 +57,10 @@ def _of_environment() -> int | None:
 
 def span(text: str) -> timedelta:
     """Return the span of time in "30d", "12h" or "2w". Raises BadInput."""
-    found = _SPAN.fullmatch(text.strip())
-    if found is None:
+    match = _SPAN.fullmatch(text.strip())
+    if match is None:
         raise BadInput(
             f"due_within {text[:40]!r} is not a time span; give a whole number and h, d or w for hours, days or weeks, "
             "such as 30d"
         )
-    return timedelta(days=int(found[1]) * _UNITS[found[2]])
+    return timedelta(days=int(match[1]) * _UNITS[match[2]])

@@ -43,8 +43,8 @@ class ErrorGrid:
         counts = {
             axis: np.tile([axis in outputs for _, outputs in vectors], len(temperatures)) for axis in calibration.axes
         }
-        warm = np.repeat(np.asarray(temperatures, dtype=np.float64), len(vectors))
-        return ErrorGrid(calibration.axes, warm, rates, counts)
+        temperature_c = np.repeat(np.asarray(temperatures, dtype=np.float64), len(vectors))
+        return ErrorGrid(calibration.axes, temperature_c, rates, counts)
 
     def errors_dps(self, calibration: Calibration) -> Array | None:
         """Return the modelled errors of a calibration, (places,) deg/s, NaN where it is not valid.
@@ -58,21 +58,21 @@ class ErrorGrid:
             "temperature_c": self.temperature_c, "table_rate_dps": np.zeros(n), "position": np.full(n, "z"),
         }  # fmt: skip
         try:
-            found = errors_at_true_rates(calibration.fitted, Channels(columns, dict(self.rates_dps)))
+            errors = errors_at_true_rates(calibration.fitted, Channels(columns, dict(self.rates_dps)))
         except LabctlError:  # a law that has no inverse there
             return None
         valid = self._is_valid(calibration)
-        return np.concatenate([np.where(valid, found[axis], np.nan)[self.counts[axis]] for axis in self.axes])
+        return np.concatenate([np.where(valid, errors[axis], np.nan)[self.counts[axis]] for axis in self.axes])
 
     def _is_valid(self, calibration: Calibration) -> NDArray[np.bool_]:
         """Return where a version is valid, (n,); a limit that it does not have is none."""
-        (slow, fast), (cold, hot) = calibration.rate_dps, calibration.temperature_c
+        (slow, fast), (coldest, hot) = calibration.rate_dps, calibration.temperature_c
         valid = np.ones(len(self.temperature_c), dtype=np.bool_)
         if np.isfinite(fast - slow):
             size = np.linalg.norm(np.stack(list(self.rates_dps.values())), axis=0)
             valid &= size <= max(abs(slow), abs(fast)) * (1 + MARGIN_SHARE)
-        if np.isfinite(hot - cold):
-            valid &= (self.temperature_c >= cold - MARGIN_C) & (self.temperature_c <= hot + MARGIN_C)
+        if np.isfinite(hot - coldest):
+            valid &= (self.temperature_c >= coldest - MARGIN_C) & (self.temperature_c <= hot + MARGIN_C)
         return valid
 
 

@@ -38,8 +38,8 @@ class FetchLog:
         """Note a fetch at an aware time; returns whether `write` is to be called now."""
         key = (serial, version, who)
         with self._lock:
-            known = self._pending.get(key)
-            self._pending[key] = FetchRow(serial, version, who, known.first_at if known else at, at)
+            pending = self._pending.get(key)
+            self._pending[key] = FetchRow(serial, version, who, pending.first_at if pending else at, at)
             before = self._written.get(key)
             return before is None or at - before >= LAST_KNOWN_TO
 

@@ -55,25 +55,25 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is
     """
     measured = measurements_of(store, serial, request.recording, request.recordings)
     recording, campaign, recordings = measured.row.id, measured.row.campaign, measured.recordings
-    what = f"fit of {measured.named} of {serial}"
-    refuse_wrong(measured.warnings, what, accepted=request.accept_warnings)
+    job_title = f"fit of {measured.named} of {serial}"
+    refuse_wrong(measured.warnings, job_title, accepted=request.accept_warnings)
     source = measured.source
     fixed = fixed_of(request.fixed)
     result = fit(source, request.model, request.effects, covered=measured.covered, fixed=fixed)
     late = source.info.motion == "profile" and IDS.isdisjoint(result.fitted.model.effect_ids)
     warnings = [*measured.warnings, *map(warning_of, worse_than_raw(result.error, late=late))]
-    refuse_wrong(warnings, what, accepted=request.accept_warnings)
+    refuse_wrong(warnings, job_title, accepted=request.accept_warnings)
     evidence = evidence_of(source, request.model, request.effects, fixed)
     run = store.campaigns.get(campaign) if campaign is not None else None
     recipe, bench = (run.recipe_name, run.bench_name) if run is not None else (None, None)
-    made = {
+    provenance = {
         "recording": recording, "campaign": campaign, "recipe": recipe, "bench": bench, **several(recordings),
         **reference_of(measured.rows),
     }  # fmt: skip
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
-            source.info, result, version=version, parent=None, issued_at=at, provenance=made, evidence=evidence,
+            source.info, result, version=version, parent=None, issued_at=at, provenance=provenance, evidence=evidence,
             used_on=days_of(measured.rows),
         )  # fmt: skip
         answer: KeptFit = {
@@ -86,8 +86,8 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is
             is_draft=is_draft,
         )  # fmt: skip
 
-    kept = keep_next_version(store, serial, at, build)
-    return FitResponse.model_validate(kept.answer, extra="forbid")
+    kept_version = keep_next_version(store, serial, at, build)
+    return FitResponse.model_validate(kept_version.answer, extra="forbid")
 
 
 def several(recordings: tuple[int, ...]) -> dict[str, list[int]]:
@@ -98,8 +98,8 @@ def several(recordings: tuple[int, ...]) -> dict[str, list[int]]:
 def reference_of(rows: Sequence[RecordingRow]) -> dict[str, str]:
     """Return what a calibration's provenance says of the rates of its recordings, where that is known."""
     infos = [RecordingInfo.model_validate(row.info) for row in rows]
-    known = dict.fromkeys(REFERENCES[info.rate_reference] for info in infos if info.rate_reference is not None)
-    return {"rate_reference": "; ".join(known)} if known else {}
+    references = dict.fromkeys(REFERENCES[info.rate_reference] for info in infos if info.rate_reference is not None)
+    return {"rate_reference": "; ".join(references)} if references else {}
 
 
 def days_of(rows: Sequence[RecordingRow]) -> list[date]:

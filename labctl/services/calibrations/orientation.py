@@ -92,9 +92,9 @@ def orientation_of_file(
             f"{source}: the file must be a .csv or .parquet table; import any other file with "
             "`labctl import`, then give the serial number of its unit"
         )
-    known = None if calibration is None else read_calibration(calibration)
+    given_calibration = None if calibration is None else read_calibration(calibration)
     columns = read_table(source)
-    answer, angle = _follow(_Source(str(source), columns, {}), known, options)
+    answer, angle = _follow(_Source(str(source), columns, {}), given_calibration, options)
     if target is not None:
         table = pa.table({**columns, f"angle_{answer.axis}_deg": angle})
         (pq.write_table if target.suffix == ".parquet" else pacsv.write_csv)(table, target)
@@ -137,7 +137,7 @@ def _follow(
         standing_s += float(t_s[row]) - before if o.standing and before is not None else 0.0
         before = float(t_s[row])
     seconds = float(t_s[moving[-1]] - t_s[moving[0]]) if len(moving) else 0.0
-    shown = (
+    shown_rows = (
         moving[np.unique(np.linspace(0, len(moving) - 1, min(len(moving), MOST_POINTS)).astype(int))]
         if len(moving)
         else moving
@@ -150,8 +150,8 @@ def _follow(
         ),
         angle_deg=o.angle_deg, drift_deg_per_min=60 * o.angle_deg / seconds if seconds > 0 else None,
         drift_between_stops_deg_per_min=_between_stops(t_s[moving], angle[moving], declared, options),
-        offset_dps=o.offset_dps, standing_s=standing_s, gap_s=o.gap_s, t_s=t_s[shown].tolist(),
-        course_deg=angle[shown].tolist(), warning=warning,
+        offset_dps=o.offset_dps, standing_s=standing_s, gap_s=o.gap_s, t_s=t_s[shown_rows].tolist(),
+        course_deg=angle[shown_rows].tolist(), warning=warning,
     )  # fmt: skip
     return answer, angle
 
@@ -170,13 +170,13 @@ def _rows(source: _Source, axis: str, t_s: Array, rate: Array, warm_up_s: float)
             f"{source.what}: column 't_s', row {row + 1}: {t_s[row]:g} s is not later than the row before; sort the "
             "rows by time"
         )
-    warm = rows[t_s[rows] - t_s[rows[0]] >= warm_up_s]
-    if len(warm) == 0:
+    after_warm_up = rows[t_s[rows] - t_s[rows[0]] >= warm_up_s]
+    if len(after_warm_up) == 0:
         raise NotEnoughData(
             f"{source.what}: its readings last {t_s[rows[-1]] - t_s[rows[0]]:.0f} s, but the warm-up to leave "
             f"out is {warm_up_s:g} s; give a shorter warm-up, or record for longer"
         )
-    return warm, len(t_s) - len(rows)
+    return after_warm_up, len(t_s) - len(rows)
 
 
 def _declared(t_s: Array, options: OrientationOptions) -> list[bool | None]:
@@ -208,9 +208,9 @@ def _axis(source: _Source, asked: str | None) -> str:
     if asked is None and len(there) == 1:
         return there[0]
     if asked is None or asked not in there:
-        said = ", ".join(there) or "none"
+        text = ", ".join(there) or "none"
         raise BadInput(
-            f"{source.what}: axis {asked or 'not named'}; name an axis that the data have a column for ({said})"
+            f"{source.what}: axis {asked or 'not named'}; name an axis that the data have a column for ({text})"
         )
     return asked
 
@@ -228,10 +228,10 @@ def _rate_dps(source: _Source, axis: str, calibration: Calibration | None) -> tu
         warnings.simplefilter("ignore", CalibrationWarning)  # the answer says it
         compensator = Compensator(calibration)
     output = np.column_stack([_column(source, f"gyro_{each}") for each in compensator.axes])
-    warm = _column(source, "temperature_c") if compensator.needs_temperature else None
-    known = {name: _column(source, name) for name in compensator.needs}
-    found = compensator.compensate_output(output, warm, known)
-    return found.rate_dps[:, compensator.axes.index(axis)], compensator.warning
+    temperature_column = _column(source, "temperature_c") if compensator.needs_temperature else None
+    channels = {name: _column(source, name) for name in compensator.needs}
+    rates = compensator.compensate_output(output, temperature_column, channels)
+    return rates.rate_dps[:, compensator.axes.index(axis)], compensator.warning
 
 
 def _column(source: _Source, name: str) -> Array:

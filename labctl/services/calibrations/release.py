@@ -57,17 +57,17 @@ def ask_for_release(
 
 def waiting_request(store: Store, serial: str, version: int, key: str) -> ReleaseRequestRow:
     """Return what waits for a release by the person with `key`. Raises NotFound, ReleaseRefused for the first one."""
-    found = next((row for row in store.release_requests.waiting(serial) if row.version == version), None)
-    if found is None:
+    request = next((row for row in store.release_requests.waiting(serial) if row.version == version), None)
+    if request is None:
         raise NotFound(
             f"{serial} version {version} does not wait for a release; `labctl certify {serial} {version}` asks for one"
         )
-    if found.by_key == key:
+    if request.by_key == key:
         raise ReleaseRefused(
-            f"key {key!r} asked for the certification of {serial} version {version}, as {found.by}; a second person "
+            f"key {key!r} asked for the certification of {serial} version {version}, as {request.by}; a second person "
             "has to release it with another key"
         )
-    return found
+    return request
 
 
 def list_waiting(store: Store, serial: str) -> list[ReleaseRequestResponse]:

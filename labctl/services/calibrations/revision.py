@@ -82,13 +82,13 @@ def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetim
     worse than no correction.
     """
     change = _change(store, serial, request)
-    what = f"change of version {change.row.version} of {serial} on {change.measured.named}"
-    refuse_wrong(change.warnings, what, accepted=request.accept_warnings)
+    job_title = f"change of version {change.row.version} of {serial} on {change.measured.named}"
+    refuse_wrong(change.warnings, job_title, accepted=request.accept_warnings)
     return _keep(store, serial, change, at)
 
 
 def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewResponse:
-    """Say what `improve_unit` would make, and what it would leave of the recording; nothing is changed.
+    """Return what `improve_unit` would make, and the residuals it would leave; nothing is changed.
 
     Raises NotFound, BadInput, NotEnoughData.
     """
@@ -98,8 +98,8 @@ def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewR
     def work() -> PreviewResponse:
         change = _change(store, serial, request)
         _, left_out = change.after.exported()
-        said = {"serial": serial, **change.figures, "left_out": left_out, "residuals": _residuals(change)}
-        return PreviewResponse.model_validate(said, extra="forbid")
+        preview = {"serial": serial, **change.figures, "left_out": left_out, "residuals": _residuals(change)}
+        return PreviewResponse.model_validate(preview, extra="forbid")
 
     return cached(PreviewResponse, _question(row, measured, request), work)
 
@@ -109,10 +109,10 @@ def _asked(store: Store, serial: str, request: ImproveRequest, row: CalibrationR
 
     One that was asked for by number is what it is fitted to, whatever the version was fitted to.
     """
-    wanted: Sequence[int] = request.recordings
-    if request.recording is None and not wanted and len(row.recordings) > 1:
-        wanted = row.recordings
-    return measurements_of(store, serial, request.recording, wanted)
+    numbers: Sequence[int] = request.recordings
+    if request.recording is None and not numbers and len(row.recordings) > 1:
+        numbers = row.recordings
+    return measurements_of(store, serial, request.recording, numbers)
 
 
 def _question(row: CalibrationRecord, measured: Measurements, request: ImproveRequest) -> dict[str, object]:
@@ -126,18 +126,18 @@ def _question(row: CalibrationRecord, measured: Measurements, request: ImproveRe
 def _residuals(change: _Change) -> ResidualColumns:
     """Return what a criticism of the changed model would leave, without all else that it says."""
     model = change.after.fitted.model
-    found = replace(
+    residuals = replace(
         criticise(change.measured.readings, model, CATALOGUE, points=change.points, full=False), base=change.after
     )
-    return residual_columns(found.data, found.residuals, change.points, change.measured.row.id, change.after)
+    return residual_columns(residuals.data, residuals.residuals, change.points, change.measured.row.id, change.after)
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
     """Fit a changed model, or return the fit of a moment ago."""
     row = version_of(store, serial, request.version)
     measured = _asked(store, serial, request, row)
-    asked = json.dumps(_question(row, measured, request), sort_keys=True)
-    return _RECENT.get(asked, lambda: _fitted(row, measured, request))
+    question_json = json.dumps(_question(row, measured, request), sort_keys=True)
+    return _RECENT.get(question_json, lambda: _fitted(row, measured, request))
 
 
 def _refuse_what_changes_nothing(
@@ -167,12 +167,12 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
                 f"effect {effect_id!r} is not in version {row.version}; choose one of {', '.join(model.effect_ids)}"
             )
     written = read_formulas(request.formula)
-    wanted = [*_terms(request.add), *(Term(f.id, formula=f.text) for f in written)]
-    if not wanted and not request.remove:
+    terms = [*_terms(request.add), *(Term(f.id, formula=f.text) for f in written)]
+    if not terms and not request.remove:
         raise BadInput("give the change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
-    _refuse_what_changes_nothing(wanted, model, request, row.version)
+    _refuse_what_changes_nothing(terms, model, request, row.version)
     base, _ = changed(model, (), tuple(request.remove)).build(context)
-    add = tuple(_shaped(measured, base, term) for term in wanted)
+    add = tuple(_shaped(measured, base, term) for term in terms)
     before = fit_preset(context, changed(model))
     after = fit_preset(context, with_shapes(context, changed(model, add, tuple(request.remove)), all_of_them=bool(add)))
     hint = hint_of_added(context, base, [term.effect for term in add])
@@ -204,14 +204,15 @@ def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
 def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveResponse:
     parent, after = change.row.version, change.after
     recording, recordings = change.measured.row.id, change.measured.recordings
-    made = {
+    provenance = {
         "recording": recording, "improved_from": parent, **several(recordings), **reference_of(change.measured.rows),
     }  # fmt: skip
     evidence = use_evidence(fit_data_of(change.points), changed(after.fitted.model))
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
-            change.points.info, after, version=version, parent=parent, issued_at=at, provenance=made, evidence=evidence,
+            change.points.info, after, version=version, parent=parent, issued_at=at, provenance=provenance,
+            evidence=evidence,
             used_on=days_of(change.measured.rows),
         )  # fmt: skip
         answer: KeptChange = {
@@ -230,7 +231,7 @@ def plausible(result: FitResult, technology: str) -> dict[str, UsualRange]:
 
     A range is one of sizes; of an effect that has only one sign, the sign counts too.
     """
-    found: dict[str, UsualRange] = {}
+    usual_ranges: dict[str, UsualRange] = {}
     for term in result.fitted.model.terms:
         kind = kind_of(term)
         span = kind.ranges.get(technology)
@@ -242,5 +243,5 @@ def plausible(result: FitResult, technology: str) -> dict[str, UsualRange]:
                 first = fit.effects.index(term.effect)
                 sizes = zip(fit.values[first], fit.u[first], strict=True)
                 outside |= any(bool(kind.outside(technology, float(value), float(u))) for value, u in sizes)
-        found[term.effect] = {"from": span[0], "to": span[1], "inside": not outside}
-    return found
+        usual_ranges[term.effect] = {"from": span[0], "to": span[1], "inside": not outside}
+    return usual_ranges

@@ -36,25 +36,25 @@ def exported(store: Store, document: bytes, format_name: str, options: Sequence[
 
     Raises BadInput for an unknown format or option, and for a calibration that the format cannot carry.
     """
-    given = read_options(options, format_name)
+    given_options = read_options(options, format_name)
     chosen = format_named(format_name)
     if chosen.needs_noise:
-        given = {**_noise(store, document, chosen.options), **given}
-    written = written_calibration(document, format_name, given)
-    tag = "-".join([format_name, *(f"{key}={value}" for key, value in sorted(given.items()))])
+        given_options = {**_noise(store, document, chosen.options), **given_options}
+    written = written_calibration(document, format_name, given_options)
+    tag = "-".join([format_name, *(f"{key}={value}" for key, value in sorted(given_options.items()))])
     plain = "".join(char if char.isascii() and char.isprintable() and char not in '"\\' else "_" for char in tag)
     return Exported(written.content, chosen.media_type, plain, written.losses)
 
 
 def read_options(lines: Sequence[str], format_name: str) -> dict[str, str]:
     """Return options by name from lines KEY=VALUE; raises BadInput for another form, or one that is given twice."""
-    found: dict[str, str] = {}
+    options: dict[str, str] = {}
     for line in lines:
         key, sign, value = (part.strip() for part in line.partition("="))
-        if not (sign and key and value) or key in found:
+        if not (sign and key and value) or key in options:
             raise BadInput(f"format {format_name}: option {line!r}: give each option once, as KEY=VALUE")
-        found[key] = value
-    return found
+        options[key] = value
+    return options
 
 
 def _noise(store: Store, document: bytes, wanted: Mapping[str, str]) -> dict[str, str]:
@@ -68,24 +68,24 @@ def _noise(store: Store, document: bytes, wanted: Mapping[str, str]) -> dict[str
     answer = noise_of_recordings(store, newest)
     if answer is None:
         return {}
-    found = noise_options([answer.axes[axis] for axis in calibration.axes if axis in answer.axes])
-    return {key: value for key, value in found.items() if key in wanted}
+    options = noise_options([answer.axes[axis] for axis in calibration.axes if axis in answer.axes])
+    return {key: value for key, value in options.items() if key in wanted}
 
 
 def noise_options(axes: Sequence[AllanJson]) -> dict[str, str]:
     """Return the noise figures of a unit's axes as options of a format; without those that an axis lacks."""
-    found: dict[str, str] = {}
+    options: dict[str, str] = {}
     for name, figures, unit in (
         (WHITE, [axis["N"] for axis in axes], DPS_RTHZ_PER_DEG_RTH),
         (WALK, [axis["K"] for axis in axes], DPS_S_RTHZ_PER_DEG_H_RTH),
     ):
         values = [figure["value"] for figure in figures]
         if values and all(value is not None and value > 0 for value in values):
-            found[name] = ",".join(f"{value * unit:.9e}" for value in values if value is not None)
+            options[name] = ",".join(f"{value * unit:.9e}" for value in values if value is not None)
     shortest = [axis["tau_s"][0] for axis in axes if axis["tau_s"]]
     if shortest and shortest[0]:
-        found[RATE] = f"{1 / shortest[0]:.9g}"
-    return found
+        options[RATE] = f"{1 / shortest[0]:.9g}"
+    return options
 
 
 #: State of a version that was never certified.
@@ -114,18 +114,18 @@ class CalibrationFile:
 
     def headers(self, now: datetime) -> dict[str, str]:
         """Return the HTTP headers beside the bytes at an aware time: tag, state, due date, warning and notice."""
-        known = self.certification
-        found = {"ETag": f'"{self.etag}"', "Cache-Control": "no-cache", "X-Labctl-State": NOT_CERTIFIED}
-        if known is None:
-            return found
-        found["X-Labctl-State"] = known.state
-        if known.due is not None and known.state != "revoked":
-            found["X-Labctl-Due"] = f"{known.due.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}"
-        if text := known.warning(self.what, now):
-            found["Warning"] = f"299 labctl {quoted(text)}"
+        certification = self.certification
+        response_headers = {"ETag": f'"{self.etag}"', "Cache-Control": "no-cache", "X-Labctl-State": NOT_CERTIFIED}
+        if certification is None:
+            return response_headers
+        response_headers["X-Labctl-State"] = certification.state
+        if certification.due is not None and certification.state != "revoked":
+            response_headers["X-Labctl-Due"] = f"{certification.due.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        if text := certification.warning(self.what, now):
+            response_headers["Warning"] = f"299 labctl {quoted(text)}"
         if self.withdrawn is not None:
-            found[HEADER] = self.withdrawn.header()
-        return found
+            response_headers[HEADER] = self.withdrawn.header()
+        return response_headers
 
 
 def calibration_file(
@@ -136,61 +136,72 @@ def calibration_file(
     The file of a version that was ever certified has its `certification`, and a hash over that too. Raises NotFound,
     NotCertified, BadInput for an unknown format or option, and for a calibration that the format cannot carry.
     """
-    found = store.certifications.served(serial, version)
-    if found is None:
+    served = store.certifications.served(serial, version)
+    if served is None:
         document, hash_ = store.calibrations.document(serial, version)  # says why there is none
-        found = ServedCalibration(document, hash_, None, in_force=False)
-    known = _certification(found)
-    number = found.act.version if found.act else version or store.calibrations.certified_version(serial)
-    content, tag = (found.document, found.hash) if known is None else _certified(found.document, known)
+        served = ServedCalibration(document, hash_, None, in_force=False)
+    certification = _certification(served)
+    number = served.act.version if served.act else version or store.calibrations.certified_version(serial)
+    content, tag = (
+        (served.document, served.hash) if certification is None else _certified(served.document, certification)
+    )
     if format_name == "json" and not options:
-        return CalibrationFile(content, "application/json", tag, serial, number, known, withdrawn=notice_of(found))
+        return CalibrationFile(
+            content, "application/json", tag, serial, number, certification, withdrawn=notice_of(served)
+        )
     file = exported(store, content, format_name, options)
     return CalibrationFile(
-        file.content, file.media_type, f"{tag}-{file.tag}", serial, number, known, file.losses, notice_of(found)
+        file.content,
+        file.media_type,
+        f"{tag}-{file.tag}",
+        serial,
+        number,
+        certification,
+        file.losses,
+        notice_of(served),
     )
 
 
 def calibration_state(store: Store, serial: str, calibration_hash: str) -> CalibrationStateResponse:
     """Return which state a version is in, by the hash of its calibration. Raises NotFound."""
-    known = store.units.get(serial).serial
-    version = store.calibrations.version_of(known, calibration_hash)
-    found = store.certifications.served(known, version) if version is not None else None
-    if version is None or found is None:
+    known_serial = store.units.get(serial).serial
+    version = store.calibrations.version_of(known_serial, calibration_hash)
+    served = store.certifications.served(known_serial, version) if version is not None else None
+    if version is None or served is None:
         raise NotFound(
             f"unit {serial!r} has no calibration with the hash {calibration_hash[:64]!r}; give `calibration_hash` of a "
             "calibration file (64 hexadecimal digits)"
         )
-    certification, gone = _certification(found), notice_of(found)
+    certification, gone = _certification(served), notice_of(served)
     return CalibrationStateResponse(
-        serial=known, version=version, calibration_hash=found.hash,
+        serial=known_serial, version=version, calibration_hash=served.hash,
         state=certification.state if certification else NOT_CERTIFIED,
         due=certification.due if certification else None,
         withdrawn=gone and WithdrawnResponse(at=gone.at, by=gone.by, reason=gone.reason, certificate=gone.certificate),
-        in_force=version_in_force(store, known),
+        in_force=version_in_force(store, known_serial),
     )  # fmt: skip
 
 
-def notice_of(found: ServedCalibration) -> Withdrawn | None:
+def notice_of(served: ServedCalibration) -> Withdrawn | None:
     """Return the notice for those who fetch a version: it was revoked, or its certificate was withdrawn.
 
     A certification after the withdrawal ends the notice: a person has then vouched for the version again.
     """
-    act, gone = found.act, found.withdrawal
+    act, gone = served.act, served.withdrawal
     if act is None:
         return None
     if act.act == "revoke":
         return Withdrawn(act.at, act.by, act.reason)
-    if gone is not None and gone.act == found.act_number:  # not by dates: a clock may have been set back
-        return Withdrawn(gone.at, gone.by, gone.reason, found.certificate or "")
+    if gone is not None and gone.act == served.act_number:  # not by dates: a clock may have been set back
+        return Withdrawn(gone.at, gone.by, gone.reason, served.certificate or "")
     return None
 
 
-def _certification(found: ServedCalibration) -> Certification | None:
-    if (act := found.act) is None:
+def _certification(served: ServedCalibration) -> Certification | None:
+    if (act := served.act) is None:
         return None
-    state: State = "in-force" if found.in_force else "revoked" if act.act == "revoke" else "superseded"
-    return Certification(state, act.by, act.reason, act.at, act.due_at, found.hash)
+    state: State = "in-force" if served.in_force else "revoked" if act.act == "revoke" else "superseded"
+    return Certification(state, act.by, act.reason, act.at, act.due_at, served.hash)
 
 
 #: Files of certified versions, with their hashes, as they were served last.

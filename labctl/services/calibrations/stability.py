@@ -75,12 +75,12 @@ def stability_of(store: Store, serial: str, version: int, about: About = "own ax
     own = _own(store, versions_apart(certified, last, LEAST_APART), grid)
     if isinstance(own, Stability) and own.intervals >= LEAST_INTERVALS:
         return own
-    found = drift_of_type(store, last, calibration, grid)
-    if isinstance(found, str):
-        return f"{own}; {found}" if isinstance(own, str) else own
-    if isinstance(own, Stability) and not _is_typical(own, found.predicted):
+    drift = drift_of_type(store, last, calibration, grid)
+    if isinstance(drift, str):
+        return f"{own}; {drift}" if isinstance(own, str) else own
+    if isinstance(own, Stability) and not _is_typical(own, drift.predicted):
         return own
-    return Stability(found.predicted, own.intervals if isinstance(own, Stability) else 0, found)
+    return Stability(drift.predicted, own.intervals if isinstance(own, Stability) else 0, drift)
 
 
 def _own(store: Store, versions: list[CertifiedVersion], grid: ErrorGrid) -> Stability | str:
@@ -108,5 +108,5 @@ def years_until(measured: datetime, until: datetime) -> float:
 def version_measured_at(store: Store, row: CalibrationRecord) -> datetime | None:
     """Return when the newest recording of a version was begun; None where one of them has no date."""
     begun = [measured_at(store.recordings.get(n).info) for n in row.recordings]
-    known = [each for each in begun if each is not None]
-    return max(known, default=row.created_at) if len(known) == len(begun) else None
+    begin_times = [each for each in begun if each is not None]
+    return max(begin_times, default=row.created_at) if len(begin_times) == len(begun) else None

@@ -59,8 +59,8 @@ def _rate_span(store: Store, row: CalibrationRecord, calibration: Calibration) -
     low, high = calibration.rate_dps
     if np.isfinite(low) and np.isfinite(high):
         return low, high
-    known = store.recordings.get(row.recording).info.get("max_rate_dps") if row.recording is not None else None
-    fastest = float(known) if isinstance(known, int | float) and known else UNKNOWN_MAX_RATE_DPS
+    max_rate_dps = store.recordings.get(row.recording).info.get("max_rate_dps") if row.recording is not None else None
+    fastest = float(max_rate_dps) if isinstance(max_rate_dps, int | float) and max_rate_dps else UNKNOWN_MAX_RATE_DPS
     return -fastest, fastest
 
 

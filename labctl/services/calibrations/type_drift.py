@@ -59,15 +59,15 @@ def drift_of_type(store: Store, own: CertifiedVersion, calibration: Calibration,
     if not model.strip():
         return NO_MODEL
     every = _histories(store, own, calibration, model, grid)
-    found = [each for each in every if np.isfinite(each.rates_dps).any()]
-    units = int(np.min(np.sum([np.isfinite(each.rates_dps).any(axis=0) for each in found], axis=0))) if found else 0
+    grids = [each for each in every if np.isfinite(each.rates_dps).any()]
+    units = int(np.min(np.sum([np.isfinite(each.rates_dps).any(axis=0) for each in grids], axis=0))) if grids else 0
     if units < LEAST_UNITS:
         noun = "unit has" if units == 1 else "units have"
         return TOO_FEW.format(model=model, units=units or "no", noun=noun, days=LEAST_APART.days, least=LEAST_UNITS)
-    most = max(len(each.years) for each in found)
-    rates = np.full((len(found), most, found[0].rates_dps.shape[1]), np.nan)
-    years = np.zeros((len(found), most))
-    for row, each in enumerate(found):
+    most = max(len(each.years) for each in grids)
+    rates = np.full((len(grids), most, grids[0].rates_dps.shape[1]), np.nan)
+    years = np.zeros((len(grids), most))
+    for row, each in enumerate(grids):
         rates[row, : len(each.years)], years[row, : len(each.years)] = each.rates_dps, each.years
     spans = years.sum(axis=1)
     return TypeDrift(of_type(rates, years), model, units, (float(spans.min()), float(spans.max())))
@@ -84,16 +84,16 @@ def _histories(
     simulated = {
         number: has_simulated_instrument(bench) for number, bench in store.certified_versions.benches(campaigns).items()
     }
-    wanted = _is_simulated(own, calibration, simulated)
+    is_wanted = _is_simulated(own, calibration, simulated)
     for unit in chosen:
-        if all(_is_simulated(each, calibrations[each.id], simulated) == wanted for each in unit):
+        if all(_is_simulated(each, calibrations[each.id], simulated) == is_wanted for each in unit):
             yield _History(*rates_of(unit, calibrations, grid))
 
 
 def _chosen(versions: Sequence[CertifiedVersion]) -> Iterator[list[CertifiedVersion]]:
     """Yield the newest versions of each unit that has several far enough apart, up to the number of units."""
     units = 0
-    for _, every in groupby(versions, key=lambda each: each.serial):
+    for _, every in groupby(versions, key=lambda version: version.serial):
         of_unit = [each for each in every if each.measured_at is not None]
         if not of_unit:
             continue
@@ -108,5 +108,5 @@ def _is_simulated(version: CertifiedVersion, calibration: Calibration, simulated
     """Return whether a version was measured on a simulated bench: by its campaigns, or by its standards."""
     standards = () if calibration.bench is None else calibration.bench.standards
     return any(simulated.get(number, False) for number in version.campaigns) or (
-        any(each.traceability == SIMULATED for each in standards)
+        any(standard.traceability == SIMULATED for standard in standards)
     )

@@ -23,7 +23,7 @@ class BenchLending:
 
     @contextmanager
     def driving(self) -> Iterator[None]:
-        """Have the bench in this thread, the engine's."""
+        """Hold the bench in this thread, the engine's."""
         with self._lock:
             self._driver = threading.get_ident()
             try:
@@ -33,7 +33,7 @@ class BenchLending:
 
     @contextmanager
     def lent(self) -> Iterator[None]:
-        """Let another thread have the bench meanwhile; nothing where this thread does not have it."""
+        """Lend the bench to another thread meanwhile; nothing happens where this thread does not hold it."""
         if threading.get_ident() != self._driver:
             yield
             return
@@ -47,7 +47,7 @@ class BenchLending:
 
     @contextmanager
     def borrowed(self, within_s: float) -> Iterator[bool]:
-        """Have the bench in a thread that is not the engine's, once it is lent; gives False where that takes longer."""
+        """Hold the bench in a thread that is not the engine's, once lent; yields False where that takes longer."""
         has_it = self._lock.acquire(timeout=within_s)
         try:
             yield has_it

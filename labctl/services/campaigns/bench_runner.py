@@ -136,13 +136,13 @@ class BenchRunner:
         Raises BenchBusy while another runs, without the lease on the bench, or while the bench is stopped;
         StartNotConfirmed where no person has confirmed that a real bench is clear, and whatever planning raises.
         """
-        known = self.stop_latch.state.known
+        stop_known = self.stop_latch.state.known
         with self._guard:
             self._refuse_unless_free()
             bench = with_hidden_effects(self._bench, request.hide)
             refuse_unconfirmed(self._store, bench.name)
             clear = confirmation_text(bench, request)
-            self._let_move(request.confirmed_by or actor().name if attended else None, known)
+            self._let_move(request.confirmed_by or actor().name if attended else None, stop_known)
             control = self._new_control()
             clock = stoppable(self._make_clock(), control)
             self._begin(prepared := self._campaigns.prepare(request, bench, clock, clear), control)
@@ -197,7 +197,7 @@ class BenchRunner:
         Not `attended`: no person resumes it now. Raises BenchBusy while another runs, without the lease on the bench,
         or while the bench is stopped; Conflict when it is done, or when the bench waits to be inspected.
         """
-        known = self.stop_latch.state.known
+        stop_known = self.stop_latch.state.known
         with self._guard:
             job = self._job
             if job is not None and job.row.id == campaign:
@@ -207,7 +207,7 @@ class BenchRunner:
             else:
                 self._refuse_unless_free()
                 bench = with_original_simulation(self._store.campaigns.get(campaign), self._bench)
-                self._let_move(request.by if attended else None, known)
+                self._let_move(request.by if attended else None, stop_known)
                 control = self._new_control()
                 clock = stoppable(self._make_clock(), control)
                 self._begin(self._campaigns.resume(campaign, bench, clock, request), control)
@@ -239,9 +239,9 @@ class BenchRunner:
         """Make the bench safe, under the guard; returns what is not confirmed."""
         self.live.end("the bench was stopped")
         self.used = True
-        left = secure_bench(self._store, self._bench, self._make_clock())
-        self.stops.is_safe = not left
-        return left
+        problem = secure_bench(self._store, self._bench, self._make_clock())
+        self.stops.is_safe = not problem
+        return problem
 
     def resume_interrupted(self) -> None:
         """Once the bench may be driven again, resume the campaign that was interrupted when it was lost."""
@@ -357,9 +357,9 @@ class BenchRunner:
         if hindrance:
             unconfirmed = "; ".join(filter(None, (unconfirmed, f"stopping: {hindrance}")))
         running, clock = (None, None) if job is None else (job.row.id, job.prepared.clock)
-        found = description(self._bench, running, unconfirmed, self._last_check, clock)
+        bench_answer = description(self._bench, running, unconfirmed, self._last_check, clock)
         stop = self.stop_latch.describe(hindrance, stopping=ends)
-        return found.model_copy(update={"stop": stop, "live": self.live.serial})
+        return bench_answer.model_copy(update={"stop": stop, "live": self.live.serial})
 
     @property
     def polls(self) -> tuple[int, int] | None:

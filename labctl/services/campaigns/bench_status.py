@@ -41,8 +41,11 @@ def bench_statuses(store: Store) -> list[BenchStatus]:
 
     Those of simulated benches are left out: such a bench ended with its process.
     """
-    left: dict[str, list[str]] = {}
+    campaigns_left: dict[str, list[str]] = {}
     for answer in abandoned_campaigns(store):
         if outlives_its_process(store.campaigns.get(answer.id)):
-            left.setdefault(answer.bench, []).append(describe_interrupted(answer))
-    return [bench_status(store, row).model_copy(update={"left": left.get(row.name, [])}) for row in store.benches.all()]
+            campaigns_left.setdefault(answer.bench, []).append(describe_interrupted(answer))
+    return [
+        bench_status(store, row).model_copy(update={"left": campaigns_left.get(row.name, [])})
+        for row in store.benches.all()
+    ]

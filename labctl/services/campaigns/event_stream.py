@@ -43,10 +43,10 @@ class StatusCache:
         moment = (loop, self._rung, int(loop.time() / FRESH_S))
         if moment != self._moment:
             self._moment, self._found = moment, {}
-        found = self._found.get(what)
-        if found is None:
-            found = self._found[what] = asyncio.ensure_future(asyncio.to_thread(look))
-        return cast(T, await asyncio.shield(found))  # one who leaves does not end it for the others
+        pending = self._found.get(what)
+        if pending is None:
+            pending = self._found[what] = asyncio.ensure_future(asyncio.to_thread(look))
+        return cast(T, await asyncio.shield(pending))  # one who leaves does not end it for the others
 
 
 class Bell:
@@ -98,7 +98,7 @@ class CampaignEventStream:
         at most every LEAST_S.
         """
         bell = Bell()
-        shown: CampaignResponse | None = None
+        last_sent: CampaignResponse | None = None
         stop = self._listen(bell.ring) if self._listen is not None else None
         try:
             while True:
@@ -108,14 +108,14 @@ class CampaignEventStream:
                     after = event.id
                     yield event
                 now = await self._now(campaign)
-                if now != shown:
-                    shown = now
+                if now != last_sent:
+                    last_sent = now
                     yield now
                 if (state in ENDED and not awaited) or over():
                     return
                 async for live in self._meanwhile(campaign, bell):
-                    if live is None or live != shown:
-                        shown = live or shown
+                    if live is None or live != last_sent:
+                        last_sent = live or last_sent
                         yield live
         finally:
             if stop is not None:

@@ -16,8 +16,8 @@ from labctl.answers.wire_logs import RecordedSession
 from labctl.config import default_database
 from labctl.errors import Conflict, DiskFull, Stopped, StoreError
 from labctl.log import get_logger
-from labctl.log.campaign_journal import LoggedJournal
 from labctl.log.context import for_campaign
+from labctl.log.logged_journal import LoggedJournal
 from labctl.services.benches.confirmation import SafeStateRetry, describe_safe_state
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.pace import with_pace_watch
@@ -120,23 +120,25 @@ def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse
 
 
 def _stopped(store: Store, prepared: Prepared, engine: Engine) -> str:
-    left = describe_safe_state(store.campaigns.get(prepared.id).bench_name, "; ".join(engine.complaints))
-    return f"campaign {prepared.id} was stopped; {left}; `labctl campaign resume {prepared.id}` continues it"
+    state_text = describe_safe_state(store.campaigns.get(prepared.id).bench_name, "; ".join(engine.complaints))
+    return f"campaign {prepared.id} was stopped; {state_text}; `labctl campaign resume {prepared.id}` continues it"
 
 
 def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: StoreError) -> str:
-    """Say how a campaign ended that could not be written any more, and what is known of its bench."""
+    """Describe the end of a campaign that could not be written, and the state of its bench."""
     complaints, ended, marked = "; ".join(engine.complaints), False, ""
     with suppress(StoreError):
         ended, marked = store.campaigns.get(campaign).state in ENDED, store.benches.unconfirmed(bench)
-    left = describe_safe_state(bench, complaints)
+    state_text = describe_safe_state(bench, complaints)
     if complaints and not marked:  # nothing that `labctl bench clear` could take back
-        left = f"bench {bench} is NOT confirmed safe, and that could not be recorded: {complaints}; inspect the bench"
+        state_text = (
+            f"bench {bench} is NOT confirmed safe, and that could not be recorded: {complaints}; inspect the bench"
+        )
     elif not complaints and not ended:
-        left += ", but that could not be recorded"
+        state_text += ", but that could not be recorded"
     again = "there is free space again" if isinstance(error, DiskFull) else "the database can be written again"
     return (
-        f"campaign {campaign} was interrupted: {error.cause}; the data measured before are stored; {left}; once "
+        f"campaign {campaign} was interrupted: {error.cause}; the data measured before are stored; {state_text}; once "
         f"{again}, "
         f"`labctl campaign resume {campaign}` continues it"
     )
@@ -208,7 +210,7 @@ def _session(request: StartRequest) -> RecordedSession:
 
 
 def _left_on(store: Store, bench: BenchFile) -> list[str]:
-    """Say which campaigns were left on a bench that this process holds."""
+    """Return which campaigns were left on a bench that this process holds."""
     if bench.is_simulated and not store.is_sole_writer:  # it has no lease: another process may run them
         return []
     rows = [row for row in store.campaigns.unfinished() if row.bench_name == bench.name]
@@ -234,8 +236,8 @@ def run_attended(
     if wire is not None and not prepared.operator.at_once:
         prepared = replace(prepared, operator=RecordedOperator(prepared.operator, wire.note))
 
-    seen = None if observe is None else lambda progress: observe(answer_of(row, progress))
-    engine = _engine(store, prepared, control, seen)
+    observer = None if observe is None else lambda progress: observe(answer_of(row, progress))
+    engine = _engine(store, prepared, control, observer)
     bench = BenchFile.model_validate({**row.bench, "simulation": None})
     try:
         with answering_stops(store, bench, row.id, control):

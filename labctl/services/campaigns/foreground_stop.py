@@ -24,7 +24,7 @@ from procedures.contracts.control import Control
 
 
 def let_move(store: Store, bench: str, by: str, at: datetime) -> None:
-    """Let a bench move again in the name of the person who starts or resumes a campaign at a terminal.
+    """Allow a bench to move again, in the name of the person who starts or resumes a campaign at a terminal.
 
     A stop that no process carried out is written down first, and what it was to end is ended. Raises StoreError.
     """
@@ -66,8 +66,8 @@ def answering_stops(store: Store, bench: BenchFile, campaign: int, control: Cont
         ended.set()
         with contextlib.suppress(OSError):
             safe = control.is_at_rest(0.0) and not control.hindrance
-            left = f"campaign {campaign} ended; {control.hindrance or 'the bench is in its safe state'}"
-            stops.place.write_note(DriverNote(bench.name, document=document, left=left, left_safe=safe))
+            outcome = f"campaign {campaign} ended; {control.hindrance or 'the bench is in its safe state'}"
+            stops.place.write_note(DriverNote(bench.name, document=document, left=outcome, left_safe=safe))
         server.close()
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -16,7 +16,7 @@ class LiveLoan:
         self._end: Callable[[str], None] = _nothing
 
     def lend(self, serial: str, end: Callable[[str], None], begin: Callable[[], None]) -> None:
-        """Lend it to the calibration that `begin` begins; it is not lent where that raises.
+        """Lend the bench to the calibration that `begin` begins; it is not lent where that raises.
 
         `end` ends the calibration for a reason, and returns once its ports are closed.
         """

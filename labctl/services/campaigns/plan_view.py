@@ -59,13 +59,13 @@ def _state(word: str) -> StepState:
 
 def _forecast(steps: Sequence[StepRow]) -> list[float]:
     """Return when each step began or will begin, campaign time in s."""
-    found: list[float] = []
+    forecasts: list[float] = []
     free_s = 0.0
     for step in steps:
         begun = step.started_s if step.started_s is not None and step.state != "planned" else free_s
-        found.append(begun)
+        forecasts.append(begun)
         if step.state == "skipped":
             continue
         over = step.ended_s is not None and step.state in {"done", "failed"}
         free_s = step.ended_s if over and step.ended_s is not None else begun + step.expected_s
-    return found
+    return forecasts

@@ -205,7 +205,7 @@ def _log_planned(number: int, bench: BenchFile, plan: Plan, units: tuple[NewUnit
 
 def _with_reported(store: Store, bench: BenchFile, identities: Mapping[str, GyroIdentity]) -> BenchFile:
     """Return a bench with what its instruments say of themselves; raises Conflict where one is not the known one."""
-    reported = reported_of(bench, {name: found.reported for name, found in identities.items()})
+    reported = reported_of(bench, {name: identity.reported for name, identity in identities.items()})
     refuse_otherwise_set(bench, reported)
     refuse_changed(store, bench, reported)
     return bench.model_copy(update={"reported": reported})

@@ -53,10 +53,10 @@ class RecordedCampaigns:
     def prepare(self, request: CampaignRequest, bench: BenchFile, clock: Clock, clear: str) -> Prepared:
         """Plan a campaign and write it down; `clear`: what a person has confirmed. Raises as `prepare` does."""
         session = RecordedSession(kind="campaign", recipe=own_text(request.recipe), clip=request.clip, fit=request.fit)
-        with self._beginning(bench, clock, session) as found:
+        with self._beginning(bench, clock, session) as preparation:
             prepared = prepare(
                 self._store, request.recipe, bench, clock, clip=request.clip, fit=request.fit, bench_clear=clear,
-                wire=None if found is None else found.wire,
+                wire=None if preparation is None else preparation.wire,
             )  # fmt: skip
         self._name(f"campaign-{prepared.id}")
         return prepared
@@ -64,8 +64,8 @@ class RecordedCampaigns:
     def resume(self, campaign: int, bench: BenchFile, clock: Clock, request: ResumeRequest) -> Prepared:
         """Mark a campaign as resumed. Raises as `prepare_resume` does."""
         session = RecordedSession(kind="campaign resume", campaign=campaign)
-        with self._beginning(bench, clock, session) as found:
-            wire = None if found is None else found.wire
+        with self._beginning(bench, clock, session) as preparation:
+            wire = None if preparation is None else preparation.wire
             prepared = prepare_resume(self._store, campaign, bench, lambda _: clock, request, wire=wire)
         self._name(f"campaign-{campaign}-resumed")
         return prepared
@@ -74,15 +74,15 @@ class RecordedCampaigns:
         self, prepared: Prepared, control: Control, observe: Callable[[Progress], None], lending: BenchLending
     ) -> CampaignResponse:
         """Run the campaign that was prepared last to its end. Raises as `run` does."""
-        found, self._log = self._log, None
+        session_log, self._log = self._log, None
         with self._open.pop_all():
-            if found is None:
+            if session_log is None:
                 return run(self._store, prepared, control, observe, lending)
             if not prepared.operator.at_once:
-                prepared = replace(prepared, operator=RecordedOperator(prepared.operator, found.wire.note))
+                prepared = replace(prepared, operator=RecordedOperator(prepared.operator, session_log.wire.note))
             answer = run(self._store, prepared, control, observe, lending)
-            found.result.state = answer.state.value
-            found.result.readings = readings_digest(self._store, answer.id)
+            session_log.result.state = answer.state.value
+            session_log.result.readings = readings_digest(self._store, answer.id)
             return answer
 
     @contextmanager
@@ -91,12 +91,12 @@ class RecordedCampaigns:
         path = None if self._folder is None else self._folder / f"begun-{WallClock().utc():%Y%m%dT%H%M%S.%fZ}{SUFFIX}"
         self._open.close()  # of a campaign that was prepared and did not begin
         with ExitStack() as opened:
-            found = opened.enter_context(recording(path, bench, clock, session))
-            yield found
-            self._open, self._log = opened.pop_all(), found
+            session_log = opened.enter_context(recording(path, bench, clock, session))
+            yield session_log
+            self._open, self._log = opened.pop_all(), session_log
 
     def _name(self, name: str) -> None:
-        """Give the log of a campaign whose number is known its name; one that is there keeps its own."""
+        """Name the log of a campaign whose number is known; a log that is there keeps its name."""
         if self._log is None or self._folder is None:
             return
         path, n = self._folder / f"{name}{SUFFIX}", 1

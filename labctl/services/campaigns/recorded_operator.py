@@ -32,12 +32,12 @@ class RecordedOperator:
         self._note(OPERATOR, "sent", prompt.kind.encode())
 
     def answer(self, prompt_id: str) -> Answer | None:
-        found = self._operator.answer(prompt_id)
+        given_answer = self._operator.answer(prompt_id)
         self._asked += 1
-        if found is not None:
-            said = CONFIRMED if found.confirmed else AGAIN if found.again else DECLINED
-            self._note(OPERATOR, "received", said, asked=self._asked)
-        return found
+        if given_answer is not None:
+            outcome = CONFIRMED if given_answer.confirmed else AGAIN if given_answer.again else DECLINED
+            self._note(OPERATOR, "received", outcome, asked=self._asked)
+        return given_answer
 
     def withdraw(self, prompt_id: str) -> None:
         self._operator.withdraw(prompt_id)
@@ -61,8 +61,8 @@ class ReplayedOperator:
         event = self._replay.record.next(OPERATOR)
         if event is None or event.kind != "received" or self._asked < (event.number("asked") or 1):
             return None
-        said = self._replay.take(OPERATOR).data
-        return Answer(prompt_id, confirmed=said == CONFIRMED, by=BY, reason="as recorded", again=said == AGAIN)
+        outcome = self._replay.take(OPERATOR).data
+        return Answer(prompt_id, confirmed=outcome == CONFIRMED, by=BY, reason="as recorded", again=outcome == AGAIN)
 
     def withdraw(self, prompt_id: str) -> None:  # the next question passes over what is left
         pass

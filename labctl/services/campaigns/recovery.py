@@ -26,7 +26,7 @@ EndState = Literal[CampaignState.FAILED, CampaignState.ABORTED]
 
 
 def describe_recovery(store: Store, bench: str) -> str:
-    """Say which campaign a service finds left on its bench when it starts, and what becomes of it; empty for none."""
+    """Describe the campaign that a service finds on its bench when it starts, and its fate; empty for none."""
     row = next((row for row in store.campaigns.unfinished() if row.bench_name == bench), None)
     if row is None:
         return ""

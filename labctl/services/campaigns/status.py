@@ -14,7 +14,7 @@ from labctl.answers.campaign_parts import DriverResponse, OutputResponse, Prompt
 from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.benches.identity import reported_in
-from labctl.services.campaigns.advice import advice_of
+from labctl.services.campaigns.failure_advice import advice_of
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
 from labctl.store.paging import Page, PageRequest
 from procedures.contracts.campaign_state import ENDED, CampaignState
@@ -143,12 +143,12 @@ def _statuses(store: Store, read: Callable[[], list[CampaignRow]]) -> list[Campa
     tested: rows are read again before a campaign is called abandoned.
     """
     rows = read()
-    left = {row.id for row in rows if row.state not in ENDED}
-    if left and store.is_held:
-        left.clear()
-    if left:
+    unfinished = {row.id for row in rows if row.state not in ENDED}
+    if unfinished and store.is_held:
+        unfinished.clear()
+    if unfinished:
         rows = read()
-    return [mark_abandoned(answer, attended=answer.id not in left) for answer in statuses_of(store, rows)]
+    return [mark_abandoned(answer, attended=answer.id not in unfinished) for answer in statuses_of(store, rows)]
 
 
 def abandoned_campaigns(store: Store) -> list[CampaignResponse]:
@@ -157,12 +157,12 @@ def abandoned_campaigns(store: Store) -> list[CampaignResponse]:
 
 
 def how_far(answer: CampaignResponse) -> str:
-    """Say that a campaign was left, and how far it was."""
+    """Describe how far an interrupted campaign was."""
     return f"campaign {answer.id} was interrupted at {100 * answer.progress:.0f} %"
 
 
 def describe_interrupted(answer: CampaignResponse) -> str:
-    """Say that a campaign was left, and what a person can do about it."""
+    """Describe an interrupted campaign and what a person can do about it."""
     resumes, ends = f"`labctl campaign resume {answer.id}`", f"`labctl campaign abort {answer.id}`"
     return f"{how_far(answer)}; {resumes} resumes the campaign, {ends} ends it"
 
@@ -178,9 +178,9 @@ def mark_abandoned(answer: CampaignResponse, *, attended: bool) -> CampaignRespo
     if answer.state in ENDED or attended:
         return answer
     left_safe = answer.state is CampaignState.INTERRUPTED
-    why = answer.reason if left_safe else "no process runs the campaign any more: inspect the bench"
+    cause = answer.reason if left_safe else "no process runs the campaign any more: inspect the bench"
     reason = (
-        f"{why}; `labctl campaign resume` or a service on its bench resumes the campaign where it stopped, "
+        f"{cause}; `labctl campaign resume` or a service on its bench resumes the campaign where it stopped, "
         "`labctl campaign abort` ends it"
     )
     return answer.model_copy(update={"reason": reason, "abandoned": True, "active": False})

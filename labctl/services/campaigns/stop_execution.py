@@ -69,9 +69,9 @@ class StopExecution:
                 return CampaignStop.of(job)
             if job is not None:
                 return _another(job, stop)
-            left = self._secure()
+            outcome = self._secure()
             self.carry_out()
-            return left
+            return outcome
 
     def request_left(self, stop: StopRequest) -> Stopping:
         """Begin the stop of a campaign that an earlier process left: it may be about to be resumed."""
@@ -87,12 +87,12 @@ class StopExecution:
         stops = self._latch.state.open
         if not stops or self._job() is not None or not self._may_drive():
             return
-        left = "" if self.is_safe else self._secure()
+        problem = "" if self.is_safe else self._secure()
         for stop in stops:
             self._recovery.close_stopped(stop.campaign, stop.reason)
             self._latch.record(stop, WallClock().utc())
-        self._latch.carried_out(stops, left or "the bench is in its safe state")
-        log.warning("stop.carried_out", stops=[stop.reason for stop in stops], unconfirmed=left)
+        self._latch.carried_out(stops, problem or "the bench is in its safe state")
+        log.warning("stop.carried_out", stops=[stop.reason for stop in stops], unconfirmed=problem)
 
     def watch(self) -> None:
         """Read the latch from now on, in a thread: a stop may have been asked for while no process answered."""

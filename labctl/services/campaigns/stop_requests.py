@@ -72,13 +72,13 @@ class IdleStop:
 
     def _work(self) -> None:
         try:
-            found = self._make_safe()
+            problem = self._make_safe()
         except Exception as error:  # noqa: BLE001  it is the answer, whatever it is
-            found = str(error) or type(error).__name__
-        if isinstance(found, CampaignStop):
-            self._begun = found
+            problem = str(error) or type(error).__name__
+        if isinstance(problem, CampaignStop):
+            self._begun = problem
         else:
-            self._trouble = found
+            self._trouble = problem
         self._over.set()
 
     def is_heard(self, within_s: float) -> bool:  # noqa: ARG002  no engine runs that would have to hear it
@@ -112,7 +112,7 @@ class NotHere:
     campaign: int | None = None
 
     def __init__(self, text: str, *, stands: bool) -> None:
-        """Say why; `stands`: whether nothing moves that this service could stop."""
+        """Set the reason; `stands`: whether nothing moves that this service could stop."""
         self.text, self.stands = text, stands
 
     def is_heard(self, within_s: float) -> bool:  # noqa: ARG002  there is nothing to wait for

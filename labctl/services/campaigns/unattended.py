@@ -41,19 +41,19 @@ def abort_abandoned(
     row = store.campaigns.get(campaign)
     of_bench = BenchStops(store, row.bench_name)
     stops = stops if stops is not None and stops.place == of_bench.place else of_bench
-    asked = [stop for stop in stops.state.open if stop.campaign == campaign]
-    for stop in asked:
+    open_stops = [stop for stop in stops.state.open if stop.campaign == campaign]
+    for stop in open_stops:
         stops.record(stop, at)
-    if not asked:
+    if not open_stops:
         record_action(store, at, "abort", campaign, reason)
-    said = f"left unfinished; {reason}"
+    sentence = f"left unfinished; {reason}"
     if row.state in UNDER_WAY and outlives_its_process(row):
         text = f"the process that ran campaign {campaign} ended before it could make the bench safe"
         store.benches.mark(row.bench_name, text, at)
-        said += f". Bench {row.bench_name} has not been made safe: check it, then run `labctl bench clear`"
-    store.campaigns.close_unfinished(campaign, said, at, CampaignState.ABORTED)
-    stops.note_closed(campaign, said)
-    log.warning("campaign.closed", campaign=campaign, bench=row.bench_name, reason=said)
+        sentence += f". Bench {row.bench_name} has not been made safe: check it, then run `labctl bench clear`"
+    store.campaigns.close_unfinished(campaign, sentence, at, CampaignState.ABORTED)
+    stops.note_closed(campaign, sentence)
+    log.warning("campaign.closed", campaign=campaign, bench=row.bench_name, reason=sentence)
     return campaign_status(store, campaign)
 
 

@@ -50,22 +50,22 @@ SIMULATED = (
 
 def statements(facts: Facts) -> tuple[str, ...]:
     """Return the statements in order; of a simulated bench that it is simulated first, and none on traceability."""
-    found = [ITEM_ONLY, TRACEABLE, NOISE, BY_CUSTOMER, WHOLE]
-    return (SIMULATED, *found[:1], *found[2:]) if facts.simulated else tuple(found)
+    statement_texts = [ITEM_ONLY, TRACEABLE, NOISE, BY_CUSTOMER, WHOLE]
+    return (SIMULATED, *statement_texts[:1], *statement_texts[2:]) if facts.simulated else tuple(statement_texts)
 
 
 NONE = "None."
 
 
 def assembled(
-    store: Store, facts: Facts, found: Found, request: CertificateRequest, at: datetime, kept: CertificateRow | None
+    store: Store, facts: Facts, evidence: Found, request: CertificateRequest, at: datetime, kept: CertificateRow | None
 ) -> Certificate:
     """Return the certificate with the next number of the laboratory. Raises MissingFacts, BadInput, NotEnoughData."""
     first, last, act = facts.performed_from, facts.performed_until, facts.authorised
-    measurements, uncertainty = found.measurements, found.results.uncertainty
+    measurements, uncertainty = evidence.measurements, evidence.results.uncertainty
     if first is None or last is None or act is None or measurements is None or uncertainty is None:
         raise MissingFacts.of(facts.what, [])  # refused before
-    before, left, adjustment = _states(store, facts, measurements)
+    before, after, adjustment = _states(store, facts, measurements)
     order, number = facts.order, _number(store, facts, at)
     stability = stability_until(store, facts, act.due_at) if order.state_due and act.due_at else None
     return Certificate(
@@ -81,19 +81,19 @@ def assembled(
         method=_method(facts),
         performed_from=first,
         performed_until=last,
-        environment=(*found.conditions, *found.room),
-        standards=tuple(_standard(each) for each in facts.standards),
+        environment=(*evidence.conditions, *evidence.room),
+        standards=tuple(_standard(standard) for standard in facts.standards),
         uncertainty=uncertainty,
-        results=found.results.points,
-        any_axis=found.results.any_axis,
+        results=evidence.results.points,
+        any_axis=evidence.results.any_axis,
         coefficients=measured.coefficients(facts.calibration),
         sensors=tuple(facts.sensors.results(order, request.by)),
         as_found=before,
-        as_left=left,
+        as_left=after,
         adjustment=adjustment,
         conformity=None if order.conformity is None else conformity(
             order.conformity, errors_of(measurements, facts.calibration, order.conformity.about),
-            found.results.points, found.results.any_axis, found.results.left_out,
+            evidence.results.points, evidence.results.any_axis, evidence.results.left_out,
             widening_of(facts.calibration, order.conformity.about), stability,
         ),
         due=None if stability is None else stability.until,
@@ -104,7 +104,7 @@ def assembled(
             version=facts.row.version, hash=facts.row.hash, address=address_of(facts.laboratory.url, facts.row)
         ),
         manifests=tuple(_manifests(store, facts)),
-        statements=(*statements(facts), *until(stability, found.results.points), *found.results.left_out),
+        statements=(*statements(facts), *until(stability, evidence.results.points), *evidence.results.left_out),
     )  # fmt: skip
 
 
@@ -120,8 +120,8 @@ def _authorisation(act: CertificationRow) -> Authorisation:
 def _manifests(store: Store, facts: Facts) -> Iterator[ManifestNamed]:
     """Yield the manifests of the recordings that were fitted, and of the certification."""
     for number in facts.row.recordings:
-        if (found := store.manifests.of_recording(number)) is not None:
-            yield ManifestNamed(record=f"recording {number}", manifest=found.sequence, hash=found.hash)
+        if (manifests := store.manifests.of_recording(number)) is not None:
+            yield ManifestNamed(record=f"recording {number}", manifest=manifests.sequence, hash=manifests.hash)
     act = store.manifests.of_certification(facts.row.serial, facts.row.version)
     if act is not None:
         yield ManifestNamed(record=f"certification of {facts.what}", manifest=act.sequence, hash=act.hash)
@@ -134,11 +134,11 @@ def _number(store: Store, facts: Facts, at: datetime) -> str:
 
 
 def _item(facts: Facts) -> Item:
-    given = facts.order.item
+    item = facts.order.item
     return Item(
-        description=given.description, manufacturer=given.manufacturer, serial=facts.row.serial,
-        model=facts.calibration.document["unit"]["model"], identification=given.identification,
-        axes=facts.calibration.axes, condition=given.condition, received=given.received,
+        description=item.description, manufacturer=item.manufacturer, serial=facts.row.serial,
+        model=facts.calibration.document["unit"]["model"], identification=item.identification,
+        axes=facts.calibration.axes, condition=item.condition, received=item.received,
     )  # fmt: skip
 
 
@@ -163,23 +163,23 @@ def _standard(given: Standard) -> StandardUsed:
     )  # fmt: skip
 
 
-def _states(store: Store, facts: Facts, found: Measurements) -> tuple[StateOfItem, StateOfItem, str]:
+def _states(store: Store, facts: Facts, measurements: Measurements) -> tuple[StateOfItem, StateOfItem, str]:
     """Return the errors as found and as left, and what was adjusted between."""
     row, calibration = facts.row, facts.calibration
-    left = measured.corrected(
-        found, calibration, f"the calibration that is certified, version {row.version}", calibration
+    after = measured.corrected(
+        measurements, calibration, f"the calibration that is certified, version {row.version}", calibration
     )
     before = _version_before(store, facts)
     new = f"The coefficients of the correction were determined anew: version {row.version}."
-    said = f"{new} {facts.order.adjustment or 'Nothing else was adjusted or repaired.'}"
+    text = f"{new} {facts.order.adjustment or 'Nothing else was adjusted or repaired.'}"
     if before is not None:
         document, _ = store.calibrations.document(row.serial, before)
         try:
             basis = f"the calibration in force before, version {before}"
-            return measured.corrected(found, read_calibration(document), basis, calibration), left, said
+            return measured.corrected(measurements, read_calibration(document), basis, calibration), after, text
         except (BadInput, NotEnoughData):  # its model needs what was not recorded this time
             pass
-    return measured.uncorrected(found, calibration.axes), left, said
+    return measured.uncorrected(measurements, calibration.axes), after, text
 
 
 def _version_before(store: Store, facts: Facts) -> int | None:

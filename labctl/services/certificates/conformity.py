@@ -49,7 +49,7 @@ def conformity(
     (`widening_of`). Where a date is stated until which it holds, U contains the drift until then (`stability`).
     `left_out` are the sentences on places of the range where U is not known. Raises NoDecision, NoAcceptance.
     """
-    expanded, where = _about_any(ordered, any_axis) if ordered.about == "any axis" else _about_own(results)
+    expanded, place_text = _about_any(ordered, any_axis) if ordered.about == "any axis" else _about_own(results)
     if left_out:
         raise NoDecision(f"conformity to {ordered.specification}: {' '.join(left_out)} {_MEASURE}")
     decided = tuple(_decided(ordered, each, stability) for each in errors.verified)
@@ -58,7 +58,8 @@ def conformity(
     acceptance = _acceptance(ordered, expanded, band)
     passed = errors.largest_dps <= acceptance
     statement = (
-        f"{'PASS' if passed else 'FAIL'}: {where}{_temperatures(results)}, the largest error of the corrected rate, "
+        f"{'PASS' if passed else 'FAIL'}: {place_text}{_temperatures(results)}, the largest error of the corrected "
+        "rate, "
         f"{errors.largest_dps:.3g} °/s {_of(errors)}, "
         f"{'does not exceed' if passed else 'exceeds'} the acceptance limit of {acceptance:.3g} °/s = "
         f"{ordered.limit_dps:g} °/s − {band:.3g} °/s. Decision rule: {_rule(ordered, widening)}, "
@@ -146,10 +147,14 @@ def _of(errors: Errors) -> str:
     if errors.evidence == "fitted":
         return OF_FITTED.format(n=errors.datasets)
     rates = [rate for each in errors.verified for rate in each.rates_dps]
-    warm = [each.temperature_c for each in errors.verified if each.temperature_c is not None]
+    temperatures_c = [each.temperature_c for each in errors.verified if each.temperature_c is not None]
     return OF_VERIFICATION.format(
         n=errors.datasets, rates=f"{min(rates):.4g} to {max(rates):.4g} °/s",
-        temperatures=f"{min(warm):.1f} to {max(warm):.1f} °C" if warm else "the temperature of the room",
+        temperatures=(
+            f"{min(temperatures_c):.1f} to {max(temperatures_c):.1f} °C"
+            if temperatures_c
+            else "the temperature of the room"
+        ),
         how=ANEW if errors.is_anew else SHARED, fitted=errors.fitted_datasets, seen=errors.fitted_dps,
         verified=max(abs(each.error_dps) for each in errors.verified),
     )  # fmt: skip
@@ -171,8 +176,8 @@ def _until(stability: StabilityResult | None) -> str:
         return ""
     if stability.drift_dps is None:
         return f"; it holds at the time of the calibration: the drift until {stability.until} is not known"
-    known = stability.type
-    source = "" if known is None else f", by {known.units} other units of model {known.model}"
+    drift_type = stability.type
+    source = "" if drift_type is None else f", by {drift_type.units} other units of model {drift_type.model}"
     return f"; U contains a drift of {stability.drift_dps:.3g} °/s until {stability.until}{source}"
 
 
@@ -186,8 +191,8 @@ def _otherwise(ordered: OrderedConformity) -> str:
 
 def _about_any(ordered: OrderedConformity, any_axis: tuple[AnyAxisResult, ...]) -> tuple[float, str]:
     """Return U and for which rotations it holds, in the frame of the case."""
-    known = [each.expanded_dps for each in any_axis if each.expanded_dps is not None]
-    if not any_axis or len(known) < len(any_axis):
+    bounds = [each.expanded_dps for each in any_axis if each.expanded_dps is not None]
+    if not any_axis or len(bounds) < len(any_axis):
         whys = "; ".join(dict.fromkeys(each.why for each in any_axis if each.why)) or (
             "the version was made by an older version of labctl"
         )
@@ -197,7 +202,7 @@ def _about_any(ordered: OrderedConformity, any_axis: tuple[AnyAxisResult, ...]) 
             'about = "own axis" in [conformity]'
         )
     reach = max(each.reach_dps for each in any_axis)
-    return max(known), f"turned about any axis of its case at up to {reach:.4g} °/s"
+    return max(bounds), f"turned about any axis of its case at up to {reach:.4g} °/s"
 
 
 def _about_own(results: tuple[ResultPoint, ...]) -> tuple[float, str]:
@@ -209,5 +214,5 @@ def _about_own(results: tuple[ResultPoint, ...]) -> tuple[float, str]:
 
 def _temperatures(results: tuple[ResultPoint, ...]) -> str:
     """Return the range of temperatures that a statement holds for; nothing where the calibration knows none."""
-    known = [point.temperature_c for point in results if point.temperature_c is not None]
-    return f" and {min(known):.1f} to {max(known):.1f} °C" if known else ""
+    temperatures = [point.temperature_c for point in results if point.temperature_c is not None]
+    return f" and {min(temperatures):.1f} to {max(temperatures):.1f} °C" if temperatures else ""

@@ -115,11 +115,11 @@ class _Part:
         knows = math.isfinite(calibration.temperature_c[0])
         for axis, values in self.errors_dps.items():
             if self.belongs(row, axis, about):
-                warm = float(self.data.channels.temperature_c(axis)[row])
-                budget = budgets_at(calibration, rates if about == "any axis" else rates[axis], warm)[axis]
+                temperature_c = float(self.data.channels.temperature_c(axis)[row])
+                budget = budgets_at(calibration, rates if about == "any axis" else rates[axis], temperature_c)[axis]
                 budget = self._with_placement(budget, row, axis, calibration)
                 place = (rates["x"], rates["y"], rates["z"])
-                yield VerifiedError(axis, place, warm if knows else None, float(values[row]), budget)
+                yield VerifiedError(axis, place, temperature_c if knows else None, float(values[row]), budget)
 
 
 def errors_of(measured: Measurements, calibration: Calibration, about: Use) -> Errors:
@@ -129,28 +129,30 @@ def errors_of(measured: Measurements, calibration: Calibration, about: Use) -> E
     Raises NotVerified where a verification part does not cover the use; BadInput, NotEnoughData.
     """
     recordings = list(measured.of_each.values())
-    fitted = [error for each in recordings for error in _Part.of(calibration, fitted_part(each)).largest(about)]
-    aside = [(each, part) for each in recordings if (part := verification_part(each)) is not None]
-    found: list[VerifiedError] = []
+    fitted = [
+        error for recording in recordings for error in _Part.of(calibration, fitted_part(recording)).largest(about)
+    ]
+    aside = [(recording, part) for recording in recordings if (part := verification_part(recording)) is not None]
+    errors: list[VerifiedError] = []
     datasets = outside = 0
     for _, points in aside:
-        seen = _Part.of(calibration, points, anew=True)
-        outside += int(seen.outside.sum())
-        for row in np.flatnonzero(~seen.outside).tolist():
-            shown = list(seen.at(row, calibration, about))
-            found += shown
-            datasets += bool(shown)
+        part_seen = _Part.of(calibration, points, anew=True)
+        outside += int(part_seen.outside.sum())
+        for row in np.flatnonzero(~part_seen.outside).tolist():
+            shown_errors = list(part_seen.at(row, calibration, about))
+            errors += shown_errors
+            datasets += bool(shown_errors)
     if aside:
-        _require_cover(found, calibration, about, outside)
-    is_anew = bool(aside) and all(_is_anew(whole, part) for whole, part in aside)
-    return Errors(max(fitted, default=0.0), len(fitted), tuple(found), datasets, is_anew)
+        _require_cover(errors, calibration, about, outside)
+    is_anew = bool(aside) and all(_is_anew(whole_recording, part) for whole_recording, part in aside)
+    return Errors(max(fitted, default=0.0), len(fitted), tuple(errors), datasets, is_anew)
 
 
 def _is_anew(whole: Recording, part: Recording) -> bool:
     """Return whether the data sets that verify share no mounting and no powered session with those that were fitted."""
-    rest = fitted_part(whole)
+    fitted_rest = fitted_part(whole)
     return all(
-        name in part.columns and not set(part.columns[name].tolist()) & set(rest.columns[name].tolist())
+        name in part.columns and not set(part.columns[name].tolist()) & set(fitted_rest.columns[name].tolist())
         for name in ("run", "mounting")
     )
 
@@ -168,10 +170,10 @@ def _require_cover(verified: Sequence[VerifiedError], calibration: Calibration, 
             rates = [each.rates_dps[place] for each in verified if each.output == output]
             if rates and min(rates) <= low + third + 1e-9 and max(rates) >= high - third - 1e-9:
                 continue
-            said = f"at {min(rates):.4g} to {max(rates):.4g} deg/s" if rates else "at no rate"
+            text = f"at {min(rates):.4g} to {max(rates):.4g} deg/s" if rates else "at no rate"
             beyond = f" ({outside} data sets lie beyond the range of the calibration)" if outside else ""
             raise NotVerified(
-                f"output {output} was verified about {turned} {said}{beyond}; a statement about {about} for {low:.4g} "
+                f"output {output} was verified about {turned} {text}{beyond}; a statement about {about} for {low:.4g} "
                 f"to {high:.4g} deg/s needs rates in the outer thirds of this range. Verify there ([verification] of "
                 "the recipe), or leave [conformity] out of the order"
             )

@@ -83,17 +83,17 @@ class Facts:
         yield from self._traceability()
 
     def _traceability(self) -> Iterator[tuple[str, str]]:
-        if self.standards and not {each.quantity for each in self.standards} & RATE:
+        if self.standards and not {standard.quantity for standard in self.standards} & RATE:
             yield "standard of the rate", STANDARDS
         if not self.standards:
             yield "reference standards", STANDARDS
-        measured = any(each.quantity in RATE and each.certificate for each in self.standards)
-        for each in self.standards:
-            if each.quantity in RATE and measured and not each.certificate:
+        measured = any(standard.quantity in RATE and standard.certificate for standard in self.standards)
+        for standard in self.standards:
+            if standard.quantity in RATE and measured and not standard.certificate:
                 continue  # follows from the time base that has one
-            lacking = [name for name in ("certificate", "issued_by", "due") if not getattr(each, name)]
-            if lacking and not each.traceability:
-                yield f"{', '.join(lacking)} (or traceability) of standard {each.label}", STANDARDS
+            lacking = [name for name in ("certificate", "issued_by", "due") if not getattr(standard, name)]
+            if lacking and not standard.traceability:
+                yield f"{', '.join(lacking)} (or traceability) of standard {standard.label}", STANDARDS
 
 
 def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -> Facts:
@@ -121,7 +121,7 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
         or min(since, default=None),
         performed_until=max(until, default=None) if campaign else method.performed_until or max(until, default=None),
         simulated=(bench is not None and bench.has_simulated)
-        or any(each.traceability == SIMULATED for each in _standards(measured)),
+        or any(standard.traceability == SIMULATED for standard in _standards(measured)),
         sensors=Sensors.of(store, row.serial, order),
     )  # fmt: skip
 

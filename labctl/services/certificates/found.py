@@ -36,5 +36,5 @@ class Found:
     def missing(self) -> Iterator[tuple[str, str]]:
         """Yield what is not known of the results, and what makes it known."""
         yield from self.results.missing()
-        if self.measurements is not None and not any(each.unit == "°C" for each in self.conditions):
+        if self.measurements is not None and not any(condition.unit == "°C" for condition in self.conditions):
             yield "temperature of the item or of the chamber", "a recording with temperature_c or chamber_c"

@@ -33,27 +33,27 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     Raises NotFound, MissingFacts, CertificateRefused, Conflict where other facts are given for one that was issued and
     where a standard was found bad while it was being written, BadInput for a signing key that cannot be used.
     """
-    kept = store.certificates.newest(store.units.get(serial).serial, version)
-    if kept is not None and request.amend is None:
-        return certificate_by_number(store, _unchanged(kept, request).number)
-    if kept is None and request.amend is not None:
+    newest = store.certificates.newest(store.units.get(serial).serial, version)
+    if newest is not None and request.amend is None:
+        return certificate_by_number(store, _unchanged(newest, request).number)
+    if newest is None and request.amend is not None:
         raise CertificateRefused(f"{serial} version {version} has no certificate to amend; issue one without --amend")
-    order = CertificateOrder.model_validate(kept.order) if kept and not _given(request) else request.order
+    order = CertificateOrder.model_validate(newest.order) if newest and not _given(request) else request.order
     last = store.standards.last_finding()  # before the evidence is read: a later one is found when it is stored
     facts = facts_of(store, serial, version, order)
-    found = Found.of(store, facts)
-    refuse(facts, found)
+    evidence = Found.of(store, facts)
+    refuse(facts, evidence)
     _refuse_bad(store, facts)
     with signing_key(at) as key:
-        if kept is not None and kept.signed_by is not None and key is None:
+        if newest is not None and newest.signed_by is not None and key is None:
             raise CertificateRefused(
-                f"certificate {kept.number} is signed, and no key is set to sign the one that replaces it; name the "
+                f"certificate {newest.number} is signed, and no key is set to sign the one that replaces it; name the "
                 f"key by {SIGN_KEY_VARIABLE}"
             )
-        certificate = to_be_signed(assembled(store, facts, found, request, at, kept), key)
+        certificate = to_be_signed(assembled(store, facts, evidence, request, at, newest), key)
         forms = forms_of(certificate, key, at)
     row = CertificateRow(
-        certificate.number, serial, version, kept.number if kept else None, request.amend or "", request.by, at,
+        certificate.number, serial, version, newest.number if newest else None, request.amend or "", request.by, at,
         hash_of_certificate(forms.document), order.model_dump(mode="json", exclude_defaults=True), acting_key(),
         signed_by=None if certificate.signed_by is None else certificate.signed_by.model_dump(mode="json"),
     )  # fmt: skip
@@ -73,16 +73,18 @@ def _given(request: CertificateRequest) -> dict[str, object]:
 
 def _unchanged(kept: CertificateRow, request: CertificateRequest) -> CertificateRow:
     """Return what was issued; raises Conflict where the request states other facts of the order."""
-    given = _given(request)
-    if given and kept.withdrawal is not None:
+    given_facts = _given(request)
+    if given_facts and kept.withdrawal is not None:
         gone = kept.withdrawal
         raise CertificateRefused(
             f"certificate {kept.number} of {kept.serial} version {kept.version} was withdrawn at "
             f"{gone.at:%Y-%m-%d %H:%M} UTC by {gone.by} ({gone.reason}); to issue a new certificate in its place, give "
             "the reason with --amend REASON (over HTTP: `amend`)"
         )
-    if given and given != kept.order:
-        other = ", ".join(sorted(name for name in {*given, *kept.order} if given.get(name) != kept.order.get(name)))
+    if given_facts and given_facts != kept.order:
+        other = ", ".join(
+            sorted(name for name in {*given_facts, *kept.order} if given_facts.get(name) != kept.order.get(name))
+        )
         raise CertificateRefused(
             f"certificate {kept.number} of {kept.serial} version {kept.version} was issued with another "
             f"{other}; to replace that certificate, give the reason with --amend REASON (over HTTP: `amend`)"
@@ -90,10 +92,10 @@ def _unchanged(kept: CertificateRow, request: CertificateRequest) -> Certificate
     return kept
 
 
-def refuse(facts: Facts, found: Found) -> None:
+def refuse(facts: Facts, evidence: Found) -> None:
     """Raise MissingFacts, or CertificateRefused for a version that was revoked, or certified by one person where two
     are needed, and for a standard outside its dates."""
-    if missing := [*facts.missing(), *found.missing()]:
+    if missing := [*facts.missing(), *evidence.missing()]:
         raise MissingFacts.of(facts.what, missing)
     act = facts.authorised
     if act is not None and act.act == "revoke":
@@ -119,11 +121,11 @@ def _refuse_dates(facts: Facts) -> None:
             f"[item] of the order: received = {received} is after the calibration of {facts.what} began, {first}; "
             "correct the date"
         )
-    if bad := [each for each in facts.standards if _off(each, first, last)]:
-        said = "; ".join(f"{each.label}: calibrated {each.calibrated or 'not stated'}, due {each.due}" for each in bad)
+    if bad := [standard for standard in facts.standards if _off(standard, first, last)]:
+        text = "; ".join(f"{each.label}: calibrated {each.calibrated or 'not stated'}, due {each.due}" for each in bad)
         raise CertificateRefused(
             f"no certificate of {facts.what}: measured from {first} to {last}, when the calibration of a "
-            f"reference standard was not valid ({said}). Have the standard calibrated, and measure again"
+            f"reference standard was not valid ({text}). Have the standard calibrated, and measure again"
         )
 
 

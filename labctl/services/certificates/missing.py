@@ -28,13 +28,13 @@ class MissingFacts(BadInput):
         for fact, place in facts:
             places.setdefault(place, []).append(fact)
         count = "1 fact is missing" if len(facts) == 1 else f"{len(facts)} facts are missing"
-        said = "; ".join(f"{', '.join(names)}: {place}" for place, names in places.items())
-        return cls(f"no certificate of {what}: {count}. {said}", facts)
+        text = "; ".join(f"{', '.join(names)}: {place}" for place, names in places.items())
+        return cls(f"no certificate of {what}: {count}. {text}", facts)
 
     @property
     def members(self) -> JsonObject:
         """Each fact, and where it is stated."""
-        return {"missing": [{"fact": fact, "where": where} for fact, where in self.facts]}
+        return {"missing": [{"fact": fact, "where": place_text} for fact, place_text in self.facts]}
 
 
 def of_contact(contact: Contact, whose: str, where: str) -> Iterator[tuple[str, str]]:

@@ -31,15 +31,15 @@ class CertificateFile:
     def headers(self) -> dict[str, str]:
         """Return the HTTP headers beside the bytes: tag, name, and the state, which the bytes cannot say."""
         now = self.issued
-        found = {
+        response_headers = {
             "ETag": f'"{self.etag}"', "Content-Disposition": f'inline; filename="{self.name}"',
             "Cache-Control": "no-cache", "X-Labctl-State": now.state,
         }  # fmt: skip
         if (withdrawn := notice_of(now)) is not None:
-            found[HEADER] = withdrawn.header()
+            response_headers[HEADER] = withdrawn.header()
         if now.valid_instead is not None:
-            found["X-Labctl-Replaced-By"] = now.valid_instead
-        return found
+            response_headers["X-Labctl-Replaced-By"] = now.valid_instead
+        return response_headers
 
 
 def notice_of(now: CertificateResponse) -> Withdrawn | None:
@@ -51,9 +51,9 @@ def notice_of(now: CertificateResponse) -> Withdrawn | None:
 
 def format_of(name: str) -> CertificateFormat:
     """Return the format that a suffix names, with or without its dot. Raises BadInput."""
-    for known in get_args(CertificateFormat):
-        if name.lower().removeprefix(".") == known:
-            return known
+    for format_name in get_args(CertificateFormat):
+        if name.lower().removeprefix(".") == format_name:
+            return format_name
     raise BadInput(f"{name!r} is not a format of a certificate; give pdf, xml or json")
 
 
@@ -63,17 +63,19 @@ def certificate_file(
     """Return a form of the certificate of a version, by its number also one that was replaced. Raises NotFound."""
     chosen = format_of(format_name)
     rows = [row for row in list_certificates(store, serial) if row.version == version]
-    found = next((row for row in rows if number in (None, row.number)), None)
-    if found is None:
+    certificate_row = next((row for row in rows if number in (None, row.number)), None)
+    if certificate_row is None:
         store.calibrations.get(serial, version)
         raise NotFound(
             f"{serial} version {version} has no certificate{f' {number}' if number else ''}; `labctl certificate "
             f"{serial} --version {version} --order ORDER.toml --by NAME --out FILE.pdf` issues it"
         )
-    forms = store.certificates.forms(found.number)
+    forms = store.certificates.forms(certificate_row.number)
     content = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[chosen]
-    plain = "".join(char if char.isalnum() or char in "._-" else "_" for char in found.number)
-    return CertificateFile(content, MEDIA_TYPES[chosen], f"{plain}.{chosen}", f"{found.hash}-{chosen}", found)
+    plain = "".join(char if char.isalnum() or char in "._-" else "_" for char in certificate_row.number)
+    return CertificateFile(
+        content, MEDIA_TYPES[chosen], f"{plain}.{chosen}", f"{certificate_row.hash}-{chosen}", certificate_row
+    )
 
 
 def public_certificate(store: Store, number: str, calibration: str) -> PublicCertificate:
@@ -94,6 +96,6 @@ def public_certificate(store: Store, number: str, calibration: str) -> PublicCer
     if len(calibration) < HASH_DIGITS or not hash_.startswith(calibration.lower()):
         raise none
     issued = json.loads(store.certificates.forms(number).document)
-    said = now.model_dump(include=set(PublicCertificate.model_fields) - {"notices"})
+    public = now.model_dump(include=set(PublicCertificate.model_fields) - {"notices"})
     notices = Notices.of(store).for_customers(store.calibrations.get(now.serial, now.version).recordings)
-    return PublicCertificate(**said, calibration_hash=hash_, laboratory=issued["laboratory"]["name"], notices=notices)
+    return PublicCertificate(**public, calibration_hash=hash_, laboratory=issued["laboratory"]["name"], notices=notices)

@@ -26,11 +26,11 @@ def signing_key(at: datetime) -> Iterator[SigningKey | None]:
 
     Raises BadInput, which names the file or token, what is wrong with it, and what to do.
     """
-    given = signing_settings()
-    if not given.key:
+    key_settings = signing_settings()
+    if not key_settings.key:
         yield None
         return
-    with closing(_opened(given)) as key:
+    with closing(_opened(key_settings)) as key:
         key.refuse_outside_validity(at)
         yield key
 
@@ -44,13 +44,13 @@ def _opened(given: SigningSettings) -> SigningKey:
 
 def show_signing_key() -> SigningKeyResponse:
     """Return whose the signing key is, and how long it may sign. Raises BadInput."""
-    given = signing_settings()
-    if not given.key:
+    key_settings = signing_settings()
+    if not key_settings.key:
         raise BadInput(
             f"{SIGN_KEY_VARIABLE} is not set; name the signing key by it: a PEM or PKCS#12 file with key and "
             "certificate, or a PKCS#11 URI"
         )
-    with closing(_opened(given)) as key:
+    with closing(_opened(key_settings)) as key:
         return SigningKeyResponse(
             **key.signatory.model_dump(),
             valid_from=key.certificate.not_valid_before_utc,

@@ -31,26 +31,27 @@ SINGLE = " (its one interval between calibrations is within what follows)"
 def stability_until(store: Store, facts: Facts, until: datetime) -> StabilityResult:
     """Return what the item is expected to drift by until a date: by its own history, by its type, or unknown."""
     about = "own axis" if facts.order.conformity is None else facts.order.conformity.about
-    known = stability_of(store, facts.row.serial, facts.row.version, about)
+    stability = stability_of(store, facts.row.serial, facts.row.version, about)
     years = years_until(_measured(store, facts), until)
-    if isinstance(known, str):
+    if isinstance(stability, str):
         return StabilityResult(
-            until=until.date(), years=years, per_year_dps=None, intervals=0, drift_dps=None, about=about, why=known
+            until=until.date(), years=years, per_year_dps=None, intervals=0, drift_dps=None, about=about, why=stability
         )
-    per_year, freedom = known.worst
+    per_year, freedom = stability.worst
     return StabilityResult(
         until=until.date(), years=years, per_year_dps=per_year,
-        intervals=round(freedom) if known.of_type is None else known.intervals, drift_dps=known.expanded_dps(years),
-        about=about, type=_type(known, years),
+        intervals=round(freedom) if stability.of_type is None else stability.intervals,
+        drift_dps=stability.expanded_dps(years),
+        about=about, type=_type(stability, years),
     )  # fmt: skip
 
 
 def _measured(store: Store, facts: Facts) -> datetime:
     """Return when a version was measured: by its recordings, else by the order, without which nothing is issued."""
-    found = version_measured_at(store, facts.row)
-    if found is None and facts.performed_until is not None:
+    measured_at = version_measured_at(store, facts.row)
+    if measured_at is None and facts.performed_until is not None:
         return datetime.combine(facts.performed_until, time(), UTC)
-    return found or facts.row.created_at
+    return measured_at or facts.row.created_at
 
 
 def _type(known: Stability, years: float) -> TypeOfItem | None:
@@ -93,14 +94,14 @@ def _drift(stability: StabilityResult) -> str:
     """Return in words what the drift is known from."""
     turned = "turned about any axis" if stability.about == "any axis" else "turned about the axis of one output"
     intervals = f"{stability.intervals} {'interval' if stability.intervals == 1 else 'intervals'}"
-    said = {
+    figures = {
         "per_year": stability.per_year_dps, "turned": turned, "until": stability.until, "drift": stability.drift_dps,
     }  # fmt: skip
     if stability.type is None:
-        return OF_ITEM.format(intervals=intervals, **said)
+        return OF_ITEM.format(intervals=intervals, **figures)
     shortest, longest = stability.type.over_years
     return OF_TYPE.format(
         single=SINGLE if stability.intervals else "", units=stability.type.units, model=stability.type.model,
         shortest=shortest, longest=longest, mean=stability.type.mean_per_year_dps, freedom=stability.type.freedom,
-        **said,
+        **figures,
     )  # fmt: skip

@@ -30,19 +30,19 @@ class _Change:
 
 def list_certificates(store: Store, serial: str) -> list[CertificateResponse]:
     """Return every certificate of a unit with its state, newest first. Raises NotFound."""
-    known = store.units.get(serial).serial
+    known_serial = store.units.get(serial).serial
     notices = Notices.of(store)
-    behind = {row.version: row.recordings for row in store.calibrations.of_unit(known)} if notices.bad else {}
+    behind = {row.version: row.recordings for row in store.calibrations.of_unit(known_serial)} if notices.bad else {}
     return [
         row.model_copy(update={"notices": list(notices.of_recordings(behind.get(row.version, ())))})
-        for row in stated(store.certificates.of_unit(known), store.calibrations.history(known))
+        for row in stated(store.certificates.of_unit(known_serial), store.calibrations.history(known_serial))
     ]
 
 
 def certificate_by_number(store: Store, number: str) -> CertificateResponse:
     """Return a certificate with its state. Raises NotFound."""
     serial = store.certificates.get(number).serial
-    return next(each for each in list_certificates(store, serial) if each.number == number)
+    return next(certificate for certificate in list_certificates(store, serial) if certificate.number == number)
 
 
 def stated(rows: Sequence[CertificateRow], acts: Sequence[CertificationRow]) -> list[CertificateResponse]:
@@ -72,15 +72,15 @@ def _change(
     if (act := revoked.get(row.version)) is not None:  # revoked while the certificate was being written
         return _Change("withdrawn", act.at, act.reason, act.by, act.by_key)
     if (amendment := amended_by.get(row.number)) is not None:
-        why = amendment.reason
+        reason = amendment.reason
         if _is_gone(amendment, revoked):
-            why += f"; certificate {amendment.number}, which replaces it, was withdrawn"
-        return _Change("amended", amendment.at, why, amendment.by, amendment.by_key)
+            reason += f"; certificate {amendment.number}, which replaces it, was withdrawn"
+        return _Change("amended", amendment.at, reason, amendment.by, amendment.by_key)
     if last is not None and last.version != row.version:
         act = certified[last.version]
         too = ", which was withdrawn" if _is_gone(last, revoked) else ""
-        why = f"version {last.version} of the unit was certified, and has certificate {last.number}{too}"
-        return _Change("superseded", max(act.at, last.at), why, act.by, act.by_key)
+        reason = f"version {last.version} of the unit was certified, and has certificate {last.number}{too}"
+        return _Change("superseded", max(act.at, last.at), reason, act.by, act.by_key)
     return _Change("valid", row.at, "", row.by, row.by_key)
 
 

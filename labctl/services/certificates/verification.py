@@ -40,11 +40,11 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
     `signers` are expected to have signed it, one of them: subjects as RFC 4514 writes them, or fingerprints. Without
     any, those that the environment names. Raises BadInput.
     """
-    wanted = [*signers] or expected_signers()
-    if wanted:
+    expected = [*signers] or expected_signers()
+    if expected:
         with libraries("the verification of signatures"):
             from labctl.certificates.signing.expected import refuse_unreadable  # noqa: PLC0415  only where one is named
-        refuse_unreadable(wanted)
+        refuse_unreadable(expected)
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -55,19 +55,19 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
     in_register: Literal["same", "differs", "unknown"] = "unknown"
     if row is not None:
         forms = store.certificates.forms(row.number)
-        kept = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[form]
-        in_register = "same" if kept == content else "differs"
-    found = _signatures(content, form, path, ca)
-    answers = [_answer(each, wanted) for each in found]
+        stored = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[form]
+        in_register = "same" if stored == content else "differs"
+    signatures = _signatures(content, form, path, ca)
+    answers = [_answer(signature, expected) for signature in signatures]
     certificate = None if row is None else certificate_by_number(store, row.number)
     # a DCC that is attached to a PDF is signed by itself, which says nothing of the pages
-    own = [each for each in answers if each.valid and each.form == OWN.get(form)]
+    own = [answer for answer in answers if answer.valid and answer.form == OWN.get(form)]
     by = [each.signed_by for each in own]
     if form == "json" and certificate is not None and in_register == "same":
         by = [certificate.signed_by]
-    against = in_register == "differs" or not all(each.valid for each in answers)
-    against = against or any(each.trust == "not trusted" or each.expected is False for each in answers)
-    against = against or (bool(wanted) and not any(_is_one_of(each, wanted) for each in by))
+    against = in_register == "differs" or not all(answer.valid for answer in answers)
+    against = against or any(answer.trust == "not trusted" or answer.expected is False for answer in answers)
+    against = against or (bool(expected) and not any(_is_one_of(each, expected) for each in by))
     vouched = in_register == "same" or any(each.trust == "trusted" for each in own)
     state: CertificateState | Literal["unknown"] = "unknown" if certificate is None else certificate.state
     return VerifiedFileResponse(
@@ -78,7 +78,7 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
         certificate=certificate,
         state=state,
         signed_by=next(iter(by), None),
-        expected_signers=wanted,
+        expected_signers=expected,
         signatures=answers,
         ok=vouched and not against and state != "withdrawn",
     )
@@ -114,8 +114,8 @@ def _number_in(content: bytes, form: CertificateFormat) -> str | None:
         if form == "json":
             number = str(json.loads(content)["number"])
         else:
-            found = _NUMBER[form].findall(content)
-            number = html.unescape(found[-1].decode()) if found else ""
+            numbers = _NUMBER[form].findall(content)
+            number = html.unescape(numbers[-1].decode()) if numbers else ""
         return number if 0 < len(number) <= MOST_DIGITS and number.isprintable() else None
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
@@ -139,15 +139,15 @@ def _signatures(content: bytes, form: CertificateFormat, path: Path, ca: Path | 
         ) from error
 
 
-def _answer(found: SignatureFound, wanted: Sequence[str]) -> SignatureResponse:
-    signer = None if found.signatory is None else SignatoryResponse.model_validate(found.signatory.model_dump())
+def _answer(signature: SignatureFound, wanted: Sequence[str]) -> SignatureResponse:
+    signer = None if signature.signatory is None else SignatoryResponse.model_validate(signature.signatory.model_dump())
     return SignatureResponse(
-        form=found.form,
-        valid=found.valid,
-        problem=found.problem,
+        form=signature.form,
+        valid=signature.valid,
+        problem=signature.problem,
         signed_by=signer,
-        signed_at=found.signed_at,
-        trust=found.trust,
-        reason=found.reason,
+        signed_at=signature.signed_at,
+        trust=signature.trust,
+        reason=signature.reason,
         expected=_is_one_of(signer, wanted) if wanted else None,
     )

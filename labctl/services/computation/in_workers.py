@@ -69,10 +69,10 @@ class Outcome:
 
     def result(self) -> object:
         """Return the result. Raises the error."""
-        found = pickle.loads(self.content)  # noqa: S301  made by a process of this service
+        value = pickle.loads(self.content)  # noqa: S301  made by a process of this service
         if self.is_error:
-            raise found
-        return found
+            raise value
+        return value
 
 
 def carry_out(connection: Connection, task: Task) -> None:

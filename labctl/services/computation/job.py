@@ -53,7 +53,7 @@ class Job:
         self.is_abandoned = False
 
     def join(self, client: Client) -> bool:
-        """Let one more client wait, and tell it the stage; False where the job is ending because all have left."""
+        """Add a waiting client and report the stage to it; False where the job is ending because all have left."""
         with self._guard:
             if self.is_abandoned:
                 return False
@@ -64,7 +64,7 @@ class Job:
         return True
 
     def leave(self, client: Client) -> None:
-        """Let a client leave; the last one ends the job at once, where it can be ended."""
+        """Remove a waiting client; the last one ends the job at once, where it can be ended."""
         with self._guard:
             if client not in self._waiting:
                 return
@@ -77,7 +77,7 @@ class Job:
             end()
 
     def end_with(self, end: Callable[[], None]) -> None:
-        """Say how the job is ended at once; called right now where it is abandoned already."""
+        """Set how the job is ended at once; called now where it is abandoned already."""
         with self._guard:
             self._end = end
             abandoned = self.is_abandoned
@@ -85,7 +85,7 @@ class Job:
             end()
 
     def report(self, stage: str) -> None:
-        """Tell a stage to all who wait. Raises Cancelled where no caller waits any more."""
+        """Report a stage to all waiting callers. Raises Cancelled where no caller waits any more."""
         with self._guard:
             self._stage = stage
             waiting = list(self._waiting)

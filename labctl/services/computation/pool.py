@@ -103,8 +103,8 @@ class Pool(ABC):
 
     def _retry_after_s(self) -> int:
         """Return in how many seconds, by the durations of recent jobs, all jobs that wait now will have begun."""
-        known = self._durations_s or [FIRST_GUESS_S]
-        wait_s = sum(known) / len(known) * max(len(self._waiting), 1) / self.limits.at_once
+        durations_s = self._durations_s or [FIRST_GUESS_S]
+        wait_s = sum(durations_s) / len(durations_s) * max(len(self._waiting), 1) / self.limits.at_once
         return min(max(math.ceil(wait_s), 1), LONGEST_RETRY_S)
 
     def _attend(self, job: Job) -> None:

@@ -17,10 +17,10 @@ LOG_IT = (
 )
 
 
-def not_logged(found: Criticism) -> str:
+def not_logged(criticism: Criticism) -> str:
     """Return the verdict on a residual at rest that wanders slowly; "" where there is no such hypothesis."""
-    slow = found.slow
-    if found.verdict.hypothesis != "temperature_not_logged" or slow is None:
+    slow = criticism.slow
+    if criticism.verdict.hypothesis != "temperature_not_logged" or slow is None:
         return ""
     sizes = ", ".join(f"{axis} {size:.2g} deg/s" for axis, size in slow["rms_dps"].items())
     together = slow["common"]
@@ -36,53 +36,55 @@ def not_logged(found: Criticism) -> str:
     )
 
 
-def drifts(found: Criticism) -> str:
+def drifts(criticism: Criticism) -> str:
     """Return what is said of a slow process beside an adequate model, after a space; "" where there is none."""
-    if found.slow is None:
+    if criticism.slow is None:
         return ""
     return (
-        f" It is a drift (correlated over {found.slow['tau_s'] / 60:.0f} min): of the bias, or of a temperature that "
+        f" It is a drift (correlated over {criticism.slow['tau_s'] / 60:.0f} min): of the bias, or of a temperature "
+        "that "
         "was not logged."
     )
 
 
-def what_to_log(found: Criticism) -> list[str]:
+def what_to_log(criticism: Criticism) -> list[str]:
     """Return what to do about a temperature that was not logged; nothing without this hypothesis."""
-    return [LOG_IT] if found.verdict.hypothesis is not None else []
+    return [LOG_IT] if criticism.verdict.hypothesis is not None else []
 
 
-def coarse_steps(found: Criticism) -> list[str]:
+def coarse_steps(criticism: Criticism) -> list[str]:
     """Return what is said of outputs whose steps the noise does not average out; nothing where there are none."""
-    if not found.data.steps:
+    if not criticism.data.steps:
         return []
-    axes = ", ".join(f"{axis} by {step['step_dps']:.3g} deg/s" for axis, step in found.data.steps.items())
-    left = max(step["left_dps"] for step in found.data.steps.values())
-    said = (
+    axes = ", ".join(f"{axis} by {step['step_dps']:.3g} deg/s" for axis, step in criticism.data.steps.items())
+    largest_step_dps = max(step["left_dps"] for step in criticism.data.steps.values())
+    text = (
         f"Quantization: the output comes in steps ({axes}) that its noise does not average out. They leave "
-        f"{left:.2g} deg/s (standard deviation) in a mean, which no model corrects: record at a finer resolution."
+        f"{largest_step_dps:.2g} deg/s (standard deviation) in a mean, which no model corrects: record at a finer "
+        "resolution."
     )
-    return [said]
+    return [text]
 
 
-def doubtful(found: Criticism) -> str:
+def doubtful(criticism: Criticism) -> str:
     """Return what to say of evidence that is far beyond noise for an effect of an impossible size; "" without it."""
-    verdict = found.verdict
+    verdict = criticism.verdict
     if verdict.form != "unexplained" or not verdict.not_physical:
         return ""
-    technology = found.data.info.technology or "any technology"
-    suspects = {suspect.candidate.id: suspect for suspect in found.suspects}
-    parts = [_doubt(name, suspects.get(name), found, technology) for name in verdict.not_physical]
+    technology = criticism.data.info.technology or "any technology"
+    suspects = {suspect.candidate.id: suspect for suspect in criticism.suspects}
+    parts = [_doubt(name, suspects.get(name), criticism, technology) for name in verdict.not_physical]
     return f"More than noise is left, but what resembles it is physically doubtful: {'; '.join(parts)}."
 
 
-def _doubt(name: str, suspect: Suspect | None, found: Criticism, technology: str) -> str:
+def _doubt(name: str, suspect: Suspect | None, criticism: Criticism, technology: str) -> str:
     if suspect is None:
         return f"{name} would have a size that is not physical for {technology}"
     values = next(iter(next(iter(suspect.coefficients.values())).values()))
     usual = CATALOGUE[name].ranges.get(technology) if name in CATALOGUE else None
     size = f"its size would be {values['value']:.2g} {values['unit']}"
     limit = f", where {usual[0]:g} to {usual[1]:g} is usual for {technology}" if usual else ""
-    before = found.base.error.rms_dps if found.base is not None else None
+    before = criticism.base.error.rms_dps if criticism.base is not None else None
     after = suspect.after.error.rms_dps if suspect.after is not None else None
     change = ""
     if before is not None and after is not None:

@@ -45,22 +45,22 @@ LEGS = {1: "heating", -1: "cooling", 0: ""}
 def rest_columns(data: FitData, errors: Errors) -> RestColumns:
     """Return the data sets at rest, axis by axis, in order of time."""
     channels, m = data.channels, len(data)
-    t_s, known = channels.columns.get("t_s"), channels.history.thermometer
+    t_s, thermometer = channels.columns.get("t_s"), channels.history.thermometer
     run = np.asarray(channels["run"], dtype=np.int64) if "run" in channels else np.ones(m, dtype=np.int64)
-    legs = np.sign(legs_of(data.temperature_c, run)) if known and t_s is not None else np.zeros(m, dtype=np.int64)
+    legs = np.sign(legs_of(data.temperature_c, run)) if thermometer and t_s is not None else np.zeros(m, dtype=np.int64)
 
     def of(axis: str) -> _Rows:
-        bias, left = data.outputs[axis] - data.true_rate_dps(axis), _left(errors, axis)
+        bias, residual = data.outputs[axis] - data.true_rate_dps(axis), _left(errors, axis)
         return {
             "axis": [axis] * m,
             "dataset": _dataset(data),
             "t_s": _optional(t_s, m),
-            "temperature_c": _optional(channels.temperature_c(axis) if known else None, m),
+            "temperature_c": _optional(channels.temperature_c(axis) if thermometer else None, m),
             "leg": [LEGS[int(leg)] for leg in legs],
             "bias_dps": bias.tolist(),
             "u_dps": _optional(None if data.white_var is None else np.sqrt(data.white_var[axis]), m),
-            "modelled_dps": _optional(None if left is None else bias - left, m),
-            "residual_dps": _optional(left, m),
+            "modelled_dps": _optional(None if residual is None else bias - residual, m),
+            "residual_dps": _optional(residual, m),
         }
 
     return RestColumns(**_joined(data, errors, of))
@@ -73,8 +73,8 @@ def turn_columns(data: FitData, errors: Errors) -> TurnColumns:
     about = np.asarray(data.channels["position"]).astype(np.str_)[rows].tolist()
 
     def of(axis: str) -> _Rows:
-        left, true = _left(errors, axis), data.true_rate_dps(axis)[rows]
-        left = None if left is None else left[rows]
+        residual, true = _left(errors, axis), data.true_rate_dps(axis)[rows]
+        residual = None if residual is None else residual[rows]
         u_dps = None if data.white_var is None else np.sqrt(data.white_var[axis][rows])
         return {
             "axis": [axis] * m,
@@ -82,8 +82,8 @@ def turn_columns(data: FitData, errors: Errors) -> TurnColumns:
             "about": about,
             "asked_deg": (true * duration_s).tolist(),
             "output_deg": (data.outputs[axis][rows] * duration_s).tolist(),
-            "corrected_deg": _optional(None if left is None else (true + left) * duration_s, m),
-            "residual_deg": _optional(None if left is None else left * duration_s, m),
+            "corrected_deg": _optional(None if residual is None else (true + residual) * duration_s, m),
+            "residual_deg": _optional(None if residual is None else residual * duration_s, m),
             "u_deg": _optional(None if u_dps is None else u_dps * duration_s, m),
         }
 
@@ -96,16 +96,16 @@ def profile_columns(data: FitData, errors: Errors, responses: Mapping[str, Respo
     m = len(rows)
 
     def of(axis: str) -> _Rows:
-        left, true, followed = _left(errors, axis), data.true_rate_dps(axis), None
-        if left is not None and axis in responses:
-            followed = (true + left - data.through(responses[axis]).true_rate_dps(axis))[rows]
+        residual, true, followed = _left(errors, axis), data.true_rate_dps(axis), None
+        if residual is not None and axis in responses:
+            followed = (true + residual - data.through(responses[axis]).true_rate_dps(axis))[rows]
         return {
             "axis": [axis] * m,
             "dataset": np.asarray(_dataset(data))[rows].tolist(),
             "t_s": np.asarray(data.channels["t_s"], dtype=np.float64)[rows].tolist(),
             "true_dps": true[rows].tolist(),
             "output_dps": data.outputs[axis][rows].tolist(),
-            "residual_dps": _optional(None if left is None else left[rows], m),
+            "residual_dps": _optional(None if residual is None else residual[rows], m),
             "followed_dps": _optional(followed, m),
         }
 
@@ -180,9 +180,9 @@ def _compared(store: Store, row: RecordingRow, version: CalibrationRecord | None
     coefficients: Mapping[str, AxisCoefficients] = {} if version is None else version.answer["axes"]
     budgets = {} if calibration is None else calibration.document.get("response", {})
     responses = {
-        axis: found
+        axis: axis_response
         for axis in coefficients
-        if (found := _response(coefficients[axis], budgets.get(axis, {}))) is not None
+        if (axis_response := _response(coefficients[axis], budgets.get(axis, {}))) is not None
     }
     return answer.model_copy(update={
         "profile": profile_columns(data, errors, {axis: response for axis, (response, _) in responses.items()}),
@@ -227,25 +227,25 @@ def _expanded(budget: BudgetJson | None, u: float | None) -> float | None:
 
 def _single(axis: AxisCoefficients, name: str) -> tuple[float, float | None] | None:
     """Return a coefficient and its standard uncertainty; None where the model has none of this name."""
-    found = axis["coefficients"].get(name)
-    if found is None or isinstance(found, list):
+    coefficient = axis["coefficients"].get(name)
+    if coefficient is None or isinstance(coefficient, list):
         return None
-    value, u = found["value"], found["u"]
+    value, u = coefficient["value"], coefficient["u"]
     return None if isinstance(value, list) or isinstance(u, list) else (value, u)
 
 
 def _in_poses(store: Store, row: RecordingRow, calibration: Calibration | None) -> dict[str, object]:
     recording = source_of(store, row)
     correct: Correct = _as_it_is if calibration is None else correction_of(calibration, recording)
-    found = move_errors(recording, correct)
+    errors = move_errors(recording, correct)
     columns = PoseColumns(
-        from_s=found.t_s[:, 0].tolist(), until_s=found.t_s[:, 1].tolist(),
-        accelerometer_deg=found.accelerometer_deg.tolist(), gyro_deg=found.gyro_deg.tolist(),
-        residual_deg=found.residual_deg.tolist(),
+        from_s=errors.t_s[:, 0].tolist(), until_s=errors.t_s[:, 1].tolist(),
+        accelerometer_deg=errors.accelerometer_deg.tolist(), gyro_deg=errors.gyro_deg.tolist(),
+        residual_deg=errors.residual_deg.tolist(),
     )  # fmt: skip
     return {
-        "poses": columns, "rows": len(found.t_s), "of": len(found.t_s) + len(found.left_out),
-        "left_out": list(found.left_out),
+        "poses": columns, "rows": len(errors.t_s), "of": len(errors.t_s) + len(errors.left_out),
+        "left_out": list(errors.left_out),
     }  # fmt: skip
 
 

@@ -33,16 +33,16 @@ def held_sentences(model: ErrorModel) -> list[str]:
     listed = "; ".join(f"axis {axis}: {', '.join(names)}" for axis, names in model.held.axes.items())
     source = f" ({model.held.source})" if model.held.source else ""
     if model.forward().held.axes:
-        said = (
+        text = (
             f"These coefficients are held at their values{source}, within their stated uncertainties, and are not "
             f"fitted: {listed}."
         )
     else:
-        said = (
+        text = (
             f"The version holds these coefficients at their values{source}: {listed}. They belong to a law of the "
             "output; this comparison fits a law of the true rate, in which they are estimated."
         )
-    return [said]
+    return [text]
 
 
 def evaluate(
@@ -65,18 +65,18 @@ def evaluate(
     try:
         model = model_of(calibration)
         fitted = fit_means(measured.points, model)  # while the readings are being read
-        found = criticise(
+        criticised = criticise(
             measured.readings, model, catalogue, fitted=fitted, is_decimated=measured.is_decimated,
             static=measured.static,
         )  # fmt: skip
     except NotConverged as error:
-        what = f"criticism of version {calibration.version} on {measured.named}"
-        refuse_wrong(warnings, what, accepted=False, insist=f"; without refitting, {error}")
+        job_title = f"criticism of version {calibration.version} on {measured.named}"
+        refuse_wrong(warnings, job_title, accepted=False, insist=f"; without refitting, {error}")
         raise
-    columns = residual_columns(found.data, found.residuals, measured.points, measured.row.id, found.base)
+    columns = residual_columns(criticised.data, criticised.residuals, measured.points, measured.row.id, criticised.base)
     serial, version = calibration.serial, calibration.version
-    experiments = _experiments(store, measured.row.campaign, found)
-    criticism = answer_of(serial, version, measured.recordings, found, experiments)
+    experiments = _experiments(store, measured.row.campaign, criticised)
+    criticism = answer_of(serial, version, measured.recordings, criticised, experiments)
     criticism = criticism.model_copy(update={"text": [*criticism.text, *held_sentences(model)]})
     return (
         with_warnings(criticism.model_copy(update={"applied": applied}), warnings),
@@ -90,13 +90,13 @@ def evaluate(
     )
 
 
-def _experiments(store: Store, campaign: int | None, found: Criticism) -> list[Experiment]:
-    if not found.verdict.indistinguishable:
+def _experiments(store: Store, campaign: int | None, criticism: Criticism) -> list[Experiment]:
+    if not criticism.verdict.indistinguishable:
         return []
     report_stage("checking experiments")
     from labctl.services.criticism.next_experiment import experiments_for  # noqa: PLC0415  it loads the drivers
 
-    return experiments_for(store, campaign, found)
+    return experiments_for(store, campaign, criticism)
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:

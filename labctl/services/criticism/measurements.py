@@ -102,15 +102,17 @@ class Measurements:
 
         What is wrong with data sets that were measured to verify is an objection to certifying a version.
         """
-        found_in = {n: [w for w in found.warnings if w.part == "fitted"] for n, found in self.inspections.items()}
+        found_in = {
+            n: [w for w in inspection.warnings if w.part == "fitted"] for n, inspection in self.inspections.items()
+        }
         if len(self.rows) == 1:
             return [*found_in[self.row.id], *self.newer]
         return [
             warning.model_copy(
                 update={"where": f"recording {n}, {warning.where}", "text": f"recording {n}: {warning.text}"}
             )
-            for n, found in found_in.items()
-            for warning in found
+            for n, inspection in found_in.items()
+            for warning in inspection
         ] + [*undated_warnings(self.rows), *other_settings_warnings(self.rows)]
 
     @property
@@ -136,10 +138,10 @@ class Measurements:
         """What was read of each recording of which a criticism takes decimated readings."""
         for row in self.rows:
             refuse_unmeasured(row, self.of_each[row.id])
-        wanted = [row for row in self.rows if is_decimated(row)]
+        decimated_rows = [row for row in self.rows if is_decimated(row)]
         return {
             row.id: read_recording_of(self.store, row) if self.decimated is None else self.decimated(row)
-            for row in wanted
+            for row in decimated_rows
         }
 
     @property
@@ -150,10 +152,10 @@ class Measurements:
     @cached_property
     def static(self) -> StaticRecord | None:
         """The longest static record by all readings, data sets as `readings` numbers them; None: there is none."""
-        found = [(number, read.static) for number, read in self._read.items() if read.static is not None]
-        if not found:
+        static_records = [(number, read.static) for number, read in self._read.items() if read.static is not None]
+        if not static_records:
             return None
-        recording, longest = max(found, key=lambda each: each[1].duration_s)
+        recording, longest = max(static_records, key=lambda static_record: static_record[1].duration_s)
         columns = self.readings.columns
         if RECORDING not in columns:
             return longest
@@ -182,22 +184,22 @@ def undated_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
     if not undated or len(rows) < 2:
         return
     named = recordings_text(undated)
-    said = f"{named} {'have' if len(undated) > 1 else 'has'} no date of measurement, so their order is not known"
+    text = f"{named} {'have' if len(undated) > 1 else 'has'} no date of measurement, so their order is not known"
     yield DataWarning(
-        what="date", severity="likely", where=named, said=said, value=None, unit="",
+        what="date", severity="likely", where=named, said=text, value=None, unit="",
         expected="a date of measurement of each recording", do=GIVE_DATE,
-        text=f"{said}, and no trend over the recordings is looked for; {GIVE_DATE}",
+        text=f"{text}, and no trend over the recordings is looked for; {GIVE_DATE}",
     )  # fmt: skip
 
 
 def other_settings_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
     """Yield that the unit was set otherwise in one of several recordings than in the first one that says how."""
-    known = [(row.id, RecordingInfo.model_validate(row.info).configuration) for row in rows]
-    first, *others = [each for each in known if each[1]] or [(0, {})]
-    for number, found in others:
-        if differs := changed(first[1], found):
-            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in differs.items())
-            text = f"the unit is set otherwise than in recording {first[0]}: {said}"
+    configurations = [(row.id, RecordingInfo.model_validate(row.info).configuration) for row in rows]
+    first, *others = [configuration for configuration in configurations if configuration[1]] or [(0, {})]
+    for number, settings in others:
+        if differs := changed(first[1], settings):
+            sentence = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in differs.items())
+            text = f"the unit is set otherwise than in recording {first[0]}: {sentence}"
             do = "fit the recordings of each setting by themselves"
             yield DataWarning(
                 what="configuration", severity="likely", where=f"recording {number}", said=text, value=None, unit="",

@@ -32,25 +32,25 @@ PAIRS, SHOWN = 6, 4
 MOST_CHI2 = 40.0
 
 
-def experiments_for(store: Store, campaign: int | None, found: Criticism) -> list[Experiment]:
+def experiments_for(store: Store, campaign: int | None, criticism: Criticism) -> list[Experiment]:
     """Return changed recipes that would separate what a verdict could not distinguish, best first.
 
     `campaign` is the recording's, if it has one. First come the recipes that separate the leader from most rivals,
     among them those with the largest separation per hour.
     """
-    if found.comparison is None or not found.verdict.indistinguishable:
+    if criticism.comparison is None or not criticism.verdict.indistinguishable:
         return []
-    base = _recipe_of(store, campaign, found)
+    base = _recipe_of(store, campaign, criticism)
     if base is None:
         return []
     recipe, bench = base
-    effects = {c.id for c in found.comparison.candidates if not c.smooth}
-    leader, *others = found.verdict.indistinguishable
-    signal = leading_signal(found.comparison, leader)
+    effects = {c.id for c in criticism.comparison.candidates if not c.smooth}
+    leader, *others = criticism.verdict.indistinguishable
+    signal = leading_signal(criticism.comparison, leader)
     rivals = [name for name in others[:PAIRS] if name in effects]
-    floor_dps = {axis: float(np.median(left.floor_dps)) for axis, left in found.residuals.items()}
+    floor_dps = {axis: float(np.median(residuals.floor_dps)) for axis, residuals in criticism.residuals.items()}
     tried = (
-        _experiment(text, changes, recipe, bench, signal, rivals, found.comparison.model, floor_dps)
+        _experiment(text, changes, recipe, bench, signal, rivals, criticism.comparison.model, floor_dps)
         for text, changes in menu(recipe)
     )
     ranked = [experiment for experiment in tried if experiment is not None]
@@ -120,23 +120,25 @@ def _top(rates: tuple[float, ...]) -> list[float]:
     return [0.0, *(sign * size for size in sizes for sign in (1, -1))]
 
 
-def _recipe_of(store: Store, campaign: int | None, found: Criticism) -> tuple[Recipe, BenchFile] | None:
+def _recipe_of(store: Store, campaign: int | None, criticism: Criticism) -> tuple[Recipe, BenchFile] | None:
     """Return the recipe of the recording's campaign, or one like the recording, and its bench; None without either."""
     try:
         if campaign is not None:
             row = store.campaigns.get(campaign)
             return Recipe.model_validate(dict(row.recipe)), BenchFile.model_validate(dict(row.bench))
-        recipe = _recipe_like(found)
+        recipe = _recipe_like(criticism)
         return recipe, load_bench(bench_for(recipe))
     except (LabctlError, ProcedureError, ValueError):
         return None
 
 
-def _recipe_like(found: Criticism) -> Recipe:
+def _recipe_like(criticism: Criticism) -> Recipe:
     """Return a recipe with the temperatures, rates, positions and durations of a recording."""
-    data = found.data
-    warm = data.nodes["chamber_setpoint_c"] if "chamber_setpoint_c" in data.nodes else data.nodes.temperature_c("")
-    levels = np.unique(np.round(data.at_sets(np.asarray(warm, dtype=np.float64))))
+    data = criticism.data
+    temperature_c = (
+        data.nodes["chamber_setpoint_c"] if "chamber_setpoint_c" in data.nodes else data.nodes.temperature_c("")
+    )
+    levels = np.unique(np.round(data.at_sets(np.asarray(temperature_c, dtype=np.float64))))
     rates = np.unique(np.round(data.at_sets(data.nodes.table_rate_dps()), 1))
     history = data.nodes.history
     each = 1 < len(history.numbers("mounting")) <= len(history.numbers("run"))

@@ -32,13 +32,13 @@ def residual_columns(
         "table_rate_dps": data.at_sets(nodes.table_rate_dps()).tolist(),
         "t_s": data.at_sets(np.asarray(nodes["t_s"], dtype=np.float64)).tolist() if "t_s" in nodes else None,
     }
-    found = []
+    columns = []
     for axis, residuals in left.items():
         true = data.rows_of(nodes.rate_dps(axis)[:, None])[0, :, 0]
-        warm = data.at_sets(nodes.temperature_c(axis))
+        temperature_c = data.at_sets(nodes.temperature_c(axis))
         measured = data.output[axis][0] - true
-        found.append(_axis(axis, shared, true, warm, measured, residuals.means, residuals.floor_dps))
-    return _joined(found)
+        columns.append(_axis(axis, shared, true, temperature_c, measured, residuals.means, residuals.floor_dps))
+    return _joined(columns)
 
 
 def _of_fit(points: Recording, recording: int, base: FitResult) -> ResidualColumns:
@@ -50,20 +50,20 @@ def _of_fit(points: Recording, recording: int, base: FitResult) -> ResidualColum
         "table_rate_dps": channels.table_rate_dps().tolist(),
         "t_s": np.asarray(channels["t_s"]).tolist() if "t_s" in channels else None,
     }
-    found = []
+    columns = []
     for axis, residual in base.residual_dps.items():
         true = context.true_rate_dps(axis)
         floors = np.full(len(context), floor) if floor else None
-        warm, measured = channels.temperature_c(axis), context.outputs[axis] - true
-        found.append(_axis(axis, shared, true, warm, measured, residual, floors))
-    return _joined(found)
+        temperature_c, measured = channels.temperature_c(axis), context.outputs[axis] - true
+        columns.append(_axis(axis, shared, true, temperature_c, measured, residual, floors))
+    return _joined(columns)
 
 
 def _shared(sets: Channels, dataset: np.ndarray, points: Recording, recording: int) -> dict[str, Any]:
     """Return what the rows of all axes have in common; `sets` has one row per data set."""
-    known: dict[int, int] = {}
+    set_numbers: dict[int, int] = {}
     if "n" in points.columns:
-        known = dict(
+        set_numbers = dict(
             zip(np.asarray(points.columns["dataset"]).tolist(), np.asarray(points.columns["n"]).tolist(), strict=True)
         )
     single = {"recording": [recording] * len(dataset), "dataset": dataset.tolist()}
@@ -71,7 +71,7 @@ def _shared(sets: Channels, dataset: np.ndarray, points: Recording, recording: i
         **(own_numbers(sets, recording) if RECORDING in sets else single),
         "position": [str(there) for there in sets["position"]],
         "run": np.rint(sets["run"]).astype(int).tolist() if "run" in sets else [1] * len(dataset),
-        "n": [known.get(number) for number in dataset.tolist()],
+        "n": [set_numbers.get(number) for number in dataset.tolist()],
     }
 
 

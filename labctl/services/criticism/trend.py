@@ -39,17 +39,17 @@ def in_time(rows: Iterable[RecordingRow]) -> tuple[list[RecordingRow], list[Reco
 
 def occasions_of(store: Store, measured: Sequence[RecordingRow]) -> list[list[int]]:
     """Return the numbers of recordings, in order of time, by occasion: those that overlap or are close are of one."""
-    found: list[list[int]] = []
+    occasions: list[list[int]] = []
     reached = None
     for row in measured:
         begun = ordered_at(row.info)
         if reached is None or begun >= reached + LEAST_APART:
-            found.append([])
-        found[-1].append(row.id)
-        ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
+            occasions.append([])
+        occasions[-1].append(row.id)
+        ends = [data_set.t_until_s for data_set in store.recordings.data_sets(row.id) if data_set.t_until_s is not None]
         until = begun + timedelta(seconds=max(ends, default=0.0))
         reached = until if reached is None else max(reached, until)
-    return found
+    return occasions
 
 
 def occasions_text(occasions: Sequence[Sequence[int]], *, drifted: bool) -> Iterator[str]:
@@ -107,7 +107,7 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
     limit = limit_dps if limit_dps is not None else _stated(reference)
     leaves = list(_leaving(lines, points, limit)) if limit and lines else []
     drawn = _drawn(points, leaves)
-    drifts = [_drift(axis, what, unit, line, points, drawn) for axis, what, unit, line in lines]
+    drifts = [_drift(axis, figure, unit, line, points, drawn) for axis, figure, unit, line in lines]
     return TrendResponse(
         serial=serial, version=reference.version, limit_dps=limit, points=points, drifts=drifts, leaves=leaves,
         undated=[row.id for row in undated],
@@ -131,7 +131,7 @@ def _point(
     at = {each.id: ordered_at(each.info) for each in measured}
     before = [v for v in versions if v.recordings and all(at[n] < at[row.id] for n in v.recordings if n in at)]
     own = [v for v in versions if row.id in v.recordings]
-    found = TrendPoint(
+    point = TrendPoint(
         recording=row.id, at=at[row.id], as_found=_applied(store, before[-1:], data),
         as_left=_applied(store, own[-1:], data), rms_dps=None, axes={},
     )  # fmt: skip
@@ -140,22 +140,22 @@ def _point(
         errors, _ = applied_errors(read_calibration(reference.document), data.points, angles_rad=angles)
         channels = fit_data_of(data.points)
     except LabctlError as error:
-        return found.model_copy(update={"why": str(error)})
+        return point.model_copy(update={"why": str(error)})
     axes = {axis: line_left(values, channels.true_rate_dps(axis)) for axis, values in errors.items()}
     pooled = np.concatenate(list(errors.values()))
-    return found.model_copy(update={"rms_dps": float(np.sqrt(np.mean(pooled**2))), "axes": axes})
+    return point.model_copy(update={"rms_dps": float(np.sqrt(np.mean(pooled**2))), "axes": axes})
 
 
 def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measurements) -> AppliedVersion | None:
     if not version:
         return None
     try:
-        found = left_by(store, version[0], data)
+        errors = left_by(store, version[0], data)
     except LabctlError:
         return None
     return AppliedVersion(
-        version=version[0].version, rms_dps=found.rms_dps, max_dps=found.max_dps, bias_dps=found.bias_dps,
-        part=found.part,
+        version=version[0].version, rms_dps=errors.rms_dps, max_dps=errors.max_dps, bias_dps=errors.bias_dps,
+        part=errors.part,
     )  # fmt: skip
 
 
@@ -163,13 +163,13 @@ def line_left(error_dps: Array, rate_dps: Array) -> AxisPoint:
     """Return what is left of bias and scale factor on one axis: a straight line over the rate, by least squares."""
     turned = len(np.unique(np.round(rate_dps, 3))) >= LEAST_RATES
     columns = np.column_stack([np.ones(len(rate_dps)), rate_dps] if turned else [np.ones(len(rate_dps))])
-    found, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
-    left = error_dps - columns @ found
-    variance = float(left @ left) / max(len(left) - columns.shape[1], 1)
+    coefficients, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
+    residual = error_dps - columns @ coefficients
+    variance = float(residual @ residual) / max(len(residual) - columns.shape[1], 1)
     u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
     return AxisPoint(
-        bias_dps=float(found[0]), u_bias_dps=float(u[0]),
-        scale_factor=float(found[1]) if turned else None, u_scale_factor=float(u[1]) if turned else None,
+        bias_dps=float(coefficients[0]), u_bias_dps=float(u[0]),
+        scale_factor=float(coefficients[1]) if turned else None, u_scale_factor=float(u[1]) if turned else None,
     )  # fmt: skip
 
 
@@ -178,18 +178,18 @@ def _lines(points: Sequence[TrendPoint]) -> Iterator[tuple[str, str, str, TrendL
     series: dict[tuple[str, str, str], list[tuple[float, float, float]]] = {}
     for point in points:
         years = (point.at - points[0].at) / YEAR
-        for axis, left in point.axes.items():
-            series.setdefault((axis, "bias", "deg/s"), []).append((years, left.bias_dps, left.u_bias_dps))
-            if left.scale_factor is not None and left.u_scale_factor is not None:
+        for axis, axis_error in point.axes.items():
+            series.setdefault((axis, "bias", "deg/s"), []).append((years, axis_error.bias_dps, axis_error.u_bias_dps))
+            if axis_error.scale_factor is not None and axis_error.u_scale_factor is not None:
                 series.setdefault((axis, "scale_factor", "1"), []).append(
-                    (years, left.scale_factor, left.u_scale_factor)
+                    (years, axis_error.scale_factor, axis_error.u_scale_factor)
                 )
         if point.rms_dps is not None:
             series.setdefault(("all", "error", "deg/s"), []).append((years, point.rms_dps, 0.0))
-    for (axis, what, unit), rows in series.items():
+    for (axis, figure, unit), rows in series.items():
         time, values, u = np.array(rows).T
         if (line := trend_line(time, values, u)) is not None:
-            yield axis, what, unit, line
+            yield axis, figure, unit, line
 
 
 def _drawn(points: Sequence[TrendPoint], leaves: Sequence[Leaving]) -> Array:
@@ -204,25 +204,25 @@ def _drawn(points: Sequence[TrendPoint], leaves: Sequence[Leaving]) -> Array:
 
 def _course(line: TrendLine, points: Sequence[TrendPoint], years: Array) -> DriftLine:
     value, half = line.at(years)
-    known = line.freedom > 0
+    has_freedom = line.freedom > 0
     return DriftLine(
-        at=[points[0].at + each * YEAR for each in years.tolist()],
+        at=[points[0].at + year * YEAR for year in years.tolist()],
         value=value.tolist(),
-        low=(value - half).tolist() if known else [None] * len(years),
-        high=(value + half).tolist() if known else [None] * len(years),
+        low=(value - half).tolist() if has_freedom else [None] * len(years),
+        high=(value + half).tolist() if has_freedom else [None] * len(years),
     )
 
 
 def _drift(
     axis: str, what: str, unit: str, line: TrendLine, points: Sequence[TrendPoint], years: Array
 ) -> Drift:  # fmt: skip
-    known = line.freedom > 0
+    has_freedom = line.freedom > 0
     half = line.factor * line.u_slope
     return Drift(
         axis=axis, what=what, unit=f"{unit}/year" if unit != "1" else "1/year", points=line.freedom + 2,
-        per_year=line.slope, u=line.u_slope if known else None,
-        low=line.slope - half if known else None, high=line.slope + half if known else None,
-        repeatability=line.repeatability, significant=known and abs(line.slope) > half,
+        per_year=line.slope, u=line.u_slope if has_freedom else None,
+        low=line.slope - half if has_freedom else None, high=line.slope + half if has_freedom else None,
+        repeatability=line.repeatability, significant=has_freedom and abs(line.slope) > half,
         line=_course(line, points, years),
     )  # fmt: skip
 
@@ -235,8 +235,8 @@ def _leaving(
     def at(years: float | None) -> datetime | None:
         return None if years is None else (points[0].at + years * YEAR).astimezone(UTC)
 
-    for axis, what, _, line in lines:
-        if what == "bias":
+    for axis, figure, _, line in lines:
+        if figure == "bias":
             expected, earliest, latest = map(at, line.leaves(limit, last))
             outside = abs(float(line.at(np.array([last]))[0][0])) > limit
             yield Leaving(axis=axis, outside=outside, expected=expected, earliest=earliest, latest=latest)
@@ -246,14 +246,14 @@ def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
     if not drifts and points < 2:
         word = "recording" if points == 1 else "recordings"
         yield f"{points} {word} in time: a drift needs two recordings, and its uncertainty three."
-    for each in drifts:
-        said = f"Axis {each.axis}, {each.what}" if each.axis != "all" else "RMS error over all axes"
-        if each.u is None or each.low is None or each.high is None:
-            figure = f"{said}: {each.per_year:.2g} {each.unit}"
+    for drift in drifts:
+        text = f"Axis {drift.axis}, {drift.what}" if drift.axis != "all" else "RMS error over all axes"
+        if drift.u is None or drift.low is None or drift.high is None:
+            figure = f"{text}: {drift.per_year:.2g} {drift.unit}"
             yield f"{figure} from two recordings; its uncertainty needs {LEAST_POINTS} recordings."
         else:
-            is_drift = "drifts by" if each.significant else "no drift beyond repeatability:"
-            yield f"{said}: {is_drift} {each.per_year:.2g} {each.unit} (95 %: {each.low:.2g} to {each.high:.2g})."
+            is_drift = "drifts by" if drift.significant else "no drift beyond repeatability:"
+            yield f"{text}: {is_drift} {drift.per_year:.2g} {drift.unit} (95 %: {drift.low:.2g} to {drift.high:.2g})."
 
 
 def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[str]:

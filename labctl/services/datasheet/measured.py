@@ -90,16 +90,16 @@ def figures_of(data: FitData) -> list[Figure]:
     """
     straight = np.array([Position.of(each).turned_deg == 0 for each in np.asarray(data.channels["position"]).tolist()])
     straight = straight if straight.any() else ~straight
-    seen = _columns(data.take(straight))
-    found = [each for axis in data.outputs for each in (*_of_rates(seen, axis), *_at_rest(seen, axis))]
-    return [replace(each, rows=_spread(each.rows, straight)) for each in (*found, *_alignment(seen))]
+    columns = _columns(data.take(straight))
+    characteristics = [each for axis in data.outputs for each in (*_of_rates(columns, axis), *_at_rest(columns, axis))]
+    return [replace(each, rows=_spread(each.rows, straight)) for each in (*characteristics, *_alignment(columns))]
 
 
 def _spread(rows: NDArray[np.bool_], among: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return a mask of the data sets of another mask as one of all, (m,)."""
-    found = np.zeros(len(among), dtype=bool)
-    found[among] = rows
-    return found
+    is_spread = np.zeros(len(among), dtype=bool)
+    is_spread[among] = rows
+    return is_spread
 
 
 def _columns(data: FitData) -> _Columns:
@@ -129,8 +129,8 @@ def _of_rates(seen: _Columns, axis: str) -> Iterator[Figure]:
         white = seen.data.white_var
         u = None if white is None else np.sqrt(white[axis][here])
         yield Figure("scale_factor_nonlinearity", axis, nonlinearity_ppm(line, float(np.max(np.abs(rate))), u), here)
-    if (found := asymmetry_ppm(rate, seen.data.outputs[axis][here])) is not None:
-        yield Figure("scale_factor_asymmetry", axis, found, here)
+    if (value := asymmetry_ppm(rate, seen.data.outputs[axis][here])) is not None:
+        yield Figure("scale_factor_asymmetry", axis, value, here)
     yield from _over_temperature(seen, axis, own, line.scale_factor.value)
     yield from _from_run_to_run(seen, axis, own, line.scale_factor.value)
 
@@ -141,9 +141,9 @@ def _over_temperature(seen: _Columns, axis: str, own: NDArray[np.bool_], scale_f
         for level in range(len(seen.level_c))
         if (line := seen.line(axis, own & (seen.level == level))) is not None
     }
-    warm = seen.level_c[list(lines)]
-    bias = slope_over(warm, [line.bias_dps for line in lines.values()])
-    scale = slope_over(warm, [line.scale_factor for line in lines.values()])
+    temperature_c = seen.level_c[list(lines)]
+    bias = slope_over(temperature_c, [line.bias_dps for line in lines.values()])
+    scale = slope_over(temperature_c, [line.scale_factor for line in lines.values()])
     if bias is not None:
         yield Figure("bias_temperature", axis, bias, own)
     if scale is not None:
@@ -162,10 +162,10 @@ def _from_run_to_run(seen: _Columns, axis: str, own: NDArray[np.bool_], scale_fa
             }
             biases.append({run: line.bias_dps.value for run, line in lines.items()})
             scales.append({run: line.scale_factor.value for run, line in lines.items()})
-    if (found := repeatability(biases)) is not None:
-        yield Figure("bias_repeatability", axis, found[0], own)
-    if (found := repeatability(scales)) is not None:
-        yield Figure("scale_factor_repeatability", axis, _times(found[0], PPM / scale_factor), own)
+    if (value := repeatability(biases)) is not None:
+        yield Figure("bias_repeatability", axis, value[0], own)
+    if (value := repeatability(scales)) is not None:
+        yield Figure("scale_factor_repeatability", axis, _times(value[0], PPM / scale_factor), own)
 
 
 def _at_rest(seen: _Columns, axis: str) -> Iterator[Figure]:
@@ -178,8 +178,8 @@ def _at_rest(seen: _Columns, axis: str) -> Iterator[Figure]:
         range(len(seen.level_c)), key=lambda each: len(np.unique(seen.position[still & (seen.level == each)]))
     )
     rows = still & (seen.level == fullest)
-    if (found := g_sensitivity(seen.position[rows], error[rows])) is not None:
-        for along, estimate in zip(AXES, found, strict=True):
+    if (value := g_sensitivity(seen.position[rows], error[rows])) is not None:
+        for along, estimate in zip(AXES, value, strict=True):
             yield Figure("g_sensitivity", axis, estimate, rows, along)
 
 
@@ -194,15 +194,15 @@ def _bias_at_rest(seen: _Columns, axis: str, error: Array) -> Iterator[Figure]:
             at = (seen.level == level) & (seen.position == position)
             runs = np.unique(seen.run[at])
             groups.append({int(run): float(np.mean(error[at & (seen.run == run)])) for run in runs})
-    if (found := repeatability(groups)) is not None:
-        yield Figure("bias_repeatability", axis, found[0], np.ones(len(error), dtype=bool))
+    if (value := repeatability(groups)) is not None:
+        yield Figure("bias_repeatability", axis, value[0], np.ones(len(error), dtype=bool))
 
 
 def _alignment(seen: _Columns) -> Iterator[Figure]:
     """Yield misalignment and orthogonality from the slopes of all outputs over the rate about each axis."""
     if set(seen.data.outputs) != set(AXES):
         return
-    k, u, known = np.eye(3), np.zeros((3, 3)), True
+    k, u, has_u = np.eye(3), np.zeros((3, 3)), True
     used = np.zeros(len(seen.data), dtype=bool)
     for j, about in enumerate(AXES):
         rows = seen.own(about) & (seen.level == seen.usual)
@@ -213,15 +213,15 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
             if line is None:
                 return
             k[i, j] = line.scale_factor.value
-            known &= line.scale_factor.u is not None
+            has_u &= line.scale_factor.u is not None
             u[i, j] = math.hypot(line.scale_factor.u or 0.0, 0.0 if i == j else leaning)
     try:
-        found = alignment_of(k, u if known else None)
+        alignment = alignment_of(k, u if has_u else None)
     except ValueError:  # an axis has its sign reversed: no rotation takes it there
         return
-    for axis, estimate in zip(AXES, found.misalignment_deg, strict=True):
+    for axis, estimate in zip(AXES, alignment.misalignment_deg, strict=True):
         yield Figure("misalignment", axis, estimate, used)
-    for pair, estimate in zip(PAIRS, found.orthogonality_deg, strict=True):
+    for pair, estimate in zip(PAIRS, alignment.orthogonality_deg, strict=True):
         yield Figure("orthogonality", pair, estimate, used)
 
 

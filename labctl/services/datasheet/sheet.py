@@ -77,17 +77,21 @@ RULE = (
 NEAR = 2.0
 
 
-def decided(line: Line, found: Characteristic, specified: float | None) -> Characteristic:
+def decided(line: Line, characteristic: Characteristic, specified: float | None) -> Characteristic:
     """Return a characteristic with the specified value and the decision on it."""
     if specified is None:
-        return found
-    if found.value is None:  # a bound below the specified value passes; one above it decides nothing
-        bounded = line.specified_as == "at most" and found.at_most is not None and found.at_most <= specified
-        return found.model_copy(update={"specified": specified, "passed": True if bounded else None})
-    value = abs(found.value) if line.specified_as == "at most" else found.value
+        return characteristic
+    if characteristic.value is None:  # a bound below the specified value passes; one above it decides nothing
+        bounded = (
+            line.specified_as == "at most"
+            and characteristic.at_most is not None
+            and characteristic.at_most <= specified
+        )
+        return characteristic.model_copy(update={"specified": specified, "passed": True if bounded else None})
+    value = abs(characteristic.value) if line.specified_as == "at most" else characteristic.value
     passed = value <= specified if line.specified_as == "at most" else value >= specified
-    near = found.u is not None and abs(value - specified) < NEAR * found.u
-    return found.model_copy(update={"specified": specified, "passed": passed, "near_limit": near})
+    near = characteristic.u is not None and abs(value - specified) < NEAR * characteristic.u
+    return characteristic.model_copy(update={"specified": specified, "passed": passed, "near_limit": near})
 
 
 #: Figure of the Allan deviation, and its unit there over that of the data sheet.
@@ -102,14 +106,14 @@ def datasheet(store: Store, serial: str) -> DatasheetResponse:
     if not rows:
         raise BadInput(f"unit {unit.serial} has no recording: import one, or run a campaign")
     compute(UNNAMED)
-    found: dict[Key, Characteristic] = {}
+    characteristics: dict[Key, Characteristic] = {}
     for row in rows:
         report_stage(f"reading recording {row.id}")
         for each in _of_recording(store, row):
-            found.setdefault((each.id, each.axis, each.along), each)
+            characteristics.setdefault((each.id, each.axis, each.along), each)
     for each in (*_noise(store, rows), *_bandwidth(store, unit.serial)):
-        found.setdefault((each.id, each.axis, each.along), each)
-    return _response(unit, rows, found)
+        characteristics.setdefault((each.id, each.axis, each.along), each)
+    return _response(unit, rows, characteristics)
 
 
 def _of_recording(store: Store, row: RecordingRow) -> Iterator[Characteristic]:
@@ -126,10 +130,10 @@ def _of_recording(store: Store, row: RecordingRow) -> Iterator[Characteristic]:
 
 
 def _conditions(row: RecordingRow, data: FitData, figure: Figure) -> MeasuredUnder:
-    warm, rate = data.temperature_c[figure.rows], data.channels.table_rate_dps()[figure.rows]
+    temperature_c, rate = data.temperature_c[figure.rows], data.channels.table_rate_dps()[figure.rows]
     runs = len(np.unique(np.asarray(data.channels["run"])[figure.rows])) if "run" in data.channels else None
     return MeasuredUnder(
-        recording=row.id, temperature_c=(float(warm.min()), float(warm.max())),
+        recording=row.id, temperature_c=(float(temperature_c.min()), float(temperature_c.max())),
         rate_dps=(float(rate.min()), float(rate.max())), runs=runs, datasets=int(np.count_nonzero(figure.rows)),
     )  # fmt: skip
 
@@ -148,9 +152,10 @@ def _noise(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Characteristi
     if answer is None or answer.recording is None:
         return
     lines = {line.id: line for line in LINES}
-    warm = answer.temperature_c
+    temperature_c = answer.temperature_c
     under = MeasuredUnder(
-        recording=answer.recording, temperature_c=None if warm is None else (warm, warm), rate_dps=(0.0, 0.0), runs=1,
+        recording=answer.recording, temperature_c=None if temperature_c is None else (temperature_c, temperature_c),
+        rate_dps=(0.0, 0.0), runs=1,
         datasets=answer.datasets[-1] - answer.datasets[0] + 1,
     )  # fmt: skip
     for axis, noise in answer.axes.items():
@@ -171,8 +176,8 @@ def _bandwidth(store: Store, serial: str) -> Iterator[Characteristic]:
     """Yield the bandwidth of each axis by the newest version that has one."""
     line = next(each for each in LINES if each.id == "bandwidth")
     for row in store.calibrations.of_unit(serial):  # newest first
-        for axis, found in row.answer["axes"].items():
-            constant = found["coefficients"].get(TIME_CONSTANT)
+        for axis, response in row.answer["axes"].items():
+            constant = response["coefficients"].get(TIME_CONSTANT)
             if not isinstance(constant, dict) or isinstance(constant["value"], list) or row.recording is None:
                 continue
             tau_s, u_s = constant["value"], constant["u"]
@@ -189,13 +194,15 @@ def _bandwidth(store: Store, serial: str) -> Iterator[Characteristic]:
             )  # fmt: skip
 
 
-def _response(unit: Unit, rows: Sequence[RecordingRow], found: Mapping[Key, Characteristic]) -> DatasheetResponse:
+def _response(
+    unit: Unit, rows: Sequence[RecordingRow], characteristics: Mapping[Key, Characteristic]
+) -> DatasheetResponse:
     infos = [RecordingInfo.model_validate(row.info) for row in rows]
     specified: dict[str, float] = {}
     for info in reversed(infos):  # the newest recording says it last
         specified |= info.datasheet
     axes = list(dict.fromkeys(str(axis) for info in infos for axis in info.axes))
-    lines = [each for line in LINES for each in _lines(line, axes, found, specified)]
+    lines = [each for line in LINES for each in _lines(line, axes, characteristics, specified)]
     decisions = [each.passed for each in lines if each.passed is not None]
     used = sorted({each.conditions.recording for each in lines if each.conditions is not None})
     measured = {each.id for each in lines if each.value is not None or each.at_most is not None}
@@ -208,13 +215,13 @@ def _response(unit: Unit, rows: Sequence[RecordingRow], found: Mapping[Key, Char
 
 
 def _lines(
-    line: Line, axes: Sequence[str], found: Mapping[Key, Characteristic], specified: Mapping[str, float]
+    line: Line, axes: Sequence[str], characteristics: Mapping[Key, Characteristic], specified: Mapping[str, float]
 ) -> list[Characteristic]:
     """Return the lines of one characteristic; one that says what measures it where there is none."""
     if line.id in OF_THREE_AXES and len(axes) < 3:
         return []
     limit = None if line.key is None else specified.get(line.key)
-    here = [each for (name, _, _), each in sorted(found.items()) if name == line.id]
+    here = [each for (name, _, _), each in sorted(characteristics.items()) if name == line.id]
     if here:
         return [decided(line, each, limit) for each in here]
     return [
@@ -233,9 +240,9 @@ def _text(
         yield f"{serial}: {sum(decisions)} of {len(decisions)} figures with a specified value pass."
     else:
         yield f"{serial}: no measured figure has a specified value; state them in [datasheet] of the bench file."
-    for each in lines:
-        if each.passed is False:
-            axis = f", axis {each.axis}" if each.axis else ""
-            yield f"{each.title}{axis}: {each.value:.3g} {each.unit}, specified {each.specified_as} {each.specified:g}."
+    for line in lines:
+        if line.passed is False:
+            axis = f", axis {line.axis}" if line.axis else ""
+            yield f"{line.title}{axis}: {line.value:.3g} {line.unit}, specified {line.specified_as} {line.specified:g}."
     if missing:
         yield f"Not measured: {', '.join(name.replace('_', ' ') for name in missing)}."

@@ -24,8 +24,8 @@ def with_drafts(store: Store, answer: CampaignResponse) -> CampaignResponse:
     """Return the status of a campaign with its drafts, once it is done."""
     if answer.state is not CampaignState.DONE:
         return answer
-    found = drafts_of(store, answer.id)
-    return answer.model_copy(update={"drafts": found}) if found else answer
+    drafts = drafts_of(store, answer.id)
+    return answer.model_copy(update={"drafts": drafts}) if drafts else answer
 
 
 def _answers(store: Store, rows: list[DraftRow]) -> list[DraftResponse]:

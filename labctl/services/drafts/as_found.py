@@ -30,12 +30,12 @@ COVERAGE = 2.0
 def applied(store: Store, row: CalibrationRecord, measured: Measurements) -> tuple[AppliedDraft | None, str]:
     """Return what a version leaves of a recording, or None and why it cannot be applied."""
     try:
-        found = verify(store, row, measured)
+        verification = verify(store, row, measured)
         lines = _lines(row, measured)
     except REFUSALS as error:
         return None, str(error)
-    kept = found.model_dump(include=set(AppliedDraft.model_fields))
-    return AppliedDraft.model_validate({**kept, "lines": lines}), ""
+    applied_fields = verification.model_dump(include=set(AppliedDraft.model_fields))
+    return AppliedDraft.model_validate({**applied_fields, "lines": lines}), ""
 
 
 def _lines(row: CalibrationRecord, measured: Measurements) -> Mapping[str, RemainingLine]:
@@ -55,13 +55,13 @@ def drift_from(in_force: CalibrationRecord, draft: CalibrationRecord, measured: 
     Raises BadInput, NotEnoughData, NotConverged where one of them cannot be applied to the recording.
     """
     difference = _difference(in_force, draft, measured)
-    changes, why = _changes(in_force, draft)
+    changes, reason = _changes(in_force, draft)
     return DriftFromVersion(
         version=in_force.version,
         largest_dps={axis: float(np.max(np.abs(values))) for axis, values in difference.items()},
         rms_dps={axis: float(np.sqrt(np.mean(values**2))) for axis, values in difference.items()},
         coefficients=changes,
-        why=why,
+        why=reason,
     )
 
 
@@ -83,13 +83,15 @@ def _changes(in_force: CalibrationRecord, draft: CalibrationRecord) -> tuple[lis
     old, new = in_force.answer, draft.answer
     first, second = old["model"], new["model"]
     if (first["effects"], first["argument"]) != (second["effects"], second["argument"]):
-        why = f"version {in_force.version} has another model ({first['name']}): only corrected rates are compared"
-        return [], why
+        reason = f"version {in_force.version} has another model ({first['name']}): only corrected rates are compared"
+        return [], reason
     centres = [answer.get("reference_temperature_c") for answer in (old, new)]
     if centres[0] != centres[1]:
         return [], f"the models are centred on different temperatures, {centres[0]} and {centres[1]} deg C"
     before = list(_entries(old["axes"]))
-    changes = [_change(entry, found) for entry in _entries(new["axes"]) if (found := _same(entry, before)) is not None]
+    changes = [
+        _change(entry, matching) for entry in _entries(new["axes"]) if (matching := _same(entry, before)) is not None
+    ]
     return changes, "" if changes else "no coefficient is at the same temperature in both"
 
 
@@ -98,8 +100,8 @@ _Entry = tuple[str, str, float | None, float, float | None, str]
 
 
 def _entries(axes: Mapping[str, AxisCoefficients]) -> Iterator[_Entry]:
-    for axis, found in axes.items():
-        coefficients = found["coefficients"]
+    for axis, axis_answer in axes.items():
+        coefficients = axis_answer["coefficients"]
         nodes = coefficients.get("temperature_c")
         for name, entry in coefficients.items():
             if not isinstance(entry, dict):

@@ -33,9 +33,9 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
             f"campaign {campaign} is in the state {row.state}, but its drafts (proposed calibrations) are made "
             "when it is done; wait for its end, or resume the campaign"
         )
-    asked = row.recipe.get("fit")
-    if asked is not None:
-        rules = FitRules.model_validate(asked)
+    fit_rules = row.recipe.get("fit")
+    if fit_rules is not None:
+        rules = FitRules.model_validate(fit_rules)
         for draft in store.drafts.of_campaign(campaign):
             if draft.state in {"due", "fitted"} or (request.again and draft.state == "failed"):
                 _make(store, draft, rules, at)
@@ -43,8 +43,8 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
 
 
 def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
-    if why := store.drafts.dropped(draft.recording):
-        fail_draft(store, draft, rules, f"the unit was excluded from the campaign: {why}", at)
+    if reason := store.drafts.dropped(draft.recording):
+        fail_draft(store, draft, rules, f"the unit was excluded from the campaign: {reason}", at)
         return
     version = draft.version  # of a draft that was kept, and not yet reported on
     if version is None:
@@ -71,8 +71,8 @@ def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
 
 def fail_draft(store: Store, draft: DraftRow, rules: FitRules, why: str, at: datetime) -> None:
     """Write down why a draft could not be made and what to do; the campaign stays done."""
-    asked = f"--model {rules.model}" if rules.model is not None else f"--effects {','.join(rules.effects)}"
-    reason = failure_text(draft.serial, draft.recording, asked, why)
+    option = f"--model {rules.model}" if rules.model is not None else f"--effects {','.join(rules.effects)}"
+    reason = failure_text(draft.serial, draft.recording, option, why)
     if store.drafts.fail(draft.recording, reason, DraftEvent(reason, "warning"), at):
         log.warning("draft.failed", campaign=draft.campaign, serial=draft.serial, reason=reason)
 

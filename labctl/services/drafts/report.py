@@ -34,21 +34,21 @@ def _results(
     limits: FitLimits, error: CertifiedErrors, as_left: AppliedDraft | None, drift: DriftFromVersion | None
 ) -> Iterator[LimitResult]:
     if (most := limits.heldout_rms_dps) is not None:
-        why = "" if error.heldout_rms_dps is not None else "no temperature could be left out of the fit"
-        yield _result("heldout_rms_dps", None, error.heldout_rms_dps, most, why)
+        reason = "" if error.heldout_rms_dps is not None else "no temperature could be left out of the fit"
+        yield _result("heldout_rms_dps", None, error.heldout_rms_dps, most, reason)
     if (most := limits.max_error_dps) is not None:
-        found = None if as_left is None else {axis: one.max_dps for axis, one in as_left.axes.items()}
-        yield from _by_axis("max_error_dps", found, most, "the draft cannot be applied to the recording")
+        results = None if as_left is None else {axis: one.max_dps for axis, one in as_left.axes.items()}
+        yield from _by_axis("max_error_dps", results, most, "the draft cannot be applied to the recording")
     if (most := limits.drift_dps) is not None:
         largest = None if drift is None else drift.largest_dps
         yield from _by_axis("drift_dps", largest, most, "no version was in force, or it cannot be applied")
 
 
-def _by_axis(limit: Limit, found: dict[str, float] | None, most: float, why: str) -> Iterator[LimitResult]:
-    if not found:
+def _by_axis(limit: Limit, largest_by_axis: dict[str, float] | None, most: float, why: str) -> Iterator[LimitResult]:
+    if not largest_by_axis:
         yield _result(limit, None, None, most, why)
         return
-    for axis, value in found.items():
+    for axis, value in largest_by_axis.items():
         yield _result(limit, axis, value, most, "")
 
 
@@ -59,7 +59,7 @@ def _result(limit: Limit, axis: str | None, value: float | None, most: float, wh
 
 def all_within(results: Sequence[LimitResult]) -> bool | None:
     """Return whether all limits are kept; None where there are none, or where none is broken but not all are known."""
-    passed = [each.passed for each in results]
+    passed = [result.passed for result in results]
     if False in passed:
         return False
     return True if passed and None not in passed else None
@@ -73,14 +73,15 @@ def report_on(store: Store, draft: CalibrationRecord, recording: int, rules: Fit
     measured = Measurements(store, (store.recordings.get(recording),))
     error = CertifiedErrors.model_validate(dict(draft.answer["error"]))
     compared = [ComparedModel(model=draft.model, error=error), *_compared(measured, rules)]
-    known = _assessed(store, draft, rules)
+    assessment = _assessed(store, draft, rules)
     as_left, as_left_why = applied(store, draft, measured)
     as_found, as_found_why, drift = _as_found(store, draft, measured, rules)
     limits = held_against(rules.limits, error, as_left, drift)
     report = DraftReport(
         model=draft.model, error=error, compared=compared, smallest_heldout=_smallest_heldout(compared, measured),
-        verdict=known.verdict if known else None, verdict_text=known.verdict_text if known else "",
-        verdict_reason=known.verdict_reason if known else NOT_ASKED, objections=known.objections if known else [],
+        verdict=assessment.verdict if assessment else None, verdict_text=assessment.verdict_text if assessment else "",
+        verdict_reason=assessment.verdict_reason if assessment else NOT_ASKED,
+        objections=assessment.objections if assessment else [],
         as_found=as_found, as_found_why=as_found_why, as_left=as_left, as_left_why=as_left_why, drift=drift,
         limits=limits, within_limits=all_within(limits), text="",
     )  # fmt: skip
@@ -95,29 +96,29 @@ def _assessed(store: Store, draft: CalibrationRecord, rules: FitRules) -> Assess
 
 
 def _compared(measured: Measurements, rules: FitRules) -> list[ComparedModel]:
-    found: list[ComparedModel] = []
+    models: list[ComparedModel] = []
     for model in rules.compare:
         report_stage(f"fitting {model}")
         try:
             error = fit(measured.source, model, [], covered=measured.covered).error
         except (BadInput, NotEnoughData, NotConverged) as refusal:
-            found.append(ComparedModel(model=model, error=None, why=str(refusal)))
+            models.append(ComparedModel(model=model, error=None, why=str(refusal)))
             continue
         figures = {name: getattr(error, name) for name in CertifiedErrors.model_fields}
-        found.append(ComparedModel(model=model, error=CertifiedErrors.model_validate(figures)))
-    return found
+        models.append(ComparedModel(model=model, error=CertifiedErrors.model_validate(figures)))
+    return models
 
 
 def _smallest_heldout(compared: list[ComparedModel], measured: Measurements) -> str | None:
-    known = [
+    errors = [
         (each.error.heldout_rms_dps, each.model)
         for each in compared
         if each.error is not None and each.error.heldout_rms_dps is not None
     ]
-    if not known:
+    if not errors:
         return None
     n = len(measured.points) * len(measured.points.info.axes)
-    return known[first_of_smallest([error for error, _ in known], n)][1]
+    return errors[first_of_smallest([error for error, _ in errors], n)][1]
 
 
 def _as_found(
@@ -131,8 +132,8 @@ def _as_found(
         return None, "no version was in force", None
     report_stage(f"applying version {version}")
     in_force = store.calibrations.get(draft.serial, version)
-    found, why = applied(store, in_force, measured)
+    verification, reason = applied(store, in_force, measured)
     try:
-        return found, why, drift_from(in_force, draft, measured)
+        return verification, reason, drift_from(in_force, draft, measured)
     except REFUSALS as error:
-        return found, why or str(error), None
+        return verification, reason or str(error), None

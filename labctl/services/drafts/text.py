@@ -21,8 +21,8 @@ def report_text(serial: str, version: int, report: DraftReport) -> str:
 def _sentences(serial: str, version: int, report: DraftReport) -> Iterator[str]:
     error = report.error
     heldout = "" if error.heldout_rms_dps is None else f", held-out {error.heldout_rms_dps:.3g} deg/s"
-    left = "not known" if error.rms_dps is None else f"{error.rms_dps:.3g} deg/s RMS"
-    yield f"Draft calibration: version {version} of {serial} ({report.model}), error {left}{heldout}."
+    error_text = "not known" if error.rms_dps is None else f"{error.rms_dps:.3g} deg/s RMS"
+    yield f"Draft calibration: version {version} of {serial} ({report.model}), error {error_text}{heldout}."
     if report.verdict is not None:
         yield f"Verdict: {report.verdict}."
     if report.smallest_heldout is not None and report.smallest_heldout != report.model:
@@ -36,8 +36,8 @@ def _sentences(serial: str, version: int, report: DraftReport) -> Iterator[str]:
 
 
 def _limits(report: DraftReport) -> Iterator[str]:
-    broken = [limit_text(each) for each in report.limits if each.passed is False]
-    unknown = [LIMITS[each.limit] for each in report.limits if each.passed is None]
+    broken = [limit_text(limit) for limit in report.limits if limit.passed is False]
+    unknown = [LIMITS[limit.limit] for limit in report.limits if limit.passed is None]
     if broken:
         yield f"Limits of the recipe that are exceeded: {'; '.join(broken)}."
     if unknown:

@@ -91,10 +91,10 @@ class DraftWatch:
         if self._tries[campaign] < TRIES:
             return
         rules = FitRules.model_validate(self._store.campaigns.get(campaign).recipe["fit"])
-        why = str(error) if isinstance(error, LabctlError) else f"{type(error).__name__}: {error}"
+        reason = str(error) if isinstance(error, LabctlError) else f"{type(error).__name__}: {error}"
         for draft in self._store.drafts.of_campaign(campaign):
             if draft.state in {"due", "fitted"}:
-                fail_draft(self._store, draft, rules, why, self._clock.utc())
+                fail_draft(self._store, draft, rules, reason, self._clock.utc())
 
     def _note(self, error: Exception) -> None:
         """Log what keeps drafts from being made, when it changes."""

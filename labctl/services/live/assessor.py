@@ -45,13 +45,13 @@ class BackgroundAssessor:
         self._running: Future[LiveState] | None = None
 
     def state(self, calibration: LiveCalibration) -> LiveState | None:
-        found = None
+        live_state = None
         if self._running is not None:
             if not self._running.done():
                 return None
-            found = self._running.result()
+            live_state = self._running.result()
         self._running = self._executor.submit(calibration.assess)
-        return found
+        return live_state
 
     def last(self, calibration: LiveCalibration) -> LiveState:
         if self._running is not None:

@@ -87,9 +87,9 @@ class Spool:
             text = f"{self.damaged} lines or frames of the stream could not be read"
             unread = f"{text}; the first: {self._example}" if self._example else text
             info = self._info.model_copy(update={"unread": unread, "unread_share": share})
-            whole = self.folder / f".{HEAD}"
-            whole.write_bytes(head_of(info))
-            whole.replace(self.folder / HEAD)
+            head_file = self.folder / f".{HEAD}"
+            head_file.write_bytes(head_of(info))
+            head_file.replace(self.folder / HEAD)
 
     def _open(self, info: RecordingInfo, block: Block) -> None:
         self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)

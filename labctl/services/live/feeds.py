@@ -54,17 +54,17 @@ class RosbridgeFeed:
 
     def take(self) -> bytes | None:
         """Return the messages that have arrived, one a line; None at the end. Raises BadInput for its error."""
-        found: list[bytes] = []
+        messages: list[bytes] = []
         try:
-            while self._connection is not None and len(found) < MOST_MESSAGES:
+            while self._connection is not None and len(messages) < MOST_MESSAGES:
                 if line := self._line(self._connection.recv(timeout=0)):
-                    found.append(line)
+                    messages.append(line)
         except TimeoutError:  # nothing more has arrived
             pass
         except ConnectionClosed:
             self._connection = None
-            return b"".join(found) or None
-        return b"".join(found) if found or self._connection is not None else None
+            return b"".join(messages) or None
+        return b"".join(messages) if messages or self._connection is not None else None
 
     def _line(self, received: str | bytes) -> bytes:
         """Return a message as a line; what is none of this topic is left out, what is no JSON is left to the reader."""
@@ -112,32 +112,32 @@ class UdpFeed(SocketFeed):
 
     def open(self) -> None:
         family = socket.AF_INET6 if ":" in self._place[0] else socket.AF_INET
-        made = socket.socket(family, socket.SOCK_DGRAM)
+        udp_socket = socket.socket(family, socket.SOCK_DGRAM)
         try:
-            made.bind(self._place)
+            udp_socket.bind(self._place)
         except OSError as error:
-            made.close()
+            udp_socket.close()
             raise BadInput(
                 f"{self.name}: cannot listen there ({error}); name an address of this computer and a free port"
             ) from error
-        made.setblocking(False)
-        self._socket, self._is_known = made, False
+        udp_socket.setblocking(False)
+        self._socket, self._is_known = udp_socket, False
 
     def take(self) -> bytes | None:
         """Return the lines that have arrived, each whole: a datagram without a line end is a line. It has no end."""
-        found = b""
-        while self._socket is not None and len(found) < MOST_BYTES:
+        datagram = b""
+        while self._socket is not None and len(datagram) < MOST_BYTES:
             try:
                 data, sender = self._socket.recvfrom(LARGEST)
                 if not self._is_known:
                     self._socket.connect(sender)
                     self._is_known = True
             except BlockingIOError:
-                return found
+                return datagram
             except ConnectionRefusedError:  # the sender is gone: another datagram may come, or silence ends it
                 continue
-            found += data if data.endswith(b"\n") or not data else data + b"\n"
-        return found
+            datagram += data if data.endswith(b"\n") or not data else data + b"\n"
+        return datagram
 
 
 def feed_of(given: str, topic: str) -> LineFeed:

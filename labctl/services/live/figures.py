@@ -36,7 +36,7 @@ def figures_of(state: LiveState) -> _Figures:
         "rests": state.rests,
         "poses": list(state.covered),
         "poses_asked": state.wanted,
-        "coefficients": [coefficient_of(each) for each in state.coefficients],
+        "coefficients": [coefficient_of(coefficient) for coefficient in state.coefficients],
         "missing": list(state.missing),
         "left_out": list(state.left_out),
     }

@@ -57,18 +57,18 @@ class LineSource:
         if data is None:
             raise StreamEnded(f"{self.name} has ended")
         try:
-            found = self._decoder.feed(data)
+            decoded = self._decoder.feed(data)
         except BadInput as error:
             if not self._begun:
                 raise
             raise StreamEnded(str(error)) from error
         now_s = self.clock.now_s()
-        if len(found):
+        if len(decoded):
             self._last_s, self._begun = now_s, True
         elif now_s - self._last_s > (SILENCE_S if self._begun else FIRST_WITHIN_S):
-            raise StreamEnded(self._silence(now_s - self._last_s, found.example))
-        columns = found.columns if len(found) else {}
-        return Block(columns, self._lost(columns), found.damaged, found.example)
+            raise StreamEnded(self._silence(now_s - self._last_s, decoded.example))
+        columns = decoded.columns if len(decoded) else {}
+        return Block(columns, self._lost(columns), decoded.damaged, decoded.example)
 
     def _lost(self, columns: Mapping[str, NDArray[np.generic]]) -> int:
         """Return how many readings of a feed that may lose some are missing, by the times that the lines carry."""
@@ -82,8 +82,8 @@ class LineSource:
         return int(np.sum(np.rint(steps[steps > GAP * self._spacing_s] / self._spacing_s) - 1))
 
     def _silence(self, silence_s: float, example: str) -> str:
-        seen = f"; what arrived is no reading: {example}" if example else ""
-        return f"{self.name} gave no reading for {silence_s:.0f} s{seen}; check the sender"
+        example_text = f"; what arrived is no reading: {example}" if example else ""
+        return f"{self.name} gave no reading for {silence_s:.0f} s{example_text}; check the sender"
 
     def ask(self, request: PoseRequest | None) -> None:
         """Leave it to the person at the unit."""

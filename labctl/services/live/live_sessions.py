@@ -101,9 +101,9 @@ class LiveSessions:
         self._ending: EndingSource | None = None
         self._thread: threading.Thread | None = None
         self._stops = False
-        kept = kept_readings(store.location, store)
-        self._kept = folders_of(kept)
-        for each in kept:
+        kept_sessions = kept_readings(store.location, store)
+        self._kept = folders_of(kept_sessions)
+        for each in kept_sessions:
             log.warning("live.kept", text=each.text)
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
@@ -193,8 +193,8 @@ class LiveSessions:
             if record is None or ending is None or not record.is_running:
                 raise Conflict("no live calibration runs in this service, so there is nothing to end; start one first")
             record.fits_anyway = request.fit
-            why = f": {request.reason}" if request.reason else ""
-            ending.end(f"{actor().name or 'a person'} ended it{why}")
+            reason = f": {request.reason}" if request.reason else ""
+            ending.end(f"{actor().name or 'a person'} ended it{reason}")
             self._store.audit.record(
                 self._clock.utc(), "live end", f"unit {record.serial}", {"fit": request.fit, "reason": request.reason}
             )

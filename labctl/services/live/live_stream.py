@@ -28,13 +28,13 @@ class LiveEventStream:
         A client that reads slowly gets the newest state next, never a queue of old ones.
         """
         bell, silent_s = Bell(), 0.0
-        shown: LiveStateResponse | None = None
+        last_sent: LiveStateResponse | None = None
         now = first
         stop = self._listen(bell.ring)
         try:
             while True:
-                if now != shown:
-                    shown, silent_s = now, 0.0
+                if now != last_sent:
+                    last_sent, silent_s = now, 0.0
                     yield now
                 if now.stage not in GOES_ON or over():
                     return

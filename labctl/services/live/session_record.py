@@ -52,21 +52,25 @@ class UncertaintyHistory:
     def answer(self, number: int) -> LiveHistoryResponse:
         """Return all of it, by coefficient."""
         points = list(self._points)
-        found: dict[tuple[str, str], LiveUncertaintyColumn] = {}
+        columns: dict[tuple[str, str], LiveUncertaintyColumn] = {}
         for k, point in enumerate(points):
-            for each in point.coefficients:
-                column = found.setdefault(
-                    (each.axis, each.name),
+            for coefficient in point.coefficients:
+                column = columns.setdefault(
+                    (coefficient.axis, coefficient.name),
                     LiveUncertaintyColumn(
-                        axis=each.axis, name=each.name, unit=each.unit, limit=each.limit, expanded=[None] * len(points)
+                        axis=coefficient.axis,
+                        name=coefficient.name,
+                        unit=coefficient.unit,
+                        limit=coefficient.limit,
+                        expanded=[None] * len(points),
                     ),
                 )
-                column.expanded[k] = each.expanded
+                column.expanded[k] = coefficient.expanded
         return LiveHistoryResponse(
             number=number,
             t_s=[point.t_s for point in points],
             poses=[point.poses for point in points],
-            coefficients=list(found.values()),
+            coefficients=list(columns.values()),
         )
 
 

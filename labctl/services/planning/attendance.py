@@ -85,8 +85,8 @@ def _warning(offsets_s: Sequence[float], night: Sequence[datetime], better: date
     text = f"{_listed(night)} {verb} between {NIGHT_FROM_H}:00 and {NIGHT_UNTIL_H:02d}:00"
     if better is None:
         return f"{text}; no start has fewer times at night"
-    left = sum(_is_night(time) for time in _times(offsets_s, better, zone))
-    return f"{text}; a start at {better:%a %H:%M} needs {'no person at night' if not left else f'only {left} at night'}"
+    few = sum(_is_night(time) for time in _times(offsets_s, better, zone))
+    return f"{text}; a start at {better:%a %H:%M} needs {'no person at night' if not few else f'only {few} at night'}"
 
 
 def _listed(times: Sequence[datetime]) -> str:

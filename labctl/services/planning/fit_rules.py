@@ -12,8 +12,8 @@ def check_fit(recipe: Recipe) -> None:
         return
     from labctl.fitting.models.presets import preset_for  # noqa: PLC0415  it loads the libraries of the fit
 
-    asked = [(rules.model, list(rules.effects)), *((name, []) for name in rules.compare)]
-    for model, effects in asked:
+    models = [(rules.model, list(rules.effects)), *((name, []) for name in rules.compare)]
+    for model, effects in models:
         try:
             preset_for(model, effects)
         except BadInput as error:

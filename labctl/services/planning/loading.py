@@ -68,8 +68,8 @@ def load_bench(source: str) -> BenchFile:
     try:
         return checked_settings(read_bench(source))
     except FileNotFoundError:
-        known = ", ".join(shipped_benches())
-        raise BadBench(f"bench {source!r} is neither a file nor a bench that ships with labctl ({known})") from None
+        names = ", ".join(shipped_benches())
+        raise BadBench(f"bench {source!r} is neither a file nor a bench that ships with labctl ({names})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
         raise BadBench(f"bench file {source}: not TOML: {error}; correct it") from error
     except ValidationError as error:
@@ -85,11 +85,11 @@ def with_drivers(bench: BenchFile) -> BenchFile:
 
 
 def _first(error: ValidationError) -> str:
-    """Say the first thing that is wrong: its place, what is wrong there, and the value that was given."""
+    """Return the first error as text: its place, what is wrong there, and the value that was given."""
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
-    given = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
-    return f"{place}: {first['msg']}{given}"
+    value_text = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
+    return f"{place}: {first['msg']}{value_text}"
 
 
 def limits_of(bench: BenchFile, *, driven: bool = False, earlier: EarlierTimes | None = None) -> BenchLimits:

@@ -35,19 +35,19 @@ def _recipe(name: str, text: str, bench: BenchFile | None, earlier: EarlierTimes
     recipe = load_recipe(name)
     on = bench or load_bench(bench_for(recipe, driven=True))
     remark = _lacking(recipe.positions, on)
-    said: dict[str, Any] = {
+    answer: dict[str, Any] = {
         "name": name, "description": recipe.description, "text": text, "bench": on.name, "remark": remark,
         "by_hand": recipe.turns is not None,
     }  # fmt: skip
     try:
         plan = make_plan(recipe, limits_of(on, driven=True, earlier=earlier))
     except PlanRefused as refused:
-        return RecipeResponse(**said, refused=str(refused))
-    return RecipeResponse(**said, steps=len(plan.steps), datasets=plan.datasets, expected_s=plan.expected_s)
+        return RecipeResponse(**answer, refused=str(refused))
+    return RecipeResponse(**answer, steps=len(plan.steps), datasets=plan.datasets, expected_s=plan.expected_s)
 
 
 def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
-    """Say which axes a recipe turns that no unit of the bench records, if any; it would run, and show little."""
+    """Return which axes a recipe turns that no unit of the bench records, if any; it would run, and show little."""
     recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
     if lacking := sorted({Position.of(position).axis for position in positions} - recorded):
         return (

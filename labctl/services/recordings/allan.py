@@ -76,9 +76,9 @@ def _longest_rest(store: Store, row: RecordingRow) -> int:
     return max((each.n for each in still), default=0)
 
 
-def _response(recording: int, found: StaticRecord, info: RecordingInfo) -> AllanResponse:
-    said = {"recording": recording, "datasheet": dict(info.datasheet), **found.to_json()}
-    return AllanResponse.model_validate(said, extra="forbid")
+def _response(recording: int, record: StaticRecord, info: RecordingInfo) -> AllanResponse:
+    answer = {"recording": recording, "datasheet": dict(info.datasheet), **record.to_json()}
+    return AllanResponse.model_validate(answer, extra="forbid")
 
 
 def _of_set(recording: Recording, dataset: int) -> StaticRecord:
@@ -91,14 +91,14 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
             f"data set {dataset} has {len(t_s)} valid readings; name a data set with {LEAST_READINGS} or more"
         )
     period_s = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
-    found = {str(axis): allan(recording.gyro_dps(axis)[valid], period_s) for axis in recording.info.axes}
-    axes = {axis: noise for axis, noise in found.items() if noise is not None}
+    deviations = {str(axis): allan(recording.gyro_dps(axis)[valid], period_s) for axis in recording.info.axes}
+    axes = {axis: noise for axis, noise in deviations.items() if noise is not None}
     if not axes:
         raise NotEnoughData(
             f"data set {dataset}: its readings are all equal, so their noise is unknown; name another data set"
         )
-    warm = temperature_of(columns)
-    mean_c = float(warm[valid].mean()) if warm is not None else np.nan
+    temperature_c = temperature_of(columns)
+    mean_c = float(temperature_c[valid].mean()) if temperature_c is not None else np.nan
     return StaticRecord(dataset, dataset, mean_c, len(t_s) * period_s, axes)
 
 
@@ -144,9 +144,9 @@ def _together(info: RecordingInfo, parts: Sequence[Columns]) -> StaticRecord | N
 def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
     """Return the static record, looked for only in what was measured at rest: the rest of the readings stay unread."""
     at_rest, still = _still(store, recording)
-    found = None if not still else _static_record(store, recording, info, still)
-    if found is not None:
-        return found
+    record = None if not still else _static_record(store, recording, info, still)
+    if record is not None:
+        return record
     aside = at_rest - len(still)
     beside = f" beside the {aside} data sets at rest that were measured to verify a calibration" if aside else ""
     raise NotEnoughData(

@@ -38,8 +38,8 @@ def allan_of_unit(store: Store, serial: str, recording: int | None, column: str 
     info = RecordingInfo.model_validate(row.info)
     parts = [columns for _, columns in store.recordings.iter_datasets(row.id)]
     _refuse_unknown(f"recording {row.id}", column, parts[0] if parts else {})
-    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return _of_recording(Recording(info, whole), column, row.id)
+    joined_columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return _of_recording(Recording(info, joined_columns), column, row.id)
 
 
 def allan_of_recordings(
@@ -80,18 +80,18 @@ def _of_recording(recording: Recording, column: str | None, number: int | None) 
         )
     recording = fitted_part(recording)
     if column is None:
-        found = static_record(recording)
-        if found is None:
+        record = static_record(recording)
+        if record is None:
             raise NotEnoughData(
                 f"{recording.info.serial}: no {LEAST_READINGS} successive readings are at rest, at one temperature "
                 "and without a gap; record the unit at rest"
             )
-        return _answer(found, number, dict(recording.info.datasheet))
+        return _answer(record, number, dict(recording.info.datasheet))
     _refuse_unknown(recording.info.serial, column, recording.columns)
     axis = column.removeprefix("gyro_")
     values = recording.gyro_dps(axis) if f"gyro_{axis}" == column else _floats(recording.columns[column])
-    found = _of_course(recording.info.serial, {column: values}, recording.columns)
-    return _answer(found, number, dict(recording.info.datasheet))
+    record = _of_course(recording.info.serial, {column: values}, recording.columns)
+    return _answer(record, number, dict(recording.info.datasheet))
 
 
 def _of_table(path: Path, columns: Columns, column: str | None) -> AllanResponse:
@@ -108,8 +108,8 @@ def _of_table(path: Path, columns: Columns, column: str | None) -> AllanResponse
         )
     for name in names:
         _refuse_unknown(str(path), name, columns)
-    found = _of_course(str(path), {name: _floats(columns[name]) for name in names}, columns)
-    return _answer(found, None, {})
+    record = _of_course(str(path), {name: _floats(columns[name]) for name in names}, columns)
+    return _answer(record, None, {})
 
 
 def _of_course(what: str, courses: dict[str, NDArray[np.float64]], columns: Columns) -> StaticRecord:
@@ -139,8 +139,8 @@ def _of_course(what: str, courses: dict[str, NDArray[np.float64]], columns: Colu
             axes[name] = noise
     if not axes:
         raise NotEnoughData(f"{what}: its readings are all equal, so the noise cannot be estimated; check the column")
-    warm = temperature_of(columns)
-    mean_c = float("nan") if warm is None else float(warm[rows].mean())
+    temperature_c = temperature_of(columns)
+    mean_c = float("nan") if temperature_c is None else float(temperature_c[rows].mean())
     first, last = (
         int(np.asarray(columns["dataset"])[k]) if "dataset" in columns else 1 for k in (rows.start, rows.stop - 1)
     )
@@ -158,6 +158,6 @@ def _floats(values: NDArray[np.generic]) -> NDArray[np.float64]:
     return np.asarray(values, dtype=np.float64)
 
 
-def _answer(found: StaticRecord, recording: int | None, datasheet: dict[str, float]) -> AllanResponse:
-    said = {"recording": recording, "datasheet": datasheet, **found.to_json()}
-    return AllanResponse.model_validate(said, extra="forbid")
+def _answer(record: StaticRecord, recording: int | None, datasheet: dict[str, float]) -> AllanResponse:
+    answer = {"recording": recording, "datasheet": datasheet, **record.to_json()}
+    return AllanResponse.model_validate(answer, extra="forbid")

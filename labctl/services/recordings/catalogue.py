@@ -76,11 +76,11 @@ def data_sets(store: Store, recording: int) -> DataSetsResponse:
 
 def _of_rows(numbers: list[int], means: list[MeanRow]) -> dict[str, ChannelColumns]:
     place = {number: k for k, number in enumerate(numbers)}
-    found: dict[str, tuple[list[float | None], list[float | None]]] = {}
+    by_column: dict[str, tuple[list[float | None], list[float | None]]] = {}
     for row in means:
-        mean, std = found.setdefault(row.channel, ([None] * len(numbers), [None] * len(numbers)))
+        mean, std = by_column.setdefault(row.channel, ([None] * len(numbers), [None] * len(numbers)))
         mean[place[row.number]], std[place[row.number]] = row.mean, row.std
-    return {name: ChannelColumns(mean=mean, std=std) for name, (mean, std) in found.items()}
+    return {name: ChannelColumns(mean=mean, std=std) for name, (mean, std) in by_column.items()}
 
 
 #: Columns of a table of points that say which data set it is, or how its mean was made.
@@ -96,14 +96,14 @@ def _of_table(numbers: list[int], points: Recording) -> dict[str, ChannelColumns
     """Return the figures of points that were imported as such; they stand in the table itself."""
     order = np.argsort(np.asarray(points.columns["dataset"]), kind="stable")
     nothing: list[float | None] = [None] * len(numbers)
-    found: dict[str, ChannelColumns] = {}
+    by_name: dict[str, ChannelColumns] = {}
     for name, values in points.columns.items():
         if name in NO_CHANNEL or name.endswith("_std") or np.asarray(values).dtype.kind not in "fiu":
             continue
         spread = points.columns.get(f"{name}_std")
         std = nothing if spread is None else _numbers(np.asarray(spread, dtype=np.float64)[order])
-        found[name] = ChannelColumns(mean=_numbers(np.asarray(values, dtype=np.float64)[order]), std=std)
-    return found
+        by_name[name] = ChannelColumns(mean=_numbers(np.asarray(values, dtype=np.float64)[order]), std=std)
+    return by_name
 
 
 def _numbers(values: NDArray[np.float64]) -> list[float | None]:

@@ -11,17 +11,17 @@ from labctl.recording import Recording
 from labctl.recording.verification import is_marked
 
 
-def covered_of(found: RecordingInspection, points: Recording) -> Covered | None:
+def covered_of(inspection: RecordingInspection, points: Recording) -> Covered | None:
     """Return what the readings of a recording cover, as far as they are fitted; None where it has none.
 
     `points` are its means: what was measured to verify a calibration does not widen the range of one.
     """
     aside = set(np.asarray(points.columns["dataset"])[is_marked(points)].tolist()) if points.columns else set[int]()
-    kept = [place for place, number in enumerate(found.dataset) if number not in aside]
-    if not kept:
+    covered = [place for place, number in enumerate(inspection.dataset) if number not in aside]
+    if not covered:
         return None
-    low = [warm for place in kept if (warm := found.temperature_low_c[place]) is not None]
-    high = [warm for place in kept if (warm := found.temperature_high_c[place]) is not None]
+    low = [temperature_c for place in covered if (temperature_c := inspection.temperature_low_c[place]) is not None]
+    high = [temperature_c for place in covered if (temperature_c := inspection.temperature_high_c[place]) is not None]
     span = (min(low), max(high)) if low and high else (None, None)
-    rates = np.asarray(found.rate_low_dps)[kept], np.asarray(found.rate_high_dps)[kept]
-    return covered_by(rates, np.asarray(found.position)[kept], span, up_rate_dps(points.info))
+    rates = np.asarray(inspection.rate_low_dps)[covered], np.asarray(inspection.rate_high_dps)[covered]
+    return covered_by(rates, np.asarray(inspection.position)[covered], span, up_rate_dps(points.info))

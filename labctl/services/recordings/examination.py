@@ -25,8 +25,10 @@ def inspection_of_recording(store: Store, recording: int) -> InspectionResponse:
     """Return the inspection of a stored recording; computed once. Raises NotFound."""
     row = store.recordings.get(recording)
     info = RecordingInfo.model_validate(row.info)
-    found = inspect_stored(store, row).warnings
-    return _answer(f"recording {recording}", recording, info, row.readings or 0, found, examined_stored(store, row))
+    stored_warnings = inspect_stored(store, row).warnings
+    return _answer(
+        f"recording {recording}", recording, info, row.readings or 0, stored_warnings, examined_stored(store, row)
+    )
 
 
 def inspection_of_file(
@@ -39,9 +41,9 @@ def inspection_of_file(
     recording of, BadInput for an importer or option that there is not.
     """
     chosen = name or surest(path)
-    given = parsed_options(options)
+    given_options = parsed_options(options)
     out_of_order = OutOfOrder(also_steps=True)
-    if chosen == INTERCHANGE and not given:
+    if chosen == INTERCHANGE and not given_options:
         if column_map is not None or beside:
             raise BadInput(
                 f"{path}: a recording in labctl's own format has no column map and no further files; "
@@ -49,12 +51,12 @@ def inspection_of_file(
             )
         recording = read_recording(path)
     else:
-        recording = read_with(chosen, path, given, column_map, None, beside, out_of_order)
+        recording = read_with(chosen, path, given_options, column_map, None, beside, out_of_order)
     part = examination(recording)
     of_readings = [*out_of_order.findings, *part.findings]
     warnings = [warning_of(each) for each in findings_of(summarise(recording), recording.environment, of_readings)]
     examined = ReadingsExamined(
-        warnings=[warning_of(each) for each in of_readings], courses=part.courses, marks=part.marks
+        warnings=[warning_of(finding) for finding in of_readings], courses=part.courses, marks=part.marks
     )
     return _answer(str(path), None, recording.info, len(recording), warnings, examined)
 

@@ -22,23 +22,23 @@ def examples() -> dict[str, Path]:
 
 def example(name: str) -> Path:
     """Return an example's folder; raises BadInput naming those that there are."""
-    known = examples()
-    if name not in known:
-        raise BadInput(f"no example {name!r} comes with labctl; choose one of {', '.join(known)}")
-    return known[name]
+    shipped = examples()
+    if name not in shipped:
+        raise BadInput(f"no example {name!r} comes with labctl; choose one of {', '.join(shipped)}")
+    return shipped[name]
 
 
 def add_simulated(store: Store, request: SimulatedRequest, at: datetime) -> SimulatedRecordingResponse:
     """Make a recording in simulation and take it in. Raises BadInput, RecipeError, PlanRefused."""
-    asked = SimulateRequest(recipe=request.recipe, hide=request.hide, seed=request.seed, clip=request.clip)
-    made = make_recording(asked, request.serial)
-    recipe, bench, hidden = made.plan.recipe.name, made.bench.name, dict(made.hidden)
-    what = {"recipe": recipe, "bench": bench, "seed": request.seed, "hidden": hidden}
-    number = store.recordings.add_import(made.recording, at, what)
+    request_made = SimulateRequest(recipe=request.recipe, hide=request.hide, seed=request.seed, clip=request.clip)
+    made_recording = make_recording(request_made, request.serial)
+    recipe, bench, hidden = made_recording.plan.recipe.name, made_recording.bench.name, dict(made_recording.hidden)
+    details = {"recipe": recipe, "bench": bench, "seed": request.seed, "hidden": hidden}
+    number = store.recordings.add_import(made_recording.recording, at, details)
     row = store.recordings.get(number)
     return SimulatedRecordingResponse(
-        serial=made.recording.info.serial, recording=number, datasets=made.plan.datasets,
-        readings=len(made.recording), suggested_model=model_for(store, row), recipe=recipe,
+        serial=made_recording.recording.info.serial, recording=number, datasets=made_recording.plan.datasets,
+        readings=len(made_recording.recording), suggested_model=model_for(store, row), recipe=recipe,
         bench=bench, seed=request.seed, hidden=hidden,
-        warnings=inspect_stored(store, row, made.recording).warnings,
+        warnings=inspect_stored(store, row, made_recording.recording).warnings,
     )  # fmt: skip

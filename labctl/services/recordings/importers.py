@@ -26,8 +26,8 @@ from labctl.services.recordings.staging import staging_folder
 from labctl.services.recordings.time_order import OUT_OF_ORDER, OutOfOrder, leaves_out_rows, refuse_unknown
 
 
-def _importer(found: object) -> Importer[Any] | TableImporter[Any]:
-    return found if isinstance(found, TableImporter) else instance_of(Importer)(found)
+def _importer(importer: object) -> Importer[Any] | TableImporter[Any]:
+    return importer if isinstance(importer, TableImporter) else instance_of(Importer)(importer)
 
 
 IMPORTERS: PluginGroup[Importer[Any] | TableImporter[Any]] = PluginGroup("labctl.importers", "importer", _importer)
@@ -45,7 +45,7 @@ def as_interchange(
     beside: Sequence[Path] = (),
     leave_out: Sequence[str] = (),
 ) -> Iterator[Path]:
-    """Give the folder of a recording in the interchange format: the path itself, or one made of what `path` holds.
+    """Yield the folder of a recording in the interchange format: the path itself, or one made of what `path` holds.
 
     `name` is an importer's; without it the importer that is surest. `options` are KEY=VALUE. `column_map` says what the
     columns of a log are; without it one is proposed. `accept` is shown what a log would become, and raises where that
@@ -53,10 +53,10 @@ def as_interchange(
     readings are left out. Raises BadInput for an importer or option
     that there is not, BadRecording for what cannot be read.
     """
-    given = parsed_options(options)
+    given_options = parsed_options(options)
     refuse_unknown(leave_out)
     chosen = name or surest(path)
-    if chosen == INTERCHANGE and not given:
+    if chosen == INTERCHANGE and not given_options:
         if column_map is not None:
             raise _no_map(chosen)
         if beside:
@@ -67,7 +67,7 @@ def as_interchange(
         recording = read_recording(path)
     else:
         in_order = OutOfOrder() if leaves_out_rows(leave_out) else None
-        recording = read_with(chosen, path, given, column_map, accept, beside, in_order)
+        recording = read_with(chosen, path, given_options, column_map, accept, beside, in_order)
     if of_readings := [kind for kind in leave_out if kind != OUT_OF_ORDER]:
         recording = without(recording, of_readings, str(path))
     with staging_folder() as made:
@@ -78,15 +78,15 @@ def as_interchange(
 
 def parsed_options(texts: Sequence[str]) -> dict[str, str]:
     """Return options KEY=VALUE by key; raises BadInput."""
-    found: dict[str, str] = {}
+    options: dict[str, str] = {}
     for text in texts:
         key, equals, value = text.partition("=")
         if not equals or not key:
             raise BadInput(f"--option {text}: write KEY=VALUE")
-        if key in found:
+        if key in options:
             raise BadInput(f"--option {text}: {key} is given twice; give it once")
-        found[key] = value
-    return found
+        options[key] = value
+    return options
 
 
 def surest(path: Path) -> str:
@@ -103,9 +103,10 @@ def surest(path: Path) -> str:
     names = [name for name, confidence in sure.items() if confidence == best]
     if best <= 0.0:
         if path.is_file():
-            known = ", ".join(f"{name}: {importer.title}" for name, importer in IMPORTERS.all().items())
+            importer_names = ", ".join(f"{name}: {importer.title}" for name, importer in IMPORTERS.all().items())
             raise BadRecording(
-                f"{path}: no installed importer recognises this file (installed: {known}); install the package "
+                f"{path}: no installed importer recognises this file (installed: {importer_names}); install the "
+                "package "
                 "of an importer for it, or name an importer with --format"
             )
         return INTERCHANGE
@@ -129,7 +130,7 @@ def read_with(
 
     With `out_of_order` a log is read without the rows whose time goes back, and that says which they were.
     """
-    importer, given = _importer_and_options(name, options)
+    importer, given_options = _importer_and_options(name, options)
     plugin = IMPORTERS.plugin(name)
     if not path.exists():
         raise BadRecording(f"{path}: not found; name the file to import")
@@ -137,19 +138,19 @@ def read_with(
         raise _no_map(name)
     if isinstance(importer, Importer) and beside:
         raise _nothing_beside(name)
-    made: MappedFile | None = None
+    mapped: MappedFile | None = None
     with _failures_named(path, name):
         if isinstance(importer, TableImporter):
             tables = [_table(each, column_map) for each in beside]
-            made = mapped_file(name, importer, path, given, column_map, tables, out_of_order)
+            mapped = mapped_file(name, importer, path, given_options, column_map, tables, out_of_order)
         else:
-            found = instance_of(Recording)(importer.read(path, given))
-    if made is not None:
+            recording = instance_of(Recording)(importer.read(path, given_options))
+    if mapped is not None:
         if accept is not None:
-            accept(made)
-        found = made.recording
+            accept(mapped)
+        recording = mapped.recording
     read_by = f"read from {path.name} by importer {name} of {plugin.release}"
-    return _checked(path, found, read_by)
+    return _checked(path, recording, read_by)
 
 
 def log_with_map(
@@ -161,11 +162,11 @@ def log_with_map(
     With `out_of_order` the rows whose time goes back are left out.
     """
     chosen = name or surest(path)
-    importer, given = _importer_and_options(chosen, options)
+    importer, given_options = _importer_and_options(chosen, options)
     if not isinstance(importer, TableImporter):
         raise BadInput(f"{path}: importer {chosen} determines the columns itself; import it with `labctl import`")
     with _failures_named(path, chosen):
-        return mapped_file(chosen, importer, path, given, column_map, (), out_of_order)
+        return mapped_file(chosen, importer, path, given_options, column_map, (), out_of_order)
 
 
 @contextmanager
@@ -185,11 +186,11 @@ def _table(path: Path, column_map: ColumnMap | None) -> RawTable:
     if not path.exists():
         raise BadRecording(f"{path}: not found; give the path of the file whose columns are to be added")
     name = surest(path)
-    importer, given = _importer_and_options(name, {})
+    importer, given_options = _importer_and_options(name, {})
     if not isinstance(importer, TableImporter):
         raise _nothing_beside(name)
     with _failures_named(path, name):
-        return importer.table(path, given_layout(given, column_map))
+        return importer.table(path, given_layout(given_options, column_map))
 
 
 def _nothing_beside(name: str) -> BadInput:
@@ -213,8 +214,8 @@ def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Import
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
         names = [key for key in importer.options.model_fields if key != "file"]
-        known = f"its options are {', '.join(names)}" if names else "it has no options"
-        raise BadInput(f"importer {name}: option {key}: {first['msg']} ({known}); correct the option") from error
+        option_text = f"its options are {', '.join(names)}" if names else "it has no options"
+        raise BadInput(f"importer {name}: option {key}: {first['msg']} ({option_text}); correct the option") from error
 
 
 def _confidence(name: str, importer: Importer[Any] | TableImporter[Any], path: Path) -> float:

@@ -36,7 +36,7 @@ def _inspected(store: Store, row: RecordingRow, recording: Recording | None) -> 
 
 
 def _response(summary: Summary, recording: Recording, readings: ReadingsExamined) -> RecordingInspection:
-    of_readings = [finding_of(each) for each in readings.warnings]
+    of_readings = [finding_of(warning) for warning in readings.warnings]
     warnings = [warning_of(each) for each in findings_of(summary, recording.environment, of_readings)]
     if len(summary) == 0:
         return RecordingInspection(

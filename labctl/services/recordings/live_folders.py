@@ -101,15 +101,15 @@ def kept_readings(location: str, store: Store | None) -> list[KeptReadings]:
     One that a running session uses is none, nor one without a whole reading, nor one whose readings are a recording of
     `store`. Raises StoreError.
     """
-    found = []
+    kept_sessions = []
     for head in sorted(usual_place(location).glob(f"{PREFIX}*/{HEAD}")):
         folder = head.parent
         if _is_in_use(folder):
             continue
         readings, info = _count(folder / SAMPLES), _info(head)
         if readings and not (info is not None and store is not None and _is_stored(store, info, readings)):
-            found.append(KeptReadings(folder, "" if info is None else info.serial, readings))
-    return found
+            kept_sessions.append(KeptReadings(folder, "" if info is None else info.serial, readings))
+    return kept_sessions
 
 
 def kept_beside(database: str | None) -> list[KeptReadings]:

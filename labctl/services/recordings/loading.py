@@ -69,13 +69,13 @@ def is_profile(row: RecordingRow) -> bool:
     return row.kind == "samples" and row.info.get("motion") == "profile"
 
 
-def _with_steps(points: Recording, found: RecordingInspection) -> Recording:
+def _with_steps(points: Recording, inspection: RecordingInspection) -> Recording:
     """Return means with a column for what coarse steps of an output leave in them, where they do."""
-    if not found.quantisation_dps:
+    if not inspection.quantisation_dps:
         return points
     columns = dict(points.columns)
-    numbers, dataset = np.asarray(found.dataset), np.asarray(columns["dataset"], dtype=np.int64)
-    for axis, u_dps in found.quantisation_dps.items():
+    numbers, dataset = np.asarray(inspection.dataset), np.asarray(columns["dataset"], dtype=np.int64)
+    for axis, u_dps in inspection.quantisation_dps.items():
         unit = next((unit for name, unit in points.info.output.items() if name == axis), None)
         scale = abs(unit.scale) if unit else 1.0
         columns[f"gyro_{axis}{QUANTISATION}"] = per_reading(dataset, numbers, scale * np.asarray(u_dps))
@@ -117,20 +117,20 @@ def chosen_rows(
 
     Raises BadInput where both are given and differ, and what `newest_row` raises.
     """
-    wanted = sorted(set(recordings))
-    if recording is not None and wanted and wanted != [recording]:
+    numbers = sorted(set(recordings))
+    if recording is not None and numbers and numbers != [recording]:
         raise BadInput(
-            f"recording {recording} and recordings {', '.join(map(str, wanted))} were both requested: give "
+            f"recording {recording} and recordings {', '.join(map(str, numbers))} were both requested: give "
             "one of the two"
         )
-    if len(wanted) > MOST_TOGETHER:
+    if len(numbers) > MOST_TOGETHER:
         raise BadInput(
-            f"{len(wanted)} recordings were given, but at most {MOST_TOGETHER} can be fitted together; name fewer"
+            f"{len(numbers)} recordings were given, but at most {MOST_TOGETHER} can be fitted together; name fewer"
         )
-    if len(wanted) < 2:
-        asked = wanted[0] if wanted else recording
-        return (newest_row(store, serial, asked, other_unit=other_unit, to_fit=True),)
-    return tuple(newest_row(store, serial, number, other_unit=other_unit) for number in wanted)
+    if len(numbers) < 2:
+        newest = numbers[0] if numbers else recording
+        return (newest_row(store, serial, newest, other_unit=other_unit, to_fit=True),)
+    return tuple(newest_row(store, serial, number, other_unit=other_unit) for number in numbers)
 
 
 def is_to_verify(store: Store, row: RecordingRow) -> bool:
@@ -139,7 +139,9 @@ def is_to_verify(store: Store, row: RecordingRow) -> bool:
     False where nothing was measured yet.
     """
     if row.kind == "samples":
-        sets = [each for each in store.recordings.data_sets(row.id) if each.state == "complete" and each.n]
+        sets = [
+            data_set for data_set in store.recordings.data_sets(row.id) if data_set.state == "complete" and data_set.n
+        ]
         return bool(sets) and all(each.verification for each in sets)
     marked = is_marked(store.recordings.points(row.id, head=row)) if row.kind == "points" else np.zeros(0)
     return bool(len(marked) and marked.all())
@@ -156,10 +158,10 @@ def passed_over(
         return []
     chosen = rows[-1]
     newer = [row for row in store.recordings.of_unit(chosen.serial) if row.id > chosen.id and _measured(row)]
-    found = [row.id for row in reversed(newer) if is_to_verify(store, row)]
-    if not found:
+    passed = [row.id for row in reversed(newer) if is_to_verify(store, row)]
+    if not passed:
         return []
-    named = f"recording {found[0]}" if len(found) == 1 else f"recordings {', '.join(map(str, found))}"
+    named = f"recording {passed[0]}" if len(passed) == 1 else f"recordings {', '.join(map(str, passed))}"
     finding = Finding(
         "passed_over", "likely", named, f"measured only to verify a calibration, so recording {chosen.id} was used",
         None, "", "data sets that a fit takes in", "name another recording with --recording ID",

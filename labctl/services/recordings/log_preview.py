@@ -45,15 +45,15 @@ def preview_log(
     becomes, the others mark readings.
     """
     refuse_unknown(leave_out)
-    found = log_with_map(path, importer, options, column_map, OutOfOrder() if leaves_out_rows(leave_out) else None)
-    table, chosen = found.table, found.column_map
-    taken = {target: source(table, mapped.source) for target, mapped in chosen.columns.items()}
-    target_of = {column.name: target for target, column in taken.items() if column is not None}
-    log = found.log
+    mapped_log = log_with_map(path, importer, options, column_map, OutOfOrder() if leaves_out_rows(leave_out) else None)
+    table, chosen = mapped_log.table, mapped_log.column_map
+    sources = {target: source(table, mapped.source) for target, mapped in chosen.columns.items()}
+    target_of = {column.name: target for target, column in sources.items() if column is not None}
+    log = mapped_log.log
     return LogPreview(
         file=path.name,
-        importer=found.importer,
-        title=found.title,
+        importer=mapped_log.importer,
+        title=mapped_log.title,
         rows=table.rows,
         columns=[
             LogColumn(name=name, unit=column.unit, is_text=not column.is_number, target=target_of.get(name, ""))
@@ -62,46 +62,48 @@ def preview_log(
         first_rows=table.shown_rows(),
         column_map=map_document(chosen),
         map_toml=map_text(chosen),
-        guesses=found.guesses,
-        problems=found.problems,
-        warnings=_warnings(found),
+        guesses=mapped_log.guesses,
+        problems=mapped_log.problems,
+        warnings=_warnings(mapped_log),
         unused=unused(table, chosen),
         serial=log.recording.info.serial if log is not None else None,
         motion=log.motion if log is not None else None,
         datasets=None if log is None else len(np.unique(np.asarray(log.recording.columns["dataset"]))),
-        duration_s=_duration(found),
-        traces=_traces(table, found),
+        duration_s=_duration(mapped_log),
+        traces=_traces(table, mapped_log),
         targets=_targets(),
     )
 
 
-def _warnings(found: MappedFile) -> list[DataWarning]:
+def _warnings(mapped: MappedFile) -> list[DataWarning]:
     """Return what is wrong with single rows and readings, as an inspection of the file says it."""
-    _, of_rows = in_order_of_time(found.table, found.column_map)
-    of_readings = [] if found.log is None else examine(found.log.recording)
-    findings = [*([] if of_rows is None else [of_rows]), *(each.finding for each in of_readings)]
-    return [warning_of(each) for each in findings]
+    _, of_rows = in_order_of_time(mapped.table, mapped.column_map)
+    of_readings = [] if mapped.log is None else examine(mapped.log.recording)
+    findings = [*([] if of_rows is None else [of_rows]), *(finding.finding for finding in of_readings)]
+    return [warning_of(finding) for finding in findings]
 
 
-def _duration(found: MappedFile) -> float | None:
-    if found.log is None or "t_s" not in found.log.recording.columns:
+def _duration(mapped: MappedFile) -> float | None:
+    if mapped.log is None or "t_s" not in mapped.log.recording.columns:
         return None
-    t_s = np.asarray(found.log.recording.columns["t_s"], dtype=np.float64)
+    t_s = np.asarray(mapped.log.recording.columns["t_s"], dtype=np.float64)
     return float(t_s[-1] - t_s[0])
 
 
-def _traces(table: RawTable, found: MappedFile) -> list[LogTrace]:
+def _traces(table: RawTable, mapped: MappedFile) -> list[LogTrace]:
     n = table.rows
     x = np.arange(1, n + 1, dtype=np.float64)
-    if found.log is not None and "t_s" in found.log.recording.columns:
-        t_s = np.asarray(found.log.recording.columns["t_s"], dtype=np.float64)
+    if mapped.log is not None and "t_s" in mapped.log.recording.columns:
+        t_s = np.asarray(mapped.log.recording.columns["t_s"], dtype=np.float64)
         x = t_s if len(t_s) == n else x
     numbers = [column for column in table.columns.values() if column.is_number][:MOST_TRACES]
     starts = np.unique(np.linspace(0, n, BINS + 1).astype(np.int64)[:-1])
     middle = x[np.minimum(starts + np.diff(np.append(starts, n)) // 2, n - 1)]
     return [
-        LogTrace(name=each.name, x=middle.tolist(), low=_least(each.values, starts), high=_most(each.values, starts))
-        for each in numbers
+        LogTrace(
+            name=number.name, x=middle.tolist(), low=_least(number.values, starts), high=_most(number.values, starts)
+        )
+        for number in numbers
     ]
 
 

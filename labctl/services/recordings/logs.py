@@ -67,15 +67,15 @@ def mapped_file(
     if options.started_at is not None:
         chosen = chosen.model_copy(update={"started_at": options.started_at})
     guesses = [*([of_day] if of_day else []), *proposal.guesses]
-    made = MappedFile(name, importer.title, table, chosen, column_map is None, guesses)
+    mapped = MappedFile(name, importer.title, table, chosen, column_map is None, guesses)
     used = table if out_of_order is None else out_of_order.rows_in_order(table, chosen)
     try:
         log = recording_of(used, chosen)
     except BadFile as error:
-        return replace(made, problems=error.problems)
+        return replace(mapped, problems=error.problems)
     if out_of_order is not None:
         log = replace(log, recording=out_of_order.stated(log.recording, table.rows))
-    return replace(made, log=log)
+    return replace(mapped, log=log)
 
 
 def given_layout(options: TableOptionsT, column_map: ColumnMap | None) -> TableOptionsT:

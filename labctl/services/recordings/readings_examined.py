@@ -31,12 +31,12 @@ def _examined(store: Store, row: RecordingRow, recording: Recording | None) -> R
     if row.kind != "samples":
         return ReadingsExamined(warnings=[], courses=[], marks=[])
     if recording is not None:
-        found = examination(recording)
+        result = examination(recording)
     else:
         info = RecordingInfo.model_validate(row.info)
-        found = joined_examinations([examination(Recording(info, columns)) for columns in _together(store, row.id)])
+        result = joined_examinations([examination(Recording(info, columns)) for columns in _together(store, row.id)])
     return ReadingsExamined(
-        warnings=[warning_of(each) for each in found.findings], courses=found.courses, marks=found.marks
+        warnings=[warning_of(finding) for finding in result.findings], courses=result.courses, marks=result.marks
     )
 
 

@@ -19,7 +19,7 @@ PREFIX = "labctl-staging-"
 
 @contextmanager
 def staging_folder() -> Iterator[Path]:
-    """Give an empty folder that only this user may enter; it is removed at the end. Raises OSError."""
+    """Yield an empty folder that only this user may enter; it is removed at the end. Raises OSError."""
     folder, handle = _locked_folder()
     try:
         yield folder

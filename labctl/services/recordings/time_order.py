@@ -20,11 +20,11 @@ OUT_OF_ORDER = "time_back"
 
 def refuse_unknown(kinds: Sequence[str]) -> None:
     """Raise BadInput for a kind of finding whose readings cannot be left out."""
-    known = (OUT_OF_ORDER, *MAY_BE_LEFT_OUT, ALL)
-    if unknown := [kind for kind in kinds if kind not in known]:
+    kinds_known = (OUT_OF_ORDER, *MAY_BE_LEFT_OUT, ALL)
+    if unknown := [kind for kind in kinds if kind not in kinds_known]:
         raise BadInput(
             f"--leave-out {unknown[0][:60]}: readings of this kind cannot be left out; choose from "
-            f"{', '.join(known[:-1])} or {ALL}"
+            f"{', '.join(kinds_known[:-1])} or {ALL}"
         )
 
 
@@ -45,19 +45,19 @@ class OutOfOrder:
 
     def rows_in_order(self, table: RawTable, column_map: ColumnMap) -> RawTable:
         """Return the log without those rows."""
-        kept, found = in_order_of_time(table, column_map)
-        if found is None or not (found.may_leave_out or self.also_steps):
+        in_order, problem = in_order_of_time(table, column_map)
+        if problem is None or not (problem.may_leave_out or self.also_steps):
             return table
-        self.findings.append(found)
-        return kept
+        self.findings.append(problem)
+        return in_order
 
     def stated(self, recording: Recording, rows: int) -> Recording:
         """Return a recording whose head states what was left out of the log's rows."""
-        left = tuple(
-            LeftOut(what=each.what, channel=each.channel, n=each.n or 0, of=rows, why=each.said)
-            for each in self.findings
+        left_out = tuple(
+            LeftOut(what=finding.what, channel=finding.channel, n=finding.n or 0, of=rows, why=finding.said)
+            for finding in self.findings
         )
-        if not left or self.also_steps:  # an inspection leaves nothing out of what is kept
+        if not left_out or self.also_steps:  # an inspection leaves nothing out of what is kept
             return recording
-        info = recording.info.model_copy(update={"left_out": (*recording.info.left_out, *left)})
+        info = recording.info.model_copy(update={"left_out": (*recording.info.left_out, *left_out)})
         return replace(recording, info=info)

@@ -29,7 +29,7 @@ def trace(
     info = RecordingInfo.model_validate(head.info)
     rows = [row for row in store.recordings.data_sets(recording) if row.state == "complete" and row.n]
     if head.kind == "samples":
-        known = courses_of(store.recordings.dataset(recording, rows[0].number)) if rows else []
+        courses = courses_of(store.recordings.dataset(recording, rows[0].number)) if rows else []
         begins, ends = [row.t_from_s for row in rows], [row.t_until_s for row in rows]
     else:
         table = dict(store.recordings.points(recording).columns)
@@ -38,23 +38,23 @@ def trace(
                 f"recording {recording} holds {head.kind} without times (no column t_s), so no channel can be "
                 "shown over time; show its data sets instead"
             )
-        known = courses_of(table)
+        courses = courses_of(table)
         begins = ends = np.asarray(table["t_s"], dtype=np.float64).tolist()
-    if known and channel not in known:
-        raise BadInput(f"recording {recording} has no channel {channel!r}; choose one of {', '.join(sorted(known))}")
+    if courses and channel not in courses:
+        raise BadInput(f"recording {recording} has no channel {channel!r}; choose one of {', '.join(sorted(courses))}")
     low, high = _window(from_s, until_s, [t for t in begins if t is not None], [t for t in ends if t is not None])
     raw = True
     if head.kind != "samples":
-        found = _as_it_is(table["t_s"], table[channel])
+        trace_points = _as_it_is(table["t_s"], table[channel])
     else:
         inside = [row for row in rows if _overlaps(row, low, high)]
         raw = _is_few(inside, low, high, points)
-        found = _readings(store, recording, channel, inside) if raw else envelope_of(store, recording, channel)
-    shown = _binned(found, low, high, points)
+        trace_points = _readings(store, recording, channel, inside) if raw else envelope_of(store, recording, channel)
+    binned = _binned(trace_points, low, high, points)
     return TraceResponse(
         recording=recording, channel=channel, unit=_unit(info, channel), from_s=low, until_s=high, raw=raw,
-        t_s=shown.t_s.tolist(), min=shown.low.tolist(), max=shown.high.tolist(), mean=shown.mean.tolist(),
-        n=shown.n.astype(np.int64).tolist(), channels=sorted(known),
+        t_s=binned.t_s.tolist(), min=binned.low.tolist(), max=binned.high.tolist(), mean=binned.mean.tolist(),
+        n=binned.n.astype(np.int64).tolist(), channels=sorted(courses),
     )  # fmt: skip
 
 
@@ -116,23 +116,23 @@ def _as_it_is(t_s: NDArray[np.generic], values: NDArray[np.generic]) -> Envelope
     return Envelope(times, numbers, numbers, numbers, np.ones(len(numbers)))
 
 
-def _binned(found: Envelope, low: float | None, high: float | None, points: int) -> Envelope:
+def _binned(envelope: Envelope, low: float | None, high: float | None, points: int) -> Envelope:
     """Return what lies in a window in at most `points` bins of equal time, without the empty ones."""
     if low is None or high is None:
         return Envelope(*(np.zeros(0) for _ in range(5)))
-    inside = np.flatnonzero((found.t_s >= low) & (found.t_s <= high) & (found.n > 0))
+    inside = np.flatnonzero((envelope.t_s >= low) & (envelope.t_s <= high) & (envelope.n > 0))
     if len(inside) == 0:
         return Envelope(*(np.zeros(0) for _ in range(5)))
-    share = (found.t_s[inside] - low) / (high - low) if high > low else np.zeros(len(inside))
+    share = (envelope.t_s[inside] - low) / (high - low) if high > low else np.zeros(len(inside))
     which = np.minimum((share * points).astype(np.int64), points - 1)
     order = np.argsort(which, kind="stable")
     rows, which = inside[order], which[order]
     begins = np.flatnonzero(np.concatenate([[True], which[1:] != which[:-1]]))
-    n: Array = np.add.reduceat(found.n[rows], begins)
+    n: Array = np.add.reduceat(envelope.n[rows], begins)
     return Envelope(
-        np.add.reduceat(found.t_s[rows] * found.n[rows], begins) / n,
-        np.minimum.reduceat(found.low[rows], begins),
-        np.maximum.reduceat(found.high[rows], begins),
-        np.add.reduceat(found.mean[rows] * found.n[rows], begins) / n,
+        np.add.reduceat(envelope.t_s[rows] * envelope.n[rows], begins) / n,
+        np.minimum.reduceat(envelope.low[rows], begins),
+        np.maximum.reduceat(envelope.high[rows], begins),
+        np.add.reduceat(envelope.mean[rows] * envelope.n[rows], begins) / n,
         n,
     )

@@ -94,8 +94,8 @@ def export_recording(
     store: Store, recording: int, folder: Path, file_format: Literal["parquet", "csv"], *, points: bool = False
 ) -> list[str]:
     """Write a recording, or its points (one row per data set), into a new folder; returns the names of its files."""
-    taken = store.recordings.points(recording) if points else store.recordings.samples(recording, times=True)
-    return write_recording(taken, folder, file_format)
+    columns = store.recordings.points(recording) if points else store.recordings.samples(recording, times=True)
+    return write_recording(columns, folder, file_format)
 
 
 @dataclass(frozen=True)

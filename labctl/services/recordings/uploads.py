@@ -53,5 +53,5 @@ def sent_map(text: str) -> ColumnMap | None:
 
 def _plain(name: str) -> str:
     """Return a file name that is safe in any folder: no path, no special characters."""
-    kept = re.sub(r"[^\w.+# -]", "_", Path(name.replace("\\", "/")).name)[-LONGEST_NAME:].lstrip(". ")
-    return kept or "log"
+    plain_name = re.sub(r"[^\w.+# -]", "_", Path(name.replace("\\", "/")).name)[-LONGEST_NAME:].lstrip(". ")
+    return plain_name or "log"

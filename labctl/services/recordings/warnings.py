@@ -21,6 +21,6 @@ def finding_of(warning: DataWarning) -> Finding:
 
 def as_json(warning: DataWarning) -> FindingJson:
     """Return a warning as it is kept with a version."""
-    found = finding_of(warning).to_json()
-    found["text"] = warning.text
-    return found
+    document = finding_of(warning).to_json()
+    document["text"] = warning.text
+    return document

@@ -79,10 +79,10 @@ def trace(
     colour: ArrayLike | None = None,
 ) -> PaperTrace:  # fmt: skip
     """Return points or a line of (n,) numbers."""
-    made: PaperTrace = {"name": name, "kind": kind, "x": numbers(x), "y": numbers(y)}
+    paper_trace: PaperTrace = {"name": name, "kind": kind, "x": numbers(x), "y": numbers(y)}
     if colour is not None:
-        made["colour"] = np.asarray(colour, dtype=np.float64).tolist()
-    return made
+        paper_trace["colour"] = np.asarray(colour, dtype=np.float64).tolist()
+    return paper_trace
 
 
 def panel(

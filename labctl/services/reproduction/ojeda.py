@@ -37,22 +37,22 @@ RECORD = "labctl campaign start ojeda2000: the rates +-100 deg/s every 10 at 25 
 
 def reproduce_own() -> Findings:
     """Return the paper by the real gyro that comes with labctl and by the simulated unit of the paper."""
-    found = Findings(values=sheet.of_printed()).told("computed")
-    found.add(_of(shipped("osu-fog", OSU), None).told("measured"))
+    findings = Findings(values=sheet.of_printed()).told("computed")
+    findings.add(_of(shipped("osu-fog", OSU), None).told("measured"))
     unit = simulated("ojeda2000", BENCH, "RD2100, simulated", RD2100)
-    found.add(_of(unit, None).told("simulated", BUILT_IN.__contains__))
-    return found
+    findings.add(_of(unit, None).told("simulated", BUILT_IN.__contains__))
+    return findings
 
 
 def reproduce(measured: Measured, axis: str | None) -> Findings:
     """Return what a unit's recording gives of the paper. Raises BadInput for an axis that it does not have."""
-    found = Findings(values=sheet.of_printed())
-    found.add(_of(measured, axis))
-    return found
+    findings = Findings(values=sheet.of_printed())
+    findings.add(_of(measured, axis))
+    return findings
 
 
 def _of(measured: Measured, axis: str | None) -> Findings:
-    found = Findings(sources=[measured.sentence])
+    findings = Findings(sources=[measured.sentence])
     axes: list[str] = list(measured.recording.info.axes)
     if axis is not None and axis not in axes:
         raise BadInput(f"--axis {axis!r}: the recording has axes {', '.join(axes)}; choose one of them")
@@ -62,15 +62,15 @@ def _of(measured: Measured, axis: str | None) -> Findings:
     try:
         surface = surface_of(measured, axis)
     except LabctlError as error:
-        found.missing.append(Missing("Figures 3 to 9, eqs. 9 to 14", str(error), RECORD))
+        findings.missing.append(Missing("Figures 3 to 9, eqs. 9 to 14", str(error), RECORD))
     if surface is not None:
-        found.values += _of_surface(surface)
-        found.add(sheet.of_recording(surface, measured.recording.info.max_rate_dps))
-        made, lacking = figures.of_surface(surface)
-        found.figures += made
-        found.missing += lacking
+        findings.values += _of_surface(surface)
+        findings.add(sheet.of_recording(surface, measured.recording.info.max_rate_dps))
+        drawn, lacking = figures.of_surface(surface)
+        findings.figures += drawn
+        findings.missing += lacking
     if measured.rest is None:
-        found.missing.append(
+        findings.missing.append(
             Missing(
                 f"Figure 1 and eqs. 1 and 15 of {measured.name}",
                 "the recording contains means of data sets, or no readings at rest",
@@ -78,18 +78,18 @@ def _of(measured: Measured, axis: str | None) -> Findings:
             )
         )
     else:
-        _of_rest(found, measured, measured.rest, axis, surface)
-    return found
+        _of_rest(findings, measured, measured.rest, axis, surface)
+    return findings
 
 
 def _rms(values: Array) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else None
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if len(finite) else None
 
 
 def _most(values: Array) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.abs(known).max()) if len(known) else None
+    finite = values[np.isfinite(values)]
+    return float(np.abs(finite).max()) if len(finite) else None
 
 
 def _over(before: float | None, after: float | None) -> float | None:
@@ -99,14 +99,14 @@ def _over(before: float | None, after: float | None) -> float | None:
 def _of_surface(surface: Surface) -> list[Value]:
     error = surface.result.error
     rates = f"{len(surface.rate_dps)} data sets up to {np.abs(surface.rate_dps).max():.0f} deg/s"
-    warm = f"{surface.temperature_c.min():.0f} to {surface.temperature_c.max():.0f} deg C"
+    temperature_text = f"{surface.temperature_c.min():.0f} to {surface.temperature_c.max():.0f} deg C"
     coefficients = len(surface.result.fitted.axes[surface.axis].names)
     before, after = surface.turn_before_deg, surface.turn_after_deg
     largest_after = _most(after)
-    said = {
+    sentences = {
         "coefficients": (coefficients, "cubic in rate, parabola in temperature"
                          if coefficients == 12 else "with misalignment, since the unit has several axes"),
-        "raw_max": (_most(surface.raw_dps), f"another unit than the paper's: {rates}, {warm}"),
+        "raw_max": (_most(surface.raw_dps), f"another unit than the paper's: {rates}, {temperature_text}"),
         "left_max": (_most(surface.left_dps), "the paper gives a figure only"),
         "ratio": (_over(_rms(surface.raw_dps), _rms(surface.left_dps)),
                   f"larger where more of the error is smooth; {_rms(surface.left_dps):.4f} deg/s RMS are left"),
@@ -120,21 +120,23 @@ def _of_surface(surface: Surface) -> list[Value]:
         "turn_max_ratio": (_over(_most(before), largest_after),
                            "the largest errors are at the slowest rates, where a turn takes longest and drift counts"),
     }  # fmt: skip
-    return [Value(name, surface.name, None if value is None else float(value), why)
-            for name, (value, why) in said.items()]  # fmt: skip
+    return [Value(name, surface.name, None if value is None else float(value), reason)
+            for name, (value, reason) in sentences.items()]  # fmt: skip
 
 
-def _of_rest(found: Findings, measured: Measured, rest: Rest, axis: str, surface: Surface | None) -> None:
+def _of_rest(findings: Findings, measured: Measured, rest: Rest, axis: str, surface: Surface | None) -> None:
     begun = rest.t_s < paper.STATIC_S
     readings = rest.rate_dps[axis][begun]
-    found.figures.insert(0, figures.at_rest(measured.name, rest.t_s[begun], readings))
+    findings.figures.insert(0, figures.at_rest(measured.name, rest.t_s[begun], readings))
     try:
         bias = static_bias(readings)
     except LabctlError as error:
-        found.missing.append(Missing("Eqs. 1 and 15", str(error), "readings of one data set at rate 0, 10 s or more"))
+        findings.missing.append(
+            Missing("Eqs. 1 and 15", str(error), "readings of one data set at rate 0, 10 s or more")
+        )
         return
     at_rest = "contains the Earth's rate about the axis; another unit than the paper's"
-    found.values += [
+    findings.values += [
         Value("readings", measured.name, float(bias.readings), "readings in the first 10 s"),
         Value(
             "arw_rate",
@@ -155,7 +157,7 @@ def _of_rest(found: Findings, measured: Measured, rest: Rest, axis: str, surface
         still = np.abs(surface.rate_dps) <= AT_REST_DPS
         if np.any(still):
             first = int(np.flatnonzero(still)[0])
-            left = bias.bias_dps - (surface.output_dps[first] - surface.left_dps[first] - surface.rate_dps[first])
-            found.values.append(
-                Value("bias_after", measured.name, float(left), "the surface takes off its value at rest (eq. 15)")
+            residual = bias.bias_dps - (surface.output_dps[first] - surface.left_dps[first] - surface.rate_dps[first])
+            findings.values.append(
+                Value("bias_after", measured.name, float(residual), "the surface takes off its value at rest (eq. 15)")
             )

@@ -28,18 +28,18 @@ class Lines:
 def lines_of(surface: Surface) -> Lines | None:
     """Return the lines at every temperature with enough rates; None where there is none."""
     level = np.round(surface.temperature_c / LEVEL_C)
-    found = []
+    lines = []
     for number in np.unique(level):
         here = level == number
         rate, error = surface.rate_dps[here], surface.raw_dps[here]
         if len(np.unique(np.round(rate))) < LEAST_RATES:
             continue
         slope, bias = np.polyfit(rate, error, 1)
-        left = float(np.sqrt(np.mean((error - slope * rate - bias) ** 2)))
-        found.append((float(surface.temperature_c[here].mean()), float(slope), float(bias), left))
-    if not found:
+        residual_dps = float(np.sqrt(np.mean((error - slope * rate - bias) ** 2)))
+        lines.append((float(surface.temperature_c[here].mean()), float(slope), float(bias), residual_dps))
+    if not lines:
         return None
-    return Lines(*np.array(found).T)
+    return Lines(*np.array(lines).T)
 
 
 def of_printed() -> list[Value]:
@@ -56,20 +56,25 @@ def of_printed() -> list[Value]:
 
 def of_recording(surface: Surface, max_rate_dps: float | None) -> Findings:
     """Return the rows of Table I that a recording gives, and what would give the others."""
-    name, lines, found = surface.name, lines_of(surface), Findings()
+    name, lines, findings = surface.name, lines_of(surface), Findings()
     if max_rate_dps is not None:
         stated = "as its recording states it; a setting, not a measurement"
-        found.values.append(Value("sheet_range", name, max_rate_dps, stated))
+        findings.values.append(Value("sheet_range", name, max_rate_dps, stated))
     if lines is not None:
         full, at = paper.PAPER.value("sheet_range"), int(np.argmin(np.abs(lines.temperature_c - paper.MIDDLE_C)))
-        warm = f"{lines.temperature_c.min():.0f} to {lines.temperature_c.max():.0f} deg C"
+        temperature_text = f"{lines.temperature_c.min():.0f} to {lines.temperature_c.max():.0f} deg C"
         straight = f"RMS about the line at {lines.temperature_c[at]:.0f} deg C, over {full:.0f} deg/s"
-        found.values += [
+        findings.values += [
             Value("sheet_nonlinearity", name, float(100.0 * lines.left_dps[at] / full), straight),
-            Value("sheet_scale_warm", name, float(100.0 * np.ptp(lines.slope)), f"of the lines' slopes, {warm}"),
-            Value("sheet_bias_warm", name, float(np.ptp(lines.bias_dps)), f"of the lines at rest, {warm}"),
+            Value(
+                "sheet_scale_warm",
+                name,
+                float(100.0 * np.ptp(lines.slope)),
+                f"of the lines' slopes, {temperature_text}",
+            ),
+            Value("sheet_bias_warm", name, float(np.ptp(lines.bias_dps)), f"of the lines at rest, {temperature_text}"),
         ]
-    found.missing.append(
+    findings.missing.append(
         Missing(
             f"Table I, scale per bit, bias stability, bias repeatability and bandwidth of {name}",
             "a recording contains rates, one power-on, constant rates and no long rest",
@@ -77,4 +82,4 @@ def of_recording(surface: Surface, max_rate_dps: float | None) -> Findings:
             "the scale per bit is of the wire",
         )
     )
-    return found
+    return findings

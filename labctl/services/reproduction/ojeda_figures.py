@@ -42,7 +42,7 @@ def of_surface(surface: Surface) -> tuple[list[PaperFigure], list[Missing]]:
     fourth, missing = _over_temperature(surface)
     turning = int(np.isfinite(surface.turn_before_deg).sum())
     turned = f"{turning} of {n} data sets, those from 5 deg/s on; below, the error per turn grows without bound."
-    made = [
+    traces = [
         _pair(surface, 3, "error against rate", surface.raw_dps, f"All {n} data sets: output less table rate.",
               one=True),
         *fourth,
@@ -56,21 +56,21 @@ def of_surface(surface: Surface) -> tuple[list[PaperFigure], list[Missing]]:
         _pair(surface, 9, "error per turn, full compensation", surface.turn_after_deg,
               f"{turned} Surface and remaining static bias are taken off (eq. 16). The scale is its own.", y=TURN),
     ]  # fmt: skip
-    for figure in made:
+    for figure in traces:
         figure["title"] = f"{figure['title']}, {name}"
         figure["id"] = f"{figure['id']}-{_slug(name)}"
-    return made, missing
+    return traces, missing
 
 
 def _pair(
     surface: Surface, number: int, title: str, error: Array, caption: str, *, y: str = ERROR, one: bool = False
 ) -> PaperFigure:
     """Return an error over the rate, coloured by temperature, and over both, coloured by the error."""
-    known = np.isfinite(error)
-    rate, warm, values = surface.rate_dps[known], surface.temperature_c[known], error[known]
-    panels = [panel("", RATE, y, [trace("data sets", rate, values, colour=warm)], "deg C")]
+    is_finite = np.isfinite(error)
+    rate, temperature_c, values = surface.rate_dps[is_finite], surface.temperature_c[is_finite], error[is_finite]
+    panels = [panel("", RATE, y, [trace("data sets", rate, values, colour=temperature_c)], "deg C")]
     if not one:
-        panels.append(panel("", RATE, WARM, [trace("data sets", rate, warm, colour=values)], y, "error"))
+        panels.append(panel("", RATE, WARM, [trace("data sets", rate, temperature_c, colour=values)], y, "error"))
     return {
         "id": f"figure-{number}", "title": f"Figure {number}: {title}", "caption": caption, "columns": len(panels),
         "panels": panels,
@@ -87,8 +87,8 @@ def _modelled(surface: Surface, output_dps: Array, temperature_c: Array) -> Arra
 def _fitted(surface: Surface) -> PaperFigure:
     outputs = np.linspace(surface.output_dps.min(), surface.output_dps.max(), ALONG)
     lines = [
-        trace(f"{warm:.1f} deg C", outputs, _modelled(surface, outputs, np.full(ALONG, warm)), "line")
-        for warm in np.linspace(surface.temperature_c.min(), surface.temperature_c.max(), LINES)
+        trace(f"{temperature_c:.1f} deg C", outputs, _modelled(surface, outputs, np.full(ALONG, temperature_c)), "line")
+        for temperature_c in np.linspace(surface.temperature_c.min(), surface.temperature_c.max(), LINES)
     ]
     x, t = np.meshgrid(
         np.linspace(outputs[0], outputs[-1], CELLS),
@@ -113,22 +113,22 @@ def _over_temperature(surface: Surface) -> tuple[list[PaperFigure], list[Missing
     absent: list[str] = []
     for size in paper.FIGURE_4_RATES_DPS:
         traces: list[PaperTrace] = []
-        found: list[str] = []
-        for wanted in (size, -size):
-            nearest = float(centre[int(np.argmin(np.abs(centre - wanted)))])
-            if abs(nearest - wanted) > NEAR_DPS:
-                absent.append(f"{wanted:+g}")
+        sentences: list[str] = []
+        for rate in (size, -size):
+            nearest = float(centre[int(np.argmin(np.abs(centre - rate)))])
+            if abs(nearest - rate) > NEAR_DPS:
+                absent.append(f"{rate:+g}")
                 continue
-            here, sign = centre == nearest, "+" if wanted > 0 else "-"
-            found.append(f"{nearest:+.1f}")
-            warm, output = surface.temperature_c[here], float(surface.output_dps[here].mean())
-            grid = np.linspace(warm.min(), warm.max(), ALONG)
+            here, sign = centre == nearest, "+" if rate > 0 else "-"
+            sentences.append(f"{nearest:+.1f}")
+            temperature_c, output = surface.temperature_c[here], float(surface.output_dps[here].mean())
+            grid = np.linspace(temperature_c.min(), temperature_c.max(), ALONG)
             traces += [
-                trace(f"measured, {sign} deg/s", warm, surface.raw_dps[here]),
+                trace(f"measured, {sign} deg/s", temperature_c, surface.raw_dps[here]),
                 trace(f"model, {sign} deg/s", grid, _modelled(surface, np.full(ALONG, output), grid), "line"),
             ]
         if traces:
-            panels.append(panel(f"{' and '.join(found)} deg/s", WARM, ERROR, traces))
+            panels.append(panel(f"{' and '.join(sentences)} deg/s", WARM, ERROR, traces))
     drawn = sum(len(t["x"]) for p in panels for t in p["traces"] if t["kind"] == "points")
     missing = []
     if absent:

@@ -36,12 +36,14 @@ def surface_of(measured: Measured, axis: str) -> Surface:
     own = np.char.lstrip(np.asarray(data.channels["position"]).astype(np.str_), "-") == axis
     if not np.any(own):
         raise BadInput(f"the recording never turns axis {axis}; name another axis with --axis")
-    rate, warm = data.true_rate_dps(axis)[own], data.channels.temperature_c(axis)[own]
+    rate, temperature_c = data.true_rate_dps(axis)[own], data.channels.temperature_c(axis)[own]
     table = data.channels.table_rate_dps()[own]
     position = np.asarray(data.channels["position"]).astype(np.str_)[own]
-    raw, left = data.outputs[axis][own] - rate, result.residual_dps[axis][own]
+    raw, residual = data.outputs[axis][own] - rate, result.residual_dps[axis][own]
     before, after = (
-        np.array(turn_errors(error - bias_at_rest(error, table, warm, position), table), dtype=np.float64)
-        for error in (raw, left)
+        np.array(turn_errors(error - bias_at_rest(error, table, temperature_c, position), table), dtype=np.float64)
+        for error in (raw, residual)
     )
-    return Surface(measured.name, axis, result, rate, data.outputs[axis][own], warm, raw, left, before, after)
+    return Surface(
+        measured.name, axis, result, rate, data.outputs[axis][own], temperature_c, raw, residual, before, after
+    )

@@ -13,14 +13,14 @@ from labctl.papers import PAPERS, Paper, Printed
 from labctl.plots import paper_html
 from labctl.progress import report_stage
 from labctl.services.reproduction import ojeda, weiss, yang
-from labctl.services.reproduction.findings import Findings, points_in
-from labctl.services.reproduction.response import (
+from labctl.services.reproduction.answer import (
     ContradictionResponse,
     FigureResponse,
     MissingResponse,
     NumberResponse,
     ReproductionResponse,
 )
+from labctl.services.reproduction.findings import Findings, points_in
 from labctl.services.reproduction.sources import of_unit
 from labctl.store import Store
 
@@ -65,43 +65,43 @@ def reproduce_unit(
     paper = paper_named(name)
     check_folder(folder)
     measured = of_unit(store, serial, recording)
-    found = OF_UNIT[name](measured, axis).told(measured.origin)
-    return _written(paper, found, folder, serial, measured.number)
+    findings = OF_UNIT[name](measured, axis).told(measured.origin)
+    return _written(paper, findings, folder, serial, measured.number)
 
 
-def _rows(printed: Printed, found: Findings) -> list[NumberResponse]:
+def _rows(printed: Printed, findings: Findings) -> list[NumberResponse]:
     """Return a row for each source that a printed number was reproduced from; one without a number where none is."""
 
     def row(of: str, value: float | None, why: str, origin: str = "") -> NumberResponse:
-        known = value is not None and printed.value is not None
+        has_both = value is not None and printed.value is not None
         return NumberResponse(
             place=printed.place, quantity=printed.quantity, unit=printed.unit, relation=printed.relation,
             printed=printed.value, of=of, reproduced=value,
-            difference=(value or 0.0) - (printed.value or 0.0) if known else None, why=why, origin=origin,
+            difference=(value or 0.0) - (printed.value or 0.0) if has_both else None, why=why, origin=origin,
         )  # fmt: skip
 
-    made = [row(value.of, value.value, value.why, value.origin) for value in found.values if value.id == printed.id]
-    return made or [row("", None, "not made; see what could not be made")]
+    rows = [row(value.of, value.value, value.why, value.origin) for value in findings.values if value.id == printed.id]
+    return rows or [row("", None, "not made; see what could not be made")]
 
 
 def _answer(
-    paper: Paper, found: Findings, folder: Path, serial: str | None, recording: int | None
+    paper: Paper, findings: Findings, folder: Path, serial: str | None, recording: int | None
 ) -> ReproductionResponse:
     return ReproductionResponse(
         paper=paper.id, title=paper.title, citation=paper.citation, serial=serial, recording=recording,
-        sources=found.sources, story=found.story,
-        numbers=[row for printed in paper.printed for row in _rows(printed, found)],
+        sources=findings.sources, story=findings.story,
+        numbers=[row for printed in paper.printed for row in _rows(printed, findings)],
         contradictions=[
             ContradictionResponse(place=c.place, statement=c.statement, decision=c.decision)
             for c in paper.contradictions
         ],
-        missing=[MissingResponse(what=m.what, why=m.why, record=m.record) for m in found.missing],
-        figures=[FigureResponse(id=f["id"], title=f["title"], points=points_in(f)) for f in found.figures],
+        missing=[MissingResponse(what=m.what, why=m.why, record=m.record) for m in findings.missing],
+        figures=[FigureResponse(id=f["id"], title=f["title"], points=points_in(f)) for f in findings.figures],
         folder=str(folder), files=[f"{paper.id}.html", f"{paper.id}.json"],
     )  # fmt: skip
 
 
-def _page(answer: ReproductionResponse, found: Findings) -> PaperPage:
+def _page(answer: ReproductionResponse, findings: Findings) -> PaperPage:
     numbers: list[PaperNumber] = [
         {
             "place": n.place, "quantity": n.quantity, "unit": n.unit, "relation": n.relation, "printed": n.printed,
@@ -111,20 +111,20 @@ def _page(answer: ReproductionResponse, found: Findings) -> PaperPage:
     ]  # fmt: skip
     return {
         "title": answer.title, "citation": answer.citation, "sources": answer.sources, "story": answer.story,
-        "numbers": numbers, "figures": found.figures,
+        "numbers": numbers, "figures": findings.figures,
         "contradictions": [(c.place, c.statement, c.decision) for c in answer.contradictions],
         "missing": [(m.what, m.why, m.record) for m in answer.missing],
     }  # fmt: skip
 
 
 def _written(
-    paper: Paper, found: Findings, folder: Path, serial: str | None, recording: int | None
+    paper: Paper, findings: Findings, folder: Path, serial: str | None, recording: int | None
 ) -> ReproductionResponse:
     """Write the page and the numbers; each file appears whole or not at all."""
-    answer = _answer(paper, found, folder, serial, recording)
+    answer = _answer(paper, findings, folder, serial, recording)
     report_stage("write the page")
     content = {
-        f"{paper.id}.html": paper_html(_page(answer, found)),
+        f"{paper.id}.html": paper_html(_page(answer, findings)),
         f"{paper.id}.json": json.dumps(answer.model_dump(mode="json"), indent=2, ensure_ascii=False) + "\n",
     }
     folder.parent.mkdir(parents=True, exist_ok=True)

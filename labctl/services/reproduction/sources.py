@@ -70,8 +70,8 @@ def of_unit(store: Store, serial: str, recording: int | None) -> Measured:
     """Return a unit's recording, default the newest. Raises NotFound, NotEnoughData."""
     report_stage(f"read the recording of {serial}")
     row = newest_row(store, serial, recording, to_fit=True)
-    taken = source_of(store, row)
-    points = to_points(taken) if taken.info.motion != "poses" else taken
+    source = source_of(store, row)
+    points = to_points(source) if source.info.motion != "poses" else source
     rest = None
     if row.kind == "samples" and (number := _longest_rest(store, row.id)) is not None:
         rest = rest_in(store.recordings.dataset(row.id, number), points)
@@ -81,7 +81,7 @@ def of_unit(store: Store, serial: str, recording: int | None) -> Measured:
 
 def _longest_rest(store: Store, recording: int) -> int | None:
     """Return the number of the data set at rest with the most readings; None where there is none."""
-    sets = [each for each in store.recordings.data_sets(recording) if each.n and not each.verification]
+    sets = [data_set for data_set in store.recordings.data_sets(recording) if data_set.n and not data_set.verification]
     still = [each for each in sets if abs(each.table_rate_dps) <= AT_REST_DPS]
     return max(still, key=lambda each: each.n).number if still else None
 
@@ -97,11 +97,11 @@ def rest_in(columns: Columns, recording: Recording) -> Rest | None:
     if not still and np.abs(np.asarray(columns["table_rate_dps"], dtype=np.float64)[good]).max() > AT_REST_DPS:
         return None
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[good]
-    found = {}
+    rests = {}
     for axis in recording.info.axes:
         unit = recording.info.output.get(axis, OutputUnit())
-        found[str(axis)] = (np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[good] - unit.offset) / unit.scale
-    return Rest(t_s - t_s[0], found)
+        rests[str(axis)] = (np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[good] - unit.offset) / unit.scale
+    return Rest(t_s - t_s[0], rests)
 
 
 def _rest_of(recording: Recording) -> Rest | None:

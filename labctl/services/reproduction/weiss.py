@@ -41,15 +41,15 @@ UNIT = "ENV-05S, simulated"
 
 def reproduce_own() -> Findings:
     """Return the report by its own table and by a simulated unit."""
-    found = Findings()
-    found.add(_tables(shipped("weiss-gyrostar", TABLE), "z").told("measured"))
+    findings = Findings()
+    findings.add(_tables(shipped("weiss-gyrostar", TABLE), "z").told("measured"))
     table = simulated_readings("gyrostar-report", BENCH)
     tables = _tables(measured_from(table, UNIT, SIMULATED), "z")
-    found.add(tables.told("simulated", lambda _: True))  # the unit's laws were made after the report's table
+    findings.add(tables.told("simulated", lambda _: True))  # the unit's laws were made after the report's table
     rest = simulated_readings("gyrostar-at-rest", BENCH)
-    found.sources.append(AT_REST)
-    found.add(_drift(rest, UNIT, "z").told("simulated"))
-    return found
+    findings.sources.append(AT_REST)
+    findings.add(_drift(rest, UNIT, "z").told("simulated"))
+    return findings
 
 
 def reproduce(measured: Measured, axis: str | None) -> Findings:
@@ -58,27 +58,27 @@ def reproduce(measured: Measured, axis: str | None) -> Findings:
     if axis is not None and axis not in axes:
         raise BadInput(f"--axis {axis!r}: the recording has axes {', '.join(axes)}; choose one of them")
     axis = axis or axes[0]
-    found = _tables(measured, axis)
+    findings = _tables(measured, axis)
     if measured.rest is None:
-        found.missing.append(Missing("Drift", "the recording holds no readings at rest", RECORD_REST))
-        return found
+        findings.missing.append(Missing("Drift", "the recording holds no readings at rest", RECORD_REST))
+        return findings
     columns = {"t_s": measured.rest.t_s, f"gyro_{axis}": measured.rest.rate_dps[axis]}
     try:
-        found.add(_drift_in(columns, measured.name, axis))
+        findings.add(_drift_in(columns, measured.name, axis))
     except LabctlError as error:
-        found.missing.append(Missing("Drift", str(error), RECORD_REST))
-    return found
+        findings.missing.append(Missing("Drift", str(error), RECORD_REST))
+    return findings
 
 
 def _tables(measured: Measured, axis: str) -> Findings:
     """Return scale factors and offsets of a unit, in the report's units, at the report's temperatures."""
-    found = Findings(sources=[measured.sentence])
+    findings = Findings(sources=[measured.sentence])
     report_stage(f"fit weiss1995 to {measured.name}")
     try:
         result = fit(measured.recording, "weiss1995")
     except LabctlError as error:
-        found.missing.append(Missing(f"Scale factors and offsets of {measured.name}", str(error), RECORD_TABLE))
-        return found
+        findings.missing.append(Missing(f"Scale factors and offsets of {measured.name}", str(error), RECORD_TABLE))
+        return findings
     table = result.fitted.model.temperature
     assert isinstance(table, LagrangeTable)
     nodes = np.array(table.nodes_c)
@@ -86,13 +86,13 @@ def _tables(measured: Measured, axis: str) -> Findings:
     own = measured.recording.info.kind == "coefficients"
     for temperature in paper.TEMPERATURES_C:
         inside = nodes[0] - 0.5 <= temperature <= nodes[-1] + 0.5
-        for name, values, why in (
+        for name, values, reason in (
             ("scale", scale, "another unit: its hump near 23 deg C has another size"),
             ("offset", offset, "another unit: its curve is of the same shape, not of the same numbers"),
         ):
             value = float(np.interp(temperature, nodes, values)) if inside else None
-            said = "taken in as it is printed" if own else why
-            found.values.append(
+            said = "taken in as it is printed" if own else reason
+            findings.values.append(
                 Value(
                     f"{name}_{temperature:g}",
                     measured.name,
@@ -100,11 +100,11 @@ def _tables(measured: Measured, axis: str) -> Findings:
                     said if inside else f"measured from {nodes[0]:.1f} to {nodes[-1]:.1f} deg C only",
                 )
             )
-    found.values += _claims(measured.name, nodes, scale, offset)
+    findings.values += _claims(measured.name, nodes, scale, offset)
     if not own:
-        found.values += _nonlinearity(measured, result, axis)
-    found.figures.append(_figure(measured.name, nodes, scale, offset))
-    return found
+        findings.values += _nonlinearity(measured, result, axis)
+    findings.figures.append(_figure(measured.name, nodes, scale, offset))
+    return findings
 
 
 def _in_report_units(result: FitResult, recording: Recording, axis: str) -> tuple[Array, Array]:
@@ -122,7 +122,7 @@ def _in_report_units(result: FitResult, recording: Recording, axis: str) -> tupl
 
 def _claims(name: str, nodes: Array, scale: Array, offset: Array) -> list[Value]:
     deviation = 100.0 * (scale / paper.NOMINAL_MV - 1.0)
-    made = [
+    claims = [
         Value("scale_low", name, float(deviation.min()), "of the table's values; the claim is symmetric"),
         Value("scale_high", name, float(deviation.max()), "of the table's values, which exceed the claim"),
     ]
@@ -131,9 +131,9 @@ def _claims(name: str, nodes: Array, scale: Array, offset: Array) -> list[Value]
         slope = None
         if np.count_nonzero(here) > 1:
             slope = float(np.polyfit(nodes[here], offset[here], 1)[0]) / (paper.NOMINAL_MV / 1000.0)
-        made.append(Value(which, name, slope, "least squares; one number for a curve" if slope is not None else
+        claims.append(Value(which, name, slope, "least squares; one number for a curve" if slope is not None else
                           "fewer than two temperatures there"))  # fmt: skip
-    return made
+    return claims
 
 
 def _nonlinearity(measured: Measured, result: FitResult, axis: str) -> list[Value]:

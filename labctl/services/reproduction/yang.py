@@ -43,7 +43,7 @@ def _in(store: Store, readings: Recording, of: str) -> Findings:
         f"{_said(error.rms_dps)} deg/s, but the noise floor is {_said(error.noise_floor_dps)} deg/s. The criticism of "
         f"the model reports: {' '.join(answer.text)}"
     )
-    found = Findings(
+    findings = Findings(
         story=[stalled],
         values=[
             Value("stalled", of, error.rms_dps, "bias, scale factor and misalignment cannot follow the curve"),
@@ -51,21 +51,21 @@ def _in(store: Store, readings: Recording, of: str) -> Findings:
         ],
     )
     if not answer.named:
-        return found
+        return findings
     added = answer.named[0]
     report_stage(f"add {added} and criticise again")
     better = improve_unit(store, serial, ImproveRequest(add=[added]), at)
     after = better.error
     again = criticise_unit(store, serial, None, None)
-    found.story.append(
+    findings.story.append(
         f"With {added} added, the RMS error is {_said(after.rms_dps)} deg/s, and {_said(after.heldout_rms_dps)} deg/s "
         f"at temperatures left out of the fit. The criticism of this model reports: {' '.join(again.text)}"
     )
-    found.values += [
+    findings.values += [
         Value("improved", of, after.rms_dps, f"{added}, as criticism named it"),
         Value("improved_heldout", of, after.heldout_rms_dps, "each inner temperature by a fit without it"),
     ]
-    return found
+    return findings
 
 
 def _said(value: float | None) -> str:
@@ -96,7 +96,7 @@ def reproduce_own() -> Findings:
     readings = simulated_readings(RECIPE, BENCH, seed=1, sample_rate_hz=RATE_HZ)
     calibration = measured_from(readings, UNIT, WHAT)
     between = measured_from(simulated_readings(BETWEEN, BENCH, seed=2, sample_rate_hz=RATE_HZ), UNIT, HOW)
-    found = Findings(sources=[WHAT, HOW])
+    findings = Findings(sources=[WHAT, HOW])
     report_stage("fit yang2018 and the traditional method")
     proposed = fit(calibration.recording, "yang2018")
     traditional = fit(calibration.recording, "single_temperature")
@@ -109,9 +109,9 @@ def reproduce_own() -> Findings:
         UNIT, data, raw_errors(data), errors["traditional"], errors["proposed"], proposed.fitted, traditional.fitted,
         "second campaign, at temperatures and in readings that no fit has seen",
     )  # fmt: skip
-    _take_in(found, judged, fit_data_of(calibration.recording))
-    found.add(demonstrate(readings, UNIT))
-    return found.told("simulated", _built_in)
+    _take_in(findings, judged, fit_data_of(calibration.recording))
+    findings.add(demonstrate(readings, UNIT))
+    return findings.told("simulated", _built_in)
 
 
 def _built_in(name: str) -> bool:
@@ -124,19 +124,19 @@ def reproduce(measured: Measured, axis: str | None) -> Findings:
     """Return what a unit's recording gives of the paper. Raises BadInput for an axis: the paper takes all of them."""
     if axis is not None:
         raise BadInput(f"--axis {axis!r}: paper yang2018 uses all axes of the recording together; leave --axis out")
-    found = Findings(sources=[measured.sentence])
+    findings = Findings(sources=[measured.sentence])
     report_stage(f"fit yang2018 to {measured.name}")
     try:
         data = fit_data_of(measured.recording)
         result = fit(measured.recording, "yang2018")
     except LabctlError as error:
-        found.missing.append(Missing("Tables 1 to 4, figures 4 to 9", str(error), numbers.RECORD))
-        return found
+        findings.missing.append(Missing("Tables 1 to 4, figures 4 to 9", str(error), numbers.RECORD))
+        return findings
     judged = left_out_errors(measured, data, result)
-    found.sources.append(f"Errors after compensation: {judged.how}.")
-    _take_in(found, judged, data)
-    found.values += _of_fit(measured.name, result)
-    found.missing.append(
+    findings.sources.append(f"Errors after compensation: {judged.how}.")
+    _take_in(findings, judged, data)
+    findings.values += _of_fit(measured.name, result)
+    findings.missing.append(
         Missing(
             "The missing effect",
             "a criticism belongs to a version of the unit",
@@ -144,7 +144,7 @@ def reproduce(measured: Measured, axis: str | None) -> Findings:
             f"labctl improve {measured.name} --add EFFECT",
         )
     )
-    return found
+    return findings
 
 
 def _of_fit(name: str, result: FitResult) -> list[Value]:
@@ -155,11 +155,11 @@ def _of_fit(name: str, result: FitResult) -> list[Value]:
     ]
 
 
-def _take_in(found: Findings, judged: Judged, calibration: FitData) -> None:
-    found.values += [
+def _take_in(findings: Findings, judged: Judged, calibration: FitData) -> None:
+    findings.values += [
         *numbers.conditions(judged.name, calibration), *numbers.coefficients(judged), *numbers.largest_cross(judged),
         *numbers.tables(judged), *numbers.own_axis(judged),
     ]  # fmt: skip
-    found.missing += list(numbers.lacking(judged))
-    found.figures += figures.coefficients(judged.name, judged.proposed_model)
-    found.figures += figures.errors(judged, at_shown(judged.data))
+    findings.missing += list(numbers.lacking(judged))
+    findings.figures += figures.coefficients(judged.name, judged.proposed_model)
+    findings.figures += figures.errors(judged, at_shown(judged.data))

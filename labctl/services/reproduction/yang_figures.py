@@ -71,7 +71,7 @@ def errors(judged: Judged, shown: tuple[NDArray[np.bool_], float]) -> list[Paper
     here, at_c = shown
     data, n = judged.data, len(judged.data)
     methods = {"uncompensated": judged.raw, "traditional": judged.traditional, "proposed": judged.proposed}
-    at_level = {name: {a: v[here] for a, v in each.items()} for name, each in methods.items()}
+    at_level = {name: {a: v[here] for a, v in method.items()} for name, method in methods.items()}
     said = f"Rows: axis that is turned; columns: output. Errors after compensation: {judged.how}."
     level = f"The {int(here.sum())} of {n} data sets at {at_c:.1f} deg C, the level nearest to 25."
     return [

@@ -41,30 +41,32 @@ def conditions(name: str, data: FitData) -> Iterator[Value]:
 def k_g(fitted: FittedModel, temperature_c: float) -> dict[str, float]:
     """Return K_g by the paper's names at a temperature: Kij multiplies the rate about i in output j; B in deg/s."""
     basis = fitted.model.temperature.basis(np.array([temperature_c]))
-    found = {}
+    values = {}
     for out, axis in fitted.axes.items():
         for name, value in zip(axis.names, (axis.values @ basis.T)[:, 0], strict=True):
             if name == "bias":
-                found[f"B{out}"] = float(value)
+                values[f"B{out}"] = float(value)
             elif name == "scale_factor":
-                found[f"K{out}{out}"] = 1.0 + float(value)
+                values[f"K{out}{out}"] = 1.0 + float(value)
             elif name.startswith("misalignment_"):
-                found[f"K{name[-1]}{out}"] = float(value)
-    return found
+                values[f"K{name[-1]}{out}"] = float(value)
+    return values
 
 
 def coefficients(judged: Judged) -> Iterator[Value]:
     models = {"proposed": judged.proposed_model, "traditional": judged.traditional_model}
     for kind, fitted in models.items():
-        found = k_g(fitted, SHOWN_C) if fitted is not None else {}
-        why = (
+        sensitivities = k_g(fitted, SHOWN_C) if fitted is not None else {}
+        reason = (
             "interpolated to 25 deg C; the size is compared, as signs are lost in print"
             if kind == "proposed"
             else "of the one temperature nearest to 25 deg C; the size is compared"
         )
         for name in paper.NAMES:
-            value = abs(found[name]) if name in found else None
-            yield Value(f"{kind}_{name}", judged.name, value, why if value is not None else "this axis was not turned")
+            value = abs(sensitivities[name]) if name in sensitivities else None
+            yield Value(
+                f"{kind}_{name}", judged.name, value, reason if value is not None else "this axis was not turned"
+            )
 
 
 def _turning(data: FitData) -> NDArray[np.str_]:
@@ -100,14 +102,14 @@ def _gains(of: str, turned: str, output: str, before: Spread, traditional: Sprea
     mean = turned == paper.MEANS
     for against, spread in zip(paper.TABLE_4_COLUMNS[:2], (before, traditional), strict=True):
         first, last = ((s.mean_dps, s.rms_dps)[not mean] for s in (spread, after))
-        why = (
+        reason = (
             "of the size of the means, as in the paper; small means hang on the drift of the bias between two campaigns"
             if mean
             else "of the RMS errors above"
         )
         if turned != output and not mean and against == "traditional":
-            why = "of two errors of the size of the noise; the paper's 2.110 and 8.130 are 0.211 and 0.813"
-        yield _cell(f"gain_{turned}_{output}_{against}", of, 100.0 * (1.0 - abs(last) / abs(first)), why)
+            reason = "of two errors of the size of the noise; the paper's 2.110 and 8.130 are 0.211 and 0.813"
+        yield _cell(f"gain_{turned}_{output}_{against}", of, 100.0 * (1.0 - abs(last) / abs(first)), reason)
 
 
 def _cells(of: str, turned: str, output: str, before: Spread, traditional: Spread, after: Spread) -> Iterator[Value]:
@@ -123,8 +125,8 @@ def _cells(of: str, turned: str, output: str, before: Spread, traditional: Sprea
             else "noise of a data set and drift; the paper prints less than its own mean in four cells",
         ),
     }
-    for column, (value, why) in third.items():
-        yield _cell(f"table3_{turned}_{output}_{column}", of, value, why)
+    for column, (value, reason) in third.items():
+        yield _cell(f"table3_{turned}_{output}_{column}", of, value, reason)
     whys = (
         (
             "bias at this temperature, and its drift",
@@ -141,8 +143,8 @@ def _cells(of: str, turned: str, output: str, before: Spread, traditional: Sprea
             "the curve that K and B cannot follow, made to be of this size" if own else CROSS,
         )
     )
-    for column, spread, why in zip(paper.TABLE_4_COLUMNS, (before, traditional, after), whys, strict=True):
-        yield _cell(f"table4_{turned}_{output}_{column}", of, spread.mean_dps if mean else spread.rms_dps, why)
+    for column, spread, reason in zip(paper.TABLE_4_COLUMNS, (before, traditional, after), whys, strict=True):
+        yield _cell(f"table4_{turned}_{output}_{column}", of, spread.mean_dps if mean else spread.rms_dps, reason)
 
 
 def _before(*, own: bool, mean: bool) -> str:
@@ -162,8 +164,8 @@ def own_axis(judged: Judged) -> Iterator[Value]:
     """Yield the error that K and B leave, by the printed numbers alone and by this unit, deg/s."""
     for axis in paper.AXES:
         left, low, high = paper.unexplained_dps(axis)
-        why = f"root of RMS before^2 - (K - 1)^2 RMS(rates)^2 - B^2; {low:.3f} to {high:.3f} by the rounding of K"
-        yield Value(f"curve_{axis}", "printed numbers", left, why)
+        reason = f"root of RMS before^2 - (K - 1)^2 RMS(rates)^2 - B^2; {low:.3f} to {high:.3f} by the rounding of K"
+        yield Value(f"curve_{axis}", "printed numbers", left, reason)
     here, at_c = at_shown(judged.data)
     for axis, outputs in by_turning_axis(
         judged.data.take(here), {a: v[here] for a, v in judged.proposed.items()}

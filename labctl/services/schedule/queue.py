@@ -27,10 +27,10 @@ def is_scheduled(request: CampaignRequest) -> bool:
         raise BadInput("a scheduled start has either a time or a cron line; leave one of the two out")
     if request.at is not None or request.cron is not None:
         return True
-    given = [name for name in ("time_zone", "priority", "late_limit_s") if name in request.model_fields_set]
-    if given:
+    given_options = [name for name in ("time_zone", "priority", "late_limit_s") if name in request.model_fields_set]
+    if given_options:
         raise BadInput(
-            f"{', '.join(given)}: only a scheduled start has this option; give a time or a cron line, or leave "
+            f"{', '.join(given_options)}: only a scheduled start has this option; give a time or a cron line, or leave "
             "the option out"
         )
     return False

@@ -134,9 +134,11 @@ class Scheduler:
                 self._occupied_until = now
             for row in self._store.starts.due(self._bench, now):
                 due = row.due_at if row.cron is None else self._last_due(row, row.cron, now)
-                if why := self._why_missed(row, due, now):
-                    self._store.starts.take(row, due, self._next(row, now), now, "missed", why)
-                    log.warning("schedule.missed", bench=self._bench, start=row.id, recipe=row.recipe_name, reason=why)
+                if reason := self._why_missed(row, due, now):
+                    self._store.starts.take(row, due, self._next(row, now), now, "missed", reason)
+                    log.warning(
+                        "schedule.missed", bench=self._bench, start=row.id, recipe=row.recipe_name, reason=reason
+                    )
                 elif self._runner.free and self.attended():
                     self._begin(row, due, now)
             self._was_occupied = self._runner.occupied
@@ -155,7 +157,7 @@ class Scheduler:
         self._knows_the_past = True
 
     def _why_missed(self, row: StartRow, due: datetime, now: datetime) -> str:
-        """Say why a start that is due is too late to begin, and what to do; empty while it may begin."""
+        """Return why a start that is due is too late to begin, and what to do; empty while it may begin."""
         late_s = (now - due).total_seconds()
         limit_s, counted_s, of_bench = row.late_limit_s, late_s, ""
         if limit_s is None:

@@ -63,17 +63,17 @@ def moment(text: str, zone: ZoneInfo, now: datetime) -> datetime:
 
 def next_due(line: str, zone: ZoneInfo, after: datetime) -> datetime | None:
     """Return when a cron line is due next, strictly after an instant; None when never within 50 years."""
-    for found in CronSim(line, after.astimezone(zone)):
-        if found.astimezone(UTC) > after:
-            return found.astimezone(UTC)
+    for due_at in CronSim(line, after.astimezone(zone)):
+        if due_at.astimezone(UTC) > after:
+            return due_at.astimezone(UTC)
     return None
 
 
 def last_due(line: str, zone: ZoneInfo, first: datetime, now: datetime) -> datetime:
     """Return the newest time up to `now` at which a cron line was due; `first` is one of them."""
     # backwards from behind any change of the clocks: inside a repeated hour the search would miss the first of the two
-    for found in CronSim(line, (now + LARGEST_CHANGE).astimezone(zone), reverse=True):
-        due = found.astimezone(UTC)
+    for due_at in CronSim(line, (now + LARGEST_CHANGE).astimezone(zone), reverse=True):
+        due = due_at.astimezone(UTC)
         if due <= now:
             return max(due, first)
     return first

@@ -112,7 +112,7 @@ class _Walk:
             self._follow(step, step.course)
 
     def _follow(self, step: Acquire, course: RateCourse) -> None:
-        """Let the table follow a course of rates, and read it by its encoder."""
+        """Make the table follow a course of rates, and read it by its encoder."""
         times = np.arange(0.0, course.duration_s + course.step_s / 2, course.step_s)
         rates = course.rate_dps(np.minimum(times, course.duration_s))
         fastest, most = float(np.abs(rates).max()), self._table.max_rate_dps

@@ -54,12 +54,13 @@ class Made:
 
 def simulate_recording(request: SimulateRequest, out: Path, file_format: Literal["parquet", "csv"]) -> SimulateResponse:
     """Simulate a campaign and write its recording to a new folder. Raises BadInput, RecipeError, PlanRefused."""
-    made = make_recording(request)
-    write_recording(made.recording, out, file_format)
+    made_recording = make_recording(request)
+    write_recording(made_recording.recording, out, file_format)
     return SimulateResponse(
-        serial=made.recording.info.serial, datasets=len(np.unique(made.recording.columns["dataset"])),
-        readings=len(made.recording),
-        hidden=dict(made.hidden), folder=str(out),
+        serial=made_recording.recording.info.serial,
+        datasets=len(np.unique(made_recording.recording.columns["dataset"])),
+        readings=len(made_recording.recording),
+        hidden=dict(made_recording.hidden), folder=str(out),
     )  # fmt: skip
 
 
@@ -82,7 +83,7 @@ def make_recording(request: SimulateRequest, serial: str | None = None) -> Made:
 
 
 def _gyro(bench: BenchFile, name: str | None) -> GyroSettings:
-    found = [gyro for gyro in bench.gyros if name in {None, gyro.name}]
-    if not found:
+    gyros = [gyro for gyro in bench.gyros if name in {None, gyro.name}]
+    if not gyros:
         raise BadInput(f"bench {bench.name} has no gyro {name!r}; choose {', '.join(g.name for g in bench.gyros)}")
-    return found[0]
+    return gyros[0]

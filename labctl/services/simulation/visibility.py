@@ -23,8 +23,8 @@ def planned_schedule(plan: Plan, bench: BenchFile, model: ErrorModel | None = No
 
 def visibility(plan: Plan, bench: BenchFile) -> list[Visibility]:
     """Return every effect with its visible share and smallest detectable size on a plan, most visible first."""
-    found = effect_visibilities(planned_schedule(plan, bench))
-    return [Visibility(**{**asdict(one), "needs": list(one.needs)}) for one in found]
+    visibilities = effect_visibilities(planned_schedule(plan, bench))
+    return [Visibility(**{**asdict(one), "needs": list(one.needs)}) for one in visibilities]
 
 
 def planned(

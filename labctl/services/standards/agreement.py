@@ -42,13 +42,13 @@ OF_SETTINGS = frozenset({"", MEASURED_STEP_CLOCK, CLOCK_SETTING, DEMANDED_RATE})
 def matched(store: Store, standards: Sequence[Standard]) -> list[tuple[Standard, RegisteredStandard | None]]:
     """Return each entry of a bench file with its standard in the register; None: it is not there."""
     known = store.standards.all()
-    return [(each, _match(each, known)) for each in standards]
+    return [(standard, _match(standard, known)) for standard in standards]
 
 
 def _match(entry: Standard, known: Sequence[RegisteredStandard]) -> RegisteredStandard | None:
     """Return the standard that an entry names, else the one whose certificate it names."""
-    found = sorted((one for one in known if is_entry_of(one, entry)), key=lambda one: not is_named(one, entry))
-    return next(iter(found), None)
+    matches = sorted((one for one in known if is_entry_of(one, entry)), key=lambda one: not is_named(one, entry))
+    return next(iter(matches), None)
 
 
 def as_used(store: Store, standards: Sequence[Standard], on: date) -> tuple[Standard, ...]:
@@ -59,29 +59,29 @@ def as_used(store: Store, standards: Sequence[Standard], on: date) -> tuple[Stan
 def _as_used(entry: Standard, known: RegisteredStandard, on: date) -> Standard:
     """Return an entry with the larger uncertainty, the known error of the day and the earlier due date."""
     due = min((day for day in (entry.due, due_of(known)) if day is not None), default=None)
-    found = entry if due == entry.due else entry.model_copy(update={"due": due})
+    standard = entry if due == entry.due else entry.model_copy(update={"due": due})
     if not _is_comparable(entry, known):
-        return found
+        return standard
     predictions = [each for _, each in predictions_of(known, on)]
-    u = max((each.u for each in predictions), default=0.0)
+    u = max((prediction.u for prediction in predictions), default=0.0)
     changed: dict[str, object] = {}
     if u > entry.standard_u * (1 + ROUNDING):
         changed |= {"u": u, "expanded": None, "half_width": None, "distribution": "normal", "freedom": None}
     left = max(_left(entry, known, predictions), key=abs, default=entry.uncorrected)
     if abs(left - entry.uncorrected) > ROUNDING * max(u, entry.standard_u):
         changed |= {"value": left, "corrected": False}
-    return found.model_copy(update=changed) if changed else found
+    return standard.model_copy(update=changed) if changed else standard
 
 
 def _left(entry: Standard, known: RegisteredStandard, predictions: Sequence[Prediction]) -> Iterator[float]:
     """Yield the predicted error at each nominal, less what the bench corrects its readings by."""
     certified = [point.value for point in known.in_force[-1].points]
-    for each, stated in zip(predictions, certified, strict=True):
-        if each.value is None:
+    for prediction, stated in zip(predictions, certified, strict=True):
+        if prediction.value is None:
             continue
         by_entry = entry.value is not None and len(certified) == 1
         applied = entry.value if by_entry else stated
-        yield each.value - (applied or 0.0) * entry.corrected
+        yield prediction.value - (applied or 0.0) * entry.corrected
 
 
 def _is_comparable(entry: Standard, known: RegisteredStandard) -> bool:
@@ -136,7 +136,7 @@ def _differences(entry: Standard, known: RegisteredStandard, on: date) -> Iterat
         yield f"standard {label}: was due on {due} by the register; have it calibrated"
     numbers = [each.number for each in known.in_force]
     issuers = [each.laboratory for each in numbered(known, entry)]
-    if issuers and not any(same_issuer(each, entry.issued_by) for each in issuers):
+    if issuers and not any(same_issuer(issuer, entry.issued_by) for issuer in issuers):
         yield from _of_issuer(entry, [known])
     elif entry.certificate and numbers and entry.certificate not in numbers:
         yield (
@@ -231,7 +231,7 @@ def with_register(store: Store, answer: BenchCheckResponse, bench: BenchFile) ->
         labels = ", ".join(one.row.label for _, one in known)
         findings = [FindingResponse(what="register", text=f"agrees with the register: {labels}", state="good")]
     device = DeviceCheck(
-        device=DEVICE, ok=not bad, text="; ".join(each.text for each in findings),
+        device=DEVICE, ok=not bad, text="; ".join(finding.text for finding in findings),
         state="bad" if bad else findings[0].state, findings=findings,
     )  # fmt: skip
     return answer.model_copy(update={"ok": answer.ok and not bad, "devices": [*answer.devices, device]})

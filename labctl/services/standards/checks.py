@@ -15,11 +15,11 @@ BASES = {"history": "its history", "stated u": "the stated uncertainties"}
 
 def charted(standard: RegisteredStandard) -> list[tuple[StandardCheck, Judged]]:
     """Return every check of a standard in order of time, judged on the chart of its nominal."""
-    found: list[tuple[StandardCheck, Judged]] = []
-    for nominal in dict.fromkeys(each.nominal for each in standard.checks):
-        checks = [each for each in standard.checks if each.nominal == nominal]
-        found += zip(checks, judged([_point(standard, each) for each in checks]), strict=True)
-    return sorted(found, key=lambda each: each[0].checked_at)
+    charted_checks: list[tuple[StandardCheck, Judged]] = []
+    for nominal in dict.fromkeys(check.nominal for check in standard.checks):
+        checks = [check for check in standard.checks if check.nominal == nominal]
+        charted_checks += zip(checks, judged([_point(standard, check) for check in checks]), strict=True)
+    return sorted(charted_checks, key=lambda charted_check: charted_check[0].checked_at)
 
 
 def _point(standard: RegisteredStandard, check: StandardCheck) -> ChartPoint:
@@ -33,18 +33,18 @@ def _point(standard: RegisteredStandard, check: StandardCheck) -> ChartPoint:
 
 def to_be_checked(standard: RegisteredStandard) -> Iterator[tuple[StandardCheck, Judged]]:
     """Yield the newest check of each nominal that is out of limits, unless a certificate came after it."""
-    newest = {check.nominal: (check, found) for check, found in charted(standard)}
+    newest = {check.nominal: (check, judgement) for check, judgement in charted(standard)}
     last = standard.in_force[-1].calibrated if standard.in_force else None
-    for check, found in newest.values():
-        if found.state == "out" and (last is None or check.checked_at.date() >= last):
-            yield check, found
+    for check, judgement in newest.values():
+        if judgement.state == "out" and (last is None or check.checked_at.date() >= last):
+            yield check, judgement
 
 
-def check_answer(check: StandardCheck, found: Judged) -> StandardCheckResponse:
+def check_answer(check: StandardCheck, judgement: Judged) -> StandardCheckResponse:
     """Return a judged check as an answer."""
     return StandardCheckResponse(
         checked_at=check.checked_at, nominal=check.nominal, value=check.value, u=check.u, note=check.note, by=check.by,
-        state=found.state, limits=[limits_answer(each) for each in found.limits],
+        state=judgement.state, limits=[limits_answer(limit) for limit in judgement.limits],
     )  # fmt: skip
 
 
@@ -53,11 +53,11 @@ def limits_answer(limits: Limits) -> ChartLimits:
     return ChartLimits(**asdict(limits), low=limits.low, high=limits.high)
 
 
-def out_text(value: float, unit: str, found: Judged) -> str:
+def out_text(value: float, unit: str, judgement: Judged) -> str:
     """Return by which limits a value is out, in words."""
     said = "; ".join(
-        f"by {BASES[each.basis]} {each.low:.6g} to {each.high:.6g}"
-        for each in found.limits
-        if each.state_of(value) == "out"
+        f"by {BASES[limit.basis]} {limit.low:.6g} to {limit.high:.6g}"
+        for limit in judgement.limits
+        if limit.state_of(value) == "out"
     )
     return f"{value:.6g} {unit} is out of the control limits ({said})"

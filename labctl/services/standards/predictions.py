@@ -27,16 +27,16 @@ def prediction_at(standard: RegisteredStandard, nominal: float | None, on: date)
 
 def predictions_of(standard: RegisteredStandard, on: date) -> list[tuple[float | None, Prediction]]:
     """Return nominal and prediction for each nominal of the newest certificate."""
-    found = [(nominal, prediction_at(standard, nominal, on)) for nominal in nominals_of(standard)]
-    return [(nominal, each) for nominal, each in found if each is not None]
+    predictions = [(nominal, prediction_at(standard, nominal, on)) for nominal in nominals_of(standard)]
+    return [(nominal, each) for nominal, each in predictions if each is not None]
 
 
-def prediction_answer(nominal: float | None, found: Prediction) -> DriftPrediction:
+def prediction_answer(nominal: float | None, prediction: Prediction) -> DriftPrediction:
     """Return a prediction as an answer."""
-    drift = found.drift
+    drift = prediction.drift
     return DriftPrediction(
-        nominal=nominal, on=found.on, value=found.value, u=found.u,
+        nominal=nominal, on=prediction.on, value=prediction.value, u=prediction.u,
         per_year=None if drift is None else drift.per_year, u_per_year=None if drift is None else drift.u_per_year,
         certificates=0 if drift is None else drift.certificates,
-        birge_ratio=None if drift is None else drift.birge_ratio, why=found.why,
+        birge_ratio=None if drift is None else drift.birge_ratio, why=prediction.why,
     )  # fmt: skip

@@ -33,7 +33,7 @@ def performed(store: Store, row: RecordingRow) -> Days:
     at = measured_at(row.info)
     if at is None:
         return None, None
-    ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
+    ends = [data_set.t_until_s for data_set in store.recordings.data_sets(row.id) if data_set.t_until_s is not None]
     return at.date(), (at + timedelta(seconds=max(ends))).date() if ends else None
 
 
@@ -51,7 +51,7 @@ def numbered(standard: RegisteredStandard, entry: Standard) -> list[StandardCert
     """Return the certificates of a standard that have the number, and are of the quantity, of an entry."""
     if not entry.certificate or entry.quantity != standard.row.quantity:
         return []
-    return [each for each in standard.certificates if each.number == entry.certificate]
+    return [certificate for certificate in standard.certificates if certificate.number == entry.certificate]
 
 
 def same_issuer(first: str, second: str) -> bool:
@@ -94,7 +94,7 @@ def affected(store: Store, label: str, bad_from: date | None = None, bad_until: 
         row.id: row for row in touched if any(overlaps(*days[row.id], *span) for span in spans)
     }  # fmt: skip
     serials = sorted({row.serial for row in inside.values()})
-    found = [
+    versions = [
         _affected(store, version, [inside[n] for n in version.recordings if n in inside], days, standard)
         for serial in serials
         for version in reversed(store.calibrations.of_unit(serial))
@@ -103,10 +103,10 @@ def affected(store: Store, label: str, bad_from: date | None = None, bad_until: 
     starts, ends = [each[0] for each in spans], [each[1] for each in spans]
     return AffectedResponse(
         label=standard.row.label,
-        bad_from=None if None in starts else min(each for each in starts if each is not None),
-        bad_until=None if None in ends else max(each for each in ends if each is not None),
-        calibrations=found,
-        text=list(_text(standard, found)),
+        bad_from=None if None in starts else min(start for start in starts if start is not None),
+        bad_until=None if None in ends else max(end for end in ends if end is not None),
+        calibrations=versions,
+        text=list(_text(standard, versions)),
     )
 
 
@@ -140,19 +140,19 @@ def _affected(
     )
 
 
-def _text(standard: RegisteredStandard, found: Sequence[AffectedCalibration]) -> Iterator[str]:
+def _text(standard: RegisteredStandard, calibrations: Sequence[AffectedCalibration]) -> Iterator[str]:
     label = standard.row.label
-    if not found:
+    if not calibrations:
         yield f"No calibration was measured with standard {label} on these days."
         return
-    units = len({each.serial for each in found})
-    issued = [number for each in found for number in each.certificates]
-    what = "calibration" if len(found) == 1 else "calibrations"
-    of, was = ("unit", "was") if units == 1 == len(found) else ("unit" if units == 1 else "units", "were")
-    yield f"{len(found)} {what} of {units} {of} {was} measured with standard {label} on these days."
+    units = len({calibration.serial for calibration in calibrations})
+    issued = [number for calibration in calibrations for number in calibration.certificates]
+    noun = "calibration" if len(calibrations) == 1 else "calibrations"
+    of, was = ("unit", "was") if units == 1 == len(calibrations) else ("unit" if units == 1 else "units", "were")
+    yield f"{len(calibrations)} {noun} of {units} {of} {was} measured with standard {label} on these days."
     if issued:
         yield f"Certificates issued of them: {', '.join(issued)}. Inform those who hold them, and measure again."
-    if any(each.in_force for each in found):
+    if any(calibration.in_force for calibration in calibrations):
         yield "Versions in force are among them: revoke them, or state why they remain usable."
 
 

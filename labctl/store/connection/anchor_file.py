@@ -51,17 +51,17 @@ def read_anchor(location: str) -> ChainHead | None:
 def anchor_fits(engine: sa.Engine, location: str) -> bool:
     """Return whether a chain goes on from what its anchor file names; also where there is no chain, or no file."""
     try:
-        kept = read_anchor(location)
+        anchor = read_anchor(location)
     except ValueError:  # it is written anew
         return True
-    if kept is None:
+    if anchor is None:
         return True
     m = tables.manifests
     with engine.connect() as connection:
         if not sa.inspect(connection).has_table(m.name):
             return True
-        found = connection.scalar(sa.select(m.c.hash).where(m.c.sequence == kept.length))
-    return found == kept.hash
+        anchored_hash = connection.scalar(sa.select(m.c.hash).where(m.c.sequence == anchor.length))
+    return anchored_hash == anchor.hash
 
 
 def parse_anchor(text: str) -> ChainHead:

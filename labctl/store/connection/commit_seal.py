@@ -58,13 +58,13 @@ def count_commit(connection: sa.Connection) -> int:
 
 
 def missing(connection: sa.Connection | None, location: str) -> str | None:
-    """Say what is missing when a database is older than its seal; None when all is there."""
+    """Return what is missing when a database is older than its seal; None when all is there."""
     counted = sealed(location)
-    found = commits_of(connection) if connection is not None else 0
-    if found >= counted:
+    n_commits = commits_of(connection) if connection is not None else 0
+    if n_commits >= counted:
         return None
     return (
-        f"{counted - found} commits that were made are not in this database: its write-ahead log "
+        f"{counted - n_commits} commits that were made are not in this database: its write-ahead log "
         f"({Path(location).name}-wal) was deleted, a write was interrupted, or an older copy was put in its place; "
         f"restore the newest backup, or, to continue without these commits, remove {seal_path(location)}"
     )

@@ -94,7 +94,7 @@ class Backend(Protocol):
         ...
 
     def close(self) -> None:
-        """Let the next writer in. Safe to call twice."""
+        """Release the writer's lock. Safe to call twice."""
         ...
 
 
@@ -169,16 +169,16 @@ class Database:
 
     def _refuse_old(self) -> None:
         """Make the tables of an empty database; one of an earlier version is only migrated when a person asks."""
-        found = self.revision()
-        if found is None:
+        revision = self.revision()
+        if revision is None:
             if not self.writes and not is_url(self.location):
                 Database(self.location, write=True).close()
             else:
                 self.upgrade()
-        elif found != migrate.HEAD:
-            migrate.refuse_unknown(found, self._shown)
+        elif revision != migrate.HEAD:
+            migrate.refuse_unknown(revision, self._shown)
             raise OldSchema(
-                f"{self._shown}: the schema of the database is number {found}, this version of labctl needs number "
+                f"{self._shown}: the schema of the database is number {revision}, this version of labctl needs number "
                 f"{migrate.HEAD}; run `labctl migrate --database {self._shown}`"
             )
 
@@ -188,7 +188,7 @@ class Database:
             return self.outlast(self._revision)
 
     def upgrade(self) -> None:
-        """Bring the database to today's tables in one transaction: all of it, or nothing. Raises StoreError."""
+        """Migrate the database to the present tables in one transaction: all of it, or nothing. Raises StoreError."""
         with self._as_database(), self._engine.begin() as connection:
             self._backend.before_migration(connection)
             migrate.upgrade(connection)
@@ -232,7 +232,7 @@ class Database:
 
     @contextmanager
     def writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
-        """Give the one writing connection inside a transaction: all of it is kept, or nothing.
+        """Yield the one writing connection inside a transaction, which is committed as a whole or rolled back.
 
         What is not `synced` outlives this process at once, but a power cut only when the next synced transaction ends:
         a log is written in order, so that one carries all before it to the disk. Raises StoreError, naming who holds
@@ -275,16 +275,16 @@ class Database:
         if self._backend.is_disk_full(error):
             cause = f"{self._shown}: the disk is full"
             return DiskFull(f"{cause}; nothing was stored. Free disk space, then continue", cause=cause)
-        said = " ".join(str(error.orig).split())
+        text = " ".join(str(error.orig).split())
         if self._backend.is_unreachable(error):
-            cause = f"{self._shown}: the database server does not answer ({said})"
+            cause = f"{self._shown}: the database server does not answer ({text})"
             return DatabaseUnreachable(f"{cause}; nothing was stored. Try again once it runs", cause=cause)
-        cause = f"{self._shown}: {self._backend.words_for(error) or said}"
+        cause = f"{self._shown}: {self._backend.words_for(error) or text}"
         return StoreError(f"{cause}; nothing was stored, try again", cause=cause)
 
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:
-        """Give a connection to read with. Raises StoreError."""
+        """Yield a connection to read with. Raises StoreError."""
         self._backend.refuse_other()  # a new connection would make an empty file, or read another one's rows
         try:
             with self.outlast(self._connect_reader) as connection:

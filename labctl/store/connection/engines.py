@@ -57,7 +57,7 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> 
     transaction for longer than `idle_timeout_s`. A connection is tried before it is used, and one whose other end is
     gone is noticed within 20 s.
     """
-    known = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
+    advice = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
     limits = {"lock_timeout": lock_timeout_s, "idle_in_transaction_session_timeout": idle_timeout_s}
     options = " ".join(f"-c {name}={round(1000 * limit_s)}" for name, limit_s in limits.items())
     arguments = {**CONNECTION, "options": options}
@@ -69,6 +69,6 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> 
     except ModuleNotFoundError as error:
         raise BadInput(
             f"--database {shown(url)} needs {error.name}, which is not installed; run "
-            f"`pip install 'labctl[postgresql]'`; {known}"
+            f"`pip install 'labctl[postgresql]'`; {advice}"
         ) from error
-    raise BadInput(f"--database {shown(url)}: this kind of database is not known; {known}")
+    raise BadInput(f"--database {shown(url)}: this kind of database is not known; {advice}")

@@ -101,8 +101,8 @@ class PostgresqlServer:
         """Return the message for a refused connection, or for a lock that was not granted in time; else empty."""
         state = getattr(error.orig, "sqlstate", None)
         if state is None and _is_refusal(error):
-            said = " ".join(str(error.orig).split())
-            return f"the database server refuses the connection ({said}); check user, password and database in the URL"
+            text = " ".join(str(error.orig).split())
+            return f"the database server refuses the connection ({text}); check user, password and database in the URL"
         if state != LOCK_NOT_AVAILABLE:
             return ""
         return (

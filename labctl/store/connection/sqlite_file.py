@@ -36,10 +36,10 @@ Identity = tuple[int, int]
 def identity_of(path: str) -> Identity | None:
     """Return device and inode of what a path names; None where there is nothing."""
     try:
-        found = os.stat(path)  # noqa: PTH116  before every commit: a Path costs several times as much
+        file_status = os.stat(path)  # noqa: PTH116  before every commit: a Path costs several times as much
     except OSError:
         return None
-    return found.st_dev, found.st_ino
+    return file_status.st_dev, file_status.st_ino
 
 
 class FileIdentity:
@@ -55,15 +55,15 @@ class FileIdentity:
         self._known[1] = None
 
     def changed(self) -> str:
-        """Say what has become of the files since they were opened; empty while they are the same.
+        """Return what has become of the files since they were opened; empty while they are the same.
 
         The log is remembered when it is there for the first time. It stays for as long as a connection is open.
         """
         for index, path in enumerate(self._paths):
-            known, now = self._known[index], identity_of(path)
-            if known is None:
+            known_identity, now = self._known[index], identity_of(path)
+            if known_identity is None:
                 self._known[index] = now
-            elif known != now:
+            elif known_identity != now:
                 was = "deleted" if now is None else "replaced by another file"
                 return (
                     f"{self._paths[0]}: {Path(path).name} was {was} while this process had it open; labctl writes "
@@ -92,8 +92,8 @@ def first_damage(connection: sa.Connection) -> str:
     if pages * page_bytes <= WHOLE_UP_TO_BYTES:
         return _damage(connection, "PRAGMA quick_check(1)")
     names = connection.exec_driver_sql("SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name").scalars()
-    found = (_damage(connection, f"PRAGMA quick_check('{name}')") for name in names.all() if name != READINGS)
-    return next(filter(None, found), "")
+    damages = (_damage(connection, f"PRAGMA quick_check('{name}')") for name in names.all() if name != READINGS)
+    return next(filter(None, damages), "")
 
 
 def _damage(connection: sa.Connection, check: str) -> str:
@@ -154,7 +154,7 @@ class SqliteFile:
             sa_event.listen(engine, event, lambda *_: identity.forget_log())
 
     def _make_private(self) -> None:
-        """Give the files of the database to their owner alone; SQLite makes its log as it finds the database."""
+        """Restrict the files of the database to their owner; SQLite makes its log as it finds the database."""
         if self._lock is None:
             return
         make_private(Path(self._location))
@@ -171,7 +171,7 @@ class SqliteFile:
             raise StoreError(f"{text}. Nothing was stored; try again", cause=text)
 
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
-        """Let the next commits reach the disk before they return, or with a later one: the log is written in order."""
+        """Make the next commits reach the disk before they return, or with a later one: the log is written in order."""
         if synced == self._synced:
             return
         driver = engine.raw_connection()
@@ -223,7 +223,7 @@ class SqliteFile:
                 self._lock.note(address)
 
     def close(self) -> None:
-        """Let the next writer in."""
+        """Release the writer's lock."""
         self._identity = None  # the log goes with the last connection
         if self._lock is not None:
             self._lock.release()

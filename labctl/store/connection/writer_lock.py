@@ -109,7 +109,7 @@ class WriterLock:
         write_private(_note_path(self._location), json.dumps(note))
 
     def release(self) -> None:
-        """Let the next writer in. Safe to call twice."""
+        """Release the writer's lock. Safe to call twice."""
         if self._lock.is_locked:
             _note_path(self._location).unlink(missing_ok=True)
             self._lock.release()

@@ -48,7 +48,7 @@ class WriterTurn:
 
     @contextmanager
     def take(self) -> Iterator[None]:
-        """Hold the connection.
+        """Acquire the connection.
 
         Raises StoreError, naming who holds it, when it does not come free in time, and where it was closed.
         """

@@ -42,11 +42,11 @@ def copy_database(location: str, target: Path) -> Copy:
     if not target.absolute().parent.is_dir():
         raise BadInput(f"{target}: the folder does not exist; create it first")
     try:
-        with temporary_copy(target.absolute().parent) as made:
-            _copy(location, made)
-            digest = _synced_digest(made)
+        with temporary_copy(target.absolute().parent) as copy_folder:
+            _copy(location, copy_folder)
+            digest = _synced_digest(copy_folder)
             _refuse_existing(target)
-            made.rename(target)
+            copy_folder.rename(target)
         _sync_folder(target.absolute().parent)
     except sqlite3.Error as error:
         raise StoreError(
@@ -65,9 +65,9 @@ def _copy(location: str, made: Path) -> None:
         source.execute("PRAGMA query_only=ON")
         source.backup(copy)  # in one go, from one snapshot; the writer is not kept waiting
         copy.execute("PRAGMA journal_mode=DELETE")  # one file, with no log beside it
-        found = [row[0] for row in copy.execute("PRAGMA integrity_check(1)")]
-        if found != ["ok"]:
-            raise sqlite3.DatabaseError(found[0])
+        complaints = [row[0] for row in copy.execute("PRAGMA integrity_check(1)")]
+        if complaints != ["ok"]:
+            raise sqlite3.DatabaseError(complaints[0])
 
 
 def _synced_digest(path: Path) -> str:

@@ -103,13 +103,13 @@ class _Check:
 
     def result(self) -> Checked:
         """Return what was found so far."""
-        said = Checked(tuple(self.findings), self.blocks, self.calibrations, self.audit_rows)
+        checked = Checked(tuple(self.findings), self.blocks, self.calibrations, self.audit_rows)
         if self._manifests is None:
-            return replace(said, remarks=tuple(self._remarks))
-        found = self._manifests.chain
+            return replace(checked, remarks=tuple(self._remarks))
+        chain = self._manifests.chain
         return replace(
-            said, manifests=found.head.length, not_sealed=found.not_sealed, signed=found.signed,
-            keys=tuple(sorted(found.keys)), head=found.head if found.head.length else None,
+            checked, manifests=chain.head.length, not_sealed=chain.not_sealed, signed=chain.signed,
+            keys=tuple(sorted(chain.keys)), head=chain.head if chain.head.length else None,
             remarks=tuple(self._remarks),
         )  # fmt: skip
 
@@ -154,45 +154,45 @@ class _Check:
         return True
 
     def _check_schema(self, connection: sa.Connection) -> bool:
-        found = migrate.revision_of(connection)
-        if found == migrate.HEAD:
+        revision = migrate.revision_of(connection)
+        if revision == migrate.HEAD:
             return True
-        if found is None:
+        if revision is None:
             self.find("schema", "this is not a labctl database, or its content is lost: there are no tables")
         else:
             hint = (
                 f"run `labctl migrate --database {shown(self._location)}`"
-                if found in migrate.KNOWN
+                if revision in migrate.KNOWN
                 else "use a newer version of labctl"
             )
             self.find(
                 "schema",
-                f"the schema of the database is number {found}, that of this version of labctl "
+                f"the schema of the database is number {revision}, that of this version of labctl "
                 f"is {migrate.HEAD}: {hint}",
             )
         return False
 
     def _check_readings(self, connection: sa.Connection) -> bool:
         b, d, r = tables.sample_blocks.c, tables.data_sets.c, tables.recordings.c
-        whole = r.importing.is_(None)  # what is being imported is not there yet
-        kinds = {int(number): kind for number, kind in connection.execute(sa.select(r.id, r.kind).where(whole))}
+        is_complete = r.importing.is_(None)  # what is being imported is not there yet
+        kinds = {int(number): kind for number, kind in connection.execute(sa.select(r.id, r.kind).where(is_complete))}
         total = sa.select(sa.func.count(b.id)).where(_of_whole_recordings(b.recording_id))
         valid = self._valid_readings(connection, int(connection.scalar(total) or 0))
-        known = set()
+        block_places = set()
         heads = sa.select(d.recording_id, d.number, d.state, d.n).where(_of_whole_recordings(d.recording_id))
         for recording, number, state, n in connection.execute(heads):
-            known.add((recording, number))
-            found = valid.get((recording, number), 0)
-            if kinds.get(recording) == "samples" and state != "open" and found is not None and found != n:
+            block_places.add((recording, number))
+            n_valid = valid.get((recording, number), 0)
+            if kinds.get(recording) == "samples" and state != "open" and n_valid is not None and n_valid != n:
                 self.find(
                     "readings",
                     f"recording {recording} data set {number} is recorded as having {n} valid readings, "
-                    f"but {found} are stored",
+                    f"but {n_valid} are stored",
                 )
         for recording, kind in kinds.items():
             if kind != "samples" and (recording, WHOLE_TABLE) not in valid:
                 self.find("readings", f"recording {recording} ({kind}): its table of data sets is missing")
-        for recording, number in sorted(valid.keys() - known):
+        for recording, number in sorted(valid.keys() - block_places):
             if number != WHOLE_TABLE:
                 self.find("readings", f"recording {recording} holds readings of data set {number}, which is missing")
         return True
@@ -212,11 +212,11 @@ class _Check:
                 self.find("readings", f"recording {recording} data set {number}: blocks before block {seq} are missing")
                 valid[place] = None
             expected[place] = seq + 1
-            where = f"recording {recording} data set {number}"
-            columns = self._unpacked(f"{where} block {seq}", sample_codec.Block(n, codec, crc32, data))
+            place_text = f"recording {recording} data set {number}"
+            columns = self._unpacked(f"{place_text} block {seq}", sample_codec.Block(n, codec, crc32, data))
             self._note_block(recording, number, seq, n, columns)
-            before, found = valid.get(place, 0), None if columns is None else _count(columns, n)
-            valid[place] = None if found is None or before is None else before + found
+            before, n_valid = valid.get(place, 0), None if columns is None else _count(columns, n)
+            valid[place] = None if n_valid is None or before is None else before + n_valid
             for text in means.take(recording, number, columns):
                 self.find("readings", text)
             self.blocks += 1
@@ -268,8 +268,10 @@ class _Check:
                 self.find("calibrations", f"{serial} version {version}: {error}")
                 continue
             if (calibration.serial, calibration.version, calibration.hash) != (serial, version, own):
-                said = f"{calibration.serial} version {calibration.version}"
-                self.find("calibrations", f"{serial} version {version}: the stored calibration was changed ({said})")
+                version_text = f"{calibration.serial} version {calibration.version}"
+                self.find(
+                    "calibrations", f"{serial} version {version}: the stored calibration was changed ({version_text})"
+                )
         return True
 
     def _check_audit(self, connection: sa.Connection) -> bool:
@@ -283,28 +285,28 @@ class _Check:
         trail_fits = all(finding.part != "audit" for finding in self.findings)
         self._manifests.check_chain(self._chain_anchors(), trail_fits=trail_fits)
         blocks: Mapping[int, Parts | None] = {
-            recording: None if made is None else made.parts() for recording, made in self._block_parts.items()
+            recording: None if parts is None else parts.parts() for recording, parts in self._block_parts.items()
         }
         self._manifests.check_records(blocks)
         return True
 
     def _chain_anchors(self) -> dict[str, ChainHead]:
         """Return the heads that are noted down outside the database, by where that is."""
-        found = {} if self.chain_anchor is None else {"the given anchor": self.chain_anchor}
+        anchors = {} if self.chain_anchor is None else {"the given anchor": self.chain_anchor}
         if is_url(self._location):
-            if not found:
+            if not anchors:
                 self._remarks.append("a server has no anchor file; give --anchor LENGTH:HASH to compare one")
-            return found
+            return anchors
         path = anchor_path(self._location)
         try:
-            kept = read_anchor(self._location)
+            anchor = read_anchor(self._location)
         except ValueError:
             self._remarks.append(f"{path}: the anchor file is damaged; the end of the chain was not compared with it")
-            return found
-        if kept is None:
+            return anchors
+        if anchor is None:
             self._remarks.append(f"{path}: there is no anchor file; the end of the chain was not compared with it")
-            return found
-        return {**found, f"the anchor file {path.name}": kept}
+            return anchors
+        return {**anchors, f"the anchor file {path.name}": anchor}
 
 
 def _of_whole_recordings(recording: sa.ColumnElement[int]) -> sa.ColumnElement[bool]:

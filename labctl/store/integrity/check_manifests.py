@@ -61,25 +61,25 @@ class ManifestCheck:
     def check_chain(self, anchors: Mapping[str, ChainHead], *, trail_fits: bool) -> None:
         """Read the chain; `anchors` are heads that were noted down elsewhere, by where that is."""
         trail = list(self._connection.scalars(sa.select(tables.audit.c.hash).order_by(tables.audit.c.id)))
-        wanted = {(head.length, head.hash): where for where, head in anchors.items()}
+        name_by_head = {(head.length, head.hash): source for source, head in anchors.items()}
         hashes: dict[int, str] = {}
         for row, document in self._rows():
-            found = self.chain
-            if (sequence := int(row.sequence)) != found.head.length + 1:
+            checked_chain = self.chain
+            if (sequence := int(row.sequence)) != checked_chain.head.length + 1:
                 self._find("manifests", f"manifests before manifest {sequence} are missing: the chain has a gap")
-            for text in _misfits(row, document, found.head.hash):
+            for text in _misfits(row, document, checked_chain.head.hash):
                 self._find("manifests", f"manifest {sequence} {text}")
             self._take(row, document)
             self._verify(row)
             if trail_fits and not _fits_trail(document, trail):
                 trail_fits = False
                 self._find("audit", f"the audit trail was written anew: it does not fit manifest {sequence}")
-            if any(length == sequence for length, _ in wanted):
+            if any(length == sequence for length, _ in name_by_head):
                 hashes[sequence] = str(row.hash)
         if trail_fits and self.chain.trail < len(trail):
             text = f"the last {len(trail) - self.chain.trail} rows of the audit trail are in no manifest"
             self._find("audit", f"{text}: they were added without labctl, or manifests were removed")
-        self._check_end(wanted, hashes)
+        self._check_end(name_by_head, hashes)
         self._check_signed()
 
     def _rows(self) -> Iterator[tuple[sa.Row[*tuple[Any, ...]], Mapping[str, Any]]]:
@@ -93,19 +93,19 @@ class ManifestCheck:
             yield row, document if isinstance(document, dict) else {}
 
     def _take(self, row: sa.Row[*tuple[Any, ...]], document: Mapping[str, Any]) -> None:
-        found = self.chain
-        found.head = ChainHead(int(row.sequence), str(row.hash))
-        found.trail = max(found.trail, (document.get("audit") or {}).get("length", 0))
+        checked_chain = self.chain
+        checked_chain.head = ChainHead(int(row.sequence), str(row.hash))
+        checked_chain.trail = max(checked_chain.trail, (document.get("audit") or {}).get("length", 0))
         if not row.kind:
             return
-        made = _Sealed(
+        sealed = _Sealed(
             int(row.sequence), str(document.get("title") or f"{row.kind} {row.record}"), str(row.act),
             str(document.get("at", "")), str(document.get("reason", "")), document.get("parts") or {},
         )  # fmt: skip
-        found.newest[(row.kind, row.record)] = made
+        checked_chain.newest[(row.kind, row.record)] = sealed
         for name in document.get("unfit", ()):
-            text = f"{name} had been changed by hand before it was changed in order on {made.at[:10]}"
-            self._find(row.kind, f"{made.title}: {text} (manifest {made.sequence}, {made.reason})")
+            text = f"{name} had been changed by hand before it was changed in order on {sealed.at[:10]}"
+            self._find(row.kind, f"{sealed.title}: {text} (manifest {sealed.sequence}, {sealed.reason})")
 
     def _verify(self, row: sa.Row[*tuple[Any, ...]]) -> None:
         if row.signature is None:
@@ -117,23 +117,25 @@ class ManifestCheck:
         elif key is not None or not self._keys:
             self.chain.signed = int(row.sequence)
 
-    def _check_end(self, wanted: Mapping[tuple[int, str], str], hashes: Mapping[int, str]) -> None:
-        found, said = self.chain.head, chain.head_of(self._connection)
-        if said is None:
+    def _check_end(self, expected: Mapping[tuple[int, str], str], hashes: Mapping[int, str]) -> None:
+        computed, stored_head = self.chain.head, chain.head_of(self._connection)
+        if stored_head is None:
             self._find("manifests", "the head of the chain, which counts the manifests, is missing")
-        elif said.length > found.length:
-            self._find("manifests", f"the last {said.length - found.length} manifests are missing")
-        elif said != found:
+        elif stored_head.length > computed.length:
+            self._find("manifests", f"the last {stored_head.length - computed.length} manifests are missing")
+        elif stored_head != computed:
             self._find("manifests", "the last manifest is not the one that the head of the chain names")
-        for (length, digest), where in wanted.items():
-            if length > found.length:
+        for (length, digest), source in expected.items():
+            if length > computed.length:
                 self._find(
                     "manifests",
-                    f"{length - found.length} manifests that {where} counts are missing: the end of the chain was "
+                    f"{length - computed.length} manifests that {source} counts are missing: the end of the chain was "
                     "removed, or an older copy of the database was put in its place",
                 )
             elif hashes.get(length) != digest:
-                self._find("manifests", f"manifest {length} is not the one that {where} names: the chain was rewritten")
+                self._find(
+                    "manifests", f"manifest {length} is not the one that {source} names: the chain was rewritten"
+                )
 
     def _check_signed(self) -> None:
         last, total = self.chain.signed, self.chain.head.length
@@ -164,8 +166,8 @@ class ManifestCheck:
                 for text in self._differing(kind, str(record), sealed, blocks):
                     self._find(kind.name, f"{sealed.title}: {text} (manifest {sealed.sequence}, {sealed.reason})")
             elif record in at_rest:
-                what = "was never sealed" if sealed is None else "was reopened, and has ended without being sealed"
-                self._find(kind.name, f"{kind.name} {record} {what}: it was made or changed without labctl")
+                seal_text = "was never sealed" if sealed is None else "was reopened, and has ended without being sealed"
+                self._find(kind.name, f"{kind.name} {record} {seal_text}: it was made or changed without labctl")
             else:
                 self.chain.not_sealed += 1
 
@@ -196,8 +198,8 @@ def _misfits(row: sa.Row[*tuple[Any, ...]], document: Mapping[str, Any], previou
 
 
 def _fits_trail(document: Mapping[str, Any], trail: Sequence[str]) -> bool:
-    said = document.get("audit")
-    if not isinstance(said, dict) or not said.get("length"):
+    audit_entry = document.get("audit")
+    if not isinstance(audit_entry, dict) or not audit_entry.get("length"):
         return True
-    length = said["length"]
-    return isinstance(length, int) and length <= len(trail) and trail[length - 1] == said.get("hash")
+    length = audit_entry["length"]
+    return isinstance(length, int) and length <= len(trail) and trail[length - 1] == audit_entry.get("hash")

@@ -31,13 +31,13 @@ class MeansCheck:
 
         A data set with a damaged block has its own finding.
         """
-        found: list[str] = []
+        complaints: list[str] = []
         if (recording, number) != self._place:
-            found = self.rest()
+            complaints = self.rest()
             self._place = (recording, number)
         self._damaged |= columns is None
         self._parts += [columns] if columns is not None else []
-        return found
+        return complaints
 
     def rest(self) -> list[str]:
         """Return what is wrong with the data set whose blocks came last, one line a channel."""
@@ -47,10 +47,10 @@ class MeansCheck:
             return []
         if self._kept is None or self._kept.recording != recording:
             self._kept = KeptMeans(self._connection, recording)
-        where = f"recording {recording} data set {number}"
+        place_text = f"recording {recording} data set {number}"
         if any(part.keys() != parts[0].keys() for part in parts):
-            return [f"{where}: the blocks of this data set have different columns"]
-        return [f"{where}: {text}" for text in self._kept.complaints(number, join_blocks(parts))]
+            return [f"{place_text}: the blocks of this data set have different columns"]
+        return [f"{place_text}: {text}" for text in self._kept.complaints(number, join_blocks(parts))]
 
 
 class KeptMeans:
@@ -70,8 +70,8 @@ class KeptMeans:
 
     def complaints(self, number: int, raw: Mapping[str, NDArray[np.generic]]) -> list[str]:
         """Return what does not follow from the readings of a data set, one line a channel."""
-        kept = self._kept.get(number)
-        if not kept:
+        kept_means = self._kept.get(number)
+        if not kept_means:
             return []
         sent = (
             {"t_ns", "valid", "chamber_mc", *(channel["name"] for channel in self._channels)}
@@ -82,23 +82,23 @@ class KeptMeans:
             return [f"the readings have no column {', '.join(absent)}"]
         columns = scaled(dict(raw), self._channels, self._heads[number]) if self._channels else raw
         valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else slice(None)
-        found = []
-        for channel, mean, std, n in kept:
+        damages = []
+        for channel, mean, std, n in kept_means:
             if channel not in columns:
-                found.append(f"the readings have no column {channel}, but its mean is stored")
+                damages.append(f"the readings have no column {channel}, but its mean is stored")
                 continue
             now = statistics(np.asarray(columns[channel])[valid].astype(np.float64), spectrum=False)
             if now.n != n:
-                found.append(f"the stored mean of {channel} is of {n} readings, but {now.n} readings are stored")
+                damages.append(f"the stored mean of {channel} is of {n} readings, but {now.n} readings are stored")
             elif not (_same(mean, now.mean) and _same(std, now.std)):
-                found.append(
+                damages.append(
                     f"the stored mean of {channel} is {mean:.9g} +- {std}, but the readings give {now.mean:.9g} +- "
                     f"{now.std}"
                 )
-        return found
+        return damages
 
 
-def _same(kept: float | None, now: float | None) -> bool:
-    if kept is None or now is None:
-        return kept is now
-    return bool(np.isclose(kept, now, rtol=ROUNDING, atol=ROUNDING))
+def _same(stored: float | None, now: float | None) -> bool:
+    if stored is None or now is None:
+        return stored is now
+    return bool(np.isclose(stored, now, rtol=ROUNDING, atol=ROUNDING))

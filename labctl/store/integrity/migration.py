@@ -28,12 +28,12 @@ def needs_migration(location: str) -> bool:
     if not path.is_file() or not path.stat().st_size:
         return False
     with closing(Database(location, write=False, as_it_is=True)) as database:
-        found = database.revision()
-    return found in migrate.KNOWN and found != migrate.HEAD
+        revision = database.revision()
+    return revision in migrate.KNOWN and revision != migrate.HEAD
 
 
 def migrate_database(location: str, *, copy: bool) -> Migrated:
-    """Bring a database to today's schema; no other process may hold it meanwhile.
+    """Migrate a database to the present schema; no other process may hold it meanwhile.
 
     Raises BadInput where a copy is asked for that labctl cannot make, StoreError where there is no database, it is
     newer than this code or damaged, and Conflict where another process writes to it. Then it is as it was before.
@@ -42,27 +42,27 @@ def migrate_database(location: str, *, copy: bool) -> Migrated:
     if not is_url(location) and not Path(location).is_file():
         raise StoreError(f"{location}: there is no such file; name the database with --database")
     with closing(Database(location, write=True, as_it_is=True)) as database:
-        found = database.revision()
-        migrate.refuse_unknown(found, named)
-        if found is None:
+        revision = database.revision()
+        migrate.refuse_unknown(revision, named)
+        if revision is None:
             raise StoreError(f"{named}: this is not a labctl database: it has no tables; name another with --database")
-        if found == migrate.HEAD:
-            return Migrated(found, found, None)
-        made = _copied(location, found) if copy else None
+        if revision == migrate.HEAD:
+            return Migrated(revision, revision, None)
+        backup_path = _copied(location, revision) if copy else None
         database.upgrade()
-    return Migrated(found, migrate.HEAD, made)
+    return Migrated(revision, migrate.HEAD, backup_path)
 
 
-def _copied(location: str, found: str) -> Copy:
+def _copied(location: str, revision: str) -> Copy:
     if is_url(location):
         raise BadInput(
             f"{shown(location)}: labctl copies SQLite files only; back the database up with pg_dump, then run "
             "`labctl migrate --without-copy`"
         )
-    return copy_database(location, _free_name(Path(location), found))
+    return copy_database(location, _free_name(Path(location), revision))
 
 
-def _free_name(path: Path, found: str) -> Path:
+def _free_name(path: Path, revision: str) -> Path:
     """Return a name beside the file that is not taken."""
-    names = [f"{path.name}.schema-{found}", *(f"{path.name}.schema-{found}-{number}" for number in range(2, 100))]
+    names = [f"{path.name}.schema-{revision}", *(f"{path.name}.schema-{revision}-{number}" for number in range(2, 100))]
     return next((free for free in map(path.with_name, names) if not free.exists()), path.with_name(names[-1]))

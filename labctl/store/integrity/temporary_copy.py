@@ -26,20 +26,20 @@ _NAMES = frozenset({COPY, *(f"{COPY}{end}" for end in ("-wal", "-shm", "-journal
 
 @contextmanager
 def temporary_copy(folder: Path) -> Iterator[Path]:
-    """Give the path of an empty private file on the file system of a folder; it is removed if it is still there.
+    """Yield the path of an empty private file on the file system of a folder; it is removed if it is still there.
 
     What killed processes left in the folder is removed first. Raises OSError.
     """
     remove_abandoned(folder)
-    made, handle = _locked_folder(folder)
+    folder_made, handle = _locked_folder(folder)
     try:
-        path = made / COPY
+        path = folder_made / COPY
         file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, FILE)
         os.fchmod(file, FILE)  # whatever the umask takes away
         os.close(file)
         yield path
     finally:
-        shutil.rmtree(made, ignore_errors=True)
+        shutil.rmtree(folder_made, ignore_errors=True)
         os.close(handle)
 
 
@@ -50,13 +50,13 @@ def remove_abandoned(folder: Path) -> list[Path]:
     """
     removed = []
     with suppress(OSError):
-        for found in sorted(folder.glob(f"{PREFIX}*")):
+        for path in sorted(folder.glob(f"{PREFIX}*")):
             with suppress(OSError):
-                handle = os.open(found, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+                handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
                 try:
-                    if os.fstat(handle).st_uid == os.getuid() and _lock(handle) and _holds_only_a_copy(found):
-                        shutil.rmtree(found)
-                        removed.append(found)
+                    if os.fstat(handle).st_uid == os.getuid() and _lock(handle) and _holds_only_a_copy(path):
+                        shutil.rmtree(path)
+                        removed.append(path)
                 finally:
                     os.close(handle)
     return removed
@@ -64,18 +64,18 @@ def remove_abandoned(folder: Path) -> list[Path]:
 
 def _locked_folder(folder: Path) -> tuple[Path, int]:
     while True:
-        made = Path(tempfile.mkdtemp(dir=folder, prefix=PREFIX))
+        private_folder = Path(tempfile.mkdtemp(dir=folder, prefix=PREFIX))
         try:
-            made.chmod(stat.S_IRWXU)  # whatever the umask takes away
-            handle = os.open(made, os.O_RDONLY | os.O_DIRECTORY)
+            private_folder.chmod(stat.S_IRWXU)  # whatever the umask takes away
+            handle = os.open(private_folder, os.O_RDONLY | os.O_DIRECTORY)
         except FileNotFoundError:  # a backup that begins at this moment took it for one that was left
             continue
         try:
             free = _lock(handle)
         except OSError:  # a file system without locks: nothing is ever removed there as left
-            return made, handle
-        if free and made.exists():
-            return made, handle
+            return private_folder, handle
+        if free and private_folder.exists():
+            return private_folder, handle
         os.close(handle)
 
 

@@ -74,8 +74,8 @@ def finish(connection: sa.Connection) -> ChainHead | None:
 def append(connection: sa.Connection, at: datetime, manifest: Manifest) -> ChainHead:
     """Add a manifest to the chain, inside the transaction of the act that it is about."""
     m, h = tables.manifests, tables.manifest_head
-    found = connection.execute(sa.select(h.c.length, h.c.hash).where(h.c.id == HEAD_ID).with_for_update()).first()
-    before = ChainHead(int(found.length), str(found.hash)) if found is not None else last(connection)
+    last_entry = connection.execute(sa.select(h.c.length, h.c.hash).where(h.c.id == HEAD_ID).with_for_update()).first()
+    before = ChainHead(int(last_entry.length), str(last_entry.hash)) if last_entry is not None else last(connection)
     length = before.length + 1
     document = canonical(_document(connection, at, manifest, length, before.hash))
     own = hash_of(document)
@@ -84,7 +84,7 @@ def append(connection: sa.Connection, at: datetime, manifest: Manifest) -> Chain
             sequence=length, kind=manifest.kind, record=manifest.record, act=manifest.act, hash=own, document=document
         )
     )
-    if found is not None:  # a head that was removed is never made again: the check reports that it is missing
+    if last_entry is not None:  # a head that was removed is never made again: the check reports that it is missing
         connection.execute(sa.update(h).where(h.c.id == HEAD_ID).values(length=length, hash=own))
     head = ChainHead(length, own)
     connection.info[_GROWN] = head
@@ -97,7 +97,7 @@ def _document(
 ) -> dict[str, object]:
     a = tables.audit_head.c
     trail = connection.execute(sa.select(a.length, a.hash)).first()
-    made: dict[str, object] = {
+    document: dict[str, object] = {
         "schema": SCHEMA,
         "sequence": sequence,
         "previous": previous,
@@ -106,13 +106,13 @@ def _document(
         "audit": None if trail is None else {"length": int(trail.length), "hash": str(trail.hash)},
     }
     if manifest.kind:
-        made |= {
+        document |= {
             "kind": manifest.kind, "record": manifest.record, "title": manifest.title, "reason": manifest.reason,
             "parts": dict(manifest.parts), "supersedes": manifest.supersedes,
         }  # fmt: skip
         if manifest.unfit:
-            made["unfit"] = list(manifest.unfit)
-    return made
+            document["unfit"] = list(manifest.unfit)
+    return document
 
 
 def hash_of(document: bytes) -> str:

@@ -70,10 +70,10 @@ class RowsDigest:
 
 def digest_of_rows(rows: Iterable[Sequence[object]]) -> Digest:
     """Return the digest of rows in their order; they may come from a cursor."""
-    made = RowsDigest()
+    digest = RowsDigest()
     for row in rows:
-        made.take(row)
-    return made.digest()
+        digest.take(row)
+    return digest.digest()
 
 
 def _plain(value: object) -> object:
@@ -97,12 +97,12 @@ def group_of(column: str) -> str:
 
 def block_digests(columns: Mapping[str, NDArray[np.generic]]) -> dict[str, str]:
     """Return a digest for each group of the columns (n,) of a block, equal before packing and after unpacking."""
-    made = {group: hashlib.sha256() for group in GROUPS}
+    digests = {group: hashlib.sha256() for group in GROUPS}
     for name in sorted(columns):
-        found = made[group_of(name)]
-        found.update(name.encode() + b"\n")
-        found.update(_content(columns[name]))
-    return {group: each.hexdigest() for group, each in made.items()}
+        group_digests = digests[group_of(name)]
+        group_digests.update(name.encode() + b"\n")
+        group_digests.update(_content(columns[name]))
+    return {group: each.hexdigest() for group, each in digests.items()}
 
 
 def _content(values: NDArray[np.generic]) -> bytes | memoryview:

@@ -31,24 +31,24 @@ class BlockParts:
 
     def take(self, number: int, seq: int, n: int, digests: Mapping[str, str]) -> None:
         """Take one block of `n` readings."""
-        for group, made in self._made.items():
-            made.take((number, seq, n, digests[group]))
+        for group, part in self._made.items():
+            part.take((number, seq, n, digests[group]))
 
     def parts(self) -> Parts:
         """Return the digests by the names of their parts."""
-        return {BLOCK_PARTS[group]: made.digest().as_json() for group, made in self._made.items()}
+        return {BLOCK_PARTS[group]: part.digest().as_json() for group, part in self._made.items()}
 
 
 def parts_of(connection: sa.Connection, kind: Kind, record: str, *, blocks: bool = True) -> Parts:
     """Return the digest of every part of a record; those of blocks, unless left out, by what is kept of them."""
     key = kind.key_of(record)
-    found: dict[str, JsonObject] = {}
+    contents: dict[str, JsonObject] = {}
     for part in kind.parts:
         rows: Iterable[sa.Row[*tuple[object, ...]]] = connection.execute(
             part.query(key).execution_options(yield_per=AT_ONCE)
         )
-        found[part.name] = digest_of_rows(rows).as_json()
-    return {**found, **(_block_parts(connection, int(key)) if kind.has_blocks and blocks else {})}
+        contents[part.name] = digest_of_rows(rows).as_json()
+    return {**contents, **(_block_parts(connection, int(key)) if kind.has_blocks and blocks else {})}
 
 
 def _block_parts(connection: sa.Connection, recording: int) -> Parts:
@@ -60,13 +60,13 @@ def _block_parts(connection: sa.Connection, recording: int) -> Parts:
         .where(b.recording_id == recording)
         .order_by(b.number, b.seq)
     )
-    made = BlockParts()
-    for number, seq, n, *known in connection.execute(query).all():
-        if known[0] is None:  # of a data set that was never closed
-            made.take(number, seq, n, _digests_of_block(connection, recording, number, seq))
+    block_parts = BlockParts()
+    for number, seq, n, *digests in connection.execute(query).all():
+        if digests[0] is None:  # of a data set that was never closed
+            block_parts.take(number, seq, n, _digests_of_block(connection, recording, number, seq))
         else:
-            made.take(number, seq, n, dict(zip(GROUPS, known, strict=True)))
-    return made.parts()
+            block_parts.take(number, seq, n, dict(zip(GROUPS, digests, strict=True)))
+    return block_parts.parts()
 
 
 def _digests_of_block(connection: sa.Connection, recording: int, number: int, seq: int) -> Mapping[str, str]:

@@ -51,9 +51,9 @@ class PublicKey:
         return True
 
 
-def public_key(content: bytes, where: str) -> PublicKey:
+def public_key(content: bytes, location: str) -> PublicKey:
     """Read a public key in PEM form. Raises BadInput."""
-    with needs_extra("seal", f"{where}: a signature"):
+    with needs_extra("seal", f"{location}: a signature"):
         from cryptography.hazmat.primitives.asymmetric.ec import (  # noqa: PLC0415  as above
             SECP256R1,
             EllipticCurvePublicKey,
@@ -67,12 +67,12 @@ def public_key(content: bytes, where: str) -> PublicKey:
     try:
         key = load_pem_public_key(content)
     except (ValueError, TypeError) as error:
-        raise BadInput(f"{where}: this is no public key in PEM form; `labctl seal-key create` writes one") from error
+        raise BadInput(f"{location}: this is no public key in PEM form; `labctl seal-key create` writes one") from error
     ours = isinstance(key, Ed25519PublicKey) or (
         isinstance(key, EllipticCurvePublicKey) and isinstance(key.curve, SECP256R1)
     )
     if not ours or not isinstance(key, Ed25519PublicKey | EllipticCurvePublicKey):
-        raise BadInput(f"{where}: this kind of key is not used; give an Ed25519 key, or ECDSA on the curve P-256")
+        raise BadInput(f"{location}: this kind of key is not used; give an Ed25519 key, or ECDSA on the curve P-256")
     der = key.public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)
     return PublicKey(hashlib.sha256(der).hexdigest(), key)
 

@@ -60,8 +60,8 @@ def append(
     who = (who or caller.name)[:200]
     subject = subject[:300]
     h = tables.audit_head
-    found = connection.execute(sa.select(h.c.length, h.c.hash).where(h.c.id == HEAD_ID).with_for_update()).first()
-    previous = found.hash if found is not None else _last_hash(connection)
+    head = connection.execute(sa.select(h.c.length, h.c.hash).where(h.c.id == HEAD_ID).with_for_update()).first()
+    previous = head.hash if head is not None else _last_hash(connection)
     own = _hash(previous, at, who, action, subject, detail)
     connection.execute(
         sa.insert(tables.audit).values(
@@ -69,8 +69,8 @@ def append(
         )
     )
     chain.note_audit_row(connection, at)
-    if found is not None:  # a head that was removed is never made again: verification reports that it is missing
-        connection.execute(sa.update(h).where(h.c.id == HEAD_ID).values(length=found.length + 1, hash=own))
+    if head is not None:  # a head that was removed is never made again: verification reports that it is missing
+        connection.execute(sa.update(h).where(h.c.id == HEAD_ID).values(length=head.length + 1, hash=own))
 
 
 def _last_hash(connection: sa.Connection) -> str:
@@ -118,13 +118,13 @@ def first_broken(connection: sa.Connection, anchor: Head | None = None) -> Broke
     return _end_broken(connection, Head(length, previous), last)
 
 
-def _end_broken(connection: sa.Connection, found: Head, last: int) -> Broken | None:
+def _end_broken(connection: sa.Connection, stored_head: Head, last: int) -> Broken | None:
     head = head_of(connection)
     if head is None:
         return Broken(last, "the head of the trail, which counts its rows, is missing")
-    if found.length < head.length:
-        return Broken(last + 1, f"{head.length - found.length} rows are missing at the end")
-    if found != head:
+    if stored_head.length < head.length:
+        return Broken(last + 1, f"{head.length - stored_head.length} rows are missing at the end")
+    if stored_head != head:
         return Broken(
             last, "this row is not the last row that the head of the trail names: rows were added without labctl"
         )

@@ -51,15 +51,15 @@ _ACTS = _acts_query()
 
 
 def _act(row: sa.Row[Any]) -> CertificationRow:
-    known = None
+    judgement = None
     if row.override is not None:
         detail: JudgementDetail = row.assessment or JudgementDetail()
-        known = Judgement(row.verdict, row.verdict_recording, row.verdict_at, bool(row.override), detail)
+        judgement = Judgement(row.verdict, row.verdict_recording, row.verdict_at, bool(row.override), detail)
     release = None
     if row.released_by is not None:
         release = Release(row.released_by, row.released_key, row.release_reason, row.request_id)
     return CertificationRow(
-        row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, known, row.by_key, release
+        row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, judgement, row.by_key, release
     )
 
 
@@ -148,11 +148,11 @@ class Calibrations:
             "serial": serial, "version": version, "parent": new.parent, "recording_id": new.recording,
             "model": new.model, "created_at": at, "hash": new.hash, "document": new.document, "answer": new.answer,
         }  # fmt: skip
-        taken = VersionTaken(f"{serial} version {version} was made by another fit in the meantime; fit again")
+        taken_error = VersionTaken(f"{serial} version {version} was made by another fit in the meantime; fit again")
         try:
             with self._database.writing() as connection:
                 if _next_version(connection, serial) != version:
-                    raise taken
+                    raise taken_error
                 c = tables.calibrations.c
                 number = connection.scalar(sa.insert(tables.calibrations).values(**values).returning(c.id))
                 _add_recordings(connection, number, new.fitted_to)
@@ -169,7 +169,7 @@ class Calibrations:
         except exc.IntegrityError as error:  # where several processes write: after the look, before the end
             if self.next_version(serial) == version:
                 raise
-            raise taken from error
+            raise taken_error from error
         return CalibrationRecord(
             serial, version, new.parent, new.recording, new.model, at, new.hash, new.document, new.answer, new.fitted_to
         )
@@ -291,8 +291,10 @@ class Calibrations:
         if row is not None:
             return bytes(row[0]), str(row[1])
         with self._database.reading() as connection:
-            known = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN))
-        if known is None:
+            known_serial = connection.scalar(
+                sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN)
+            )
+        if known_serial is None:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
         if version is None:
             self.certified_version(serial)  # says why there is none

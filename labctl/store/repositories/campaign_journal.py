@@ -297,18 +297,18 @@ class StoreJournal:
     @outlasting
     def environment(self, sample: EnvironmentSample) -> None:
         """Record the environment, once for each unit whose thermometer, or that which stands for it, was read."""
-        warm = {gyro: self._temperature_c(gyro, sample) for gyro in self._recordings}
+        temperatures_c = {gyro: self._temperature_c(gyro, sample) for gyro in self._recordings}
         rows = [
             {
                 "recording_id": recording,
                 "t_s": sample.t_s,
                 "run": sample.run,
-                "temperature_c": warm[gyro],
+                "temperature_c": temperatures_c[gyro],
                 "chamber_c": sample.chamber_c,
                 "chamber_setpoint_c": sample.chamber_setpoint_c,
             }
             for gyro, recording in self._recordings.items()
-            if warm[gyro] is not None
+            if temperatures_c[gyro] is not None
         ]
         if rows:
             with self._writing(synced=False) as connection:

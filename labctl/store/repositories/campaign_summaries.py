@@ -63,11 +63,11 @@ class CampaignSummaries:
 
     def of(self, campaigns: Sequence[int]) -> dict[int, CampaignSummary]:
         """Return the summary of each campaign, by its number."""
-        found: dict[int, CampaignSummary] = {}
+        summaries: dict[int, CampaignSummary] = {}
         with self._database.reading() as connection:
             for start in range(0, len(campaigns), PAGE):
-                found |= _page(connection, campaigns[start : start + PAGE])
-        return found
+                summaries |= _page(connection, campaigns[start : start + PAGE])
+        return summaries
 
 
 def _page(connection: sa.Connection, numbers: Sequence[int]) -> dict[int, CampaignSummary]:
@@ -174,8 +174,8 @@ def _environments(connection: sa.Connection, numbers: Sequence[int]) -> _Found:
 def _dropped(connection: sa.Connection, numbers: Sequence[int]) -> _Found:
     r = tables.recordings.c
     query = sa.select(r.campaign_id, r.gyro, r.dropped).where(r.campaign_id.in_(numbers), r.dropped.is_not(None))
-    found: dict[int, dict[str, str]] = {}
-    for number, gyro, why in connection.execute(query):
-        found.setdefault(number, {})[gyro] = why
-    for number, dropped in found.items():
+    dropped_by_campaign: dict[int, dict[str, str]] = {}
+    for number, gyro, reason in connection.execute(query):
+        dropped_by_campaign.setdefault(number, {})[gyro] = reason
+    for number, dropped in dropped_by_campaign.items():
         yield number, {"dropped": dropped}

@@ -90,13 +90,13 @@ class Campaigns:
                     for index, step in enumerate(new.steps)
                 ],
             )
-            made: dict[int, str] = {}
+            recording_ids: dict[int, str] = {}
             for unit in new.units:
                 info = RecordingInfo.model_validate(unit.info)
                 key = new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
-                made[key] = info.serial
+                recording_ids[key] = info.serial
             if new.recipe.get("fit") is not None:
-                make_due(connection, number, made)
+                make_due(connection, number, recording_ids)
             if new.bench_clear:
                 _confirmed(connection, number, new.bench_clear, at)
             append(connection, at, "campaign start", f"campaign {number}", _audited(new))
@@ -116,17 +116,17 @@ class Campaigns:
 
     def get(self, campaign: int) -> CampaignRow:
         """Return one campaign; raises NotFound."""
-        found = self._rows(tables.campaigns.c.id == campaign)
-        if not found:
+        rows = self._rows(tables.campaigns.c.id == campaign)
+        if not rows:
             raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows the campaigns")
-        return found[0]
+        return rows[0]
 
     def newest(self) -> CampaignRow:
         """Return the campaign made last; raises NotFound when there is none."""
-        found = self._rows(tables.campaigns.c.id == sa.select(sa.func.max(tables.campaigns.c.id)).scalar_subquery())
-        if not found:
+        rows = self._rows(tables.campaigns.c.id == sa.select(sa.func.max(tables.campaigns.c.id)).scalar_subquery())
+        if not rows:
             raise NotFound("there is no campaign in this database yet; `labctl campaign start RECIPE` starts one")
-        return found[0]
+        return rows[0]
 
     def newest_of_unit(self, serial: str) -> CampaignRow | None:
         """Return the campaign in which a unit was measured last; None for none."""
@@ -156,9 +156,9 @@ class Campaigns:
         )
         last_s = sa.select(sa.func.max(v.t_s)).where(v.recording_id.in_(newest.recordings.values()))
         with self._database.reading() as connection:
-            known = [at for query in queries if (at := connection.scalar(query)) is not None]
+            times = [at for query in queries if (at := connection.scalar(query)) is not None]
             read_s = connection.scalar(last_s)
-        return max([newest.started_at, *known, newest.started_at + timedelta(seconds=float(read_s or 0.0))])
+        return max([newest.started_at, *times, newest.started_at + timedelta(seconds=float(read_s or 0.0))])
 
     def all(self) -> list[CampaignRow]:
         """Return every campaign, newest first."""
@@ -205,19 +205,23 @@ class Campaigns:
         with self._database.reading() as connection:
             rows = [dict(row) for row in connection.execute(query.where(condition).order_by(c.id.desc())).mappings()]
             chosen = sa.select(c.id).where(condition)
-            made = connection.execute(sa.select(r.campaign_id, r.serial, r.id).where(r.campaign_id.in_(chosen))).all()
+            recording_rows = connection.execute(
+                sa.select(r.campaign_id, r.serial, r.id).where(r.campaign_id.in_(chosen))
+            ).all()
         recordings: dict[int, dict[str, int]] = {}
-        for campaign, serial, recording in made:
+        for campaign, serial, recording in recording_rows:
             recordings.setdefault(campaign, {})[serial] = recording
         return [CampaignRow(**row, recordings=recordings.get(row["id"], {})) for row in rows]
 
     def state(self, campaign: int) -> CampaignState:
         """Return the state of one campaign; raises NotFound."""
         with self._database.reading() as connection:
-            found = connection.scalar(sa.select(tables.campaigns.c.state).where(tables.campaigns.c.id == campaign))
-        if found is None:
+            stored_state = connection.scalar(
+                sa.select(tables.campaigns.c.state).where(tables.campaigns.c.id == campaign)
+            )
+        if stored_state is None:
             raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows the campaigns")
-        return found
+        return stored_state
 
     def count_by_state(self) -> dict[str, int]:
         """Return how many campaigns there are in each state that has any."""

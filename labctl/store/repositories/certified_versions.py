@@ -100,8 +100,8 @@ def _versions(rows: sa.CursorResult[*tuple[Any, ...]]) -> list[CertifiedVersion]
 def _version(rows: list[Any]) -> CertifiedVersion:
     first = rows[0]
     begun = [measured_at(row.head) for row in rows if row.head is not None]
-    known = [each for each in begun if each is not None]
-    newest = max(known, default=first.created_at) if len(known) == len(begun) else None
+    begin_times = [each for each in begun if each is not None]
+    newest = max(begin_times, default=first.created_at) if len(begin_times) == len(begun) else None
     return CertifiedVersion(
         first.id, first.serial, first.version, newest,
         frozenset(row.recording for row in rows if row.recording is not None),

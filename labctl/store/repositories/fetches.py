@@ -52,10 +52,10 @@ def _record(connection: sa.Connection, row: FetchRow) -> None:
     table = tables.calibration_fetches
     f = table.c
     same = sa.and_(f.serial == row.serial, f.version == row.version, f.who == row.who)
-    known = connection.execute(sa.select(f.first_at, f.last_at).where(same).with_for_update()).first()
-    if known is None:
+    fetched = connection.execute(sa.select(f.first_at, f.last_at).where(same).with_for_update()).first()
+    if fetched is None:
         values = {"serial": row.serial, "version": row.version, "who": row.who}
         connection.execute(sa.insert(table).values(**values, first_at=row.first_at, last_at=row.last_at))
         return
-    first, last = min(known.first_at, row.first_at), max(known.last_at, row.last_at)
+    first, last = min(fetched.first_at, row.first_at), max(fetched.last_at, row.last_at)
     connection.execute(sa.update(table).where(same).values(first_at=first, last_at=last))

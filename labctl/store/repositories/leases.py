@@ -60,12 +60,12 @@ class Leases:
                 if replacing is None:
                     connection.execute(sa.insert(x).values(**asdict(lease)))
                     return True
-                seen = (
+                is_unchanged = (
                     x.c.bench_name == lease.bench_name,
                     x.c.owner == replacing.owner,
                     x.c.beat == replacing.beat,
                 )
-                return connection.execute(sa.update(x).where(*seen).values(**asdict(lease))).rowcount == 1
+                return connection.execute(sa.update(x).where(*is_unchanged).values(**asdict(lease))).rowcount == 1
         except exc.IntegrityError:
             return False
 
@@ -88,7 +88,7 @@ class Leases:
 
     @transaction
     def release(self, bench_name: str, owner: str) -> None:
-        """Let a bench go; nothing happens when the lease is another's by now."""
+        """Release a bench; nothing happens when the lease is another's by now."""
         x = tables.leases
         with self._database.writing() as connection:
             connection.execute(sa.delete(x).where(x.c.bench_name == bench_name, x.c.owner == owner))

@@ -58,12 +58,12 @@ def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArr
     if any(row[11] for row in heads):
         columns[VERIFICATION] = np.array([bool(row[11]) for row in heads], dtype=np.int64)
     columns["table_rate_dps"] = _floats(heads, 4)
-    known = {
+    channels = {
         "table_angle_deg": _floats(heads, 5),
         "chamber_setpoint_c": _floats(heads, 6),
         "power_s": t_s - _floats(heads, 9),
     }
-    columns |= {name: values for name, values in known.items() if np.isfinite(values).all()}
+    columns |= {name: values for name, values in channels.items() if np.isfinite(values).all()}
     columns["n"] = np.array([row[10] for row in heads], dtype=np.int64)
     means = connection.execute(
         sa.select(m.channel, m.number, m.mean, m.std, m.white_std).where(m.recording_id == recording)
@@ -104,8 +104,8 @@ class Recordings:
         try:
             for part in import_parts(ticket.recording, recording):
                 imports.add_part(ticket, part)
-            what = {"serial": info.serial, "kind": info.kind, "rows": len(recording), **(simulated or {})}
-            return imports.finish(ticket, at, "import" if simulated is None else "simulate", what)
+            details = {"serial": info.serial, "kind": info.kind, "rows": len(recording), **(simulated or {})}
+            return imports.finish(ticket, at, "import" if simulated is None else "simulate", details)
         except BaseException:
             with suppress(LabctlError):  # what is left is discarded when the database is next opened for writing
                 imports.discard(ticket)
@@ -113,10 +113,10 @@ class Recordings:
 
     def get(self, recording: int) -> RecordingRow:
         """Return one recording's head; raises NotFound."""
-        found = self._heads(tables.recordings.c.id == recording)
-        if not found:
+        heads = self._heads(tables.recordings.c.id == recording)
+        if not heads:
             raise NotFound(f"recording {recording} is not in this database; check its number")
-        return found[0]
+        return heads[0]
 
     def of_unit(self, serial: str) -> list[RecordingRow]:
         """Return a unit's recordings, newest first."""
@@ -179,8 +179,8 @@ class Recordings:
         sets = sa.select(d.number, d.state, d.n).where(d.recording_id == recording).order_by(d.number)
         packed = sa.select(b.number, b.seq, b.n, b.crc32).where(b.recording_id == recording)
         if complete:
-            whole = sa.and_(d.recording_id == recording, d.state == "complete")
-            sets, packed = sets.where(whole), packed.where(b.number.in_(sa.select(d.number).where(whole)))
+            is_complete = sa.and_(d.recording_id == recording, d.state == "complete")
+            sets, packed = sets.where(is_complete), packed.where(b.number.in_(sa.select(d.number).where(is_complete)))
         ours = (
             sets,
             packed.order_by(b.number, b.seq),
@@ -188,8 +188,8 @@ class Recordings:
         )
         with self._database.reading() as connection:
             rows = [[tuple(row) for row in connection.execute(query)] for query in ours[: 2 if complete else 3]]
-        said = json.dumps([head.serial, head.campaign, head.kind, dict(head.info), rows], sort_keys=True)
-        return hashlib.sha256(said.encode()).hexdigest()
+        content = json.dumps([head.serial, head.campaign, head.kind, dict(head.info), rows], sort_keys=True)
+        return hashlib.sha256(content.encode()).hexdigest()
 
     def points(self, recording: int, *, head: RecordingRow | None = None) -> Recording:
         """Return one row per complete data set, from the statistics alone (kind "points"), or the table imported.

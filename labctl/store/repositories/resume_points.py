@@ -85,9 +85,9 @@ class ResumePoints:
         complete = frozenset(
             step[0] for step in steps if step[1] not in FINISHED and step[2].get("dataset") in planned - {None}
         )
-        left = [step[0] for step in steps if step[1] not in FINISHED and step[0] not in complete]
+        steps_left = [step[0] for step in steps if step[1] not in FINISHED and step[0] not in complete]
         return ResumePoint(
-            start_at=left[0] if left else len(steps),
+            start_at=steps_left[0] if steps_left else len(steps),
             complete=complete,
             skipped=frozenset(step[0] for step in steps if step[1] == "skipped"),
             last_t_s=last_t_s,
@@ -102,7 +102,7 @@ class ResumePoints:
 
     def _last_t_s(self, connection: sa.Connection, campaign: int, recordings: list[int]) -> float:
         e, v, d = tables.environment.c, tables.events.c, tables.data_sets.c
-        found = [
+        times_s = [
             connection.scalar(sa.select(sa.func.max(v.t_s)).where(v.campaign_id == campaign)),
             connection.scalar(sa.select(sa.func.max(e.t_s)).where(e.recording_id.in_(recordings))),
             connection.scalar(
@@ -111,8 +111,8 @@ class ResumePoints:
         ]
         newest = sa.select(d.recording_id, d.number).where(d.recording_id.in_(recordings), d.state != "complete")
         for recording, number in connection.execute(newest).all():
-            found += [float(part["t_ns"][-1]) / 1e9 for part in blocks_of(connection, recording, number)[-1:]]
-        return max((t_s for t_s in found if t_s is not None), default=0.0)
+            times_s += [float(part["t_ns"][-1]) / 1e9 for part in blocks_of(connection, recording, number)[-1:]]
+        return max((t_s for t_s in times_s if t_s is not None), default=0.0)
 
     @staticmethod
     def _events(connection: sa.Connection, campaign: int, ended_s: float) -> tuple[bool, int]:
@@ -150,10 +150,10 @@ class ResumePoints:
             self._database.writing() as connection,
             changing(connection, records, how.at, f"resumed: {how.reason}", prepared),
         ):
-            taken = connection.execute(
+            updated = connection.execute(
                 sa.update(c).where(c.c.id == campaign, c.c.state != CampaignState.DONE).values(**values)
             )
-            if taken.rowcount == 0:
+            if updated.rowcount == 0:
                 raise Conflict(f"campaign {campaign} is done and cannot be resumed; start a new one")
             mine = s.c.campaign_id == campaign
             self._mark(connection, mine & s.c.number.in_(point.complete), "done", how, "its data set was complete")

@@ -104,12 +104,12 @@ def blocks_of_sets(
     connection: sa.Connection, recording: int, numbers: Sequence[int]
 ) -> dict[int, list[dict[str, NDArray[np.generic]]]]:
     """Return number -> unpacked blocks, in order, of some data sets."""
-    found: dict[int, list[dict[str, NDArray[np.generic]]]] = {}
+    blocks: dict[int, list[dict[str, NDArray[np.generic]]]] = {}
     for number, n, codec, crc32, data in connection.execute(
         _BLOCKS, {"recording": recording, "numbers": list(numbers)}
     ):
-        found.setdefault(number, []).append(sample_codec.unpack(sample_codec.Block(n, codec, crc32, data)))
-    return found
+        blocks.setdefault(number, []).append(sample_codec.unpack(sample_codec.Block(n, codec, crc32, data)))
+    return blocks
 
 
 def join_blocks(parts: list[dict[str, NDArray[np.generic]]]) -> dict[str, NDArray[np.generic]]:
@@ -214,7 +214,7 @@ def _of_course(
     course = MeasuredCourse.of_json(document)
     period_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 1.0
     measured, commanded = course.rates_dps(t_s, period_s)
-    found: dict[str, NDArray[np.generic]] = {
+    course_columns: dict[str, NDArray[np.generic]] = {
         "table_rate_dps": measured if encoder.get("is_reference", True) else commanded,
         "table_angle_deg": course.angle_deg(t_s - period_s / 2),  # at the middle of what a reading averages
         "computed_rate_dps": commanded,
@@ -222,9 +222,9 @@ def _of_course(
         "encoder_rate_u_dps": np.full(len(t_s), encoder["rate_u_dps"]),
     }
     if "time_u_s" in encoder and "time_common_u_s" in encoder:  # an older version did not record them
-        found[TIME_U_S] = np.full(len(t_s), encoder["time_u_s"])
-        found[TIME_COMMON_U_S] = np.full(len(t_s), encoder["time_common_u_s"])
-    return found
+        course_columns[TIME_U_S] = np.full(len(t_s), encoder["time_u_s"])
+        course_columns[TIME_COMMON_U_S] = np.full(len(t_s), encoder["time_common_u_s"])
+    return course_columns
 
 
 def angle_values(angles: TableAngles) -> dict[str, object]:
@@ -248,8 +248,8 @@ def _turned(turn_deg: float, turn_u_deg: float, valid_s: NDArray[np.float64], n:
     """
     duration_s = float(valid_s[-1] - valid_s[0]) if len(valid_s) > 1 else 0.0
     rate_dps = turn_deg / duration_s if duration_s > 0 else 0.0
-    said = {"table_rate_dps": rate_dps, "turn_deg": turn_deg, "turn_u_deg": turn_u_deg}
-    return {name: np.full(n, value) for name, value in said.items()}
+    columns = {"table_rate_dps": rate_dps, "turn_deg": turn_deg, "turn_u_deg": turn_u_deg}
+    return {name: np.full(n, value) for name, value in columns.items()}
 
 
 def _floats(values: NDArray[np.generic]) -> NDArray[np.float64]:

@@ -77,20 +77,20 @@ class Starts:
         row = sa.insert(tables.scheduled_starts).values(**asdict(new), state="waiting", created_at=at)
         with self._database.writing() as connection:
             number = int(connection.scalar(row.returning(tables.scheduled_starts.c.id)) or 0)
-            what = {"recipe": new.recipe_name, "due_at": new.due_at.isoformat(), "cron": new.cron}
+            details = {"recipe": new.recipe_name, "due_at": new.due_at.isoformat(), "cron": new.cron}
             if new.confirmed_by:
-                what["bench_clear_confirmed_by"] = new.confirmed_by
-            audit.append(connection, at, "schedule enter", _subject(number, new.bench_name), what)
+                details["bench_clear_confirmed_by"] = new.confirmed_by
+            audit.append(connection, at, "schedule enter", _subject(number, new.bench_name), details)
         return number
 
     def get(self, start: int) -> StartRow:
         """Return one entry; raises NotFound."""
-        found = self._rows(tables.scheduled_starts.c.id == start)
-        if not found:
+        rows = self._rows(tables.scheduled_starts.c.id == start)
+        if not rows:
             raise NotFound(
                 f"scheduled start {start} is not in this database; `labctl campaign schedule list` shows the starts"
             )
-        return found[0]
+        return rows[0]
 
     def all(self, *, ended: bool) -> list[StartRow]:
         """Return what waits, next first, and what was missed and not removed since; with `ended` all entries."""

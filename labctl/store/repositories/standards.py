@@ -101,19 +101,19 @@ class RegisteredStandard:
 
         A row without a reason is another certificate, also where another laboratory used the same number.
         """
-        found: list[StandardCertificate] = []
-        for each in self.certificates:
-            alike = [one for one in found if one.number == each.number]
-            if each.reason and alike:
-                found.remove(next((one for one in alike if one.laboratory == each.laboratory), alike[-1]))
-            found.append(each)
-        return tuple(sorted(found, key=lambda each: each.calibrated))
+        certificates: list[StandardCertificate] = []
+        for certificate in self.certificates:
+            alike = [one for one in certificates if one.number == certificate.number]
+            if certificate.reason and alike:
+                certificates.remove(next((one for one in alike if one.laboratory == certificate.laboratory), alike[-1]))
+            certificates.append(certificate)
+        return tuple(sorted(certificates, key=lambda certificate: certificate.calibrated))
 
     @property
     def bad(self) -> tuple[StandardFinding, ...]:
         """The findings that are not withdrawn."""
-        withdrawn = {each.finding for each in self.findings if each.act == "withdraw"}
-        return tuple(each for each in self.findings if each.act == "bad" and each.id not in withdrawn)
+        withdrawn = {finding.finding for finding in self.findings if finding.act == "withdraw"}
+        return tuple(finding for finding in self.findings if finding.act == "bad" and finding.id not in withdrawn)
 
 
 def _day(text: str | None) -> date | None:
@@ -123,7 +123,7 @@ def _day(text: str | None) -> date | None:
 def _certificate(row: sa.Row[Any]) -> StandardCertificate:
     return StandardCertificate(
         row.number, row.laboratory, date.fromisoformat(row.calibrated), _day(row.due), bool(row.adjusted),
-        row.traceability, tuple(CertifiedPoint(**each) for each in row.points), row.reason, row.by, row.at,
+        row.traceability, tuple(CertifiedPoint(**point) for point in row.points), row.reason, row.by, row.at,
     )  # fmt: skip
 
 
@@ -152,17 +152,19 @@ class Standards:
         """Return a standard by label or serial; None: it is not in the register."""
         s = tables.standards.c
         with self._database.reading() as connection:
-            found = self._registered(connection, sa.or_(s.label == label, sa.and_(s.serial == label, s.serial != "")))
-        return next(iter(sorted(found, key=lambda each: each.row.label != label)), None)
+            standards = self._registered(
+                connection, sa.or_(s.label == label, sa.and_(s.serial == label, s.serial != ""))
+            )
+        return next(iter(sorted(standards, key=lambda standard: standard.row.label != label)), None)
 
     def get(self, label: str) -> RegisteredStandard:
         """Return a standard by label or serial. Raises NotFound."""
-        if (found := self.find(label)) is None:
+        if (standard := self.find(label)) is None:
             raise NotFound(
                 f"standard {label!r} is not in the register; `labctl standards list` lists those that are, "
                 "`labctl standards add` adds one"
             )
-        return found
+        return standard
 
     def has_findings(self) -> bool:
         """Return whether any standard was ever found bad: a point query before anything is compared."""
@@ -180,11 +182,11 @@ class Standards:
         numbers = [row.id for row in rows]
 
         def of(table: sa.Table, order: str = "id") -> dict[int, list[sa.Row[Any]]]:
-            found: dict[int, list[sa.Row[Any]]] = {}
+            certificates: dict[int, list[sa.Row[Any]]] = {}
             query = sa.select(table).where(table.c.standard_id.in_(numbers)).order_by(table.c[order], table.c.id)
             for row in connection.execute(query):
-                found.setdefault(row.standard_id, []).append(row)
-            return found
+                certificates.setdefault(row.standard_id, []).append(row)
+            return certificates
 
         certificates, findings = of(tables.standard_certificates), of(tables.standard_findings)
         checks = of(tables.standard_checks, "checked_at")
@@ -201,9 +203,9 @@ class Standards:
     @transaction
     def add(self, row: StandardRow) -> None:
         """Enter a standard. Raises Conflict for a label, or a serial number, that another one has."""
-        taken = self.find(row.label) or (self.find(row.serial) if row.serial else None)
-        if taken is not None:
-            raise Conflict(_taken(taken.row, row))
+        duplicate = self.find(row.label) or (self.find(row.serial) if row.serial else None)
+        if duplicate is not None:
+            raise Conflict(_taken(duplicate.row, row))
         try:
             with self._database.writing() as connection:
                 t = tables.standards
@@ -220,7 +222,7 @@ class Standards:
         values: dict[str, Any] = {
             **{name: getattr(new, name) for name in ("number", "laboratory", "adjusted", "traceability", "reason")},
             "calibrated": new.calibrated.isoformat(), "due": None if new.due is None else new.due.isoformat(),
-            "points": [asdict(each) for each in new.points],
+            "points": [asdict(point) for point in new.points],
         }  # fmt: skip
         self._add(label, tables.standard_certificates, STANDARD_CERTIFICATE.name, values, "certificate", new.by, new.at)
 
@@ -257,14 +259,19 @@ class Standards:
         audited: Mapping[str, Any] | None = None,
     ) -> int:
         """Add a row of a standard with its audit row and its manifest; returns its number. Raises NotFound."""
-        found = self.get(label).row.label
+        known_label = self.get(label).row.label
         with self._database.writing() as connection:
             s = tables.standards.c
-            standard = connection.scalar(sa.select(s.id).where(s.label == found))
+            standard = connection.scalar(sa.select(s.id).where(s.label == known_label))
             row = sa.insert(table).values(standard_id=standard, by=by, at=at, **values).returning(table.c.id)
             number = int(connection.scalar(row) or 0)
             append(
-                connection, at, f"standard {act}", f"standard {found}", dict(audited or values), who=acting_key() or by
+                connection,
+                at,
+                f"standard {act}",
+                f"standard {known_label}",
+                dict(audited or values),
+                who=acting_key() or by,
             )
             seal(connection, (kind, str(number)), at, act)
         return number
@@ -275,9 +282,9 @@ def last_finding(connection: sa.Connection) -> int:
     return int(connection.scalar(sa.select(sa.func.max(tables.standard_findings.c.id))) or 0)
 
 
-def _taken(there: StandardRow, new: StandardRow) -> str:
-    named = new.label if new.label in (there.label, there.serial) else new.serial
+def _taken(row: StandardRow, new: StandardRow) -> str:
+    named = new.label if new.label in (row.label, row.serial) else new.serial
     return (
-        f"{named!r} is already standard {there.label} of the register (serial number "
-        f"{there.serial or 'not stated'}); give another label, or add certificates to that one"
+        f"{named!r} is already standard {row.label} of the register (serial number "
+        f"{row.serial or 'not stated'}); give another label, or add certificates to that one"
     )

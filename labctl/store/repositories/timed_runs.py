@@ -22,7 +22,7 @@ def timed_runs(connection: sa.Connection, campaign: int) -> tuple[ClockRun, ...]
 def write_step_clock(
     connection: sa.Connection, campaign: int, measured: Mapping[str, object], factor: Callable[[float], float]
 ) -> None:
-    """Let the runs of this session count: correct the rates of the data sets, and state their uncertainty.
+    """Apply the timed runs of this session: correct the rates of the data sets, and state their uncertainty.
 
     Runs of an earlier session that never counted stay so: they disagreed, or the session ended before they were used.
     `measured` replaces what the head of a recording says of that standard; `factor` is by the campaign time of a gate.
@@ -32,8 +32,11 @@ def write_step_clock(
     recordings = {row.id: row.info for row in rows}
     _correct_rates(connection, list(recordings), factor)
     for key, info in recordings.items():
-        known = info.get("standards", ())
-        standards = [{**each, **measured} if each.get("name") == MEASURED_STEP_CLOCK else each for each in known]
+        used_standards = info.get("standards", ())
+        standards = [
+            {**used_standard, **measured} if used_standard.get("name") == MEASURED_STEP_CLOCK else used_standard
+            for used_standard in used_standards
+        ]
         connection.execute(sa.update(r).where(r.c.id == key).values(info={**info, "standards": standards}))
     session = sa.select(sa.func.max(t.c.session)).where(t.c.campaign_id == campaign).scalar_subquery()
     connection.execute(sa.update(t).where(t.c.campaign_id == campaign, t.c.session == session).values(used=True))

@@ -20,8 +20,8 @@ from labctl.store.schema import tables
 
 def _measured() -> sa.ColumnElement[bool]:
     r, s = tables.recordings.c, tables.sensor_versions.c
-    whole = sa.exists().where(r.serial == tables.units.c.serial, r.importing.is_(None))
-    return sa.or_(whole, sa.exists().where(s.serial == tables.units.c.serial))
+    is_complete = sa.exists().where(r.serial == tables.units.c.serial, r.importing.is_(None))
+    return sa.or_(is_complete, sa.exists().where(s.serial == tables.units.c.serial))
 
 
 #: Serial numbers that begin or end with so many equal characters are compared whole.
@@ -36,24 +36,24 @@ SEEN = _measured()
 
 def add_missing_unit(connection: sa.Connection, serial: str, model: str, technology: str | None, at: datetime) -> bool:
     """Keep a unit that is seen for the first time; returns whether it was."""
-    known = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial))
-    if known is None:
+    known_serial = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial))
+    if known_serial is None:
         connection.execute(
             sa.insert(tables.units).values(serial=serial, model=model, technology=technology, first_seen_at=at)
         )
-    return known is None
+    return known_serial is None
 
 
 def remember_unit(connection: sa.Connection, serial: str, model: str, technology: str | None, at: datetime) -> None:
     """Keep a unit that is seen for the first time; fill in what was not known of it."""
     if add_missing_unit(connection, serial, model, technology, at):
         return
-    found = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial)).one()
-    if (model and not found.model) or (technology and not found.technology):
+    row = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial)).one()
+    if (model and not row.model) or (technology and not row.technology):
         connection.execute(
             sa.update(tables.units)
             .where(tables.units.c.serial == serial)
-            .values(model=found.model or model, technology=found.technology or technology)
+            .values(model=row.model or model, technology=row.technology or technology)
         )
 
 
@@ -74,22 +74,22 @@ class Units:
 
     def has(self, serial: str) -> bool:
         """Return whether a unit is there."""
-        wanted = sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN)
+        query = sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN)
         with self._database.reading() as connection:
-            return connection.scalar(wanted) is not None
+            return connection.scalar(query) is not None
 
     def most_similar(self, serial: str) -> str | None:
         """Return the serial number of the unit that differs from this one by least, such as by one digit; None: none.
 
         Compared are those of nearly the same length that begin or end alike.
         """
-        known, k = tables.units.c.serial, min(ALIKE, len(serial))
-        begins = sa.func.substr(known, 1, k) == serial[:k]
-        ends = sa.func.substr(known, sa.func.length(known) - k + 1) == serial[-k:]
-        near = sa.func.abs(sa.func.length(known) - len(serial)) <= 1
-        wanted = sa.select(known).where(SEEN, near, begins | ends, known != serial).limit(MAX_COMPARED)
+        known_serials, k = tables.units.c.serial, min(ALIKE, len(serial))
+        begins = sa.func.substr(known_serials, 1, k) == serial[:k]
+        ends = sa.func.substr(known_serials, sa.func.length(known_serials) - k + 1) == serial[-k:]
+        near = sa.func.abs(sa.func.length(known_serials) - len(serial)) <= 1
+        query = sa.select(known_serials).where(SEEN, near, begins | ends, known_serials != serial).limit(MAX_COMPARED)
         with self._database.reading() as connection:
-            near_by = difflib.get_close_matches(serial, list(connection.scalars(wanted)), n=10, cutoff=SIMILARITY)
+            near_by = difflib.get_close_matches(serial, list(connection.scalars(query)), n=10, cutoff=SIMILARITY)
         return min(near_by, key=lambda each: sum(a != b for a, b in zip_longest(each, serial)), default=None)
 
     def count(self) -> int:
@@ -152,8 +152,8 @@ def _with_certificate(joined: sa.FromClause) -> sa.Join:
         .correlate(tables.calibrations)
         .scalar_subquery()
     )
-    known = joined.outerjoin(tables.certificates, _Z.id == newest)
-    return known.outerjoin(tables.certificate_withdrawals, _W.number == _Z.number)
+    with_certificates = joined.outerjoin(tables.certificates, _Z.id == newest)
+    return with_certificates.outerjoin(tables.certificate_withdrawals, _W.number == _Z.number)
 
 
 def _served_in_force() -> sa.Select[*tuple[Any, ...]]:

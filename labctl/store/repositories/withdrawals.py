@@ -16,34 +16,34 @@ from labctl.store.sealing.seals import seal
 
 
 def withdraw(
-    connection: sa.Connection, number: str, said: Withdrawal, sealed_at: datetime, why: str = "withdrawn"
+    connection: sa.Connection, number: str, withdrawal: Withdrawal, sealed_at: datetime, reason: str = "withdrawn"
 ) -> None:
-    """Withdraw a certificate that is not withdrawn yet, inside a transaction; `why` is the reason of its manifest."""
+    """Withdraw a certificate that is not withdrawn yet, inside a transaction; `reason` is that of its manifest."""
     w = tables.certificate_withdrawals
-    made = connection.scalar(
+    withdrawal_id = connection.scalar(
         sa.insert(w).values(
-            number=number, by=said.by, by_key=said.by_key, reason=said.reason, at=said.at,
-            certification_id=said.act,
+            number=number, by=withdrawal.by, by_key=withdrawal.by_key, reason=withdrawal.reason, at=withdrawal.at,
+            certification_id=withdrawal.act,
         ).returning(w.c.id)
     )  # fmt: skip
-    seal(connection, (WITHDRAWAL.name, str(made)), sealed_at, why)
+    seal(connection, (WITHDRAWAL.name, str(withdrawal_id)), sealed_at, reason)
 
 
-def withdraw_of_version(connection: sa.Connection, serial: str, version: int, said: Withdrawal) -> list[str]:
+def withdraw_of_version(connection: sa.Connection, serial: str, version: int, withdrawal: Withdrawal) -> list[str]:
     """Withdraw every certificate of a version that is not withdrawn; returns their numbers, oldest first."""
-    found = _standing(connection, serial, version)
-    for number in found:
-        withdraw(connection, number, said, said.at)
-        detail = {"number": number, "reason": said.reason, "by": said.by, "revoked": True}
+    certificates = _standing(connection, serial, version)
+    for number in certificates:
+        withdraw(connection, number, withdrawal, withdrawal.at)
+        detail = {"number": number, "reason": withdrawal.reason, "by": withdrawal.by, "revoked": True}
         append(
             connection,
-            said.at,
+            withdrawal.at,
             "certificate withdraw",
             f"{serial} version {version}",
             detail,
-            who=said.by_key or said.by,
+            who=withdrawal.by_key or withdrawal.by,
         )
-    return found
+    return certificates
 
 
 def _standing(connection: sa.Connection, serial: str, version: int, issued_until: datetime | None = None) -> list[str]:
@@ -58,12 +58,12 @@ def _standing(connection: sa.Connection, serial: str, version: int, issued_until
 def withdraw_of_revocations(connection: sa.Connection) -> None:
     """Withdraw the certificates of versions that were revoked when no withdrawals were kept: of migration 0019."""
     sealed_at = SystemClock().utc()
-    why = f"withdrawn by migration on {sealed_at:%Y-%m-%d}"
+    reason = f"withdrawn by migration on {sealed_at:%Y-%m-%d}"
     x = tables.certifications.c
     revoked = sa.select(x.id, x.serial, x.version, x.by, x.reason, x.at).where(x.act == "revoke").order_by(x.id)
     chain.begin(connection)
     for row in connection.execute(revoked).all():
-        said = Withdrawal(row.by, None, row.reason, row.at, int(row.id))
+        withdrawal = Withdrawal(row.by, None, row.reason, row.at, int(row.id))
         for number in _standing(connection, row.serial, row.version, row.at):
-            withdraw(connection, number, said, sealed_at, why)
+            withdraw(connection, number, withdrawal, sealed_at, reason)
     chain.finish(connection)

@@ -60,14 +60,14 @@ def _digest_blocks(connection: sa.Connection) -> None:
     b, last = tables.sample_blocks.c, 0
     query = sa.select(b.id, b.recording_id, b.number, b.seq, b.n, b.codec, b.crc32, b.data)
     while rows := connection.execute(query.where(b.id > last).order_by(b.id).limit(AT_ONCE)).all():
-        made = []
+        digests = []
         for row in rows:
             try:
                 columns = sample_codec.unpack(sample_codec.Block(row.n, row.codec, row.crc32, row.data))
             except StoreError:
                 continue
             place = {"recording_id": row.recording_id, "number": row.number, "seq": row.seq}
-            made.append({**place, **block_digests(columns)})
-        if made:
-            connection.execute(sa.insert(tables.block_digests), made)
+            digests.append({**place, **block_digests(columns)})
+        if digests:
+            connection.execute(sa.insert(tables.block_digests), digests)
         last = rows[-1].id

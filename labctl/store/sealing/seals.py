@@ -79,8 +79,8 @@ def changing(
         act: chain.Act = "sealed" if at_rest else "reopened"
         title = _title(connection, kind, record[1])
         supersedes = None if was is None else was.sequence
-        made = chain.Manifest(kind.name, record[1], title, act, reason, parts, unfit[record], supersedes)
-        chain.append(connection, at, made)
+        manifest = chain.Manifest(kind.name, record[1], title, act, reason, parts, unfit[record], supersedes)
+        chain.append(connection, at, manifest)
 
 
 def _unfit(connection: sa.Connection, record: Record, was: Newest | None, prepared: Prepared) -> list[str]:
@@ -111,8 +111,8 @@ def _title(connection: sa.Connection, kind: Kind, record: str) -> str:
 def of_campaign(connection: sa.Connection, campaign: int) -> list[Record]:
     """Return a campaign and its recordings as records."""
     r = tables.recordings.c
-    made = connection.scalars(sa.select(r.id).where(r.campaign_id == campaign).order_by(r.id))
-    return [(RECORDING.name, str(number)) for number in made] + [(CAMPAIGN.name, str(campaign))]
+    recordings = connection.scalars(sa.select(r.id).where(r.campaign_id == campaign).order_by(r.id))
+    return [(RECORDING.name, str(number)) for number in recordings] + [(CAMPAIGN.name, str(campaign))]
 
 
 def sealed_at(connection: sa.Connection, campaign: int) -> datetime | None:
@@ -122,8 +122,8 @@ def sealed_at(connection: sa.Connection, campaign: int) -> datetime | None:
         return None
     c = tables.campaigns.c
     row = connection.execute(sa.select(c.ended_at, c.created_at).where(c.id == campaign)).one()
-    found: datetime = row.ended_at or row.created_at
-    return found
+    sealed: datetime = row.ended_at or row.created_at
+    return sealed
 
 
 def prepared_recordings(database: Database, records: Sequence[Record]) -> Prepared:

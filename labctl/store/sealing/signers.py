@@ -122,28 +122,28 @@ class TokenSigner:
         from pkcs11.exceptions import PKCS11Error  # noqa: PLC0415  as above
         from pkcs11.util.ec import encode_ec_public_key  # noqa: PLC0415  as above
 
-        where = f"seal key {uri.named}"
+        place_text = f"seal key {uri.named}"
         try:
             self._session = open_session(uri)
             self._key: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PRIVATE_KEY, label=uri.object)
             public: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PUBLIC_KEY, label=uri.object)
             der = encode_ec_public_key(public)
         except (PKCS11Error, RuntimeError, KeyError, OSError) as error:
-            said = " ".join(str(error).split()) or type(error).__name__
-            raise BadInput(f"{where}: {said}; check token, object, module and PIN") from error
-        self._where, self._mechanism, self._trouble = where, pkcs11.Mechanism.ECDSA, PKCS11Error
+            text = " ".join(str(error).split()) or type(error).__name__
+            raise BadInput(f"{place_text}: {text}; check token, object, module and PIN") from error
+        self._where, self._mechanism, self._trouble = place_text, pkcs11.Mechanism.ECDSA, PKCS11Error
         self.pem = _pem_of(der)
-        self.public = public_key(self.pem, where)
+        self.public = public_key(self.pem, place_text)
 
     def sign(self, digest: str) -> bytes:
         """Return r and s, 32 bytes each, as the token gives them."""
         try:
-            made: bytes = self._key.sign(hashlib.sha256(signed_text(digest)).digest(), mechanism=self._mechanism)
+            signature: bytes = self._key.sign(hashlib.sha256(signed_text(digest)).digest(), mechanism=self._mechanism)
         except self._trouble as error:
             raise BadInput(
                 f"{self._where}: {error or type(error).__name__}; nothing was signed; check the token"
             ) from error
-        return made
+        return signature
 
 
 def _pem_of(der: bytes) -> bytes:

@@ -260,5 +260,5 @@ def test_an_odd_instrument(behaviour: Behaviour) -> None:
     stand.bench.close()
 
 
-def test_they_are_many() -> None:
+def test_there_are_at_least_70_distinct_behaviours() -> None:
     assert len(BEHAVIOURS) == len({str(each) for each in BEHAVIOURS}) >= 70

@@ -160,7 +160,7 @@ def test_another_server_than_a_modbus_instrument(serve: Callable[[socket.socket]
     assert re.search(text, line), line
 
 
-def test_a_host_where_nobody_listens() -> None:
+def test_a_closed_port_is_reported() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     line = said_by("chamber", identity, tcp_port=port)

@@ -271,5 +271,5 @@ def test_an_odd_gyro(behaviour: Behaviour) -> None:
     stand.bench.close()
 
 
-def test_they_are_many() -> None:
+def test_there_are_at_least_60_distinct_behaviours() -> None:
     assert len(BEHAVIOURS) == len({str(each) for each in BEHAVIOURS}) >= 60

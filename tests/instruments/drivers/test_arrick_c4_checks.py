@@ -153,7 +153,7 @@ def turned(table: Any, *rates: float) -> None:
         table.settle(table.spin(rate, 3.0))
 
 
-def test_home_is_where_it_was_left(stand: Make) -> None:
+def test_the_home_check_finds_no_missed_steps(stand: Make) -> None:
     s = stand(table=CHECKED)
     table = s.bench.table
     assert table.check_home(waiting(s)) is None  # a new process knows no place

@@ -102,7 +102,7 @@ def test_bus_off_is_told_and_the_bus_can_be_opened_again(on_bus: Make) -> None:
     assert counts([s.gyro.read(1.0)])[1:] == (0, 0)
 
 
-def test_what_came_in_place_of_readings_is_told(on_bus: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_frames_other_than_readings_are_reported(on_bus: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     s = on_bus()
     out: list[bytes] = []
     altered(s, monkeypatch, lambda data: b"".join(out) if data else b"")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -22,8 +23,8 @@ from instruments.protocols.kvh_lines import KvhSettings
 
 OWN = [name for name in DRIVERS.names if DRIVERS.plugin(name).is_own]
 CHECKS = [(name, check) for name in OWN for check in checks_of(name)]
-#: The first word of a method's docstring says whether it asks, acts, or changes a setting.
-FIRST_WORDS = ("Get", "Control", "Measure", "Set", "What")
+#: The summary of a docstring (PEP 257): a capital letter first, a full stop at the end.
+SUMMARY = re.compile(r"[A-Z].*\.", re.DOTALL)
 
 
 def test_every_driver_has_a_place() -> None:
@@ -55,7 +56,7 @@ def test_every_method_says_what_it_does(stand: Stand) -> None:
             continue  # a plain attribute will do for what never changes
         text = inspect.getdoc(getattr(driver, name))
         assert text, f"{driver.__name__}.{name} has no docstring"
-        assert text.split()[0] in FIRST_WORDS, f"{driver.__name__}.{name}: {text!r}"
+        assert SUMMARY.fullmatch(text.partition("\n\n")[0].strip()), f"{driver.__name__}.{name}: {text!r}"
 
 
 class Crooked(KvhGyro):

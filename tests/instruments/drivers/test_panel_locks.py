@@ -94,7 +94,7 @@ def test_a_panel_that_cannot_be_freed_keeps_no_safe_set_point_from_being_written
     assert s.simulated.chamber.setpoint_c == 25.0
 
 
-def test_a_controller_without_a_lock_is_told(espec: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_controller_without_a_panel_lock_is_reported(espec: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     s = espec(lock_panel=True)
     answer = s.simulated.answer
     monkeypatch.setattr(

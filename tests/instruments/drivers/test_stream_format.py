@@ -91,7 +91,7 @@ def altered(s: Any, monkeypatch: pytest.MonkeyPatch, change: Callable[[bytes], b
     monkeypatch.setattr(device, "transmit", lambda t_s: change(transmit(t_s)))
 
 
-def test_a_counter_that_stands_is_told(stand: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_constant_counter_is_reported(stand: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     s = on_bench(stand, "kvh-1750", sample_rate_hz=100)
     s.gyro.read(1.0)
     import instruments.simulators.devices.stream_format as simulated
@@ -117,7 +117,7 @@ def test_a_frame_that_is_sent_twice_is_one_reading(stand: Make, monkeypatch: pyt
     assert np.allclose(np.diff(times), 0.02, rtol=1e-2)
 
 
-def test_bytes_of_another_baud_rate_are_told(stand: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_baud_rate_is_reported(stand: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     s = on_bench(stand, "kvh-1750", sample_rate_hz=100)
     s.gyro.read(1.0)
     altered(s, monkeypatch, lambda data: bytes(each & 0x9B for each in data))
@@ -127,7 +127,7 @@ def test_bytes_of_another_baud_rate_are_told(stand: Make, monkeypatch: pytest.Mo
         read_on(s, 4.0)
 
 
-def test_another_rate_is_told(stand: Make) -> None:
+def test_a_different_sample_rate_is_reported(stand: Make) -> None:
     s = stand(
         "triaxial-sim",
         gyro={

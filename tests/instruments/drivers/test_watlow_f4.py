@@ -25,7 +25,7 @@ def test_making_the_driver_sends_nothing(f4: Any) -> None:
     assert (f4.driver.name, f4.driver.safe_c) == ("chamber", 25)
 
 
-def test_it_says_what_it_is(f4: Any) -> None:
+def test_identify_states_the_resolution(f4: Any) -> None:
     assert f4.driver.identify() == "Watlow F4, steps of 0.1 deg C"
 
 

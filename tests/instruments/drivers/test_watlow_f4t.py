@@ -19,7 +19,7 @@ def test_making_the_driver_sends_nothing(f4t: Any) -> None:
     assert f4t.ports.opened == []
 
 
-def test_it_says_what_it_is(f4t: Any) -> None:
+def test_identify_reads_the_part_number(f4t: Any) -> None:
     assert f4t.driver.identify() == "Watlow F4T1A1A1A1A1A1A"
 
 

@@ -69,6 +69,6 @@ def test_a_campaign_keeps_the_day_as_text() -> None:
         ({"since": "last year"}, "ageing.since = 'last year' is not a date; write 2026-01-05"),
     ],
 )
-def test_what_is_no_law_is_refused(law: Any, said: str) -> None:
+def test_an_invalid_ageing_law_is_refused(law: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said.replace("(", r"\(")):
         open_simulation(bench(law), VirtualClock())

@@ -33,7 +33,7 @@ def test_a_turn_goes_from_rest_to_rest_with_the_least_jerk() -> None:
     assert not turning.is_turning(20.0)
 
 
-def test_turns_add_up_on_what_a_table_below_does() -> None:
+def test_turns_add_to_the_angle_of_the_table() -> None:
     table = TableMotion(1600, step_error_deg=0.0)
     table.start(0.0, 400, 200.0, 90.0)
     turning = hand(below=table)
@@ -44,7 +44,7 @@ def test_turns_add_up_on_what_a_table_below_does() -> None:
     assert turning.commanded_deg(at) == pytest.approx([90.0, 450.0, -270.0])
 
 
-def test_how_well_it_meets_the_angle_is_as_said() -> None:
+def test_angle_errors_scatter_by_the_stated_u() -> None:
     turning = hand({"u_deg": 1.5})
     for number in range(400):
         turning.turn(100.0 * number, "x", 360.0)

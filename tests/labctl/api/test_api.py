@@ -48,7 +48,7 @@ def unchanged_fog(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClie
         yield with_fog(client)
 
 
-def test_it_is_well(client: TestClient) -> None:
+def test_health_and_metrics_describe_an_idle_bench(client: TestClient) -> None:
     body = client.get("/health").json()
     assert body["status"] == "ok"
     assert body["bench"]["name"] == "single-axis-sim"

@@ -63,7 +63,7 @@ LIMITS = ConnectionLimits(total=4, local=4, per_address=2, reserve=2)
         ([(Phase.ANSWER, 1)] * 4, None),
     ],
 )
-def test_who_makes_room(waits: list[tuple[Phase, float]], goes: int | None) -> None:
+def test_which_connection_a_full_table_closes(waits: list[tuple[Phase, float]], goes: int | None) -> None:
     table, loop = ConnectionTable(LIMITS), FakeLoop()
     old = [FakeConnection(*each) for each in waits]
     assert all(table.admit(each, loop) for each in old)
@@ -120,7 +120,7 @@ def test_a_loop_that_stood_still_reads_before_it_ends_a_connection() -> None:
         ("somewhere", "somewhere"),
     ],
 )
-def test_whom_connections_are_counted_by(address: str | None, source: str) -> None:
+def test_connections_are_counted_by_source_address(address: str | None, source: str) -> None:
     assert source_of(address) == source
 
 

@@ -19,7 +19,7 @@ def sent(name: str, content: bytes) -> dict[str, tuple[str, bytes]]:
     return {"file": (name, content)}
 
 
-def test_a_log_is_looked_at_and_nothing_is_kept(client: TestClient) -> None:
+def test_a_preview_of_a_log_stores_nothing(client: TestClient) -> None:
     seen = client.post(PREVIEW, files=sent("chamber.csv", GOOD)).json()
     assert seen["problems"] == []
     assert (seen["importer"], seen["rows"], seen["motion"], seen["datasets"]) == ("text", 400, "rest", 1)

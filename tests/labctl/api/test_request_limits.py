@@ -63,7 +63,7 @@ def test_a_body_is_bounded_declared_or_not(client: TestClient, path: str) -> Non
     assert client.post(path, content=in_pieces(BODY - 500), headers=as_json).status_code == 422
 
 
-def test_nobody_comes_in_by_a_websocket(client: TestClient) -> None:
+def test_websocket_connections_are_refused(client: TestClient) -> None:
     with pytest.raises(WebSocketDisconnect), client.websocket_connect("/api/campaigns"):
         pass
 

@@ -30,7 +30,7 @@ def test_an_act_is_one_record_with_the_number_of_its_request(client: TestClient,
     assert (planned["request_id"], planned["campaign"]) == ("mine-1", number)
 
 
-def test_what_reads_is_told_when_it_is_asked_for(client: TestClient, tmp_path: Path) -> None:
+def test_reading_requests_are_logged_at_debug_level(client: TestClient, tmp_path: Path) -> None:
     with logged(tmp_path, logging.DEBUG) as records:
         client.get("/api/units?key=labctl_not_to_be_shown")
     (ended,) = records.named("request.ended")

@@ -33,7 +33,7 @@ def found(offset: float, slopes: Any, *, outputs: str = "xyz", places: Any = PLA
     return cast(Any, [at(100.0 * np.array(place)) for place in places])
 
 
-def test_of_one_error_it_is_its_own_quantile() -> None:
+def test_widening_for_one_output_is_the_normal_quantile() -> None:
     alone = found(1.0, np.zeros((3, 3)), outputs="x", places=[(0.0, 0.0, 0.0)])
     assert widening(alone) == pytest.approx(norm.ppf(0.5 * (1 + LEVEL)) / 2.0, rel=0.02)
 

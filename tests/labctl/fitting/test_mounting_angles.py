@@ -176,7 +176,7 @@ def test_gains_are_those_of_a_fit_to_the_mountings(positions: list[str]) -> None
         assert gains.mounting == pytest.approx(np.linalg.norm(mean), abs=1e-9)
 
 
-def test_what_turns_are_worth() -> None:
+def test_angle_gains_by_mounting_positions() -> None:
     def gains(*positions: str) -> tuple[float, float, float]:
         found = angle_gains(dict.fromkeys(positions, 1.0 / len(positions)), "x")
         return found.fixture, found.table, found.mounting

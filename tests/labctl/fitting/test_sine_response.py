@@ -98,7 +98,7 @@ def model(k_squared: float, scale: float = 1e-3) -> FittedModel:
 
 
 @pytest.mark.parametrize("k_squared", [0.0, 1e-9, 0.01, 0.04, -0.01])
-def test_its_inverse_is_exact(k_squared: float) -> None:
+def test_the_sine_response_is_inverted_exactly(k_squared: float) -> None:
     fitted = model(k_squared)
     rate = np.linspace(-400, 400, 1001)
     channels = Channels({"temperature_c": np.full(len(rate), 20.0)}, {"z": rate})

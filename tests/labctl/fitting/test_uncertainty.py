@@ -77,7 +77,7 @@ def test_it_is_the_spread_of_what_drawn_coefficients_give(
     assert np.std(found) == pytest.approx(expected, rel=0.12)
 
 
-def test_it_grows_outside_and_says_so(make_points: Callable[..., Recording], grid_11_by_11: Any) -> None:
+def test_uncertainty_grows_outside_the_range(make_points: Callable[..., Recording], grid_11_by_11: Any) -> None:
     calibration = calibrated(make_points, grid_11_by_11, "ojeda2000")
     inside, outside = (uncertainty_of(calibration, 0.0, warm)["z"] for warm in (35.0, 80.0))
     assert inside.coefficients_dps is not None

@@ -13,7 +13,7 @@ import pytest
 from instruments.clock import VirtualClock
 from labctl.answers.campaigns import CampaignResponse, ResumeRequest, StartRequest
 from labctl.errors import StoreError
-from labctl.log.campaign_journal import LoggedJournal
+from labctl.log.logged_journal import LoggedJournal
 from labctl.log.setup import running_log
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
@@ -120,7 +120,7 @@ def test_a_campaign_that_is_interrupted_and_resumed(tmp_path: Path) -> None:
     assert up["reason"].startswith("resumed by Ada")
 
 
-def test_a_journal_that_refuses_is_told_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_journal_is_logged_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the database cannot say why a campaign ended, the log does."""
 
     def refuse(*_: object) -> None:
@@ -139,7 +139,7 @@ def test_a_journal_that_refuses_is_told_once(tmp_path: Path, monkeypatch: pytest
     assert (refused["level"], refused["campaign"], refused["error"]) == ("error", 1, "the disk is full")
 
 
-def test_what_is_begun_again_says_so(tmp_path: Path) -> None:
+def test_a_repeated_step_is_logged_as_repeated(tmp_path: Path) -> None:
     plan = make_plan(load_recipe("short"), limits_of(load_bench("single-axis-sim")), clip=False)
     clock = VirtualClock()
     with logged(tmp_path) as records:

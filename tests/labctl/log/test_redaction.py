@@ -77,7 +77,7 @@ def test_a_path_is_no_address_and_a_short_password_is_no_word() -> None:
         "/dev/serial/by-id/usb-FTDI:port@1",
     ],
 )
-def test_what_is_no_secret_stays(text: str) -> None:
+def test_text_without_a_secret_is_unchanged(text: str) -> None:
     assert Redaction().text(text) == text
 
 

@@ -104,7 +104,7 @@ def test_an_output_that_does_not_block_gets_everything_once_it_takes_it(pipe: tu
     assert (len(lines), writer.lost) == (40, 0)
 
 
-def test_what_was_lost_is_told_once(pipe: tuple[int, int]) -> None:
+def test_lost_lines_are_reported_once(pipe: tuple[int, int]) -> None:
     reading, writing = pipe
     writer = LogWriter(writing, notes=lambda lost: [f"{lost} lost"] if lost else [], notes_every_s=0.01)
     writer.lost = 3

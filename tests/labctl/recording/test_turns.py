@@ -104,7 +104,7 @@ def test_means_of_turns_need_their_length() -> None:
     assert found["table_rate_dps"].tolist() == [0.0, 72.0]
 
 
-def test_a_long_turn_is_taken_whole() -> None:
+def test_a_long_turn_is_not_divided() -> None:
     """A rest through which the temperature moves is taken in pieces; a piece of a turn would be no known angle."""
     rng = np.random.default_rng(2)
     slow = measured(rng, Unit.drawn(rng), 0.01, 1, 36000.0, rate_hz=2.0)

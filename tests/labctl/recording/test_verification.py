@@ -91,7 +91,7 @@ def test_it_is_left_out_of_several_recordings_too(recording: Recording) -> None:
     assert np.abs(joined.columns["gyro_x"][np.asarray(joined.columns["table_rate_dps"]) == 0]).max() < 1.0
 
 
-def test_its_parts_are_all_of_it(recording: Recording) -> None:
+def test_verification_and_fitted_parts_cover_a_recording(recording: Recording) -> None:
     aside = verification_part(recording)
     assert aside is not None
     assert len(aside) + len(fitted_part(recording)) == len(recording)
@@ -137,7 +137,7 @@ def test_a_wrong_mark_is_named(recording: Recording, tmp_path: Path, change: Any
         read_recording(tmp_path / "out")
 
 
-def test_a_campaign_marks_it(tmp_path: Path) -> None:
+def test_a_campaign_marks_its_verification_part(tmp_path: Path) -> None:
     bench = resolve(read_bench("servo-sim"))
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         prepared = prepare(store, RECIPE, bench, VirtualClock(), clip=False)

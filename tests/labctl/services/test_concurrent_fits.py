@@ -56,7 +56,7 @@ def test_a_number_that_was_taken_meanwhile_is_not_taken_twice(store: Store) -> N
     assert [row.subject for row in store.audit.rows() if row.action == "fit"] == ["G-1 version 1", "G-1 version 2"]
 
 
-def test_others_that_are_always_quicker_end_it(store: Store) -> None:
+def test_a_fit_ends_when_other_fits_keep_taking_its_number(store: Store) -> None:
     def slow(version: int) -> NewCalibration:
         store.calibrations.add("G-1", AT, version, calibration(version))
         return calibration(version)

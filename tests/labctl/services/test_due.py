@@ -205,7 +205,7 @@ def test_a_span_of_time(text: str, days: float) -> None:
 
 
 @pytest.mark.parametrize("text", ["30", "d", "-1d", "1.5d", "1y", "٣d", "9999999d"])
-def test_a_span_that_is_none(text: str) -> None:
+def test_a_malformed_time_span_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match=r"due_within .*30d"):
         span(text)
 

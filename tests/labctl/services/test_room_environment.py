@@ -101,7 +101,7 @@ def test_a_certificate_states_the_room_while_its_campaign_ran(measured: Store) -
         ({"pressure": (1.0, "kPa")}, "is outside 500 to 1200 hPa"),
     ],
 )
-def test_what_no_room_has_is_refused(tmp_path: Path, values: dict[str, tuple[float, str]], said: str) -> None:
+def test_implausible_room_values_are_refused(tmp_path: Path, values: dict[str, tuple[float, str]], said: str) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         with pytest.raises(BadInput, match=said):
             add(store, AT, **values)

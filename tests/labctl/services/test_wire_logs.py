@@ -104,7 +104,7 @@ def test_a_check_of_a_bench_is_recorded_and_replayed(tmp_path: Path) -> None:
     assert answer["requests"] > 10
 
 
-def test_the_command_says_what_came_of_it(tmp_path: Path) -> None:
+def test_the_replay_command_prints_its_result(tmp_path: Path) -> None:
     lab = Lab(tmp_path)
     assert "equal to those of the session, bit for bit" in lab.run("replay", str(ONE)).stdout
     assert [each["id"] for each in lab.json("campaign", "list")] == [1]  # with --database it is kept

@@ -40,7 +40,7 @@ def standing() -> FakeStopping:
     return stopping
 
 
-def test_it_shows_what_runs_and_stops_it(standing: FakeStopping) -> None:
+def test_the_page_shows_the_campaign_and_stops_it(standing: FakeStopping) -> None:
     asked: list[StopRequest] = []
     with page(PageAccess(HOSTS), standing, asked) as http:
         shown = http.get("/bench")
@@ -57,7 +57,7 @@ def test_it_shows_what_runs_and_stops_it(standing: FakeStopping) -> None:
     ]
 
 
-def test_a_table_that_goes_on_is_said_to_go_on(standing: FakeStopping) -> None:
+def test_a_table_that_does_not_stop_is_reported(standing: FakeStopping) -> None:
     standing.stands, standing.text = False, "table to rest: no answer"
     with page(PageAccess(HOSTS), standing, []) as http:
         said = http.post("/api/stop")

@@ -59,7 +59,7 @@ def tamper(location: str, *statements: str) -> None:
     raw.close()
 
 
-def test_a_trail_that_nobody_touched_is_whole(store: Store) -> None:
+def test_an_untouched_audit_trail_verifies(store: Store) -> None:
     assert store.audit.first_broken() is None
     answer = verify_audit(store)
     assert (answer.ok, answer.rows) == (True, 6)
@@ -147,7 +147,7 @@ def test_rows_of_before_the_head_get_one(location: str) -> None:
         assert (head.length, head.hash) == (1, first)
 
 
-def test_a_campaign_leaves_its_story(location: str) -> None:
+def test_a_campaign_is_recorded_in_the_audit_trail(location: str) -> None:
     with open_store(location, write=True) as store:
         with acting(Actor("A. Person", "key")):
             prepared = prepare(store, "short", load_bench("single-axis-sim"), VirtualClock(), clip=False)

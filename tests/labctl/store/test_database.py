@@ -133,7 +133,7 @@ def test_something_else_is_refused(location: str) -> None:
         pass
 
 
-def test_a_second_writer_is_told_who_holds_it(location: str) -> None:
+def test_a_second_writer_gets_the_holder_in_the_error(location: str) -> None:
     with open_store(location, write=True, address=ServiceAddress("http://127.0.0.1:1")) as store:
         holder = holder_of(location)
         assert holder is not None

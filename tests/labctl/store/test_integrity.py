@@ -179,7 +179,7 @@ def test_something_else_is_no_database(location: str) -> None:
     assert "file: " in labctl(location, "check", status=1).stdout
 
 
-def test_where_there_is_nothing_nothing_is_made(tmp_path: Path) -> None:
+def test_a_missing_database_is_not_created(tmp_path: Path) -> None:
     missing = str(tmp_path / "nothing.sqlite")
     assert "there is no such file" in labctl(missing, "check", status=2).stderr
     assert "there is no such file" in labctl(missing, "backup", str(tmp_path / "copy"), status=2).stderr

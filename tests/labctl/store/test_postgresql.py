@@ -94,7 +94,7 @@ def test_a_campaign_leaves_the_same_rows_as_in_a_file(url: str, tmp_path: Path) 
         assert on_server[name] == in_file[name], name
 
 
-def test_the_tables_are_what_the_code_declares(url: str) -> None:
+def test_the_migrated_tables_match_the_declared_ones(url: str) -> None:
     from alembic.autogenerate import compare_metadata
     from alembic.migration import MigrationContext
 
@@ -202,7 +202,7 @@ def test_a_commit_that_was_not_answered_is_made_once(url: str, monkeypatch: pyte
         assert subjects(store) == ["row 1"]
 
 
-def test_a_server_that_stays_away_is_told(cluster: Cluster, url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unreachable_server_is_reported(cluster: Cluster, url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(postgresql_server, "WRITER_PATIENCE_S", 0.2)
     with open_store(url, write=True) as store:
         cluster.stop()

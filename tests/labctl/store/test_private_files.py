@@ -29,7 +29,7 @@ def mode(path: Path) -> int:
 
 
 @pytest.mark.usefixtures("umask")
-def test_a_database_and_all_beside_it(tmp_path: Path) -> None:
+def test_a_database_and_its_side_files_are_private(tmp_path: Path) -> None:
     location = tmp_path / "lab.sqlite"
     with open_store(str(location), write=True) as store, open_store(str(location), write=False) as reader:
         store.audit.record(AT, "fit", "unit G-1", {})

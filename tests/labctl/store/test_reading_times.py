@@ -53,7 +53,7 @@ def blocks(path: Path) -> list[dict[str, Any]]:
         return [sample_codec.unpack(sample_codec.Block(*row)) for row in raw.execute(query)]
 
 
-def test_they_are_kept_and_cost_little(path: Path) -> None:
+def test_reading_times_are_stored_compactly(path: Path) -> None:
     found = blocks(path)
     stored = join_blocks(found)
     assert stored["device_ns"].dtype == np.int64

@@ -50,7 +50,7 @@ def test_a_question_can_be_taken_back() -> None:
         person.confirm("1", by="Ada")
 
 
-def test_a_hand_does_at_once_what_is_asked(rig: Any) -> None:
+def test_a_unit_handler_answers_a_prompt_at_once(rig: Any) -> None:
     unit_handler = UnitHandlerOperator(rig.unit_handler)
     for kind in ("mount", "power_on", "power_off"):
         prompt = Prompt("1", kind, "", "-x")  # type: ignore[arg-type]  a loop over the three literals

@@ -310,7 +310,7 @@ def test_a_person_who_declines_ends_the_campaign(rig: Any) -> None:
     assert "the cube is hot" in outcome.reason
 
 
-def test_nobody_answers(rig: Any) -> None:
+def test_a_campaign_fails_when_a_prompt_times_out(rig: Any) -> None:
     rig.operator = HumanOperator()
     outcome = rig.run(rig.recipe(on_failure={"operator_timeout_s": 900}))
     assert outcome.state == CampaignState.FAILED

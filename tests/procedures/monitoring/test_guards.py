@@ -24,7 +24,7 @@ def test_every_guard_has_a_case_here() -> None:
     assert {case[0] for case in TRIPS} == set(CHECKS)
 
 
-def test_nothing_trips_when_all_is_well(guards: Guards) -> None:
+def test_no_guard_trips_in_normal_conditions(guards: Guards) -> None:
     assert guards.check(WELL) == []
 
 

@@ -69,7 +69,7 @@ def judged(
         ({}, 360, "x", "the unit turned by only 0 deg about axis x instead of 360 deg"),
     ],
 )
-def test_what_came_out_is_said(turned: dict[str, float], asked: float, position: str, said: str) -> None:
+def test_a_turn_is_judged_by_its_angle(turned: dict[str, float], asked: float, position: str, said: str) -> None:
     found = judged(turned, asked, position)
     assert found.refused == said
     sign = -1.0 if position.startswith("-") else 1.0

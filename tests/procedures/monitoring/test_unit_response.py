@@ -57,7 +57,7 @@ def test_a_unit_in_another_mode_or_place_is_found_in_the_second_data_set(output:
     assert advice in second
 
 
-def test_what_cannot_tell_is_not_judged() -> None:
+def test_rates_outside_the_judged_range_are_not_judged() -> None:
     silent = {"z": 0.0}
     assert complaints("z", (0.0, silent), (4.0, silent)) == ["", ""]  # slower than a drift may be
     assert complaints("z", (0.0, silent), (500.0, silent)) == ["", ""]  # beyond the range of the unit

@@ -38,7 +38,7 @@ def test_it_is_that_of_a_first_order_lag(way_c: float, ramp: float, band_c: floa
     assert move_s(way_c, ramp, band_c, tau_s) == pytest.approx(solved_s(way_c, ramp, band_c, tau_s), rel=0.01)
 
 
-def test_the_limits_of_it() -> None:
+def test_move_time_in_limiting_cases() -> None:
     assert move_s(0.4, 1.0, 0.5) == 0.0
     assert move_s(40.0, math.inf, 0.5) == 0.0
     # air that hardly lags is in its band at the end of the ramp

@@ -153,7 +153,7 @@ def test_the_informative_recipe_is_what_it_promises(limits: BenchLimits) -> None
     assert [step.kind for step in plan.steps[off : off + 3]] == ["power_off", "power_on", "soak"]
 
 
-def test_whole_turns_where_they_fit(limits: BenchLimits) -> None:
+def test_fast_data_sets_last_whole_turns(limits: BenchLimits) -> None:
     for step in acquires(make_plan(read_recipe("informative"), limits)):
         turns = abs(step.rate_dps) * step.duration_s / 360
         if abs(step.rate_dps) >= 6:

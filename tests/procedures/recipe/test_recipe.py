@@ -13,7 +13,7 @@ from procedures.recipe.recipe import Recipe, parse_recipe, read_recipe, shipped_
 GOOD = 'name = "a"\ntemperatures_c = [20]\nrates_dps = [0, 10]\npositions = ["z"]\n'
 
 
-def test_what_ships() -> None:
+def test_shipped_recipes_are_listed() -> None:
     assert set(shipped_recipes()) >= {
         "table1-x-table2",
         "yang-23-rates",
@@ -98,7 +98,7 @@ def test_a_file_is_read_by_path(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_is_said_in_one_line(text: str, words: list[str]) -> None:
     with pytest.raises(RecipeError) as caught:
-        parse_recipe(text, where="mine.toml")
+        parse_recipe(text, source="mine.toml")
     message = str(caught.value)
     assert message.startswith("mine.toml: ")
     assert "\n" not in message

@@ -143,8 +143,8 @@ def withdraw(
     if as_json:
         print_json(answer)
         return
-    said = f"certificate {answer.number} of {answer.serial} version {answer.version} is {state_text(answer)}"
-    console.print(said, soft_wrap=True)
+    text = f"certificate {answer.number} of {answer.serial} version {answer.version} is {state_text(answer)}"
+    console.print(text, soft_wrap=True)
 
 
 def _say_state(answer: CertificateResponse) -> None:
@@ -152,8 +152,8 @@ def _say_state(answer: CertificateResponse) -> None:
     from labctl.cli.printing.certificates import state_text
 
     if answer.state != "valid":
-        said = f"labctl: certificate {answer.number} is {state_text(answer)}"
-        stderr.print(said, style="bold red", soft_wrap=True)
+        text = f"labctl: certificate {answer.number} is {state_text(answer)}"
+        stderr.print(text, style="bold red", soft_wrap=True)
 
 
 def read_order(path: Path | None) -> CertificateOrder:
@@ -173,7 +173,7 @@ def read_order(path: Path | None) -> CertificateOrder:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: not TOML ({error}); correct it") from error
     except ValidationError as error:
-        said = listed(
+        text = listed(
             f"{'.'.join(map(str, each['loc']))} = {shown(each['input'])}: {each['msg']}" for each in error.errors()
         )
-        raise BadInput(f"{path}: {said}; correct it (docs/how-to/certificates.md lists the keys)") from error
+        raise BadInput(f"{path}: {text}; correct it (docs/how-to/certificates.md lists the keys)") from error

@@ -102,8 +102,8 @@ def _print(file: Path, answer: VerifiedFileResponse) -> None:
         )
     if answer.signatures:
         console.print(_signer(answer), soft_wrap=True)
-    for each in answer.signatures:
-        console.print(_signature(each), soft_wrap=True)
+    for signature in answer.signatures:
+        console.print(_signature(signature), soft_wrap=True)
     if not answer.signatures:
         console.print("no signature", soft_wrap=True)
 
@@ -115,11 +115,15 @@ def _signer(answer: VerifiedFileResponse) -> str:
     return f"{signer}; any signer is accepted, because --signer names none"
 
 
-def _signature(found: SignatureResponse) -> str:
-    signer = "" if found.signed_by is None else f" by {found.signed_by.subject} ({found.signed_by.fingerprint[:16]})"
-    if not found.valid:
-        return f"{found.form} signature{signer}: NOT VALID: {found.problem}"
-    at = "" if found.signed_at is None else f", {found.signed_at:%Y-%m-%d %H:%M} UTC as the signer states"
-    trust = found.reason if found.trust == "not established" else f"{found.trust}: {found.reason}"
-    other = "; NOT BY AN EXPECTED SIGNER" if found.expected is False else ""
-    return f"{found.form} signature{signer}: valid{at}; {trust}{other}"
+def _signature(signature: SignatureResponse) -> str:
+    signer = (
+        ""
+        if signature.signed_by is None
+        else f" by {signature.signed_by.subject} ({signature.signed_by.fingerprint[:16]})"
+    )
+    if not signature.valid:
+        return f"{signature.form} signature{signer}: NOT VALID: {signature.problem}"
+    at = "" if signature.signed_at is None else f", {signature.signed_at:%Y-%m-%d %H:%M} UTC as the signer states"
+    trust = signature.reason if signature.trust == "not established" else f"{signature.trust}: {signature.reason}"
+    other = "; NOT BY AN EXPECTED SIGNER" if signature.expected is False else ""
+    return f"{signature.form} signature{signer}: valid{at}; {trust}{other}"

@@ -13,7 +13,7 @@ from labctl.cli.output import console, format_number, print_json, table
 from labctl.cli.stage_line import stage_line
 
 if TYPE_CHECKING:
-    from labctl.services.reproduction.response import NumberResponse, ReproductionResponse
+    from labctl.services.reproduction.answer import NumberResponse, ReproductionResponse
 
 
 def reproduce(
@@ -62,7 +62,7 @@ def reproduce(
 
 
 def _print(answer: ReproductionResponse) -> None:
-    shown = table(
+    rows = table(
         answer.title,
         "place",
         "quantity",
@@ -75,8 +75,8 @@ def _print(answer: ReproductionResponse) -> None:
         numbers=3,
     )
     for number in answer.numbers:
-        shown.add_row(number.place, number.quantity, number.unit, number.of, number.origin, *_cells(number))
-    console.print(shown)
+        rows.add_row(number.place, number.quantity, number.unit, number.of, number.origin, *_cells(number))
+    console.print(rows)
     for line in answer.story:
         console.print(line)
     for part in answer.missing:

@@ -28,10 +28,13 @@ __all__ = ["VIEWS", "draws_of", "residual_maps", "views_of"]
 
 
 def views_of(
-    comparison: Comparison, left: Mapping[str, Residuals], recording: Recording, catalogue: Mapping[str, Effect]
+    comparison: Comparison,
+    axis_residuals: Mapping[str, Residuals],
+    recording: Recording,
+    catalogue: Mapping[str, Effect],
 ) -> Views:
     """Return all views of a criticism: lists of records, one or more for each axis, of plain numbers without NaN."""
-    axes = [axis_view(comparison, axis, residuals) for axis, residuals in left.items()]
+    axes = [axis_view(comparison, axis, residuals) for axis, residuals in axis_residuals.items()]
     channels = [line for view in axes for line in channel_lines(view)]
     angle, frequency, start = _within(axes, recording)
     return {
@@ -40,7 +43,7 @@ def views_of(
         "time": [time_line(view) for view in axes],
         "frequency": [line for view in axes if (line := between_sets(view)) is not None],
         "legs": [line for view in axes for line in hysteresis_lines(view)],
-        "previous_rate": [found for view in axes if (found := previous_rate(view)) is not None],
+        "previous_rate": [rate_before for view in axes if (rate_before := previous_rate(view)) is not None],
         "repeats": [again for view in axes if (again := repeats(view)) is not None],
         "angle": angle,
         "frequency_within": frequency,

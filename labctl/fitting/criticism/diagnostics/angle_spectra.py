@@ -72,14 +72,14 @@ def angle_lines(within: Within, residual: Residual, axis: str) -> list[AngleSpec
 
 def _stepper(within: Within, residual: Residual, count: NDArray[np.int64]) -> list[AngleLine]:
     """Return the amplitude of the lines that were taken out, RMS over the data sets that show them."""
-    found: list[AngleLine] = []
+    spectral_lines: list[AngleLine] = []
     for k, cycles in enumerate(STEP_LINES):
         pair = residual.lines[2 * k : 2 * k + 2]
-        shown = np.any(within.basis[1 + 2 * k : 3 + 2 * k], axis=(0, 2))
-        if shown.any():
-            squared = 2 * (pair**2).sum(axis=0)[shown] / count[shown]
-            found.append({"cycles_per_turn": cycles, "amplitude_dps": plain(np.sqrt(squared.mean()))})
-    return found
+        is_shown = np.any(within.basis[1 + 2 * k : 3 + 2 * k], axis=(0, 2))
+        if is_shown.any():
+            squared = 2 * (pair**2).sum(axis=0)[is_shown] / count[is_shown]
+            spectral_lines.append({"cycles_per_turn": cycles, "amplitude_dps": plain(np.sqrt(squared.mean()))})
+    return spectral_lines
 
 
 def _hann(count: NDArray[np.int64], n: int) -> NDArray[np.float64]:
@@ -129,7 +129,7 @@ def start_profile(within: Within, residual: Residual, axis: str) -> list[StartPr
     time = np.add.reduceat((seconds * there).sum(axis=0), edges) / np.maximum(
         np.add.reduceat(there.sum(axis=0), edges), 1.0
     )
-    found: StartProfile = {
+    profile: StartProfile = {
         "axis": axis,
         "datasets": len(step),
         "since_s": plain_list(time),
@@ -137,6 +137,6 @@ def start_profile(within: Within, residual: Residual, axis: str) -> list[StartPr
         "band_dps": plain_list(BAND * residual.spread_dps / np.sqrt(total)),
     }
     if np.any(step):
-        found["per_step"] = plain_list((step[:, None] * sums).sum(axis=0) / size)
-        found["per_step_band"] = plain_list(BAND * residual.spread_dps / np.sqrt(size))
-    return [found]
+        profile["per_step"] = plain_list((step[:, None] * sums).sum(axis=0) / size)
+        profile["per_step_band"] = plain_list(BAND * residual.spread_dps / np.sqrt(size))
+    return [profile]

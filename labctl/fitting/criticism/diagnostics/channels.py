@@ -92,7 +92,7 @@ def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> DataSetColumn
     if "previous_rate_dps" in data.nodes:
         names.add("previous_rate_dps")
     name, along = time_axis(first)
-    found: DataSetColumns = {
+    set_columns: DataSetColumns = {
         "of": len(first),
         "timed": first.timed,
         "dataset": data.dataset[rows].tolist(),
@@ -104,9 +104,9 @@ def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> DataSetColumn
         "over_floor": {view.axis: plain_list(view.over_floor[rows]) for view in axes},
     }
     if RECORDING in data.nodes:
-        found["recording"] = _numbers(first.channel(RECORDING)[rows])
-        found["own_dataset"] = _numbers(first.channel(OWN_DATASET)[rows])
-    return found
+        set_columns["recording"] = _numbers(first.channel(RECORDING)[rows])
+        set_columns["own_dataset"] = _numbers(first.channel(OWN_DATASET)[rows])
+    return set_columns
 
 
 def _numbers(values: Array) -> list[int]:
@@ -125,11 +125,11 @@ def channel_lines(view: AxisView) -> Iterator[ChannelLine]:
         if name not in {"t_s", "table_rate_dps"}:
             yield _channel_line(view, name, running_mean(view, view.channel(name), everywhere))
     position, rate = view.position(), view.channel("table_rate_dps")
-    for there in np.unique(position):
-        here = position == there
+    for up_position in np.unique(position):
+        here = position == up_position
         if np.ptp(rate[here]) > 0:
             line = _channel_line(view, "table_rate_dps", running_mean(view, rate, here))
-            line["position"] = str(there)
+            line["position"] = str(up_position)
             yield line
 
 
@@ -140,12 +140,12 @@ def _channel_line(view: AxisView, channel: str, mean: MeanLine) -> ChannelLine:
     }  # fmt: skip
 
 
-def running_mean(view: AxisView, values: Array, here: NDArray[np.bool_]) -> MeanLine:
-    """Return the mean residual along a channel (m,), where `here`, with a 95 % band that includes the drift.
+def running_mean(view: AxisView, values: Array, inside: NDArray[np.bool_]) -> MeanLine:
+    """Return the mean residual along a channel (m,), where `inside`, with a 95 % band that includes the drift.
 
     A channel of few levels has a point for each; another a running mean.
     """
-    rows = np.flatnonzero(here)
+    rows = np.flatnonzero(inside)
     groups = [rows[group] for group in groups_of(values[rows])]
     weights = np.zeros((len(groups), len(view)))
     for k, group in enumerate(groups):
@@ -197,7 +197,7 @@ def time_line(view: AxisView) -> TimeLine:
     _, along = time_axis(view)
     line = running_mean(view, along, np.ones(len(view), dtype=bool))
     z, p = runs_test(view.whitened)
-    found: TimeLine = {
+    line_json: TimeLine = {
         "axis": view.axis,
         "mean_dps": line["mean_dps"],
         "low_dps": line["low_dps"],
@@ -209,10 +209,10 @@ def time_line(view: AxisView) -> TimeLine:
         "runs_p": plain(p),
     }
     if view.timed:
-        found["t_s"], found["power_on_t_s"] = line["at"], plain_list(along[begins])
+        line_json["t_s"], line_json["power_on_t_s"] = line["at"], plain_list(along[begins])
     else:
-        found["order"], found["power_on_order"] = line["at"], plain_list(along[begins])
-    return found
+        line_json["order"], line_json["power_on_order"] = line["at"], plain_list(along[begins])
+    return line_json
 
 
 def runs_test(values: Array) -> tuple[float, float]:

@@ -28,12 +28,12 @@ def between_sets(view: AxisView) -> BetweenSets | None:
         return None
     hz = np.geomspace(lowest, highest, POINTS)
     waves = np.exp(-2j * np.pi * hz[:, None] * (t_s - t_s[0])[None, :])
-    taken = _taken_off(view.residual_dps, waves)
+    waves_removed = _taken_off(view.residual_dps, waves)
     noise = np.einsum("fm,fm->f", waves @ view.covariance, waves.conj()).real
     return {
         "axis": view.axis,
         "per_hour": plain_list(3600.0 * hz),
-        "amplitude_dps": plain_list(np.sqrt(2 * np.maximum(taken, 0.0) / len(view))),
+        "amplitude_dps": plain_list(np.sqrt(2 * np.maximum(waves_removed, 0.0) / len(view))),
         "noise_dps": plain_list(2 * np.sqrt(np.maximum(noise, 0.0)) / len(view)),
     }
 

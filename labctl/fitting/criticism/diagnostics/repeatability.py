@@ -40,12 +40,15 @@ def hysteresis_states(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[n
 
 def hysteresis_lines(view: AxisView) -> Iterator[LegLine]:
     """Yield the residual reached from below minus that from above at equal rate and temperature, deg/s, by channel."""
-    warm, rate = view.temperature_c(), view.channel("table_rate_dps")
-    side = hysteresis_states(warm, view.run)
-    ups, downs = _matched(view, side, warm, rate)
+    temperature_c, rate = view.temperature_c(), view.channel("table_rate_dps")
+    side = hysteresis_states(temperature_c, view.run)
+    ups, downs = _matched(view, side, temperature_c, rate)
     if not len(ups):
         return
-    for name, values in (("temperature_c", (warm[ups] + warm[downs]) / 2), ("table_rate_dps", rate[ups])):
+    for name, values in (
+        ("temperature_c", (temperature_c[ups] + temperature_c[downs]) / 2),
+        ("table_rate_dps", rate[ups]),
+    ):
         groups = groups_of(values)
         weights = np.zeros((len(groups), len(view)))
         for k, group in enumerate(groups):
@@ -65,7 +68,7 @@ def hysteresis_lines(view: AxisView) -> Iterator[LegLine]:
 
 
 def _matched(
-    view: AxisView, side: NDArray[np.int64], warm: Array, rate: Array
+    view: AxisView, side: NDArray[np.int64], temperature_c: Array, rate: Array
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return data sets reached from below, each with the one from above that is nearest at its rate and position."""
     position, near = view.position(), REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
@@ -74,8 +77,8 @@ def _matched(
     for i in np.flatnonzero(side > 0) if len(down) else ():
         same = down[(position[down] == position[i]) & (np.abs(rate[down] - rate[i]) <= near)]
         if len(same):
-            nearest = same[np.argmin(np.abs(warm[same] - warm[i]))]
-            if abs(warm[nearest] - warm[i]) <= SAME_TEMPERATURE_K:
+            nearest = same[np.argmin(np.abs(temperature_c[same] - temperature_c[i]))]
+            if abs(temperature_c[nearest] - temperature_c[i]) <= SAME_TEMPERATURE_K:
                 ups.append(i)
                 downs.append(nearest)
     return np.array(ups, dtype=np.int64), np.array(downs, dtype=np.int64)
@@ -87,14 +90,14 @@ def repeats(view: AxisView) -> Repeats | None:
     The floor is what noise gives two data sets that far apart in time: drift moves neighbours alike. `apart_s` is
     there only where times are known.
     """
-    warm, rate, position = view.temperature_c(), view.channel("table_rate_dps"), view.position()
+    temperature_c, rate, position = view.temperature_c(), view.channel("table_rate_dps"), view.position()
     near = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
-    order = np.lexsort((warm, np.round(rate / near), position))
+    order = np.lexsort((temperature_c, np.round(rate / near), position))
     first, second = order[:-1], order[1:]
     close = (
         (position[first] == position[second])
         & (np.abs(rate[first] - rate[second]) <= near)
-        & (np.abs(warm[first] - warm[second]) <= REPEAT_TEMPERATURE_C)
+        & (np.abs(temperature_c[first] - temperature_c[second]) <= REPEAT_TEMPERATURE_C)
     )
     first, second = first[close], second[close]
     if not len(first):
@@ -105,20 +108,22 @@ def repeats(view: AxisView) -> Repeats | None:
     floor = float(np.sqrt(np.mean(expected) / 2))
     scatter = float(np.sqrt(np.mean(difference**2) / 2))
     everything = np.arange(len(first))
-    shown = everything if len(first) <= MOST_PAIRS else np.sort(np.argsort(difference)[_evenly(len(first), MOST_PAIRS)])
-    found: Repeats = {
+    pairs_shown = (
+        everything if len(first) <= MOST_PAIRS else np.sort(np.argsort(difference)[_evenly(len(first), MOST_PAIRS)])
+    )
+    repeats_json: Repeats = {
         "axis": view.axis,
         "pairs": len(first),
         "scatter_dps": plain(scatter),
         "floor_dps": plain(floor),
         "over_floor": plain(scatter / floor) if floor > 0 else None,
-        "datasets": [[int(a), int(b)] for a, b in view.data.dataset[np.stack([first, second], axis=1)[shown]]],
-        "apart_sets": np.abs(second - first)[shown].tolist(),
-        "difference_dps": plain_list(difference[shown]),
+        "datasets": [[int(a), int(b)] for a, b in view.data.dataset[np.stack([first, second], axis=1)[pairs_shown]]],
+        "apart_sets": np.abs(second - first)[pairs_shown].tolist(),
+        "difference_dps": plain_list(difference[pairs_shown]),
     }
     if view.timed:
-        found["apart_s"] = plain_list(np.abs(view.t_s[second] - view.t_s[first])[shown])
-    return found
+        repeats_json["apart_s"] = plain_list(np.abs(view.t_s[second] - view.t_s[first])[pairs_shown])
+    return repeats_json
 
 
 def _evenly(n: int, most: int) -> NDArray[np.int64]:

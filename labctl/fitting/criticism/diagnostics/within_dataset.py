@@ -58,19 +58,19 @@ class Within:
         values = values - self._earth(values, axis)
         spread = 1.4826 * float(np.median(np.abs(values[self.there > 0])))
         inside = np.abs(values) <= OUTLIER * spread
-        kept = (self.there * inside).sum(axis=1)
+        n_inside = (self.there * inside).sum(axis=1)
         # where most readings are equal, as of a coarse output, the usual spread says nothing of the others
-        inside |= (kept < LEAST_KEPT * self.there.sum(axis=1))[:, None]
+        inside |= (n_inside < LEAST_KEPT * self.there.sum(axis=1))[:, None]
         return Residual(np.where(inside, values, 0.0), self.there * inside, inner[-1], spread, inner[1:-1])
 
     def _earth(self, values: NDArray[np.float64], axis: str) -> NDArray[np.float64]:
         """Return what once per turn belongs to the Earth's rate, by position: where the latitude is known."""
-        found = np.zeros_like(values)
+        earth_dps = np.zeros_like(values)
         if self.angle is None or self.recording.info.latitude_deg is None:
-            return found
-        for there in np.unique(self.position):
-            rows = np.flatnonzero(self.position == there)
-            if Position.of(there).axis == axis:
+            return earth_dps
+        for up_position in np.unique(self.position):
+            rows = np.flatnonzero(self.position == up_position)
+            if Position.of(up_position).axis == axis:
                 continue
             waves = np.stack([np.cos(2 * np.pi * self.angle[rows]), np.sin(2 * np.pi * self.angle[rows])])
             waves = waves * self.there[rows]
@@ -78,8 +78,8 @@ class Within:
             waves = waves - np.einsum("rkm,rmn->kmn", inner, self.basis[:, rows])
             normal = np.einsum("kmn,lmn->kl", waves, waves)
             size = np.linalg.lstsq(normal, np.einsum("kmn,mn->k", waves, values[rows]), rcond=1e-9)[0]
-            found[rows] = np.einsum("k,kmn->mn", size, waves)
-        return found
+            earth_dps[rows] = np.einsum("k,kmn->mn", size, waves)
+        return earth_dps
 
 
 @dataclass(frozen=True)
@@ -125,19 +125,19 @@ def within_of(recording: Recording) -> Within | None:
 
 
 def _basis(
-    there: NDArray[np.float64], since: NDArray[np.float64], angle: NDArray[np.float64] | None
+    presence: NDArray[np.float64], since: NDArray[np.float64], angle: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
     turn = 2 * np.pi * angle if angle is not None else np.zeros_like(since)
     lines = [wave(k * turn) for k in STEP_LINES for wave in (np.cos, np.sin)]
-    functions = [there, *lines, since]
-    found = np.zeros((len(functions), *there.shape))
+    functions = [presence, *lines, since]
+    basis = np.zeros((len(functions), *presence.shape))
     for k, function in enumerate(functions):
-        values = function * there
+        values = function * presence
         size = np.sqrt(np.einsum("mn,mn->m", values, values))
         for _ in range(2):
-            inner = np.einsum("rmn,mn->rm", found[:k], values)
-            values = values - np.einsum("rm,rmn->mn", inner, found[:k])
-        left = np.sqrt(np.einsum("mn,mn->m", values, values))
-        independent = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
-        found[k] = np.where(independent[:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
-    return found
+            inner = np.einsum("rmn,mn->rm", basis[:k], values)
+            values = values - np.einsum("rm,rmn->mn", inner, basis[:k])
+        norm = np.sqrt(np.einsum("mn,mn->m", values, values))
+        independent = norm > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+        basis[k] = np.where(independent[:, None], values / np.maximum(norm, 1e-300)[:, None], 0.0)
+    return basis

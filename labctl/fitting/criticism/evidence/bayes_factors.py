@@ -74,14 +74,14 @@ def evidence(
     log_all = float(np.logaddexp.reduce(log_p))
     total = np.logaddexp.reduce(log_p[:, None] + log_bf, axis=0) - log_all
     best = int(np.argmax(log_p))
-    left = WhitenedBase(design, means.white_var, noises[best]).eliminate_from(everything[0], others)
+    eliminated = WhitenedBase(design, means.white_var, noises[best]).eliminate_from(everything[0], others)
     competes = [
-        _is_of_base(option) or visible_share(left, where) >= LEAST_COMPETING
-        for option, where in zip(design.options, slices, strict=True)
+        _is_of_base(option) or visible_share(eliminated, option_rows) >= LEAST_COMPETING
+        for option, option_rows in zip(design.options, slices, strict=True)
     ]
     return AxisEvidence(
         np.where((k[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
-        left,
+        eliminated,
         gain[best], k[best], slices, np.exp(log_p - log_all), noises, rows,
         int((design.precision == 0).sum()),
         float(log_all + 0.5 * np.log(design.precision[design.precision > 0]).sum()),

@@ -20,8 +20,8 @@ from labctl.fitting.numeric.arrays import Array
 
 def stack(rows: NDArray[np.float64], scale: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the coordinates besides the means, (rows, k), over their scale (R, m): each present one is a row."""
-    kept = present[1:]
-    return rows[1:][kept] / scale[1:][kept][:, None]
+    present_after = present[1:]
+    return rows[1:][present_after] / scale[1:][present_after][:, None]
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class MeansByNoise:
     ) -> MeansByNoise:
         """Return the products of `means` (m, k), the options' columns and the data, at each noise."""
         options = OptionPairs.of(slices)
-        found: dict[Noise, MeanProducts] = {}
+        products: dict[Noise, MeanProducts] = {}
         for tau_s in dict.fromkeys(noise.tau_s for noise in noises):
             modes = DriftModes.of(tau_s, white_var, design.t_s, design.run)
             here = [noise for noise in noises if noise.tau_s == tau_s]
@@ -86,13 +86,13 @@ class MeansByNoise:
             with_data = shares @ (columns * columns[:, -1:])
             for k, noise in enumerate(here):
                 weighted = shares[k][:, None] * base
-                found[noise] = MeanProducts(
+                products[noise] = MeanProducts(
                     noise, log_dets[k], weighted.T @ base, weighted.T @ columns, pairs[k], with_data[k]
                 )
-        return MeansByNoise(white_var, noises, slices, options, [found[noise] for noise in noises])
+        return MeansByNoise(white_var, noises, slices, options, [products[noise] for noise in noises])
 
 
-def gains_by_noise(means: MeansByNoise, others: NonMeanProducts) -> tuple[
+def gains_by_noise(means: MeansByNoise, other_products: NonMeanProducts) -> tuple[
     Array, NDArray[np.float64], NDArray[np.int64]
 ]:  # fmt: skip
     """Return the log likelihood of the base at each noise, and the gains of the options.
@@ -101,12 +101,12 @@ def gains_by_noise(means: MeansByNoise, others: NonMeanProducts) -> tuple[
     options). The same as from `WhitenedBase`, without the inner products between options, which are most of the work.
     """
     left, right = means.options.left, means.options.right
-    own_pairs, own_with_data = others.own[left, right], others.own[:, -1]
+    own_pairs, own_with_data = other_products.own[left, right], other_products.own[:, -1]
     single = means.options.single
     log_p, gain = np.empty(len(means.noises)), np.empty((len(means.noises), len(means.slices)))
     dimensions = np.empty(gain.shape, dtype=np.int64)
     for i, at in enumerate(means.products):
-        crossed, log_det = _projected(at.of_base + others.of_base, at.crossed + others.crossed)
+        crossed, log_det = _projected(at.of_base + other_products.of_base, at.crossed + other_products.crossed)
         data_products = at.with_data + own_with_data - crossed.T @ crossed[:, -1]
         log_p[i] = _log_p(at.noise, at.log_det + log_det, float(data_products[-1]))
         before = at.pairs + own_pairs
@@ -122,8 +122,8 @@ def _projected(of_base: NDArray[np.float64], crossed: NDArray[np.float64]) -> tu
     size = np.sqrt(np.maximum(np.diag(of_base), 1e-300))
     scaled = of_base / np.outer(size, size) + 1e-10 * np.eye(len(size))
     factor = cholesky(scaled, lower=True, check_finite=False)
-    found = solve_triangular(factor, crossed / size[:, None], lower=True, check_finite=False)
-    return found, 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum())
+    projected = solve_triangular(factor, crossed / size[:, None], lower=True, check_finite=False)
+    return projected, 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum())
 
 
 def _log_p(noise: Noise, log_det: float, chi2: float) -> float:
@@ -139,12 +139,15 @@ class WhitenedBase:
         self._blocks, self._log_det = factors(noise, white_var, design.t_s, design.run)
         self._means = whiten(self._blocks, design.base[0])
 
-    def eliminate_from(self, means: NDArray[np.float64], others: NonMeanProducts) -> EliminatedBase:
+    def eliminate_from(self, means: NDArray[np.float64], other_products: NonMeanProducts) -> EliminatedBase:
         """Return what remains of means (m, k), the last of which are the data, beside the base."""
         whitened = whiten(self._blocks, means)
-        of_base, crossed = self._means.T @ self._means + others.of_base, self._means.T @ whitened + others.crossed
+        of_base, crossed = (
+            self._means.T @ self._means + other_products.of_base,
+            self._means.T @ whitened + other_products.crossed,
+        )
         crossed, log_det = _projected(of_base, crossed)
-        before = whitened.T @ whitened + others.own
+        before = whitened.T @ whitened + other_products.own
         gram = before - crossed.T @ crossed
         chi2 = float(gram[-1, -1])
         return EliminatedBase(

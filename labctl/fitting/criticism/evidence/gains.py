@@ -43,12 +43,12 @@ class OptionPairs:
     @staticmethod
     def of(slices: Sequence[slice]) -> OptionPairs:
         """Return the pairs of options whose columns are at these places."""
-        widths = np.array([where.stop - where.start for where in slices], dtype=np.int64)
+        widths = np.array([option_rows.stop - option_rows.start for option_rows in slices], dtype=np.int64)
         groups, left, right, count = [], [], [], 0
         for width in np.unique(widths).tolist():
             options = np.flatnonzero(widths == width)
             here = [slices[i] for i in options.tolist()]
-            columns = np.array([np.arange(where.start, where.stop) for where in here])
+            columns = np.array([np.arange(option_rows.start, option_rows.stop) for option_rows in here])
             i, j = np.triu_indices(width)
             among = np.zeros((width, width), dtype=np.int64)
             among[i, j] = among[j, i] = np.arange(len(i))
@@ -77,44 +77,46 @@ class OptionPairs:
             else:
                 values, vectors = np.linalg.eigh(scaled)
                 inner = np.einsum("oij,oi->oj", vectors, inner)
-            kept = values > LEAST_LEFT
-            gain[group.options] = np.where(kept, inner**2 / np.where(kept, values, 1.0), 0.0).sum(axis=1)
-            dimensions[group.options] = kept.sum(axis=1)
+            is_estimable = values > LEAST_LEFT
+            gain[group.options] = np.where(is_estimable, inner**2 / np.where(is_estimable, values, 1.0), 0.0).sum(
+                axis=1
+            )
+            dimensions[group.options] = is_estimable.sum(axis=1)
         return gain, dimensions
 
 
-def gains_of(left: EliminatedBase, slices: Sequence[slice]) -> tuple[Array, NDArray[np.int64]]:
+def gains_of(base: EliminatedBase, slices: Sequence[slice]) -> tuple[Array, NDArray[np.int64]]:
     """Return the chi2 that each option removes, (options,), and the number of its directions beside the base."""
     pairs = OptionPairs.of(slices)
-    return pairs.gains(left.gram[pairs.left, pairs.right], left.squared_norms, left.data_products)
+    return pairs.gains(base.gram[pairs.left, pairs.right], base.squared_norms, base.data_products)
 
 
-def solve_option(left: EliminatedBase, where: slice) -> tuple[Array, NDArray[np.float64]]:
+def solve_option(base: EliminatedBase, option_rows: slice) -> tuple[Array, NDArray[np.float64]]:
     """Return the coefficients (k,) of an option beside the base, and their covariance (k, k)."""
-    size = np.sqrt(np.maximum(left.squared_norms[where], 1e-300))
-    values, vectors = np.linalg.eigh(left.gram[where, where] / np.outer(size, size))
-    kept = values > LEAST_LEFT
-    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-    coefficients = inverse @ (left.data_products[where] / size) / size
+    size = np.sqrt(np.maximum(base.squared_norms[option_rows], 1e-300))
+    values, vectors = np.linalg.eigh(base.gram[option_rows, option_rows] / np.outer(size, size))
+    is_estimable = values > LEAST_LEFT
+    inverse = (vectors[:, is_estimable] / values[is_estimable]) @ vectors[:, is_estimable].T
+    coefficients = inverse @ (base.data_products[option_rows] / size) / size
     return coefficients, inverse / np.outer(size, size)
 
 
-def visible_share(left: EliminatedBase, where: slice) -> float:
+def visible_share(base: EliminatedBase, option_rows: slice) -> float:
     """Return the largest share of an option's columns that the base does not absorb, 0 to 1, in whitened size."""
-    shares = np.diag(left.gram)[where] / np.maximum(left.squared_norms[where], 1e-300)
+    shares = np.diag(base.gram)[option_rows] / np.maximum(base.squared_norms[option_rows], 1e-300)
     return float(np.sqrt(np.clip(shares.max(initial=0.0), 0.0, 1.0)))
 
 
-def reproduced_and_size(left: EliminatedBase, signal: slice, by: slice) -> tuple[float, float]:
+def reproduced_and_size(base: EliminatedBase, signal: slice, by: slice) -> tuple[float, float]:
     """Return the part of an option's fitted signal that another option reproduces, and the signal's size, in chi2."""
-    values, _ = solve_option(left, signal)
-    return reproduced(left, signal, values, by), float(values @ left.gram[signal, signal] @ values)
+    values, _ = solve_option(base, signal)
+    return reproduced(base, signal, values, by), float(values @ base.gram[signal, signal] @ values)
 
 
-def reproduced(left: EliminatedBase, signal: slice, values: Array, by: slice) -> float:
+def reproduced(base: EliminatedBase, signal: slice, values: Array, by: slice) -> float:
     """Return the part of an option's signal with coefficients (k,) that another option reproduces, in chi2."""
-    inner = left.gram[by, signal] @ values
-    scale = np.sqrt(np.maximum(left.squared_norms[by], 1e-300))
-    sizes, vectors = np.linalg.eigh(left.gram[by, by] / np.outer(scale, scale))
-    kept = sizes > LEAST_LEFT
-    return float(((vectors[:, kept].T @ (inner / scale)) ** 2 / sizes[kept]).sum())
+    inner = base.gram[by, signal] @ values
+    scale = np.sqrt(np.maximum(base.squared_norms[by], 1e-300))
+    sizes, vectors = np.linalg.eigh(base.gram[by, by] / np.outer(scale, scale))
+    is_estimable = sizes > LEAST_LEFT
+    return float(((vectors[:, is_estimable].T @ (inner / scale)) ** 2 / sizes[is_estimable]).sum())

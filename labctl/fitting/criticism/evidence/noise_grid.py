@@ -76,9 +76,9 @@ def _correlation(times: bytes, tau_s: float) -> NDArray[np.float64]:
     t_s = np.frombuffer(times, dtype=np.float64)
     lag = np.abs(t_s[:, None] - t_s[None, :])
     taus = (tau_s,) if tau_s > 0 else MIXTURE_S
-    found = np.mean([np.exp(-lag / tau) for tau in taus], axis=0)
-    found.setflags(write=False)
-    return np.asarray(found)
+    autocorrelation = np.mean([np.exp(-lag / tau) for tau in taus], axis=0)
+    autocorrelation.setflags(write=False)
+    return np.asarray(autocorrelation)
 
 
 def factors(
@@ -110,15 +110,15 @@ class DriftModes:
     @staticmethod
     def of(tau_s: float, white_var: Array, t_s: Array, run: NDArray[np.int64]) -> DriftModes:
         """Return the modes of m data sets; `white_var` (m,) is the white variance of the means, (deg/s)^2."""
-        given = (np.ascontiguousarray(values, dtype=np.float64).tobytes() for values in (white_var, t_s))
-        return _modes(tau_s, *given, np.ascontiguousarray(run, dtype=np.int64).tobytes())
+        cache_key = (np.ascontiguousarray(values, dtype=np.float64).tobytes() for values in (white_var, t_s))
+        return _modes(tau_s, *cache_key, np.ascontiguousarray(run, dtype=np.int64).tobytes())
 
     def amplitudes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return values (m, k) as amplitudes of the modes, (m, k), over white noise."""
-        found = np.empty_like(values)
+        mode_amplitudes = np.empty_like(values)
         for rows, modes in self.blocks:
-            found[rows] = modes.T @ values[rows]
-        return found
+            mode_amplitudes[rows] = modes.T @ values[rows]
+        return mode_amplitudes
 
     def weights(self, size_dps: float) -> tuple[Array, float]:
         """Return the factors (m,) that whiten amplitudes where the drift has a size, and the log determinant."""
@@ -150,10 +150,10 @@ def _of_one_run(t_s: Array, tau_s: float, white_dps: Array) -> tuple[Array, NDAr
     lag = np.diff(t_s) / tau_s if tau_s > 0 else np.zeros(len(t_s) - 1)
     if len(lag) == 0 or lag.min() < LEAST_LAG:
         return np.linalg.eigh(correlation(t_s, tau_s) / np.outer(white_dps, white_dps))
-    next_to, left = np.exp(-lag), -np.expm1(-2 * lag)
-    diagonal = np.append(1 / left, 1.0) + np.append(0.0, next_to**2 / left)
+    next_to, step_share = np.exp(-lag), -np.expm1(-2 * lag)
+    diagonal = np.append(1 / step_share, 1.0) + np.append(0.0, next_to**2 / step_share)
     values, vectors = eigh_tridiagonal(
-        diagonal * white_dps**2, -next_to / left * white_dps[:-1] * white_dps[1:], check_finite=False
+        diagonal * white_dps**2, -next_to / step_share * white_dps[:-1] * white_dps[1:], check_finite=False
     )
     return 1 / values[::-1], vectors[:, ::-1]
 
@@ -162,7 +162,7 @@ def whiten(
     blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return values (m,) or (m, k) whitened by the Cholesky factors of their covariance, run by run."""
-    found = np.empty_like(values)
+    whitened = np.empty_like(values)
     for rows, factor in blocks:
-        found[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
-    return found
+        whitened[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
+    return whitened

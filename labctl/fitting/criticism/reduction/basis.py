@@ -20,32 +20,32 @@ LEAST_INDEPENDENT_SHARE = 0.1
 
 
 def orthonormal_basis(
-    there: NDArray[np.float64], since: NDArray[np.float64], turned: NDArray[np.float64],
+    presence: NDArray[np.float64], since: NDArray[np.float64], turned: NDArray[np.float64],
     angle: NDArray[np.float64] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:  # fmt: skip
     """Return orthonormal functions, (R, m, n), and which exist in which data set, (R, m).
 
-    By Gram-Schmidt, twice (Kahan), over readings (m, n): `there` is 1 where there is one, `since` the time in its data
-    set in s, `turned` the angle that the table turned and `angle` where it stands (None: not recorded), rad.
+    By Gram-Schmidt, twice (Kahan), over readings (m, n): `presence` is 1 where there is one, `since` the time in its
+    data set in s, `turned` the angle that the table turned and `angle` where it stands (None: not recorded), rad.
     """
-    wanted = [there, since, np.exp(-since / START_TAU_S)]
+    basis_functions = [presence, since, np.exp(-since / START_TAU_S)]
     lines = [wave(k * turned) for k in STEP_LINES for wave in (np.cos, np.sin)]
     if angle is not None:
-        wanted += [wave(k * angle) for k in WAVES for wave in (np.cos, np.sin)]
-    functions = [*lines, *wanted]
-    found = np.zeros((len(functions), *there.shape))
-    present = np.zeros((len(functions), len(there)), dtype=bool)
-    count = np.maximum(there.sum(axis=1), 1.0)
+        basis_functions += [wave(k * angle) for k in WAVES for wave in (np.cos, np.sin)]
+    functions = [*lines, *basis_functions]
+    basis = np.zeros((len(functions), *presence.shape))
+    present = np.zeros((len(functions), len(presence)), dtype=bool)
+    count = np.maximum(presence.sum(axis=1), 1.0)
     for k, function in enumerate(functions):
-        values = function * there
+        values = function * presence
         size = np.sqrt((values**2).sum(axis=1))
         steady = np.abs(values.sum(axis=1)) / np.maximum(size * np.sqrt(count), 1e-300)
         for _ in range(2):
-            inner = np.einsum("rmn,mn->rm", found[:k], values)
-            values = values - np.einsum("rm,rmn->mn", inner, found[:k])
-        left = np.sqrt((values**2).sum(axis=1))
-        present[k] = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+            inner = np.einsum("rmn,mn->rm", basis[:k], values)
+            values = values - np.einsum("rm,rmn->mn", inner, basis[:k])
+        norm = np.sqrt((values**2).sum(axis=1))
+        present[k] = norm > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
         if k < len(lines):
             present[k] &= steady < STEADY
-        found[k] = np.where(present[k][:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
-    return found[len(lines) :], present[len(lines) :]
+        basis[k] = np.where(present[k][:, None], values / np.maximum(norm, 1e-300)[:, None], 0.0)
+    return basis[len(lines) :], present[len(lines) :]

@@ -17,19 +17,19 @@ FEW = 0.05
 NEXT_CODE = 1.5
 
 
-def inlier_mask(values: NDArray[np.float64], there: NDArray[np.float64], step: float = 0.0) -> NDArray[np.float64]:
+def inlier_mask(values: NDArray[np.float64], presence: NDArray[np.float64], step: float = 0.0) -> NDArray[np.float64]:
     """Return 1 where a reading is no outlier of its data set, (m, n).
 
     `step` is the step in which the readings come, in their unit: the next code is no outlier where most have one code.
     """
-    count = (there > 0).sum(axis=1)
-    middle = _quantile(np.sort(np.where(there > 0, values, np.inf), axis=1), count, 0.5)
-    distance = np.sort(np.where(there > 0, np.abs(values - middle), np.inf), axis=1)
+    count = (presence > 0).sum(axis=1)
+    middle = _quantile(np.sort(np.where(presence > 0, values, np.inf), axis=1), count, 0.5)
+    distance = np.sort(np.where(presence > 0, np.abs(values - middle), np.inf), axis=1)
     spread, most = 1.4826 * _quantile(distance, count, 0.5), _quantile(distance, count, 1.0 - 2 * FEW)
     far = (np.abs(values - middle) > np.maximum(np.maximum(OUTLIER * spread, BEYOND * most), NEXT_CODE * step)) & (
-        there > 0
+        presence > 0
     )
-    few = far.sum(axis=1, keepdims=True) <= FEW * there.sum(axis=1, keepdims=True)
+    few = far.sum(axis=1, keepdims=True) <= FEW * presence.sum(axis=1, keepdims=True)
     return np.where(far & few, 0.0, 1.0)
 
 
@@ -42,13 +42,17 @@ def _quantile(ordered: NDArray[np.float64], count: NDArray[np.int64], share: flo
     return np.asarray(below + (place - low) * (above - below))[:, None]
 
 
-def white_level_dps(values: NDArray[np.float64], there: NDArray[np.float64]) -> float:
+def white_level_dps(values: NDArray[np.float64], presence: NDArray[np.float64]) -> float:
     """Return the white standard deviation of one reading, deg/s: the median over data sets and frequencies.
 
     It is NaN for data sets of fewer than 6 readings: they are too short for a spectrum.
     """
-    full = there.all(axis=1) if there.all(axis=1).sum() >= max(8, len(there) // 10) else np.ones(len(there), dtype=bool)
-    chosen, mask = values[full], there[full]
+    full = (
+        presence.all(axis=1)
+        if presence.all(axis=1).sum() >= max(8, len(presence) // 10)
+        else np.ones(len(presence), dtype=bool)
+    )
+    chosen, mask = values[full], presence[full]
     middle = (chosen * mask).sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1.0)
     window = np.hanning(chosen.shape[1])[None, :]
     residual = np.where(mask > 0, chosen - middle, 0.0) * window

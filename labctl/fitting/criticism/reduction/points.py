@@ -33,17 +33,17 @@ def _white_of_points(points: Recording) -> dict[str, Array] | None:
 
     One level of white noise for all data sets, and what coarse steps leave in each mean; for turns each has its own.
     """
-    found: dict[str, Array] = {}
+    white_by_axis: dict[str, Array] = {}
     for axis in points.info.axes:
         variance = white_var_of(points, axis)
         if variance is None or not np.any(variance > 0):
             return None
         if points.info.motion == "turns":  # a rest is known far better than a turn
-            found[axis] = np.maximum(variance, LEAST_SHARE * float(np.median(variance)))
+            white_by_axis[axis] = np.maximum(variance, LEAST_SHARE * float(np.median(variance)))
             continue
         n = np.maximum(np.asarray(points.columns["n"], dtype=np.float64), 1.0)
-        left = quantisation_var_of(points, axis)
-        found[axis] = float(np.median((variance - left) * n)) / n + left
-        if not np.all(found[axis] > 0):
+        quantisation_var = quantisation_var_of(points, axis)
+        white_by_axis[axis] = float(np.median((variance - quantisation_var) * n)) / n + quantisation_var
+        if not np.all(white_by_axis[axis] > 0):
             return None
-    return found
+    return white_by_axis

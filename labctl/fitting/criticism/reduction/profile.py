@@ -49,9 +49,9 @@ def reduce_profile(recording: Recording) -> ReducedRecording:
         variance = white_var_of(points, axis)
         if variance is not None:
             white[axis] = (variance[index] * there).sum(axis=1) / count**2
-    known = len(white) == len(outputs) and all(np.all(each > 0) for each in white.values())
+    has_white = len(white) == len(outputs) and all(np.all(each > 0) for each in white.values())
     return ReducedRecording(
-        points.info, channels.take(index.ravel()), basis, {}, outputs, present, white if known else None,
+        points.info, channels.take(index.ravel()), basis, {}, outputs, present, white if has_white else None,
         np.asarray(points.columns["dataset"], dtype=np.int64)[index[:, 0]],
     )  # fmt: skip
 
@@ -89,18 +89,18 @@ def _functions(points: Recording, profile: RateProfile) -> list[Array]:
 
 
 def _basis(
-    functions: list[Array], index: NDArray[np.int64], there: NDArray[np.float64]
+    functions: list[Array], index: NDArray[np.int64], presence: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return orthonormal functions, (R, m, B), and which exist in which piece, (R, m): by Gram-Schmidt, twice."""
-    found = np.zeros((len(functions), *there.shape))
-    present = np.zeros((len(functions), len(there)), dtype=bool)
+    basis = np.zeros((len(functions), *presence.shape))
+    present = np.zeros((len(functions), len(presence)), dtype=bool)
     for k, function in enumerate(functions):
-        values = function[index] * there
+        values = function[index] * presence
         size = np.sqrt((values**2).sum(axis=1))
         for _ in range(2):
-            inner = np.einsum("rmb,mb->rm", found[:k], values)
-            values = values - np.einsum("rm,rmb->mb", inner, found[:k])
-        left = np.sqrt((values**2).sum(axis=1))
-        present[k] = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
-        found[k] = np.where(present[k][:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
-    return found, present
+            inner = np.einsum("rmb,mb->rm", basis[:k], values)
+            values = values - np.einsum("rm,rmb->mb", inner, basis[:k])
+        norm = np.sqrt((values**2).sum(axis=1))
+        present[k] = norm > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+        basis[k] = np.where(present[k][:, None], values / np.maximum(norm, 1e-300)[:, None], 0.0)
+    return basis, present

@@ -70,15 +70,15 @@ NODES = 12
 
 def nodes_of(
     recording: Recording, numbers: Mapping[str, Array], texts: Mapping[str, NDArray[np.generic]], padded: Padded,
-    there: NDArray[np.float64], since: NDArray[np.float64], basis: NDArray[np.float64],
+    presence: NDArray[np.float64], since: NDArray[np.float64], basis: NDArray[np.float64],
 ) -> tuple[Channels, NDArray[np.float64]]:  # fmt: skip
     """Return the channels at the nodes, (m * B,), and the weights (R, m, B) that bring them to coordinates."""
-    m, n = there.shape
+    m, n = presence.shape
     edges = np.linspace(0, n, min(NODES, n) + 1).astype(np.int64)[:-1]
-    inside = np.add.reduceat(there, edges, axis=1)
+    inside = np.add.reduceat(presence, edges, axis=1)
 
     def averaged(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        sums = np.add.reduceat(values * there, edges, axis=1)
+        sums = np.add.reduceat(values * presence, edges, axis=1)
         whole = sums.sum(axis=1, keepdims=True) / np.maximum(inside.sum(axis=1, keepdims=True), 1.0)
         return np.where(inside > 0, sums / np.maximum(inside, 1.0), whole)
 
@@ -141,17 +141,17 @@ def reduce_samples(recording: Recording, *, outliers: bool) -> ReducedRecording:
     for axis in axes:
         noise = white_level_dps(outputs[axis], there) ** 2
         white[axis] = np.full(m, noise) / count + _steps_var(recording, numbers, axis)[begin]
-    known = all(np.all(values > 0) for values in white.values())  # else no reading differs from the next
+    has_white = all(np.all(values > 0) for values in white.values())  # else no reading differs from the next
     return ReducedRecording(
-        recording.info, nodes, weights, waves, coordinates, present, white if known else None, dataset[begin],
+        recording.info, nodes, weights, waves, coordinates, present, white if has_white else None, dataset[begin],
         int(padded.there.sum() - there.sum()),
     )  # fmt: skip
 
 
 def _steps_var(recording: Recording, numbers: Mapping[str, Array], axis: str) -> Array:
     """Return what coarse steps of an output leave in a mean, at each reading (n,), (deg/s)^2."""
-    left = numbers.get(f"gyro_{axis}{QUANTISATION}")
-    if left is None:
+    step_columns = numbers.get(f"gyro_{axis}{QUANTISATION}")
+    if step_columns is None:
         return np.zeros(len(numbers[f"gyro_{axis}"]))
     output = next((unit for name, unit in recording.info.output.items() if name == axis), None)
-    return np.asarray((left / (output.scale if output else 1.0)) ** 2)
+    return np.asarray((step_columns / (output.scale if output else 1.0)) ** 2)

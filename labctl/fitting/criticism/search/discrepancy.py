@@ -39,14 +39,14 @@ DRIVERS = ("table_rate_dps", "temperature_c")
 
 def discrepancies(comparison: Comparison, candidate: Candidate) -> dict[str, Discrepancy]:
     """Return axis -> the discrepancy of a candidate as it is fitted in a comparison."""
-    found = {}
+    by_axis = {}
     for axis, index in candidate.option.items():
         option = comparison.designs[axis].options[index]
         values, _ = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
         signal = option.rows @ values
         if np.any(signal):
-            found[axis] = _of_signal(comparison, axis, option.term, signal, values)
-    return found
+            by_axis[axis] = _of_signal(comparison, axis, option.term, signal, values)
+    return by_axis
 
 
 def _of_signal(
@@ -71,21 +71,21 @@ def _of_signal(
 def drivers(kind: Effect | None, channels: frozenset[str]) -> list[str]:
     """Return the channels on which an effect's shape may depend otherwise than its law says."""
     needs, draws = (kind.needs, kind.draws) if kind is not None else ((), ())
-    wanted = dict.fromkeys((*DRIVERS, *needs, *draws))
-    return [name for name in wanted if name in channels]
+    names = dict.fromkeys((*DRIVERS, *needs, *draws))
+    return [name for name in names if name in channels]
 
 
 def _beside_base(comparison: Comparison, axis: str, means: Array) -> Array:
     """Return what the base leaves of a signal's means (m,)."""
     base = comparison.designs[axis].base[0]
     size = np.maximum(np.linalg.norm(base, axis=0), 1e-300)
-    taken, *_ = np.linalg.lstsq(base / size, means, rcond=1e-9)
-    return np.asarray(means - base / size @ taken)
+    coordinates, *_ = np.linalg.lstsq(base / size, means, rcond=1e-9)
+    return np.asarray(means - base / size @ coordinates)
 
 
 def _moved(comparison: Comparison, axis: str, kind: Effect, term: Term, values: Array) -> list[NDArray[np.float64]]:
     """Return what each parameter of the shape moves, one column each."""
-    found = []
+    moved_groups = []
     for name, at in term.parameters.items():
         if name in CHOICES or not at > 0:
             continue
@@ -96,21 +96,23 @@ def _moved(comparison: Comparison, axis: str, kind: Effect, term: Term, values: 
             if option is not None and option.rows.shape[2] == len(values):
                 ends.append(option.rows @ values)
         if len(ends) == 2:
-            found.append((PARAMETER_ERROR / (2 * STEP) * (ends[0] - ends[1]))[:, :, None])
-    return found
+            moved_groups.append((PARAMETER_ERROR / (2 * STEP) * (ends[0] - ends[1]))[:, :, None])
+    return moved_groups
 
 
 def _otherwise_chosen(
     comparison: Comparison, axis: str, term: Term, signal: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
     """Return an effect's signal in the best shape of each other choice, less its signal as chosen, one column each."""
-    options, found = comparison.designs[axis].options, comparison.axes[axis]
+    options, axis_comparison = comparison.designs[axis].options, comparison.axes[axis]
     best: dict[tuple[float, ...], int] = {}
-    for i in np.argsort(found.log_bf).tolist():
+    for i in np.argsort(axis_comparison.log_bf).tolist():
         other = options[i].term
         if other is not None and other.effect == term.effect and _choices(other) != _choices(term):
             best[_choices(other)] = i
-    fitted = ((options[i].rows, solve_option(found.best, found.slices[i])[0]) for i in best.values())
+    fitted = (
+        (options[i].rows, solve_option(axis_comparison.best, axis_comparison.slices[i])[0]) for i in best.values()
+    )
     return [(rows @ values - signal)[:, :, None] for rows, values in fitted]
 
 

@@ -34,12 +34,12 @@ def stepped_terms(comparison: Comparison, terms: tuple[Term, ...], axes: Iterabl
     factor of some per cent, does not enter their parameters.
     """
     chosen = list(axes)
-    rest = comparison.model.with_terms(
+    smooth_model = comparison.model.with_terms(
         tuple(term for term in comparison.model.terms if term not in exact_terms(comparison.model.terms))
     )
     for _ in range(STEPS):
         data = comparison.data.through(response_of_terms(terms))
-        steps = np.mean([_steps(comparison, data, rest, axis, terms) for axis in chosen], axis=0)
+        steps = np.mean([_steps(comparison, data, smooth_model, axis, terms) for axis in chosen], axis=0)
         before = np.array([next(iter(term.parameters.values())) for term in terms])
         after = np.maximum(before + steps, np.maximum(LEAST_LEFT * before, LEAST))
         terms = tuple(
@@ -60,18 +60,18 @@ def with_exact_terms(comparison: Comparison, terms: tuple[Term, ...]) -> tuple[T
 
 
 def _steps(
-    comparison: Comparison, data: ReducedRecording, rest: ErrorModel, axis: str, terms: tuple[Term, ...]
+    comparison: Comparison, data: ReducedRecording, base_model: ErrorModel, axis: str, terms: tuple[Term, ...]
 ) -> Array:
     """Return by how much each parameter should change on one axis, by weighted least squares beside the rest."""
-    made = [option_of(data, axis, rest.reference, kind_of(term), term) for term in terms]
-    tangents = [option.rows for option in made if option is not None]
+    options = [option_of(data, axis, base_model.reference, kind_of(term), term) for term in terms]
+    tangents = [option.rows for option in options if option is not None]
     if len(tangents) < len(terms):
         return np.zeros(len(terms))
-    base, _ = base_of(data, rest, axis)
+    base, _ = base_of(data, base_model, axis)
     scale = comparison.scales[axis].copy()
     scale[0] = np.sqrt(comparison.white_var[axis] + comparison.axes[axis].best.noise.size_dps ** 2)
-    kept = comparison.designs[axis].present
-    columns = np.concatenate([base, *tangents], axis=2)[kept] / scale[kept][:, None]
+    present = comparison.designs[axis].present
+    columns = np.concatenate([base, *tangents], axis=2)[present] / scale[present][:, None]
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    solution, *_ = np.linalg.lstsq(columns / size, data.error_dps(axis)[kept] / scale[kept], rcond=1e-10)
+    solution, *_ = np.linalg.lstsq(columns / size, data.error_dps(axis)[present] / scale[present], rcond=1e-10)
     return np.asarray((solution / size)[base.shape[2] :])

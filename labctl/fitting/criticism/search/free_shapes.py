@@ -57,12 +57,12 @@ def channels_of_free_shape(
         rivals = _shapes(first, axis)
         options = [shape for shapes in rivals.values() for shape in shapes]
         own = _named(first, axis, terms, catalogue)
-        found = _weighed(first, beside, axis, replace(first.designs[axis], options=[*options, *own])).log_bf
+        log_bf_by_shape = _weighed(first, beside, axis, replace(first.designs[axis], options=[*options, *own])).log_bf
         for channels, shapes in rivals.items():
-            here, found = found[: len(shapes)], found[len(shapes) :]
+            here, log_bf_by_shape = log_bf_by_shape[: len(shapes)], log_bf_by_shape[len(shapes) :]
             free[channels] = free.get(channels, 0.0) + float(here.max(initial=0.0))
         wrong_by = beside.axes[axis].log_p - _weighed(first, beside, axis, replace(exact, options=[])).log_p
-        named += float(found.max(initial=0.0)) + max(wrong_by, 0.0)
+        named += float(log_bf_by_shape.max(initial=0.0)) + max(wrong_by, 0.0)
     best = max(free, key=lambda channels: free[channels], default=())
     return best if best and free[best] > max((1 + SHARE_LEFT) * named, least) + LEAD else ()
 
@@ -82,7 +82,9 @@ def beside_terms(first: Comparison, terms: tuple[Term, ...], discrepancy: Mappin
     """Return the comparison beside terms and their discrepancy, in which nothing competes."""
     model = with_steady(first, terms)
     designs = designs_beside(first, model, discrepancy)
-    return compare_models(first.data, model, {}, {axis: replace(each, options=[]) for axis, each in designs.items()})
+    return compare_models(
+        first.data, model, {}, {axis: replace(design, options=[]) for axis, design in designs.items()}
+    )
 
 
 def _shapes(comparison: Comparison, axis: str) -> dict[tuple[str, ...], list[CandidateShape]]:
@@ -93,14 +95,16 @@ def _shapes(comparison: Comparison, axis: str) -> dict[tuple[str, ...], list[Can
         return {}
     rate = channels[RATE] / max(float(np.abs(channels[RATE]).max()), 1e-9)
     of_rate = np.asarray(legvander(rate, max(OF_BOTH)), dtype=np.float64)
-    found: dict[tuple[str, ...], list[CandidateShape]] = {
+    shapes: dict[tuple[str, ...], list[CandidateShape]] = {
         (RATE,): [_shape(comparison, RATE, of_rate[:, 1 : degree + 1]) for degree in OF_RATE]
     }
     if TEMPERATURE in channels:
-        warm = channels[TEMPERATURE]
-        of_warm = legvander(2 * (warm - warm.min()) / np.ptp(warm) - 1, max(OF_BOTH)).astype(np.float64)
-        found[RATE, TEMPERATURE] = [_shape(comparison, RATE, _products(of_rate, of_warm, d)) for d in OF_BOTH]
-    return found
+        temperature_c = channels[TEMPERATURE]
+        of_warm = legvander(2 * (temperature_c - temperature_c.min()) / np.ptp(temperature_c) - 1, max(OF_BOTH)).astype(
+            np.float64
+        )
+        shapes[RATE, TEMPERATURE] = [_shape(comparison, RATE, _products(of_rate, of_warm, d)) for d in OF_BOTH]
+    return shapes
 
 
 def _products(first: NDArray[np.float64], other: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
@@ -119,13 +123,13 @@ def _named(
     comparison: Comparison, axis: str, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]
 ) -> list[CandidateShape]:
     """Return what is to be named on one axis as one option; none where it does not touch the axis."""
-    made = (
+    pair_options = (
         option_of(comparison.data, axis, comparison.model.reference, catalogue[term.effect], term) for term in terms
     )
     base, precision = comparison.designs[axis].base, comparison.designs[axis].precision
     level = constant_coordinates(base, comparison.data)
     exact = base[:, :, precision == 0]
-    options = [orthogonalised(centred(option, level), exact) for option in made if option is not None]
+    options = [orthogonalised(centred(option, level), exact) for option in pair_options if option is not None]
     if not options:
         return []
     rows = np.concatenate([option.rows for option in options], axis=2)

@@ -45,8 +45,8 @@ def held_out_rises(comparison: Comparison, terms: tuple[Term, ...], catalogue: M
 
 def _by_temperature(comparison: Comparison) -> list[NDArray[np.bool_]]:
     data = comparison.data
-    warm = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
-    masks = folds(warm, thermometer=data.nodes.history.thermometer)
+    temperature_c = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
+    masks = folds(temperature_c, thermometer=data.nodes.history.thermometer)
     inner = masks[1:-1] if isinstance(comparison.model.temperature, LagrangeTable) else masks
     return [mask for mask in inner if not mask.all()]
 
@@ -92,21 +92,25 @@ class _Axis:
         data, model = comparison.data, comparison.model
         table = model.temperature
         if isinstance(table, LagrangeTable):
-            warm = data.at_sets(data.nodes.temperature_c(self.name))[mask]
-            kept = tuple(node for node in table.nodes_c if not warm.min() - EDGE_K <= node <= warm.max() + EDGE_K)
-            if len(kept) >= table.points and np.ptp(warm) < NARROW_K:
-                model = replace(model, temperature=LagrangeTable(kept, table.points))
+            temperature_c = data.at_sets(data.nodes.temperature_c(self.name))[mask]
+            nodes_kept = tuple(
+                node
+                for node in table.nodes_c
+                if not temperature_c.min() - EDGE_K <= node <= temperature_c.max() + EDGE_K
+            )
+            if len(nodes_kept) >= table.points and np.ptp(temperature_c) < NARROW_K:
+                model = replace(model, temperature=LagrangeTable(nodes_kept, table.points))
         base, _, precision = base_rows(data, model, self.name)
         base = base / self.scale[:, :, None]
-        seen, left = data.present & ~mask, data.present & mask
-        found = []
+        in_fit, left_out = data.present & ~mask, data.present & mask
+        axis_errors = []
         for rows, prior in (
             (base, precision),
             (np.concatenate([base, self.added], axis=2), np.concatenate([precision, self.precision])),
         ):
-            values = _solved(rows[seen], self.y[seen], prior)
-            found.append(float(np.sum((self.y[left] - rows[left] @ values) ** 2)))
-        return found[0], found[1]
+            values = _solved(rows[in_fit], self.y[in_fit], prior)
+            axis_errors.append(float(np.sum((self.y[left_out] - rows[left_out] @ values) ** 2)))
+        return axis_errors[0], axis_errors[1]
 
 
 def _solved(rows: NDArray[np.float64], y: Array, precision: Array) -> Array:
@@ -114,6 +118,6 @@ def _solved(rows: NDArray[np.float64], y: Array, precision: Array) -> Array:
     gram = rows.T @ rows + np.diag(precision)
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     values, vectors = np.linalg.eigh(gram / np.outer(size, size))
-    kept = values > LEAST_EIGENVALUE
-    inner = vectors[:, kept].T @ (rows.T @ y / size)
-    return np.asarray(vectors[:, kept] @ (inner / values[kept]) / size)
+    is_estimable = values > LEAST_EIGENVALUE
+    inner = vectors[:, is_estimable].T @ (rows.T @ y / size)
+    return np.asarray(vectors[:, is_estimable] @ (inner / values[is_estimable]) / size)

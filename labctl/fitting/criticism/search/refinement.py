@@ -41,9 +41,9 @@ def with_refined_leaders(comparison: Comparison, catalogue: Mapping[str, Effect]
     data, model = comparison.data, comparison.model
     designs = {}
     for axis, design in comparison.designs.items():
-        made = (option_of(data, axis, model.reference, catalogue[name], term) for name, term in new.items())
+        options = (option_of(data, axis, model.reference, catalogue[name], term) for name, term in new.items())
         level = constant_coordinates(design.base, data)
-        more = [centred(option, level) for option in (*made, steps.get(axis)) if option is not None]
+        more = [centred(option, level) for option in (*options, steps.get(axis)) if option is not None]
         designs[axis] = replace(design, options=[*design.options, *more])
     return compare_models(data, model, catalogue, designs)
 
@@ -78,10 +78,10 @@ def _along(comparison: Comparison, candidate: Candidate, kind: Effect, term: Ter
     def with_value(logarithm: float) -> Term:
         return replace(term, parameters={**term.parameters, name: float(np.exp(logarithm))})
 
-    found = minimize_scalar(
+    optimum = minimize_scalar(
         lambda value: -gain(with_value(value)), bounds=(low, high), method="bounded", options={"maxiter": EVALUATIONS}
     )
-    return with_value(float(found.x)) if -found.fun > gain(term) else term
+    return with_value(float(optimum.x)) if -optimum.fun > gain(term) else term
 
 
 def _gain_function(comparison: Comparison, candidate: Candidate, kind: Effect) -> Callable[[Term], float]:
@@ -103,8 +103,8 @@ def _gain_function(comparison: Comparison, candidate: Candidate, kind: Effect) -
             if option is None:
                 continue
             rows = np.concatenate([option.rows, outputs[axis][:, :, None]], axis=2)
-            left = whitened.eliminate_from(rows[0], scaled.products(rows))
-            total += float(gains_of(left, [slice(0, option.rows.shape[2])])[0][0])
+            eliminated = whitened.eliminate_from(rows[0], scaled.products(rows))
+            total += float(gains_of(eliminated, [slice(0, option.rows.shape[2])])[0][0])
         return total
 
     return gain

@@ -74,9 +74,9 @@ def _excess(first: Comparison, final: Comparison, axis: str, design: Design) -> 
     """Return the chi2 beyond the degrees of freedom beside a base, at the noise of the final comparison, and these."""
     noise = final.axes[axis].best.noise
     y = first.data.error_dps(axis)
-    (left,) = eliminate_base(design, y, final.white_var[axis], final.scales[axis], [noise])
+    (eliminated,) = eliminate_base(design, y, final.white_var[axis], final.scales[axis], [noise])
     freedom = float(design.present.sum() - (design.precision == 0).sum())
-    return left.chi2 - freedom, freedom
+    return eliminated.chi2 - freedom, freedom
 
 
 def is_better_than_smooth(
@@ -103,8 +103,8 @@ def is_better_than_smooth(
         y, design, wide, narrow = first.data.error_dps(axis), initial.designs[axis], none[axis], exact[axis]
         rivals = [design.options[c.option[axis]] for c in (effect, smooth) if axis in c.option]
         white, scale, noises = beside.white_var[axis], beside.scales[axis], beside.axes[axis].noises
-        found = evidence_of(replace(first.designs[axis], options=rivals), y, white, scale, noises)
-        of = dict(zip([c.smooth for c in (effect, smooth) if axis in c.option], found.log_bf, strict=True))
+        rival_evidence = evidence_of(replace(first.designs[axis], options=rivals), y, white, scale, noises)
+        of = dict(zip([c.smooth for c in (effect, smooth) if axis in c.option], rival_evidence.log_bf, strict=True))
         shape = evidence_of(wide, y, white, scale, noises).log_p - evidence_of(narrow, y, white, scale, noises).log_p
         lead += max(of.get(False, 0.0), 0.0) + max(shape, 0.0) - max(of.get(True, 0.0), 0.0)
     return lead > LEAD

@@ -65,8 +65,8 @@ class _Axis:
 
     def __init__(self, comparison: Comparison, name: str, effect: int | None) -> None:
         self.name, self._data, self._design = name, comparison.data, comparison.designs[name]
-        known = comparison.data.white_var
-        white = comparison.white_var[name] if known is None else known[name]
+        white_var = comparison.data.white_var
+        white = comparison.white_var[name] if white_var is None else white_var[name]
         self._scale = comparison.scales[name]
         self._base = WhitenedBase(self._design, white, Noise(0.0, 0.0, 0.0))
         self._y = comparison.data.error_dps(name)[:, :, None]

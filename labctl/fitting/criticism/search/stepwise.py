@@ -49,46 +49,52 @@ NEXT_SHARE_AMBIGUOUS = 0.08
 LEAST_PART = 0.05
 
 
-def is_shape_error(before: Comparison, named: Step, after: Comparison, step: Step) -> bool:
+def is_shape_error(before: Comparison, named_step: Step, after: Comparison, step: Step) -> bool:
     """Return whether the new leader may be the residue of a wrong shape of the effect that was just added.
 
     The two are compared where the new leader is largest, within data sets or between them: the wrong shape of a wave
     within data sets leaves waves, and hardly anything between them. Beside an effect of the temperature, another one
     of which the shortest time constant fits best is the delay of the first.
     """
-    if step.leader is None or named.leader is None or are_exact(step.leader, named.leader):
+    if step.leader is None or named_step.leader is None or are_exact(step.leader, named_step.leader):
         return False
-    both = all(leader.id in CATALOGUE and CATALOGUE[leader.id].by_temperature for leader in (named.leader, step.leader))
+    both = all(
+        leader.id in CATALOGUE and CATALOGUE[leader.id].by_temperature for leader in (named_step.leader, step.leader)
+    )
     if both and is_at_end(after, step.leader, shortest=True):
         return True
-    least = NEXT_SHARE if _are_one(before, named) else NEXT_SHARE_AMBIGUOUS
-    of_new, of_old = _within_and_between(after, step.leader), _within_and_between(before, named.leader)
+    least = NEXT_SHARE if _are_one(before, named_step) else NEXT_SHARE_AMBIGUOUS
+    of_new, of_old = _within_and_between(after, step.leader), _within_and_between(before, named_step.leader)
     there = int(np.argmax(of_new))
-    could = max(float(of_old[there]), LEAST_PART) * named.leader.log_bf
+    could = max(float(of_old[there]), LEAST_PART) * named_step.leader.log_bf
     return bool(of_new[there] * step.leader.log_bf < least * could)
 
 
-def _are_one(comparison: Comparison, named: Step) -> bool:
+def _are_one(comparison: Comparison, named_step: Step) -> bool:
     """Return whether a group is one effect, or several that each reproduce the leader's signal."""
-    others = [c for c in comparison.candidates if not c.smooth and c.id in named.group[1:]]
-    return all(overlap(comparison, named.leader, other) > ALIKE for other in others) if named.leader else False
+    other_candidates = [c for c in comparison.candidates if not c.smooth and c.id in named_step.group[1:]]
+    return (
+        all(overlap(comparison, named_step.leader, other) > ALIKE for other in other_candidates)
+        if named_step.leader
+        else False
+    )
 
 
 def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray[np.float64]:
     """Return the shares of a candidate's signal beside the base that lie within data sets, and between them."""
     total = np.zeros(2)
     for axis, index in candidate.option.items():
-        design, found = comparison.designs[axis], comparison.axes[axis]
-        values, _ = solve_option(found.best, found.slices[index])
+        design, axis_comparison = comparison.designs[axis], comparison.axes[axis]
+        values, _ = solve_option(axis_comparison.best, axis_comparison.slices[index])
         scale = comparison.scales[axis].copy()
-        scale[0] = np.sqrt(comparison.white_var[axis] + found.best.noise.size_dps**2)
-        kept = design.present
-        base, signal = (rows[kept] / scale[kept][:, None] for rows in (design.base, design.options[index].rows))
+        scale[0] = np.sqrt(comparison.white_var[axis] + axis_comparison.best.noise.size_dps**2)
+        present = design.present
+        base, signal = (rows[present] / scale[present][:, None] for rows in (design.base, design.options[index].rows))
         size = np.maximum(np.linalg.norm(base, axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(base / size, signal @ values, rcond=1e-9)
-        left = np.zeros(kept.shape)
-        left[kept] = signal @ values - base / size @ taken
-        total += (np.sum(left[1:] ** 2), np.sum(left[0] ** 2))
+        coordinates, *_ = np.linalg.lstsq(base / size, signal @ values, rcond=1e-9)
+        residual = np.zeros(present.shape)
+        residual[present] = signal @ values - base / size @ coordinates
+        total += (np.sum(residual[1:] ** 2), np.sum(residual[0] ** 2))
     return np.asarray(total / max(float(total.sum()), 1e-300))
 
 
@@ -99,7 +105,7 @@ def merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
     axes: dict[tuple[str, ...], tuple[str, ...]] = {}
     for axis, verdict in apart.items():
         for group in verdict.groups:
-            same = next((known for known in axes if known[0] == group[0]), group)
+            same = next((same_axis for same_axis in axes if same_axis[0] == group[0]), group)
             axes[same] = (*axes.get(same, ()), axis)
     if not axes:
         return joint
@@ -108,8 +114,8 @@ def merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
     return Verdict(
         "missing" if all(len(group) == 1 for group in axes) else "ambiguous", tuple(axes), joint.depends_on,
         terms={group[0]: terms[group[0]] for group in axes if group[0] in terms},
-        remainder=max(remainders, key=lambda each: float(each["share"]), default=None),
-        axes={group[0]: where for group, where in axes.items()},
+        remainder=max(remainders, key=lambda remainder: float(remainder["share"]), default=None),
+        axes={group[0]: group_axes for group, group_axes in axes.items()},
     )  # fmt: skip
 
 
@@ -176,25 +182,25 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
             findings = []
         form = _form(findings) if findings else "unexplained"
     depends = depends or step.depends_on or _driver_of(initial, step)
-    found = with_exact_terms(first, tuple(finding.term for finding in findings))
+    with_findings = with_exact_terms(first, tuple(finding.term for finding in findings))
     if findings:
         wrong_by = together([finding.discrepancy for finding in findings])
-        beside = beside_terms(first, found, wrong_by) if final is initial else final  # a pair is not in `final`
-        if channels := channels_of_free_shape(first, beside, found, catalogue):
+        beside = beside_terms(first, with_findings, wrong_by) if final is initial else final  # a pair is not in `final`
+        if channels := channels_of_free_shape(first, beside, with_findings, catalogue):
             return _unnamed(initial, (*channels, *(name for name in depends if name not in channels)))
-    remainder = remainder_of(first, final, found, catalogue) if findings else None
+    remainder = remainder_of(first, final, with_findings, catalogue) if findings else None
     if remainder is not None and remainder["share"] > MOST_LEFT:
         return _unnamed(initial, tuple(remainder["depends_on"]))
-    terms = {term.effect: term for term in found}
-    kept = depends if findings or form == "unexplained" else ()
+    terms = {term.effect: term for term in with_findings}
+    channel_names = depends if findings or form == "unexplained" else ()
     groups = tuple(finding.group for finding in findings)
     alike = not_physical_group(initial, step.leader) if step.leader is not None and findings else ()
-    confounded = _confounded(initial, kept) if form == "unexplained" else ()
+    confounded = _confounded(initial, channel_names) if form == "unexplained" else ()
     if form == "unexplained":
         also = (*confounded, *channels_beside_smooth(first, catalogue))
-        confounded = tuple(dict.fromkeys(name for name in also if name not in kept[:1]))
+        confounded = tuple(dict.fromkeys(name for name in also if name not in channel_names[:1]))
     verdict = Verdict(
-        form, groups, kept, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder,
+        form, groups, channel_names, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder,
         axes={finding.group[0]: finding.axes for finding in findings},
     )  # fmt: skip
     return verdict, initial, final
@@ -242,8 +248,8 @@ def _one_by_one(
         findings.append(finding)
         before = (comparison, step)
         comparison, step = _compared_beside(first, findings, catalogue)
-        known = {name for finding in findings for name in finding.group}
-        if known & set(step.group) or is_shape_error(*before, comparison, step):
+        names = {name for finding in findings for name in finding.group}
+        if names & set(step.group) or is_shape_error(*before, comparison, step):
             break
     return findings, comparison
 
@@ -256,20 +262,20 @@ def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]
     """
     if step.form not in {"missing", "ambiguous"} or step.leader is None:
         return None
-    known = {c.id: c for c in comparison.candidates if not c.smooth}
-    left: list[str] = []
+    candidate_by_id = {c.id: c for c in comparison.candidates if not c.smooth}
+    group: list[str] = []
     for name in step.group:
-        if left:
-            left.append(name)
+        if group:
+            group.append(name)
             continue
-        term = refined_term(comparison, known[name])
+        term = refined_term(comparison, candidate_by_id[name])
         if not held_out_rises(comparison, (term,), catalogue):
-            left, chosen = [name], known[name]
-            found = term
-    if not left or (len(left) == 1 and chosen.log_bf < step.leader.log_bf - LEAD):
+            group, chosen = [name], candidate_by_id[name]
+            missing_term = term
+    if not group or (len(group) == 1 and chosen.log_bf < step.leader.log_bf - LEAD):
         return None
     axes = axes_of(comparison, chosen)
-    return Finding(tuple(left), found, chosen.log_bf, discrepancies(comparison, chosen), axes)
+    return Finding(tuple(group), missing_term, chosen.log_bf, discrepancies(comparison, chosen), axes)
 
 
 def _compared_beside(
@@ -290,13 +296,13 @@ def _finding_beside(first: Comparison, findings: Sequence[Finding], catalogue: M
 
 def _refined_findings(first: Comparison, findings: Sequence[Finding], catalogue: Mapping[str, Effect]) -> list[Finding]:
     """Return findings, each sought again beside the others: the first was found before the others were known."""
-    found = list(findings)
-    for k in range(len(found)):
-        others = found[:k] + found[k + 1 :]
+    refined = list(findings)
+    for k in range(len(refined)):
+        others = refined[:k] + refined[k + 1 :]
         again = _finding_beside(first, others, catalogue)
         if again is not None and not set(again.group) & {name for other in others for name in other.group}:
-            found[k] = again
-    return found
+            refined[k] = again
+    return refined
 
 
 def _judged(comparison: Comparison, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Comparison, Step]:

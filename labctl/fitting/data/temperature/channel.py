@@ -27,10 +27,10 @@ def with_temperature(recording: Recording) -> Recording:
     columns, environment = recording.columns, recording.environment
     if "temperature_c" in columns:
         return recording
-    warm = temperature_of(columns)
-    if warm is None and recording.info.motion != "rates":
+    temperature_c = temperature_of(columns)
+    if temperature_c is None and recording.info.motion != "rates":
         return recording
-    if warm is None:
+    if temperature_c is None:
         raise NotEnoughData(
             f"{recording.info.serial}: columns 'temperature_c' and 'chamber_c' are both missing; add one of the two"
         )
@@ -38,7 +38,7 @@ def with_temperature(recording: Recording) -> Recording:
         theirs = {name: values for name, values in environment.items() if name != "temperature_c"}
         there = temperature_of(theirs)
         environment = None if there is None else {**theirs, "temperature_c": there}
-    return replace(recording, columns={**columns, "temperature_c": warm}, environment=environment)
+    return replace(recording, columns={**columns, "temperature_c": temperature_c}, environment=environment)
 
 
 def with_stand_in(columns: Mapping[str, NDArray[np.generic]], n: int) -> dict[str, NDArray[np.generic]]:

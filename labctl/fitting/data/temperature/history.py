@@ -81,13 +81,13 @@ class TemperatureHistory:
         """Return the same for many pairs of time constants (p,) at once, (n, p) K."""
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
-        found = np.zeros((len(t_s), len(taus_s)))
+        lag_k = np.zeros((len(t_s), len(taus_s)))
         for number, course in self.courses.items():
             here = run == number
             if here.any():
                 lags = _lags_two_ways(course.temperature_c, taus_s, cooling_taus_s)
-                found[here] = np.column_stack([course.at(lag, t_s[here]) for lag in lags.T])
-        return found
+                lag_k[here] = np.column_stack([course.at(lag, t_s[here]) for lag in lags.T])
+        return lag_k
 
     def hysteresis_state(self, columns: LoggedColumns, width_k: float, *, rounded: bool = False) -> Array:
         """Return the state of a play hysteresis of width `width_k`, (n,), 1: approached from below, -1: from above.
@@ -96,10 +96,10 @@ class TemperatureHistory:
         """
         if not rounded:
             return self._evaluate(columns, _play, width_k)
-        found = np.zeros(len(next(iter(columns.values()), ())))
+        state = np.zeros(len(next(iter(columns.values()), ())))
         for width, share in rounded_plays(width_k):
-            found += share * self._evaluate(columns, _play, width)
-        return found
+            state += share * self._evaluate(columns, _play, width)
+        return state
 
     def _evaluate(self, columns: LoggedColumns, function: CourseFunction, *parameters: float) -> Array:
         """Return a function of each run's temperature course, (k,) to (k,), at the times of the rows, (n,)."""
@@ -107,15 +107,15 @@ class TemperatureHistory:
             return np.zeros(len(next(iter(columns.values()), ())))
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
-        known = self._known.setdefault((function, parameters), {})
-        found = np.zeros(len(t_s))
+        cache = self._known.setdefault((function, parameters), {})
+        evaluated = np.zeros(len(t_s))
         for number, course in self.courses.items():
             here = run == number
             if here.any():
-                if number not in known:
-                    known[number] = function(course.temperature_c, *parameters)
-                found[here] = course.at(known[number], t_s[here])
-        return found
+                if number not in cache:
+                    cache[number] = function(course.temperature_c, *parameters)
+                evaluated[here] = course.at(cache[number], t_s[here])
+        return evaluated
 
 
 def rounded_plays(width_k: float) -> list[tuple[float, float]]:
@@ -159,15 +159,15 @@ def _lags_two_ways(temperature_c: Array, warming_s: Array, cooling_s: Array) -> 
     """
     shares = np.array([[lag_shares(SPACING_S, float(tau)) for tau in taus] for taus in (warming_s, cooling_s)])
     warming, cooling = shares.transpose(0, 2, 1)
-    found = np.empty((len(temperature_c), len(warming_s)))
+    lag_k = np.empty((len(temperature_c), len(warming_s)))
     at = np.full(len(warming_s), temperature_c[0])
-    found[0] = 0.0
+    lag_k[0] = 0.0
     for k in range(1, len(temperature_c)):
         now = temperature_c[k]
         keep, last, new = np.where(now >= at, warming, cooling)
         at = keep * at + last * temperature_c[k - 1] + new * now
-        found[k] = at - now
-    return found
+        lag_k[k] = at - now
+    return lag_k
 
 
 def _play(temperature_c: Array, width_k: float) -> Array:
@@ -201,8 +201,8 @@ def history_of(recording: Recording) -> TemperatureHistory:
     rate = float(np.max(np.abs(np.asarray(columns["table_rate_dps"], dtype=np.float64)), initial=0.0)) or 1.0
     if "temperature_c" not in columns:
         return TemperatureHistory({}, counted, rate, thermometer=False, middle_s=_middle_s(columns))
-    warm = np.asarray(columns["temperature_c"], dtype=np.float64)
-    span = (float(warm.min()), float(warm.max())) if len(warm) else (0.0, 1.0)
+    temperature_c = np.asarray(columns["temperature_c"], dtype=np.float64)
+    span = (float(temperature_c.min()), float(temperature_c.max())) if len(temperature_c) else (0.0, 1.0)
     if "t_s" not in columns:
         return TemperatureHistory({}, counted, rate, span)
     return TemperatureHistory(_courses(source, columns), counted, rate, span, middle_s=_middle_s(columns))
@@ -217,25 +217,25 @@ def _middle_s(columns: LoggedColumns) -> float:
 
 def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int, TemperatureCourse]:
     t_s = np.asarray(source["t_s"], dtype=np.float64)
-    warm = np.asarray(source["temperature_c"], dtype=np.float64)
+    temperature_c = np.asarray(source["temperature_c"], dtype=np.float64)
     there = np.asarray(source["run"]) if "run" in source else np.ones(len(t_s), dtype=np.int64)
     runs = np.unique(np.asarray(columns["run"])) if "run" in columns else np.array([1])
-    found = {}
+    courses = {}
     for run in runs:
-        here = (there == run) & np.isfinite(warm)
+        here = (there == run) & np.isfinite(temperature_c)
         if "run" not in source:
-            here = np.isfinite(warm)
+            here = np.isfinite(temperature_c)
         if here.sum() < 2:
             continue
         order = np.argsort(t_s[here], kind="stable")
-        times, values = t_s[here][order], warm[here][order]
+        times, values = t_s[here][order], temperature_c[here][order]
         if source is columns and "duration_s" in columns:
             times, values = _to_the_ends(
                 times, values, np.asarray(columns["duration_s"], dtype=np.float64)[here][order]
             )
         grid = np.arange(times[0], times[-1] + SPACING_S, SPACING_S)
-        found[int(run)] = TemperatureCourse(float(grid[0]), np.interp(grid, times, values))
-    return found
+        courses[int(run)] = TemperatureCourse(float(grid[0]), np.interp(grid, times, values))
+    return courses
 
 
 def _to_the_ends(times: Array, values: Array, durations_s: Array) -> tuple[Array, Array]:

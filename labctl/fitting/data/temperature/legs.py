@@ -30,17 +30,17 @@ def legs_of(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _stretches(temperature_c: Array, least: float) -> list[tuple[int, int, int]]:
     """Return start, end and direction of each leg of one run, (n,) in order of time."""
-    found: list[tuple[int, int, int]] = []
+    stretches: list[tuple[int, int, int]] = []
     begin, direction, low, high = 0, 0, 0, 0
     for k, now in enumerate(temperature_c.tolist()):
         low = k if now <= temperature_c[low] else low
         high = k if now >= temperature_c[high] else high
         if direction <= 0 and now - temperature_c[low] >= least:
             if direction:
-                found.append((begin, low + 1, -1))
+                stretches.append((begin, low + 1, -1))
             begin, direction, high = (low + 1 if direction else 0), 1, k
         elif direction >= 0 and temperature_c[high] - now >= least:
             if direction:
-                found.append((begin, high + 1, 1))
+                stretches.append((begin, high + 1, 1))
             begin, direction, low = (high + 1 if direction else 0), -1, k
-    return [*found, (begin, len(temperature_c), direction)] if direction else []
+    return [*stretches, (begin, len(temperature_c), direction)] if direction else []

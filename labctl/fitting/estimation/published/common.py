@@ -27,9 +27,9 @@ def numbers(recording: Recording, name: str, rows: Rows = slice(None)) -> Array:
 
 def uncertainty(recording: Recording, name: str, rows: Rows = slice(None)) -> Array:
     """Return the standard uncertainty of a column, (n,); 0 where the table states none."""
-    stated = f"u_{name}"
-    if stated in recording.columns:
-        return numbers(recording, stated, rows)
+    u_column = f"u_{name}"
+    if u_column in recording.columns:
+        return numbers(recording, u_column, rows)
     return np.zeros(len(numbers(recording, name, rows)))
 
 

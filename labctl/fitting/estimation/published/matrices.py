@@ -46,13 +46,13 @@ def from_matrices(recording: Recording, model: str) -> FitResult:
 def _axis(recording: Recording, axis: Axis, rows: NDArray[np.intp]) -> AxisFit:
     """Return the row of K and the element of B that belong to one output, without K's unit diagonal."""
     output = recording.info.output.get(axis, OutputUnit())
-    others = tuple(other for other in recording.info.axes if other != axis)
-    columns = (f"b_{axis}", f"k_{axis}{axis}", *(f"k_{axis}{other}" for other in others))
+    other_axes = tuple(other for other in recording.info.axes if other != axis)
+    columns = (f"b_{axis}", f"k_{axis}{axis}", *(f"k_{axis}{other}" for other in other_axes))
     values = np.array([numbers(recording, name)[rows] for name in columns])
     values[0] -= output.offset
     values /= output.scale
     values[1] -= 1.0
     u = np.array([uncertainty(recording, name)[rows] for name in columns]) / abs(output.scale)
-    effects = ("bias", "scale_factor", *("misalignment" for _ in others))
-    names = ("bias", "scale_factor", *(f"misalignment_{other}" for other in others))
+    effects = ("bias", "scale_factor", *("misalignment" for _ in other_axes))
+    names = ("bias", "scale_factor", *(f"misalignment_{other}" for other in other_axes))
     return axis_fit(effects, names, ("deg/s", *("1" for _ in columns[1:])), values, u)

@@ -46,12 +46,12 @@ def from_polynomials(recording: Recording, model: str) -> FitResult:
 
 def _terms(cells: list[str]) -> tuple[Term, ...]:
     """Return the effects that columns such as b_t0, b_t1, k_t0 need."""
-    found = []
+    polynomial_terms = []
     for letter, (effect, _) in EFFECTS.items():
         highest = max((int(cell[-1]) for cell in cells if cell[0] == letter), default=-1)
-        found += [Term(effect)] if highest >= 0 else []
-        found += [Term(f"{effect}_temperature", highest)] if highest > 0 else []
-    return tuple(found)
+        polynomial_terms += [Term(effect)] if highest >= 0 else []
+        polynomial_terms += [Term(f"{effect}_temperature", highest)] if highest > 0 else []
+    return tuple(polynomial_terms)
 
 
 def _axis(recording: Recording, axis: Axis, cells: list[str], row: int) -> AxisFit:

@@ -30,19 +30,19 @@ class Adequacy:
         return "unexplained" if self.heldout_g > UNEXPLAINED * self.expected_g else "adequate"
 
 
-def adequacy_of(found: Accelerometer, rests: Rests, known: NDArray[np.float64] | None = None) -> Adequacy:
+def adequacy_of(accelerometer: Accelerometer, rests: Rests, covariance: NDArray[np.float64] | None = None) -> Adequacy:
     """Return what is left of each rest by a fit to the others.
 
-    The fit without a rest is that to all with one unknown more, which absorbs its residual: none is made again. `known`
-    are the rows (m, 9), of variance 1, of what was known of the parameters before.
+    The fit without a rest is that to all with one unknown more, which absorbs its residual: none is made again.
+    `covariance` are the rows (m, 9), of variance 1, of what was known of the parameters before.
     """
-    accel_g, sigma = rests.accel_g[found.used], found.u_rest_g[found.used]
-    forces = np.linalg.solve(np.eye(3) + found.errors, (accel_g - found.bias_g).T).T
-    residual = np.linalg.norm(forces, axis=1) - found.gravity_g
-    white = rests.accel_white_var.mean(axis=1)[found.used]
-    jacobian = size_jacobian(found.errors, found.bias_g, accel_g) / sigma[:, None]
-    before = np.linalg.norm(accel_g, axis=1) - found.gravity_g
-    return left_out_adequacy(residual, jacobian, found.covariance, sigma, white, before, known)
+    accel_g, sigma = rests.accel_g[accelerometer.used], accelerometer.u_rest_g[accelerometer.used]
+    forces = np.linalg.solve(np.eye(3) + accelerometer.errors, (accel_g - accelerometer.bias_g).T).T
+    residual = np.linalg.norm(forces, axis=1) - accelerometer.gravity_g
+    white = rests.accel_white_var.mean(axis=1)[accelerometer.used]
+    jacobian = size_jacobian(accelerometer.errors, accelerometer.bias_g, accel_g) / sigma[:, None]
+    before = np.linalg.norm(accel_g, axis=1) - accelerometer.gravity_g
+    return left_out_adequacy(residual, jacobian, accelerometer.covariance, sigma, white, before, covariance)
 
 
 def left_out_adequacy(
@@ -54,13 +54,13 @@ def left_out_adequacy(
     `white` (k,) is the variance of a mean by its noise, g^2, `before` (k,) what was left before the fit.
     """
     hat = jacobian @ covariance @ jacobian.T
-    kept = np.maximum(1 - np.diag(hat), 1e-6)
+    remaining_share = np.maximum(1 - np.diag(hat), 1e-6)
     # residual / sigma = (1 - hat) noise / sigma: the noise of every rest is in what the others predict of one
     spread = (np.eye(len(hat)) - hat) * (np.sqrt(white) / sigma)
     if known is not None:
         spread = np.hstack([spread, jacobian @ covariance @ known.T])
-    expected = sigma * np.linalg.norm(spread, axis=1) / kept
-    return Adequacy(_rms(before), _rms(residual / kept), _rms(expected))
+    expected = sigma * np.linalg.norm(spread, axis=1) / remaining_share
+    return Adequacy(_rms(before), _rms(residual / remaining_share), _rms(expected))
 
 
 def _rms(values: Array) -> float:

@@ -27,12 +27,12 @@ class Bias:
     @property
     def mean_dps(self) -> Array:
         """The bias over the recording at 0 g, (3,)."""
-        return np.array([float(found.values[0]) for found in self.solutions])
+        return np.array([float(solution.values[0]) for solution in self.solutions])
 
     @property
     def per_g(self) -> NDArray[np.float64]:
         """The bias that a specific force of one g adds, (3, 3) deg/s/g: axis of the gyro, axis of the force."""
-        return np.array([found.values[1:] for found in self.solutions])
+        return np.array([solution.values[1:] for solution in self.solutions])
 
 
 def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], used: NDArray[np.bool_]) -> Bias:
@@ -41,7 +41,7 @@ def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], 
     Where the latitude is known the vertical part of the Earth's rate is taken off. Its horizontal part turns with the
     unknown heading; it scatters from pose to pose, and is in the uncertainty by that.
     """
-    rest = rests.gyro_dps - up_rate_dps(readings.info) * unit(force_g)
+    rest_rate_dps = rests.gyro_dps - up_rate_dps(readings.info) * unit(force_g)
     white = rests.gyro_white_var
     design = np.column_stack([np.ones(len(rests)), force_g])
     k = int(np.count_nonzero(used))
@@ -49,25 +49,25 @@ def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], 
     def of(axis: int) -> Solution:
         stability = readings.info.stability_dps
         scatter = Scatter(rests.t_s[used], np.ones(k, dtype=np.int64), np.zeros(k), white[used, axis], stability)
-        return solve(design[used], rest[used, axis], scatter)
+        return solve(design[used], rest_rate_dps[used, axis], scatter)
 
     solutions = tuple(_with_earth(of(axis), axis, readings) for axis in range(3))
-    per_g = np.array([found.values[1:] for found in solutions])
-    left = rest - force_g @ per_g.T
-    change = np.diff(left, axis=0)
+    per_g = np.array([solution.values[1:] for solution in solutions])
+    residual = rest_rate_dps - force_g @ per_g.T
+    change = np.diff(residual, axis=0)
     # robust: a pull at the cable in one rest is no drift
     scatter = (1.4826 * np.median(np.abs(change), axis=0)) ** 2 / 2
     extra = np.maximum(scatter - np.median(white, axis=0), 0.0)
-    return Bias(left, np.sqrt(white + extra), solutions)
+    return Bias(residual, np.sqrt(white + extra), solutions)
 
 
-def _with_earth(found: Solution, axis: int, readings: PoseReadings) -> Solution:
+def _with_earth(solution: Solution, axis: int, readings: PoseReadings) -> Solution:
     """Return a solution (4,) with what an unknown latitude adds to the uncertainty of the own axis' g-sensitivity.
 
     The vertical part of the Earth's rate, its sine, lies along the specific force in every pose and looks like one.
     """
     if readings.info.latitude_deg is not None:
-        return found
-    covariance = found.covariance.copy()
+        return solution
+    covariance = solution.covariance.copy()
     covariance[1 + axis, 1 + axis] += EARTH_RATE_DPS**2 / 3
-    return replace(found, covariance=covariance)
+    return replace(solution, covariance=covariance)

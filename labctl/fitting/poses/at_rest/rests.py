@@ -180,9 +180,9 @@ def _broken(breaks: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
 def _union(quiet: NDArray[np.bool_], size: int, n: int) -> NDArray[np.bool_]:
     """Return which readings are in a quiet window, (n,)."""
     edges = np.zeros(n + 1, dtype=np.int64)
-    where = np.flatnonzero(quiet)
-    np.add.at(edges, where, 1)
-    np.add.at(edges, where + size, -1)
+    quiet_rows = np.flatnonzero(quiet)
+    np.add.at(edges, quiet_rows, 1)
+    np.add.at(edges, quiet_rows + size, -1)
     return np.asarray(np.cumsum(edges)[:n] > 0)
 
 

@@ -62,15 +62,15 @@ def _noisy_sets(series: Series, values: Array) -> list[tuple[slice, float]]:
     noises = np.array([noise_of(values[part]) for part in series.parts])
     speed = np.abs([series.rate_dps[part.start] for part in series.parts])
     usual = float(np.median(noises))
-    found = []
+    noisy = []
     for k, part in enumerate(series.parts):
         like = noises[(speed == speed[k]) & (np.arange(len(noises)) != k)]
         if not len(like) or min(float(np.min(like)), usual) <= 0:
             continue
         times = float(noises[k] / max(float(np.max(like)), usual))  # along the table's axis an output has more noise
         if times > SET_TIMES:
-            found.append((part, times))
-    return found
+            noisy.append((part, times))
+    return noisy
 
 
 def _other_noise(values: Array) -> tuple[Rows, float]:
@@ -85,13 +85,13 @@ def _other_noise(values: Array) -> tuple[Rows, float]:
     if not (size > 0).all():
         return rows, 1.0
     log = np.log(size)
-    found = _other_level(log, np.log(TIMES), LASTING)
-    for begin, end in found:
+    levels = _other_level(log, np.log(TIMES), LASTING)
+    for begin, end in levels:
         rows[begin * BLOCK : len(values) if end == blocks else end * BLOCK] = True
-    if not found:
+    if not levels:
         return rows, 1.0
     of_blocks = np.zeros(blocks, dtype=bool)
-    for begin, end in found:
+    for begin, end in levels:
         of_blocks[begin:end] = True
     return rows, float(np.exp(np.median(log[of_blocks]) - np.median(log[~of_blocks])))
 
@@ -99,7 +99,7 @@ def _other_noise(values: Array) -> tuple[Rows, float]:
 def _other_level(values: Array, least: float, lasting: int) -> list[tuple[int, int]]:
     """Return runs of (m,) values that leave the usual one by `least` at once, as (first, after the last)."""
     usual = float(np.sort(values)[(len(values) - 1) // 2])  # one of the two levels, not between them
-    found = []
+    stretches = []
     for side in (1.0, -1.0):
         for begin, end in runs(side * (values - usual) > least):
             if end - begin < lasting or end - begin > len(values) - lasting:
@@ -108,8 +108,8 @@ def _other_level(values: Array, least: float, lasting: int) -> list[tuple[int, i
             beside = [values[max(begin - 3, 0) : max(begin - 1, 1)]] if begin > 0 else []
             beside += [values[min(end + 1, len(values) - 1) : end + 3]] if end < len(values) else []
             if all(abs(level - float(np.median(each))) > least for each in beside):  # it does not creep there
-                found.append((begin, end))
-    return found
+                stretches.append((begin, end))
+    return stretches
 
 
 def check_sampling(series: Series) -> Iterator[Marked]:
@@ -123,11 +123,11 @@ def check_sampling(series: Series) -> Iterator[Marked]:
         usual = np.median(steps[: blocks * STEP_BLOCK].reshape(blocks, STEP_BLOCK), axis=1)
         if not (usual > 0).all():
             continue
-        found = _other_level(np.log(usual), np.log(STEP_TIMES), STEP_LASTING)
-        if not found:
+        stretches = _other_level(np.log(usual), np.log(STEP_TIMES), STEP_LASTING)
+        if not stretches:
             continue
         rows = np.zeros(len(series), dtype=bool)
-        for begin, end in found:
+        for begin, end in stretches:
             last = part.stop if end == blocks else part.start + end * STEP_BLOCK
             rows[part.start + begin * STEP_BLOCK : last] = True
         inside = rows[part][1:]

@@ -61,12 +61,12 @@ def step_of_one_code(series: Series, name: str) -> float | None:
     if series.rate_dps is None or np.ptp(series.rate_dps):
         return None  # a table that turns would move an output of any step
     value = float(series.outputs[name][0])
-    others = {other: values for other, values in series.outputs.items() if other != name}
-    if not any(np.ptp(values) for values in others.values()):
+    other_outputs = {other: values for other, values in series.outputs.items() if other != name}
+    if not any(np.ptp(values) for values in other_outputs.values()):
         return 0.0
     coarse = [
         series.code_steps[other]
-        for other, readings in others.items()
+        for other, readings in other_outputs.items()
         if series.code_steps[other] > COARSE_LATTICE * spread_of(readings)
     ]
     return next((step for step in coarse if abs(value / step - round(value / step)) < ON_LATTICE), None)
@@ -75,14 +75,14 @@ def step_of_one_code(series: Series, name: str) -> float | None:
 def _one_code(series: Series, name: str, step: float) -> Marked:
     values = series.outputs[name]
     if step:
-        why = f"another output comes in steps of {step:.4g} deg/s, and this value is a multiple of them"
+        reason = f"another output comes in steps of {step:.4g} deg/s, and this value is a multiple of them"
     else:
-        why = "no other output changes either"
+        reason = "no other output changes either"
     return Marked(
         Finding(
             "quantised", "likely", name,
             f"the output is {values[0]:.6g} deg/s in all {len(values)} readings: its steps are far larger than its "
-            f"noise ({why}), or the unit does not measure",
+            f"noise ({reason}), or the unit does not measure",
             step or None, "deg/s", "readings that differ by their noise",
             "log the output with more digits or a finer converter, and check that the unit is switched on",
             channel=name, n=len(values),
@@ -93,15 +93,15 @@ def _one_code(series: Series, name: str, step: float) -> Marked:
 
 def frozen_rows(series: Series, name: str, values: Array) -> Rows:
     """Return which rows, (n,), are in a run of equal readings that is no accident."""
-    found = np.zeros(len(values), dtype=bool)
+    is_frozen = np.zeros(len(values), dtype=bool)
     # a run of k+1 equal readings is k steps of 0
     steady = [(begin, end + 1) for begin, end in runs(np.diff(values) == 0)]
     if not steady:
-        return found
+        return is_frozen
     usual = [end - begin for begin, end in steady if end - begin <= USUAL_RUN]
     long = sum(end - begin for begin, end in steady if end - begin > USUAL_RUN)
-    rest = len(values) - long
-    share = min(sum(length - 1 for length in usual) / rest, 0.9) if rest > LEAST_RUN else 0.9
+    last_begin = len(values) - long
+    share = min(sum(length - 1 for length in usual) / last_begin, 0.9) if last_begin > LEAST_RUN else 0.9
     is_coarse = series.code_steps[name] > COARSE_NOISES * series.noises[name]
     least = LEAST_RUN if is_coarse else max(LEAST_RUN, np.log(CHANCE / len(values)) / np.log(max(share, 1e-3)))
     ends = (float(values.min()), float(values.max()))
@@ -114,8 +114,8 @@ def frozen_rows(series: Series, name: str, values: Array) -> Rows:
             continue
         if is_coarse and not _would_move(series, slice(begin, end), gain, series.code_steps[name]):
             continue
-        found[begin:end] = True
-    return found
+        is_frozen[begin:end] = True
+    return is_frozen
 
 
 def _would_move(series: Series, rows: slice, gain: float, step: float) -> bool:

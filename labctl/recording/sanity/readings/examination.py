@@ -14,11 +14,9 @@ from labctl.recording.points import dataset_starts
 from labctl.recording.recording import Recording
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.changes import check_noise, check_sampling
-from labctl.recording.sanity.readings.clock import check_clock, check_gaps
 from labctl.recording.sanity.readings.constant import check_frozen, check_repeated
 from labctl.recording.sanity.readings.exchanged import check_exchanged
 from labctl.recording.sanity.readings.factors import check_factors
-from labctl.recording.sanity.readings.lines import check_lines
 from labctl.recording.sanity.readings.mixture import check_copies, check_devices, check_units
 from labctl.recording.sanity.readings.series import (
     Array,
@@ -32,8 +30,10 @@ from labctl.recording.sanity.readings.series import (
     spread_of,
 )
 from labctl.recording.sanity.readings.shifted import check_shifted
+from labctl.recording.sanity.readings.spectral_lines import check_lines
 from labctl.recording.sanity.readings.sudden import check_moved, check_spikes
 from labctl.recording.sanity.readings.thermometers import check_thermometers
+from labctl.recording.sanity.readings.time_stamps import check_clock, check_gaps
 
 #: Bins of a course, at most; readings below twice as many are drawn one by one.
 BINS = 600
@@ -81,10 +81,10 @@ def _numbers(values: Array) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values.tolist()]
 
 
-def marks_of(recording: Recording, found: Sequence[Marked]) -> list[MarkJson]:
+def marks_of(recording: Recording, marked: Sequence[Marked]) -> list[MarkJson]:
     """Return where each finding is, by time."""
-    t_s = np.asarray(recording.columns["t_s"], dtype=np.float64) if found else np.zeros(0)
-    return [_mark(each, t_s) for each in found]
+    t_s = np.asarray(recording.columns["t_s"], dtype=np.float64) if marked else np.zeros(0)
+    return [_mark(each, t_s) for each in marked]
 
 
 def _mark(marked: Marked, t_s: Array) -> MarkJson:
@@ -104,14 +104,15 @@ def joined_courses(parts: Sequence[list[CourseJson]]) -> list[CourseJson]:
     """Return the courses of parts of a recording as one for each channel."""
     joined: dict[str, CourseJson] = {}
     for course in (course for part in parts for course in part):
-        known = joined.get(course["channel"])
-        if known is None:
+        joined_course = joined.get(course["channel"])
+        if joined_course is None:
             joined[course["channel"]] = course
             continue
         joined[course["channel"]] = {
-            "channel": course["channel"], "unit": course["unit"], "t_s": [*known["t_s"], None, *course["t_s"]],
-            "low": [*known["low"], None, *course["low"]], "high": [*known["high"], None, *course["high"]],
-            "readings": known["readings"] + course["readings"], "bins": known["bins"] + course["bins"],
+            "channel": course["channel"], "unit": course["unit"], "t_s": [*joined_course["t_s"], None, *course["t_s"]],
+            "low": [*joined_course["low"], None, *course["low"]],
+            "high": [*joined_course["high"], None, *course["high"]],
+            "readings": joined_course["readings"] + course["readings"], "bins": joined_course["bins"] + course["bins"],
         }  # fmt: skip
     return list(joined.values())
 
@@ -157,11 +158,11 @@ def check_clipped(series: Series, repeated: Rows) -> Iterator[Marked]:
         if not ends:
             continue
         rows = np.any([at_end for _, at_end in ends], axis=0)
-        shown = " and ".join(f"{top:.5g}" for top, _ in ends)
+        limits_text = " and ".join(f"{top:.5g}" for top, _ in ends)
         yield Marked(
             Finding(
                 "clipped", "likely", f"{name}, {rows_in_words(rows)}",
-                f"{int(rows.sum())} readings are exactly at {shown} deg/s, and none beyond",
+                f"{int(rows.sum())} readings are exactly at {limits_text} deg/s, and none beyond",
                 ends[0][0], "deg/s", "readings that thin out towards the ends of their range",
                 "leave out the data sets or readings at the limit, or measure at lower rates or in a larger range: "
                 "means of clipped readings are too small",
@@ -235,24 +236,24 @@ def examine(recording: Recording) -> list[Marked]:
     if whole is None or series is None or not all(np.isfinite(values).all() for values in series.outputs.values()):
         return []
     at = np.flatnonzero(valid)
-    of_values = [replace(each, rows=_spread(each.rows, at, n)) for each in _of_values(recording, series, at)]
+    of_values = [replace(fault, rows=_spread(fault.rows, at, n)) for fault in _of_values(recording, series, at)]
     return [*check_clock(whole), *check_gaps(whole), *check_sampling(whole), *of_values]
 
 
-def _rows(recording: Recording, kept: Rows | Indices) -> Recording:
-    return replace(recording, columns={name: np.asarray(values)[kept] for name, values in recording.columns.items()})
+def _rows(recording: Recording, rows: Rows | Indices) -> Recording:
+    return replace(recording, columns={name: np.asarray(values)[rows] for name, values in recording.columns.items()})
 
 
 def _spread(rows: Rows, at: Indices, n: int) -> Rows:
-    found = np.zeros(n, dtype=bool)
-    found[at[rows]] = True
-    return found
+    is_apart = np.zeros(n, dtype=bool)
+    is_apart[at[rows]] = True
+    return is_apart
 
 
 def examination(recording: Recording) -> Examination:
     """Return what is wrong with the readings of a recording, and the course of its channels."""
-    found = examine(recording)
-    return Examination([each.finding for each in found], courses_of(recording), marks_of(recording, found))
+    faults = examine(recording)
+    return Examination([fault.finding for fault in faults], courses_of(recording), marks_of(recording, faults))
 
 
 def joined_examinations(parts: Sequence[Examination]) -> Examination:
@@ -260,9 +261,9 @@ def joined_examinations(parts: Sequence[Examination]) -> Examination:
     findings: dict[tuple[str, str], Finding] = {}
     for finding in (finding for part in parts for finding in part.findings):
         key = finding.what, finding.channel
-        known = findings.get(key)
-        more = None if known is None else (known.n or 0) + (finding.n or 0)
-        findings[key] = finding if known is None else replace(known, n=more)
+        joined_finding = findings.get(key)
+        more = None if joined_finding is None else (joined_finding.n or 0) + (finding.n or 0)
+        findings[key] = finding if joined_finding is None else replace(joined_finding, n=more)
     marks = [mark for part in parts for mark in part.marks]
     return Examination(list(findings.values()), joined_courses([part.courses for part in parts]), marks)
 
@@ -274,13 +275,13 @@ def _of_values(recording: Recording, series: Series, at: Indices) -> list[Marked
     repeated = list(check_repeated(series, _all(frozen, n)))
     clipped = list(check_clipped(series, _all(repeated, n)))
     shifted = list(check_shifted(series))
-    found = [*frozen, *repeated, *clipped, *check_thermometers(series), *shifted]
+    faults = [*frozen, *repeated, *clipped, *check_thermometers(series), *shifted]
     # what is written again is no reading, and makes the noise look smaller; a shifted row is none of its outputs
     once = np.flatnonzero(~_all([*repeated, *shifted], n))
     alone = series if len(once) == n else series_of(_rows(recording, at[once]))
     if alone is not None:
-        found += [replace(each, rows=_spread(each.rows, once, n)) for each in _of_each(alone)]
-    return [each for each in found if not _is_explained(each, found)]
+        faults += [replace(each, rows=_spread(each.rows, once, n)) for each in _of_each(alone)]
+    return [fault for fault in faults if not _is_explained(fault, faults)]
 
 
 def _of_each(series: Series) -> Iterator[Marked]:
@@ -292,14 +293,14 @@ def _of_each(series: Series) -> Iterator[Marked]:
         yield from check(series)
 
 
-def _all(found: list[Marked], n: int) -> Rows:
-    return np.any([each.rows for each in found], axis=0) if found else np.zeros(n, dtype=bool)
+def _all(marked: list[Marked], n: int) -> Rows:
+    return np.any([each.rows for each in marked], axis=0) if marked else np.zeros(n, dtype=bool)
 
 
-def _is_explained(one: Marked, found: list[Marked]) -> bool:
-    for other in found:
-        if one.finding.what not in EXPLAINS.get(other.finding.what, frozenset()):
+def _is_explained(fault: Marked, marked: list[Marked]) -> bool:
+    for other in marked:
+        if fault.finding.what not in EXPLAINS.get(other.finding.what, frozenset()):
             continue
-        if other.finding.what not in OF_CHANNEL or other.finding.channel == one.finding.channel:
+        if other.finding.what not in OF_CHANNEL or other.finding.channel == fault.finding.channel:
             return True
     return False

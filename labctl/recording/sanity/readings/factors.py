@@ -52,7 +52,7 @@ def check_factors(series: Series) -> Iterator[Marked]:
     """Yield the outputs whose level and noise are both multiplied by one known factor from a row on."""
     if series.motion not in ("rest", "rates"):
         return  # where the rate changes all the time no level is known beside a row
-    found: dict[str, tuple[int, Change]] = {}
+    by_change: dict[str, tuple[int, Change]] = {}
     for name, values in series.outputs.items():
         if series.code_steps[name] > COARSE * series.noises[name]:
             continue
@@ -62,8 +62,8 @@ def check_factors(series: Series) -> Iterator[Marked]:
             if (change := _change(series, values[part], rows))
         ]
         if changes:
-            found[name] = max(changes, key=lambda each: each[1].size)
-    for name, (start, change) in found.items():
+            by_change[name] = max(changes, key=lambda each: each[1].size)
+    for name, (start, change) in by_change.items():
         yield _marked(series, name, start + change.row, change)
 
 
@@ -97,8 +97,8 @@ def _by_factors(values: Array, row: int, factors: Sequence[float]) -> Iterator[C
         if abs(ratio - math.log(abs(factor))) > AGREES * u_noise or abs(levels[1] - expected) > AGREES * u_level:
             continue
         if factor == -1.0:
-            known = min(abs(level) for level in levels) > LEVEL_NOISES * max(noises)
-            agrees = known and _is_at_once(values, row, levels[1] - levels[0])
+            above_noise = min(abs(level) for level in levels) > LEVEL_NOISES * max(noises)
+            agrees = above_noise and _is_at_once(values, row, levels[1] - levels[0])
         else:
             agrees = abs(ratio) >= NOISE_CHANGES * u_noise and _lasts(values, row, factor)
         if agrees:
@@ -154,12 +154,12 @@ def _marked(series: Series, name: str, row: int, change: Change) -> Marked:
     rows = np.zeros(len(series), dtype=bool)
     rows[row:] = True
     size = abs(change.factor)
-    where = f"{name}, from row {row + 1} on"
+    place_text = f"{name}, from row {row + 1} on"
     n = int(rows.sum())
     if change.factor < 0:
         return Marked(
             Finding(
-                "sign", "certain", where,
+                "sign", "certain", place_text,
                 f"the output changes its sign at row {row + 1}: its level is {change.factor:g} times that before, with "
                 "the same noise",
                 change.factor, "1", "one sign in a recording", f"change the sign of {name} from row {row + 1} on, or "
@@ -172,7 +172,7 @@ def _marked(series: Series, name: str, row: int, change: Change) -> Marked:
         unit, other = ("deg/s", "rad/s") if size > 1 else ("rad/s", "deg/s")
         return Marked(
             Finding(
-                "mixed_units", "certain", where,
+                "mixed_units", "certain", place_text,
                 f"level and noise of {name} are {size:.3g} times those of the rows before, 180/pi or its inverse: "
                 f"from row {row + 1} on the output is in {unit}, before in {other}",
                 size, "1", "one unit in a file",
@@ -184,7 +184,7 @@ def _marked(series: Series, name: str, row: int, change: Change) -> Marked:
         )  # fmt: skip
     return Marked(
         Finding(
-            "gain_changes", "certain", where,
+            "gain_changes", "certain", place_text,
             f"level and noise of {name} are {size:.3g} times those of the rows before: the range was switched, and the "
             "scale of the output was not",
             size, "1", "one scale in a recording",

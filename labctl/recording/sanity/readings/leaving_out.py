@@ -23,24 +23,26 @@ def without(recording: Recording, kinds: Sequence[str], name: str) -> Recording:
     What is left out is stated in `left_out` of its head. Nothing is removed: the readings stay as they were measured.
     Raises BadInput for readings that cannot be left out, and where no reading would stay.
     """
-    found = [each for each in examine(recording) if ALL in kinds or each.finding.what in kinds]
-    chosen = [each for each in found if each.finding.may_leave_out]
-    if refused := [each.finding for each in found if not each.finding.may_leave_out and each.finding.what in kinds]:
+    faults = [each for each in examine(recording) if ALL in kinds or each.finding.what in kinds]
+    chosen_faults = [fault for fault in faults if fault.finding.may_leave_out]
+    if refused := [
+        fault.finding for fault in faults if not fault.finding.may_leave_out and fault.finding.what in kinds
+    ]:
         raise BadInput(f"{name}: {refused[0].where}: cannot be left out: {refused[0].said}; {refused[0].do}")
-    if not chosen:
+    if not chosen_faults:
         return recording
     n = len(recording)
     valid = np.asarray(recording.columns["valid"]) != 0 if "valid" in recording.columns else np.ones(n, dtype=bool)
-    left: list[LeftOut] = []
-    for each in chosen:
+    left_out: list[LeftOut] = []
+    for each in chosen_faults:
         rows = each.rows & valid
         valid &= ~each.rows
-        left.append(
+        left_out.append(
             LeftOut(
                 what=each.finding.what, channel=each.finding.channel, n=int(rows.sum()), of=n, why=each.finding.said
             )
         )
     if not valid.any():
         raise BadInput(f"{name}: no reading would be left without those of {', '.join(kinds)}; measure again")
-    info = recording.info.model_copy(update={"left_out": (*recording.info.left_out, *left)})
+    info = recording.info.model_copy(update={"left_out": (*recording.info.left_out, *left_out)})
     return replace(recording, info=info, columns={**recording.columns, "valid": valid.astype(np.int64)})

@@ -44,10 +44,10 @@ STEADY, STEADY_BLOCKS = 0.2, 8
 def check_units(series: Series) -> Iterator[Marked]:
     """Yield the rows whose outputs are as much smaller than the others' as rad/s are than deg/s: of all, or of one."""
     names = list(series.outputs)
-    found = list(_units_of(series, names))
-    if not found and len(names) > 1:
-        found = [each for name in names for each in _units_of(series, [name])]
-    yield from found
+    faults = list(_units_of(series, names))
+    if not faults and len(names) > 1:
+        faults = [each for name in names for each in _units_of(series, [name])]
+    yield from faults
 
 
 def _units_of(series: Series, names: list[str]) -> Iterator[Marked]:
@@ -55,16 +55,16 @@ def _units_of(series: Series, names: list[str]) -> Iterator[Marked]:
     if len(blocks) < 4:
         return
     noises = np.array([[noise_of(series.outputs[name][block]) for name in names] for block in blocks])
-    known = (noises > 0).all(axis=1)
-    if known.sum() < 4:
+    has_noise = (noises > 0).all(axis=1)
+    if has_noise.sum() < 4:
         return
     size = np.full(len(blocks), np.nan)
-    size[known] = np.mean(np.log(noises[known] / np.median(noises[known], axis=0)), axis=1)
-    split = _two_levels(size[known])
+    size[has_noise] = np.mean(np.log(noises[has_noise] / np.median(noises[has_noise], axis=0)), axis=1)
+    split = _two_levels(size[has_noise])
     if split is None:
         return
-    each = np.log(noises[known])
-    low = size[known] < split
+    each = np.log(noises[has_noise])
+    low = size[has_noise] < split
     apart = np.median(each[~low], axis=0) - np.median(each[low], axis=0)
     if np.any(np.abs(apart - np.log(DEG_PER_RAD)) > NEAR):
         return
@@ -146,13 +146,13 @@ def _rms(values: Array) -> float:
 
 
 def _blocks(series: Series) -> list[slice]:
-    found = []
+    blocks = []
     for part in series.parts:
         length = part.stop - part.start
         size = max(length // BLOCKS, LEAST_IN_BLOCK) if len(series.parts) < BLOCKS // 4 else length
         edges = np.linspace(part.start, part.stop, max(length // size, 1) + 1).astype(np.int64)
-        found += [slice(int(a), int(b)) for a, b in pairwise(edges) if b - a >= LEAST_IN_BLOCK]
-    return found
+        blocks += [slice(int(a), int(b)) for a, b in pairwise(edges) if b - a >= LEAST_IN_BLOCK]
+    return blocks
 
 
 def _two_levels(values: Array) -> float | None:
@@ -214,9 +214,10 @@ def check_devices(series: Series) -> Iterator[Marked]:
         )  # fmt: skip
         return
     mixed = {
-        name: found
+        name: intermixed
         for name, values in series.residuals.items()
-        if (found := _intermixed(values, series.code_steps[name])) is not None and series.motion in ("rest", "rates")
+        if (intermixed := _intermixed(values, series.code_steps[name])) is not None
+        and series.motion in ("rest", "rates")
     }
     if mixed:
         name, rows = max(mixed.items(), key=lambda each: float(np.median(np.abs(np.diff(series.residuals[each[0]])))))
@@ -278,11 +279,15 @@ def _after(series: Series) -> Iterator[Marked]:
         n = part.stop - part.start
         if n < 4 * LEAST_BESIDE or not (series.still[part].all() or series.rate_dps is not None):
             continue  # turned by hand, a unit changes its rate on all axes at once
-        found = {name: _steps_of_level(values[part], series.noises[name]) for name, values in series.residuals.items()}
-        row = int(np.argmax(np.sum([np.abs(step) for step in found.values()], axis=0)))
-        apart = {name: float(step[row]) for name, step in found.items() if abs(step[row]) > APART}
+        steps_by_name = {
+            name: _steps_of_level(values[part], series.noises[name]) for name, values in series.residuals.items()
+        }
+        row = int(np.argmax(np.sum([np.abs(step) for step in steps_by_name.values()], axis=0)))
+        apart = {name: float(step[row]) for name, step in steps_by_name.items() if abs(step[row]) > APART}
         lasting = {
-            name for name in apart if _lasts(series.residuals[name][part], row, series.noises[name], found[name])
+            name
+            for name in apart
+            if _lasts(series.residuals[name][part], row, series.noises[name], steps_by_name[name])
         }
         if len(lasting) < 2:
             share = min(row, n - row) / n
@@ -310,12 +315,12 @@ def _after(series: Series) -> Iterator[Marked]:
 
 def _jumps(series: Series, part: slice) -> dict[str, int]:
     """Return the outputs whose level jumps within a drift, and the rows of a data set where they do."""
-    found = {
+    jumps = {
         name: jump_of(values[part], series.noises[name], series.code_steps[name])
         for name, values in series.residuals.items()
     }
     ends = ALONE_SHARE * (part.stop - part.start)
-    return {name: row for name, row in found.items() if row is not None and ends < row < part.stop - part.start - ends}
+    return {name: row for name, row in jumps.items() if row is not None and ends < row < part.stop - part.start - ends}
 
 
 def _level_step(series: Series, name: str, row: int, part: slice) -> Marked:

@@ -101,11 +101,11 @@ def series_of(recording: Recording) -> Series | None:
         return None
     numbers = {name: np.asarray(columns[name], dtype=np.float64) for name in measured_names(columns)}
     n = len(recording)
-    known = {"rates", "profile", "rest"}
+    kinds = {"rates", "profile", "rest"}
     rate = None
     if info.motion == "rest":
         rate = np.zeros(n)
-    elif info.motion in known and "table_rate_dps" in columns:
+    elif info.motion in kinds and "table_rate_dps" in columns:
         rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
     if info.motion == "turns" and "turn_deg" in columns:
         still = np.asarray(columns["turn_deg"], dtype=np.float64) == 0
@@ -206,9 +206,9 @@ def gain_of(values: Array, rate: Array | None) -> float:
     return float(centred @ (values - values.mean()) / (centred @ centred))
 
 
-def runs(same: Rows) -> Iterator[tuple[int, int]]:
+def runs(is_same: Rows) -> Iterator[tuple[int, int]]:
     """Yield the stretches of rows that hold, as (first row, row after the last)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], is_same.astype(np.int8), [0]])))
     for begin, end in edges.reshape(-1, 2):
         yield int(begin), int(end)
 
@@ -225,20 +225,20 @@ def medians_around(values: Array, readings: int) -> Array:
     """Return the median of the `readings` (odd) values around each of (n,); the ends are repeated."""
     half = readings // 2
     padded = np.pad(values, half, mode="edge")
-    found = np.empty(len(values))
+    medians = np.empty(len(values))
     for begin in range(0, len(values), 50_000):  # a window of every row at once would take too much memory
         end = min(begin + 50_000, len(values))
         window = np.lib.stride_tricks.sliding_window_view(padded[begin : end + 2 * half], readings)
-        found[begin:end] = np.median(window, axis=1)
-    return found
+        medians[begin:end] = np.median(window, axis=1)
+    return medians
 
 
 def rows_in_words(rows: Rows) -> str:
     """Return "row 7" or "rows 7 to 20 and 3 more places"; rows count from 1."""
-    found = list(runs(rows))
-    if not found:
+    row_runs = list(runs(rows))
+    if not row_runs:
         return "no row"
-    begin, end = found[0]
+    begin, end = row_runs[0]
     first = f"row {begin + 1}" if end == begin + 1 else f"rows {begin + 1} to {end}"
-    more = len(found) - 1
+    more = len(row_runs) - 1
     return first + (f" and {more} more place{'s' if more > 1 else ''}" if more else "")

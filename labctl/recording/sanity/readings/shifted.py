@@ -35,16 +35,16 @@ def check_shifted(series: Series) -> Iterator[Marked]:
         # whole and shifted rows take turns, and each look shifted beside the other: whole are the more
         stretches = list(pairwise([0, *jumps, n]))
         turns = sorted((stretches[::2], stretches[1::2]), key=lambda part: sum(end - begin for begin, end in part))
-        rows, said = np.zeros(n, dtype=bool), ""
+        rows, text = np.zeros(n, dtype=bool), ""
         for begin, end in turns[0]:
-            if found := _exchanged(series, name, begin, end):
-                rows[begin:end], said = True, found
-        if not said:
+            if exchanged := _exchanged(series, name, begin, end):
+                rows[begin:end], text = True, exchanged
+        if not text:
             continue
         yield Marked(
             Finding(
                 "shifted", "certain", f"{name}, {rows_in_words(rows)}",
-                f"the columns of {int(rows.sum())} rows are shifted: {said}",
+                f"the columns of {int(rows.sum())} rows are shifted: {text}",
                 float(rows.sum()), "rows", "the same columns in every row",
                 "leave these rows out, or write them again with the field that is missing",
                 channel=name, n=int(rows.sum()), may_leave_out=True,
@@ -79,13 +79,13 @@ def _length(part: slice) -> int:
     return int(part.stop - part.start)
 
 
-def _held(columns: Mapping[str, Array], name: str, thermometer: str, inside: slice, beside: slice) -> str:
+def _held(columns: Mapping[str, Array], name: str, thermometer: str, inside: slice, neighbours: slice) -> str:
     """Return the other column whose level beside a stretch a column has inside; nothing if it keeps its own."""
     level = float(np.median(columns[name][inside]))
-    if _is_near(level, columns[name][beside], name == thermometer):
+    if _is_near(level, columns[name][neighbours], name == thermometer):
         return ""
     others = [other for other in columns if other != name]
-    near = [other for other in others if _is_near(level, columns[other][beside], other == thermometer)]
+    near = [other for other in others if _is_near(level, columns[other][neighbours], other == thermometer)]
     return near[0] if near else ""
 
 

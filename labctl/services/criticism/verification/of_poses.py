@@ -44,8 +44,8 @@ def correction_of(calibration: Calibration, recording: Recording) -> Correct:
     def correct(gyro_dps: Array) -> tuple[Array, NDArray[np.bool_]]:
         raw = np.empty_like(gyro_dps)
         raw[:, columns] = gyro_dps
-        found = compensator.compensate(raw, _temperature(calibration, readings), channels)
-        return found.rate_dps[:, columns], found.outside
+        corrected = compensator.compensate(raw, _temperature(calibration, readings), channels)
+        return corrected.rate_dps[:, columns], corrected.outside
 
     return correct
 

@@ -57,12 +57,12 @@ def own_errors(
 
     It is {} where an axis has no more data sets than coefficients, or no error: one expectation then serves all axes.
     """
-    found = {}
+    by_axis = {}
     for axis, parts in errors.items():
         values = np.concatenate(list(parts))
         freedom = len(values) - _number(coefficients.get(axis))
-        found[axis] = OwnError(rms(values), freedom)
-    return found if all(each.freedom > 0 and each.rms_dps > 0 for each in found.values()) else {}
+        by_axis[axis] = OwnError(rms(values), freedom)
+    return by_axis if all(each.freedom > 0 and each.rms_dps > 0 for each in by_axis.values()) else {}
 
 
 def _number(axis: AxisCoefficients | None) -> int:
@@ -87,18 +87,18 @@ def judged(
     what its mountings add, which are not those of the fit.
     """
     pooled = math.sqrt(sum(own[axis].rms_dps ** 2 for axis in errors) / len(errors)) if own else 0.0
-    found = {}
+    verifications = {}
     for axis, values in errors.items():
         size, expected, limit = rms(values), None, None
         if expected_dps is not None:
             expected = expected_dps * own[axis].rms_dps / pooled if own else expected_dps
             expected = math.hypot(expected, (mounted_dps or {}).get(axis, 0.0))
             limit = expected * largest_ratio(len(errors), groups, own[axis].freedom if own else None)
-        found[axis] = AxisVerification(
+        verifications[axis] = AxisVerification(
             rms_dps=size, max_dps=float(np.max(np.abs(values))), bias_dps=float(np.mean(values)),
             expected_dps=expected, limit_dps=limit, ok=None if limit is None else size <= limit,
         )  # fmt: skip
-    return found
+    return verifications
 
 
 def largest_ratio(axes: int, groups: int, freedom: int | None) -> float:
@@ -115,14 +115,14 @@ def independent_groups(points: Recording) -> int:
     """Return the number of powered sessions times temperature levels of a recording, at least 1."""
     n = len(points)
     runs = np.asarray(points.columns.get("run", np.ones(n)))
-    warm = np.asarray(points.columns.get("temperature_c", np.zeros(n)), dtype=np.float64)
-    found = 0
+    temperature_c = np.asarray(points.columns.get("temperature_c", np.zeros(n)), dtype=np.float64)
+    n_groups = 0
     for run in np.unique(runs):
         reached = -np.inf
-        for each in np.sort(warm[runs == run]).tolist():
+        for each in np.sort(temperature_c[runs == run]).tolist():
             if each > reached:
-                found, reached = found + 1, each + LEVEL_K
-    return max(found, 1)
+                n_groups, reached = n_groups + 1, each + LEVEL_K
+    return max(n_groups, 1)
 
 
 def rms(values: Array) -> float:
@@ -184,25 +184,25 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
 
     Raises BadInput, NotEnoughData as `left_by`.
     """
-    left, expected = left_by(store, row, measured), expected_dps(row)
-    own = _own_errors(store, row, measured, left) if expected is not None and len(left.errors) > 1 else {}
-    axes = judged(left.errors, expected, own, left.groups, left.mounted_dps)
+    errors_left, expected = left_by(store, row, measured), expected_dps(row)
+    own = _own_errors(store, row, measured, errors_left) if expected is not None and len(errors_left.errors) > 1 else {}
+    axes = judged(errors_left.errors, expected, own, errors_left.groups, errors_left.mounted_dps)
     return VerificationResponse(
         serial=row.serial,
         version=row.version,
         recording=measured.row.id,
         recorded_unit=measured.row.serial,
-        seen=not left.is_part and measured.row.id in row.recordings,
-        part=left.part,
-        datasets=len(left.outside),
-        rms_dps=left.rms_dps,
-        max_dps=left.max_dps,
-        bias_dps=left.bias_dps,
+        seen=not errors_left.is_part and measured.row.id in row.recordings,
+        part=errors_left.part,
+        datasets=len(errors_left.outside),
+        rms_dps=errors_left.rms_dps,
+        max_dps=errors_left.max_dps,
+        bias_dps=errors_left.bias_dps,
         axes=axes,
-        axes_off=[axis for axis, found in axes.items() if found.ok is False],
-        outside_validity=int(np.count_nonzero(left.outside)),
+        axes_off=[axis for axis, axis_errors in axes.items() if axis_errors.ok is False],
+        outside_validity=int(np.count_nonzero(errors_left.outside)),
         expected_dps=expected,
-        ok=all(found.ok is True for found in axes.values()),
+        ok=all(axis_errors.ok is True for axis_errors in axes.values()),
     )
 
 
@@ -276,13 +276,13 @@ def applied_errors(
         )
     compensator = Compensator(calibration)
     raw = np.column_stack([data.outputs[axis] for axis in calibration.axes])
-    warm = np.column_stack([data.channels.temperature_c(axis) for axis in calibration.axes])
-    found = compensator.compensate(
-        raw, warm, _channels(compensator, data), history=data.channels.history,
+    temperature_c = np.column_stack([data.channels.temperature_c(axis) for axis in calibration.axes])
+    corrected = compensator.compensate(
+        raw, temperature_c, _channels(compensator, data), history=data.channels.history,
         cross_rates_dps=(data.across_dps or None) if across_known else None,
     )  # fmt: skip
-    errors = {axis: found.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
-    return errors, found.outside
+    errors = {axis: corrected.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
+    return errors, corrected.outside
 
 
 def _mounted_dps(calibration: Calibration, data: FitData, *, own: bool) -> dict[str, float]:
@@ -304,10 +304,10 @@ def mounting_angles_of(calibration: Calibration, *, anew: bool = False) -> Angle
 
     With `anew` without what is different whenever the unit is mounted: for a part in mountings of its own.
     """
-    found = {} if calibration.bench is None else calibration.bench.angles_rad
+    angles = {} if calibration.bench is None else calibration.bench.angles_rad
     return {
         axis: {name: angle for name, angle in named.items() if not (anew and name.endswith(PLACED))}
-        for axis, named in found.items()
+        for axis, named in angles.items()
     }
 
 
@@ -320,8 +320,8 @@ def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[n
     needed = {name: np.asarray(data.channels[name], dtype=np.float64) for name in compensator.needs}
     if not compensator.remembers:
         return needed
-    kept = {name: data.channels[name] for name in ("run", "temperature_c") if name in data.channels}
-    return {**needed, **{name: np.asarray(values, dtype=np.float64) for name, values in kept.items()}}
+    channels = {name: data.channels[name] for name in ("run", "temperature_c") if name in data.channels}
+    return {**needed, **{name: np.asarray(values, dtype=np.float64) for name, values in channels.items()}}
 
 
 def expected_dps(row: CalibrationRecord) -> float | None:
@@ -334,5 +334,5 @@ def expected_dps(row: CalibrationRecord) -> float | None:
         return row.answer["poses"]["moves"]["applied_rms_dps"]
     error, joint = row.answer["error"], row.answer.get("joint")
     later = joint["heldout_rms_dps"] if joint else None  # of several recordings each was predicted by the others
-    known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"], later) if figure is not None]
-    return max(known, default=None)
+    errors_dps = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"], later) if figure is not None]
+    return max(errors_dps, default=None)

@@ -58,10 +58,10 @@ class Drafts:
 
     def of_campaigns(self, campaigns: Sequence[int]) -> Mapping[int, list[DraftRow]]:
         """Return the drafts of several campaigns by their numbers; a campaign without any is left out."""
-        found: dict[int, list[DraftRow]] = {}
+        drafts: dict[int, list[DraftRow]] = {}
         for row in self._rows(tables.drafts.c.campaign_id.in_(campaigns)):
-            found.setdefault(row.campaign, []).append(row)
-        return found
+            drafts.setdefault(row.campaign, []).append(row)
+        return drafts
 
     def newest_of_unit(self, serial: str) -> DraftRow | None:
         """Return the draft that was made, or failed, last for a unit; None for none."""

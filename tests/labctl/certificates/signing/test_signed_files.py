@@ -75,7 +75,7 @@ def test_the_signatures_are_valid_by_other_hands(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_they_are_of_this_key_only(kind: str) -> None:
+def test_signatures_fail_with_another_certificate(kind: str) -> None:
     made, other = signed(kind), owner("Ada Authoriser", kind)
     assert not xml_verifies(made.xml, other.certificate)
     assert not pdf_verifies(made.pdf, other.certificate)

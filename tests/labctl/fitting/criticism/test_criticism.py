@@ -25,7 +25,7 @@ HELD: dict[str, Any] = {"scale_factor_asymmetry": 2e-4}
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_nothing_is_missing_when_nothing_is(seed: int) -> None:
+def test_a_complete_model_is_adequate(seed: int) -> None:
     found = held(single_axis(seed))
     assert (found.verdict.form, found.verdict.named) == ("adequate", ())
 

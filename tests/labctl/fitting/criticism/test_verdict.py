@@ -78,7 +78,7 @@ def test_an_effect_that_a_technology_cannot_have_is_not_named() -> None:
     assert "scale_factor_odd" in found.verdict.named
 
 
-def test_a_fibre_gyro_may_have_it() -> None:
+def test_a_sine_response_is_named_for_a_fibre_gyro() -> None:
     assert "sine_response" in held(single_axis(5, sine_response=0.25)).verdict.named
 
 

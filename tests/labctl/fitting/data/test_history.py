@@ -17,7 +17,7 @@ def _state(temperature_c: np.ndarray, width_k: float) -> np.ndarray:
 
 @pytest.mark.parametrize("width_k", [0.02, 0.5, 8.0, 100.0])
 @pytest.mark.parametrize("number", [1, 2, 3, 1000])
-def test_a_play_follows_its_definition(number: int, width_k: float) -> None:
+def test_the_play_operator_follows_its_definition(number: int, width_k: float) -> None:
     noise = np.random.default_rng(number).normal(0.0, 0.05, number)
     temperature_c = 20.0 + 6.0 * np.sin(np.arange(number) / 90.0) + np.cumsum(noise)
     follower, wanted = temperature_c[0], []

@@ -175,7 +175,7 @@ MAPS = {"wrong separator": '[file]\nseparator = ";"\n[columns]\ngyro_x = {from =
 
 
 @pytest.mark.parametrize("kind", FILES)
-def test_one_clear_line_and_nothing_kept(kind: str, tmp_path: Path) -> None:
+def test_a_bad_file_gives_one_error_and_stores_nothing(kind: str, tmp_path: Path) -> None:
     from labctl.recording import read_recording
 
     make, said = FILES[kind]

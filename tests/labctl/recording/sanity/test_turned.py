@@ -77,7 +77,7 @@ def test_a_missing_uncertainty_is_told_with_what_is_taken_for_it(turned: Recordi
     assert "column turn_u_deg: the column is missing, so 1 deg is used for every turn" in finding.text
 
 
-def test_a_rest_that_moves_is_told(turned: Recording) -> None:
+def test_motion_during_a_rest_is_reported(turned: Recording) -> None:
     rests = np.asarray(turned.columns["dataset"]) == 3
     shaken = np.asarray(turned.columns["gyro_x"], dtype=np.float64).copy()
     shaken[rests] += 20.0 * np.sin(np.arange(rests.sum()) / 7.0)

@@ -119,7 +119,7 @@ def test_a_lease_that_beats_is_respected_whatever_the_clocks_say(shared: Store, 
         BenchHold(shared, BENCH, clock).take()
 
 
-def test_of_two_that_take_over_one_wins(shared: Store) -> None:
+def test_only_one_of_two_takeovers_succeeds(shared: Store) -> None:
     clock = VirtualClock(AT)
     lease = far(clock)
     shared.leases.claim(lease, replacing=None)

@@ -118,7 +118,7 @@ def test_exchanged_ports_are_named_with_what_to_set() -> None:
         (["a", "b"], "a and b moved: turn only the named unit, and start again"),
     ],
 )
-def test_nothing_and_several_are_told(moves: list[str], says: str) -> None:
+def test_no_unit_or_several_units_that_move_are_reported(moves: list[str], says: str) -> None:
     answer, _ = run({"a": moves, "b": ["b"]})
     assert (answer.units[0].ok, sorted(answer.units[0].moved), answer.units[1].ok) == (False, moves, True)
     assert answer.units[0].text.split(": ", 1)[1] == says.split(": ", 1)[1]

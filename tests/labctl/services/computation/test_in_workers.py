@@ -67,7 +67,7 @@ def test_a_worker_that_is_killed_is_one_clear_error(workers: InWorkers) -> None:
     assert workers.run(work.who_asks, "yes")[0] == "yes"
 
 
-def test_a_deadline_ends_it(store: Store, tmp_path: Path) -> None:
+def test_a_deadline_ends_a_computation(store: Store, tmp_path: Path) -> None:
     hasty = InWorkers(store, replace(LIMITS, deadline_s=0.0))
     held = work.Held(tmp_path)
     with pytest.raises(ComputationEnded, match="ended after 0 s"):

@@ -270,7 +270,7 @@ def test_what_cannot_be_is_refused_and_the_bench_is_free(service: Service, reque
     assert service.live.state().stage == "idle"
 
 
-def test_nothing_to_end(service: Service) -> None:
+def test_ending_without_a_session_is_a_conflict(service: Service) -> None:
     with pytest.raises(Conflict, match="no live calibration runs in this service"):
         service.live.end(LiveEndRequest())
 

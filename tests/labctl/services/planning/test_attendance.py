@@ -100,6 +100,6 @@ def test_many_times_are_counted_and_a_long_plan_names_dates() -> None:
         (None, "0 20 * * FRI", "2026-01-09 20:00"),
     ],
 )
-def test_a_plan_is_looked_at_for_its_start(at: str | None, cron: str | None, due: str) -> None:
+def test_the_planned_start_is_the_next_due_time(at: str | None, cron: str | None, due: str) -> None:
     start, zone = planned_start(at, cron, "Europe/Berlin", datetime(2026, 1, 5, 8, tzinfo=UTC))
     assert f"{start.astimezone(zone):%Y-%m-%d %H:%M}" == due

@@ -52,7 +52,7 @@ def test_what_is_left_out_is_stated(log: Path, tmp_path: Path) -> None:
         assert kinds(folder) == {}
 
 
-def test_the_commands_say_it(log: Path, tmp_path: Path) -> None:
+def test_the_commands_print_the_findings(log: Path, tmp_path: Path) -> None:
     database = str(tmp_path / "labctl.db")
     picture = tmp_path / "picture.html"
     said = run_labctl(["inspect", str(log), "--picture", str(picture)])

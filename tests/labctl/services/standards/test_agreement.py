@@ -72,7 +72,7 @@ def test_what_agrees_is_recorded_as_it_is(store: Store) -> None:
         ({"certificate": "T-0"}, "certificate T-0 of the bench file is not in the register, whose newest is T-1"),
     ],
 )
-def test_what_differs_is_said(store: Store, changed: dict[str, Any], words: str) -> None:
+def test_differences_from_the_register_are_reported(store: Store, changed: dict[str, Any], words: str) -> None:
     register.certificate(store, "T-1", date(2023, 12, 1), None, due="2026-06-30")
     assert words in said(store, Standard.model_validate({**ENTRY.model_dump(), **changed}))
 

@@ -69,14 +69,14 @@ def rounding_dps(calibration: Calibration, roundoff: float) -> float:
     over = range_of(calibration)
     surface = surface_of(fitted, calibration.axes)
     if surface is not None:
-        found, gain = _of_surface(surface, over, roundoff)
+        roundoff_dps, gain = _of_surface(surface, over, roundoff)
     else:
         law = correction(fitted, calibration.axes)
-        part = StaticPart(calibration, lambda raw, warm: law(raw, warm, {}), memory)
+        part = StaticPart(calibration, lambda raw, temperature_c: law(raw, temperature_c, {}), memory)
         sine = sine_form_of(fitted, calibration.axes)
-        found, gain = _of_solution(part, over, roundoff, _roundings(calibration, is_sine=sine is not None))
+        roundoff_dps, gain = _of_solution(part, over, roundoff, _roundings(calibration, is_sine=sine is not None))
     before = _of_memory(memory, over, roundoff) + _of_force(calibration.force_sensitivity, over, roundoff)
-    whole = BEYOND * (found + gain * before)
+    whole = BEYOND * (roundoff_dps + gain * before)
     # the calibration is itself evaluated in double, and so is part of the code in any precision
     return whole + (rounding_dps(calibration, DOUBLE) if roundoff > DOUBLE else whole)
 
@@ -121,13 +121,13 @@ def _of_solution(part: StaticPart, over: Range, roundoff: float, roundings: tupl
     Rounding acts as if the output were off by as many roundoffs of its largest size as there are roundings, and the
     temperature by some roundoffs of its own.
     """
-    raw, warm = _corners(part, over)
-    rate = part.rate(raw, warm)
+    raw, temperature_c = _corners(part, over)
+    rate = part.rate(raw, temperature_c)
     gain = np.zeros(rate.shape)
     for by in range(raw.shape[1]):
         moved = raw.copy()
         moved[:, by] -= np.copysign(SLOPE_STEP_DPS, raw[:, by])
-        gain += np.abs(part.rate(moved, warm) - rate) / SLOPE_STEP_DPS
+        gain += np.abs(part.rate(moved, temperature_c) - rate) / SLOPE_STEP_DPS
     largest, size = float(gain.max()), over.output_dps + float(np.abs(raw - rate).max())
     step_k = max(float(np.ptp(over.temperature_c)) / (len(over.temperature_c) - 1), 1e-9)
     slope = len(part.axes) * float(np.abs(np.diff(_by_temperature(part, over), axis=1)).max()) / step_k
@@ -153,7 +153,7 @@ def _by_temperature(part: StaticPart, over: Range) -> NDArray[np.float64]:
 
 def _of_memory(memory: Memory | None, over: Range, roundoff: float) -> float:
     """Return what a rounded temperature does to the followers, all of them together, deg/s."""
-    found = 0.0
+    largest_dps = 0.0
     for each in memory.followers if memory is not None else ():
         size = float(np.abs(each.size).max())
         if each.scale is not None:
@@ -161,8 +161,8 @@ def _of_memory(memory: Memory | None, over: Range, roundoff: float) -> float:
         per_k = size if each.kind == "lag" else size / (each.parameter / 2)
         if each.bow is not None:
             per_k += 4 * size / max(each.bow[1] - each.bow[0], 1e-9)
-        found += per_k * (2 * over.hottest * roundoff + 20 * DOUBLE * float(np.ptp(over.temperature_c)))
-    return found + roundoff * over.output_dps * bool(found)
+        largest_dps += per_k * (2 * over.hottest * roundoff + 20 * DOUBLE * float(np.ptp(over.temperature_c)))
+    return largest_dps + roundoff * over.output_dps * bool(largest_dps)
 
 
 def _of_force(force: ForceSensitivity | None, over: Range, roundoff: float) -> float:

@@ -15,8 +15,8 @@ from instruments.errors import NoReply
 from labctl.api import create_app
 from labctl.cli.printing.campaigns import print_campaign
 from labctl.services.campaigns import preparation
-from labctl.services.campaigns.advice import DID_NOTHING, DID_SAFE, DID_UNSAFE, FAILURES, LOOK, OTHER, advice_of
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.failure_advice import DID_NOTHING, DID_SAFE, DID_UNSAFE, FAILURES, LOOK, OTHER, advice_of
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import limits_of, load_bench
@@ -39,7 +39,7 @@ def happened(reason: str) -> str:
 
 
 @pytest.mark.parametrize(("kind", "change"), [(case[0], case[1]) for case in TRIPS])
-def test_every_guard_is_told_in_its_own_words(kind: str, change: dict[str, Any]) -> None:
+def test_every_guard_has_its_own_advice(kind: str, change: dict[str, Any]) -> None:
     limits = limits_of(load_bench("triaxial-sim"))
     named = replace(limits, gyros={"imu": next(iter(limits.gyros.values()))})
     trips = [trip for trip in Guards(GuardRules(), named).check(replace(WELL, **change)) if trip.kind == kind]

@@ -10,4 +10,4 @@ from labctl.answers.benches import PortResponse
 
 def list_ports() -> list[PortResponse]:
     """Return every serial port, with its adapter and why it cannot be used; nothing is sent to any."""
-    return [PortResponse(**asdict(each)) for each in serial_ports()]
+    return [PortResponse(**asdict(serial_port)) for serial_port in serial_ports()]

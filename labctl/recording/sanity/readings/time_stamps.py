@@ -44,12 +44,12 @@ def rows_in_order(t_s: Array) -> Rows:
             last.append(row)
         else:
             ends[length], last[length] = value, row
-    kept = np.zeros(len(t_s), dtype=bool)
+    in_order = np.zeros(len(t_s), dtype=bool)
     row = last[-1] if last else -1
     while row >= 0:
-        kept[row] = True
+        in_order[row] = True
         row = int(before[row])
-    return kept
+    return in_order
 
 
 def check_clock(series: Series) -> Iterator[Marked]:
@@ -159,5 +159,5 @@ def _usual_steps(steps: Array, usual: float) -> Array:
         return np.full(len(steps), usual)
     of_blocks = np.pad(np.median(steps[: blocks * STEPS].reshape(blocks, STEPS), axis=1), 1, mode="edge")
     around = np.median([of_blocks[:-2], of_blocks[1:-1], of_blocks[2:]], axis=0)
-    found = around[np.minimum(np.arange(len(steps)) // STEPS, blocks - 1)]
-    return np.asarray(np.where(found > 0, found, usual))  # stamps that several readings share say nothing
+    step_s = around[np.minimum(np.arange(len(steps)) // STEPS, blocks - 1)]
+    return np.asarray(np.where(step_s > 0, step_s, usual))  # stamps that several readings share say nothing

@@ -70,9 +70,9 @@ class LoggedJournal:
     def step_started(self, index: int, t_s: float, at: datetime) -> None:
         """Record and log that a step begins; the second time it is a retry."""
         self._attempts[index] += 1
-        what = describe_step(self._plan.steps[index], self._plan.datasets)
+        step_text = describe_step(self._plan.steps[index], self._plan.datasets)
         again: dict[str, Any] = {"attempt": self._attempts[index]} if self._attempts[index] > 1 else {}
-        with self._entry("step.started", **self._step(index), what=what, **again, t_s=_seconds(t_s), at=at):
+        with self._entry("step.started", **self._step(index), what=step_text, **again, t_s=_seconds(t_s), at=at):
             self._journal.step_started(index, t_s, at)
 
     def step_ended(self, index: int, result: StepResult, t_s: float, at: datetime) -> None:

@@ -55,7 +55,7 @@ def first_response(data: FitData, model: ErrorModel, axis: str) -> Response:
     return best
 
 
-def next_response(before: Response, wanted: Response, model: ErrorModel, u_s: float) -> Response:
+def next_response(before: Response, target: Response, model: ErrorModel, u_s: float) -> Response:
     """Return the response of the next step, at most 1 s; `u_s` is the time constant's standard uncertainty before, s.
 
     Beside a delay only the square of a time constant T is seen near 0, where a change of T acts like a change of the
@@ -63,12 +63,12 @@ def next_response(before: Response, wanted: Response, model: ErrorModel, u_s: fl
     from 0: nearer to 0 a step does not go, and T comes out as half of that with all of it as its u.
     """
     if TimeDelay.id not in model.effect_ids or Bandwidth.id not in model.effect_ids:
-        return _within_reach(wanted)
-    told = float(np.sqrt(before.time_constant_s * u_s)) if np.isfinite(u_s) else before.time_constant_s
-    least = max(LEAST_LEFT * before.time_constant_s, told)
-    if wanted.time_constant_s >= least:
-        return _within_reach(wanted)
-    lag_s = wanted.delay_s + wanted.time_constant_s
+        return _within_reach(target)
+    seen_s = float(np.sqrt(before.time_constant_s * u_s)) if np.isfinite(u_s) else before.time_constant_s
+    least = max(LEAST_LEFT * before.time_constant_s, seen_s)
+    if target.time_constant_s >= least:
+        return _within_reach(target)
+    lag_s = target.delay_s + target.time_constant_s
     return _within_reach(Response(lag_s - least, least))
 
 
@@ -80,10 +80,10 @@ def _nearest(data: FitData, axis: str, responses: list[Response]) -> Response:
     """Return the response at which a straight line through the output leaves the smallest residuals."""
 
     def left(response: Response) -> float:
-        seen = data.through(response).true_rate_dps(axis)
-        seen, output = seen - seen.mean(), data.outputs[axis] - data.outputs[axis].mean()
-        along = float(seen @ output)
-        return float(output @ output) - along**2 / max(float(seen @ seen), 1e-300)
+        delayed = data.through(response).true_rate_dps(axis)
+        delayed, output = delayed - delayed.mean(), data.outputs[axis] - data.outputs[axis].mean()
+        along = float(delayed @ output)
+        return float(output @ output) - along**2 / max(float(delayed @ delayed), 1e-300)
 
     return min(responses, key=left)
 

@@ -75,23 +75,23 @@ def _pieces(series: Series) -> list[list[slice]]:
     readings = min(1 << int(np.log2(np.median(long))), MOST_READINGS)
     if len(series.parts) == 1 and long[0] < 8 * readings:
         readings = max(readings // 4, LEAST_READINGS)
-    found = []
+    pieces = []
     for part in series.parts:
         begins = range(part.start, part.stop - readings + 1, readings // 2)
-        found.append([slice(begin, begin + readings) for begin in begins])
-    return [same for same in found if same]
+        pieces.append([slice(begin, begin + readings) for begin in begins])
+    return [same for same in pieces if same]
 
 
 def _over_background(spectrum: Array) -> Array:
     """Return a spectrum (k,) over what is beside each bin; 0 in the first bins, where drift is."""
     padded = np.log(np.maximum(spectrum, 1e-300))
-    found = np.zeros(len(spectrum))
+    excess = np.zeros(len(spectrum))
     for k in range(FIRST_BIN, len(spectrum)):
-        left = padded[max(k - GUARD - BACKGROUND, 1) : k - GUARD]
+        below = padded[max(k - GUARD - BACKGROUND, 1) : k - GUARD]
         right = padded[k + GUARD + 1 : k + GUARD + 1 + BACKGROUND]
-        sides = [float(np.median(side)) for side in (left, right) if len(side) >= 2]
-        found[k] = np.exp(padded[k] - max(sides))
-    return found
+        sides = [float(np.median(side)) for side in (below, right) if len(side) >= 2]
+        excess[k] = np.exp(padded[k] - max(sides))
+    return excess
 
 
 def _peak(spectrum: Array, hz: Array, k: int) -> float:
@@ -104,8 +104,8 @@ def mains_at(hz: float, step_s: float, tolerance_hz: float) -> float | None:
     """Return which line of the mains, Hz, is seen at a frequency when sampled every `step_s`; None for none."""
     rate_hz = 1.0 / step_s
     for mains in MAINS_HZ:
-        seen = abs(mains - rate_hz * round(mains / rate_hz))
-        if abs(seen - hz) < tolerance_hz + MAINS_SHARE * mains:
+        folded_hz = abs(mains - rate_hz * round(mains / rate_hz))
+        if abs(folded_hz - hz) < tolerance_hz + MAINS_SHARE * mains:
             return mains
     return None
 
