@@ -21,7 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validat
 from instruments.datasheet import Convention, undeclared
 from instruments.laboratory import Laboratory
 from instruments.standards import Standard
-from instruments.toml_documents import MOST_BYTES, read_toml
+from instruments.toml_documents import MAX_BYTES, read_toml
 
 #: A serial number becomes part of file names, addresses and C comments.
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
@@ -322,9 +322,9 @@ def _with_formats(document: dict[str, object], folder: Path) -> dict[str, object
 def _dbc_text(path: Path) -> str:
     """Return the text of a DBC file, which is of UTF-8 or, as most tools write it, of Windows' code page 1252."""
     with path.open("rb") as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise tomllib.TOMLDecodeError(f"DBC file {path}: larger than {MOST_BYTES} bytes, the limit of such a file")
+        content = file.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise tomllib.TOMLDecodeError(f"DBC file {path}: larger than {MAX_BYTES} bytes, the limit of such a file")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

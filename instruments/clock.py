@@ -263,13 +263,13 @@ class PacedClock:
     #: Real time by which the clock may be late and still catch up: what a busy scheduler takes, s.
     BACKLOG_S = 0.1
     #: The clock waits once it is this far ahead of real time: shorter waits cost more than they last, s.
-    LEAST_WAIT_S = 0.002
+    MIN_WAIT_S = 0.002
     #: Longest wait between two advances of a sleep, s of real time.
     STEP_S = 0.1
     #: Without another wait in so long, the threads that wait for the interpreter are given it for `GIVE_WAY_S`.
     GIVE_WAY_EVERY_S, GIVE_WAY_S = 0.002, 0.0002
     #: `reached_speed` is that of the last so many seconds of real time, and unknown during the first.
-    WINDOW_S, MARK_EVERY_S, LEAST_WINDOW_S = 10.0, 0.5, 1.0
+    WINDOW_S, MARK_EVERY_S, MIN_WINDOW_S = 10.0, 0.5, 1.0
     #: Every time-out, s of real time, as that of a VirtualClock.
     WALL_TIMEOUT_S = 10.0
 
@@ -315,12 +315,12 @@ class PacedClock:
 
     @property
     def reached_speed(self) -> float | None:
-        """Clock seconds per second of real time in the last `WINDOW_S`; None in the first `LEAST_WINDOW_S`."""
+        """Clock seconds per second of real time in the last `WINDOW_S`; None in the first `MIN_WINDOW_S`."""
         with self._changed:
             wall_s = self._wall.now_s()
             self._forget_before(wall_s - self.WINDOW_S)
             since_s, then_s = self._marks[0]
-            if wall_s - since_s < self.LEAST_WINDOW_S:
+            if wall_s - since_s < self.MIN_WINDOW_S:
                 return None
             return (self._now_s - then_s) / (wall_s - since_s)
 
@@ -333,7 +333,7 @@ class PacedClock:
         self._drop_backlog(wall_s)
         since_s, then_s = self._pace
         ahead_s = (first_s - then_s) / self.speed - (wall_s - since_s)
-        if ahead_s >= self.LEAST_WAIT_S:
+        if ahead_s >= self.MIN_WAIT_S:
             self._now_s = min(max(self._now_s, then_s + (wall_s - since_s) * self.speed), first_s)
             self._mark(wall_s)
             self._wait(min(ahead_s, self.STEP_S))

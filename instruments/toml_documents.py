@@ -13,7 +13,7 @@ from pathlib import Path
 from reprlib import Repr
 
 #: The largest file or text that is read.
-MOST_BYTES = 1 << 20
+MAX_BYTES = 1 << 20
 #: The deepest nesting of brackets, and the most parts of a dotted key; no file of labctl needs more than 4.
 DEEPEST = 32
 
@@ -46,17 +46,17 @@ def listed(complaints: Iterable[str], most: int = 5) -> str:
 def read_toml_text(path: Path) -> str:
     """Return the text of a TOML file. Raises OSError, UnicodeDecodeError, and TOMLDecodeError for one over 1 MiB."""
     with path.open("rb") as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise tomllib.TOMLDecodeError(f"larger than {MOST_BYTES} bytes, the limit of such a file")
+        content = file.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise tomllib.TOMLDecodeError(f"larger than {MAX_BYTES} bytes, the limit of such a file")
     return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def parse_toml(text: str) -> dict[str, object]:
     """Return what a TOML text says. Raises TOMLDecodeError, also where it is too long or nested too deeply."""
-    if len(text) > MOST_BYTES:
+    if len(text) > MAX_BYTES:
         raise tomllib.TOMLDecodeError(
-            f"{len(text)} characters long; the limit of such a file is {MOST_BYTES} characters"
+            f"{len(text)} characters long; the limit of such a file is {MAX_BYTES} characters"
         )
     _refuse_deep(text)
     try:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from labctl.errors import BadInput, NotEnoughData
 
 #: The error per turn grows without bound towards rest.
-LEAST_RATE_DPS = 5.0
+MIN_RATE_DPS = 5.0
 #: Below this rate the table is at rest; the Earth turns at 0.004 deg/s.
 AT_REST_DPS = 0.01
-LEAST_READINGS = 10
+MIN_READINGS = 10
 
 
 def error_per_turn(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -22,18 +22,18 @@ def error_per_turn(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]
     Eq. 14 is error x sampling rate x time for an error per sample; for an error in deg/s it is error x time, with
     360 / |rate| seconds for a turn. Raises BadInput below 5 deg/s.
     """
-    slow = np.abs(rate_dps) < LEAST_RATE_DPS
+    slow = np.abs(rate_dps) < MIN_RATE_DPS
     if np.any(slow):
         raise BadInput(
             f"rate {float(np.asarray(rate_dps)[slow][0]):g} deg/s: the error per turn is defined only for rates "
-            f"of {LEAST_RATE_DPS:g} deg/s or more; use the error in deg/s instead"
+            f"of {MIN_RATE_DPS:g} deg/s or more; use the error in deg/s instead"
         )
     return error_dps * 360.0 / np.abs(rate_dps)
 
 
 def turn_errors(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]) -> list[float | None]:
     """Return the error after one turn, deg, of n data sets; None below the least rate, or without an error."""
-    there = (np.abs(rate_dps) >= LEAST_RATE_DPS) & np.isfinite(error_dps)
+    there = (np.abs(rate_dps) >= MIN_RATE_DPS) & np.isfinite(error_dps)
     turned = np.full(len(rate_dps), np.nan)
     turned[there] = error_per_turn(error_dps[there], rate_dps[there])
     return [float(value) if ok else None for value, ok in zip(turned, there, strict=True)]
@@ -78,9 +78,9 @@ def static_bias(at_rest_dps: NDArray[np.float64], instability_dps: float = 0.0) 
     10 to 20 s of readings are usual. Raises NotEnoughData for fewer than 10 readings.
     """
     n = len(at_rest_dps)
-    if n < LEAST_READINGS or not np.all(np.isfinite(at_rest_dps)):
+    if n < MIN_READINGS or not np.all(np.isfinite(at_rest_dps)):
         raise NotEnoughData(
-            f"a static bias needs at least {LEAST_READINGS} finite readings at rest; {n} were given, record more"
+            f"a static bias needs at least {MIN_READINGS} finite readings at rest; {n} were given, record more"
         )
     white = float(np.std(at_rest_dps, ddof=1)) / np.sqrt(n)
     return StaticBias(float(np.mean(at_rest_dps)), float(np.hypot(white, instability_dps)), n)

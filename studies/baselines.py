@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.evidence.design import Design
-from labctl.fitting.criticism.evidence.gains import LEAST_LEFT
+from labctl.fitting.criticism.evidence.gains import MIN_REMAINING
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.temperature.levels import folds
 from labctl.fitting.numeric.arrays import Array
@@ -27,7 +27,7 @@ from labctl.fitting.numeric.arrays import Array
 #: What the extra `study` brings.
 DISTRIBUTIONS = ("statsmodels", "scikit-learn", "pysindy")
 #: Forward selection ends here at the latest.
-MOST_TERMS = 30
+MAX_TERMS = 30
 LASSO_FOLDS = 5
 #: The default path of LassoCV takes some five times as long on collinear columns, and is right no more often.
 LASSO_PATH = {"eps": 1e-2, "alphas": 30, "max_iter": 300}
@@ -78,7 +78,7 @@ def table_of(data: ReducedRecording, design: Design, axis: str, *, means: bool) 
     left = columns - base @ (base.T @ columns)
     left -= base @ (base.T @ left)
     before, after = np.linalg.norm(columns, axis=0), np.linalg.norm(left, axis=0)
-    kept = after**2 > LEAST_LEFT * np.maximum(before**2, 1e-300)
+    kept = after**2 > MIN_REMAINING * np.maximum(before**2, 1e-300)
     names = np.repeat([option.candidate for option in effects], [option.rows.shape[2] for option in effects])
     target = y[there] * weights
     return Table(left[:, kept] / after[kept], target - base @ (base.T @ target), names[kept], _levels(data, there))
@@ -97,9 +97,9 @@ def _levels(data: ReducedRecording, there: NDArray[np.bool_]) -> NDArray[np.int6
 def entries(table: Table) -> Iterator[tuple[int, float]]:
     """Yield the columns of forward selection in order, each with the sum of squares that it takes off."""
     left, residual = table.columns.copy(), table.target.copy()
-    for _ in range(MOST_TERMS):
+    for _ in range(MAX_TERMS):
         size = np.einsum("nk,nk->k", left, left)
-        gains = np.where(size > LEAST_LEFT, (left.T @ residual) ** 2 / np.maximum(size, LEAST_LEFT), 0.0)
+        gains = np.where(size > MIN_REMAINING, (left.T @ residual) ** 2 / np.maximum(size, MIN_REMAINING), 0.0)
         best = int(np.argmax(gains)) if len(gains) else -1
         if best < 0 or gains[best] <= 0:
             return

@@ -28,7 +28,7 @@ from labctl.fitting.numeric.rounding import at_most
 from studies.c_units import UNITS
 
 POINTS = int(os.environ.get("LABCTL_STUDY_POINTS", "1000000"))
-SEED, MOST_G = 20_260, 16.0
+SEED, MAX_G = 20_260, 16.0
 FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror")
 #: Samples of a unit that remembers are so far apart, s; its temperature goes up and down in 2 pi times the second.
 STEP_S, SWING_S = 0.1, 900.0
@@ -72,7 +72,7 @@ def drawn(calibration: Calibration, n: int) -> Points:
         t_s = np.concatenate([[0.0], np.cumsum(np.full(n - 1, STEP_S))])
         warm = low + (high - low) * (0.5 + 0.5 * np.sin(t_s / SWING_S + rng.uniform()))
         known = {"t_s": t_s}
-    force = rng.uniform(-MOST_G, MOST_G, (n, 3)) if calibration.force_sensitivity is not None else None
+    force = rng.uniform(-MAX_G, MAX_G, (n, 3)) if calibration.force_sensitivity is not None else None
     raw = rng.uniform(slow, fast, (n, len(calibration.axes)))
     if force is not None:  # an output with the force's part taken off is inside too
         raw *= 0.9

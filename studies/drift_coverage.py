@@ -23,7 +23,7 @@ SEED = int(os.environ.get("LABCTL_STUDY_SEED", "30007"))
 #: Years of an interval between calibrations, of the past and to the due date.
 YEARS = (0.5, 2.0)
 #: Most intervals in the history of a unit of the type.
-MOST_INTERVALS = 4
+MAX_INTERVALS = 4
 #: Scatter of a unit's drift from interval to interval.
 SCATTER = 0.3
 #: Units that share the lengths of the intervals of a draw.
@@ -78,8 +78,8 @@ def by_type(population: Population, units: int, trials: int, seed: int) -> float
     inside = 0
     for batch in range(trials // BATCH):
         rng = np.random.default_rng([seed, units, batch])
-        years = population.years(rng, units + 1, MOST_INTERVALS + 1)
-        known = np.arange(MOST_INTERVALS) < rng.integers(1, MOST_INTERVALS + 1, size=(units, 1))
+        years = population.years(rng, units + 1, MAX_INTERVALS + 1)
+        known = np.arange(MAX_INTERVALS) < rng.integers(1, MAX_INTERVALS + 1, size=(units, 1))
         rates, last = population.history(rng, years, BATCH)
         seen = np.where(known[:, :, np.newaxis], rates[:-1, :-1], np.nan)
         inside += population.inside(of_type(seen, years[:-1, :-1]), rates[-1, -1], last[-1], float(years[-1, -1]))

@@ -25,7 +25,7 @@ FILE = Path(__file__).with_name("effect_sizes.json")
 COMMAND = "python -m studies.effect_sizes"
 Z_LEVELS = (5.0, 10.0, 20.0, 30.0, 100.0)
 #: A protocol cannot show an effect of which less than this share is visible beside the model.
-LEAST_VISIBLE = 0.15
+MIN_VISIBLE = 0.15
 #: z is taken to be proportional to the size when it is at both ends of the levels, to within this share.
 STRAIGHT = 0.03
 #: A size may be this many times the noticeable size, or as many times less.
@@ -66,7 +66,7 @@ def sizes_of(sizing: Sizing, effect: str, default: float) -> dict[str, float]:
     Most effects are proportional to their size: three simulations show this, and the other sizes follow in proportion.
     """
     at, share = sizing.z_of(effect, default)
-    if share < LEAST_VISIBLE or at <= 0:
+    if share < MIN_VISIBLE or at <= 0:
         return {}
     factors = [min(z / at, FARTHEST) for z in (Z_LEVELS[0], Z_LEVELS[-1])]
     seen = {1.0: at} | {factor: sizing.z_of(effect, default * factor)[0] for factor in factors}

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from labctl.fitting.criticism import criticise
-from labctl.fitting.criticism.criticism import MOST_OVER_FLOOR
+from labctl.fitting.criticism.criticism import MAX_OVER_FLOOR
 from labctl.fitting.estimation.fit import fit
 from labctl.recording import Recording
 from labctl.services.criticism.report_text import sentences
@@ -48,7 +48,7 @@ class Outcome:
     @property
     def contradicts(self) -> bool:
         """Whether the text calls a model adequate whose residual is far above the floor."""
-        return "adequate" in self.text.lower() and self.before_over_floor > MOST_OVER_FLOOR
+        return "adequate" in self.text.lower() and self.before_over_floor > MAX_OVER_FLOOR
 
 
 def of_one_output(recording: Recording, axis: str) -> Recording:

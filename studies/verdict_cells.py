@@ -51,7 +51,7 @@ FOREIGN = (
 )
 READINGS_HZ = 4.0
 #: The part of an error that the model leaves cannot be seen below this size, in noise units.
-LEAST_Z = 5.0
+MIN_Z = 5.0
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def _is_absorbed(case: Case) -> bool:
         drift = expected_drift_dps(before.info.technology or "", before.info.stability_dps)
         difference = after.output[axis] - before.output[axis]
         z_squared += eliminate_base(design, difference, white, scale, [Noise(drift, 0.0, 0.0)])[0].chi2
-    return bool(z_squared < LEAST_Z**2)
+    return bool(z_squared < MIN_Z**2)
 
 
 def score(case: Case, verdict: Verdict) -> str:

@@ -27,8 +27,8 @@ ELSEWHERE = {
     "docs/how-to/extending.md": "tests/system/test_extending.py",
     "docs/how-to/from-a-file-to-a-calibration.md": "tests/system/test_published_files.py",
 }
-MOST_SKIPPED = 26
-LEAST_REASON_WORDS = 5
+MAX_SKIPPED = 26
+MIN_REASON_WORDS = 5
 
 
 def text_of(page: Path) -> str:
@@ -81,8 +81,8 @@ def test_no_command_hides_in_a_block_of_text() -> None:
 def test_blocks_that_are_not_executed_are_few_and_say_why() -> None:
     marks = [(page, found["reason"] or "") for page in PAGES for found in SKIP.finditer(text_of(page))]
     reported = "\n".join(f"{page.relative_to(ROOT)}: {reason}" for page, reason in marks)
-    assert len(marks) <= MOST_SKIPPED, reported
-    assert all(len(reason.split()) >= LEAST_REASON_WORDS for _, reason in marks), reported
+    assert len(marks) <= MAX_SKIPPED, reported
+    assert all(len(reason.split()) >= MIN_REASON_WORDS for _, reason in marks), reported
     directives = sum(len(re.findall(r"<!--+\s*(?:;\s*)?skip", text_of(page))) for page in PAGES)
     assert directives == len(marks), 'the only form is <!-- skip: next "reason" -->'
 

@@ -27,7 +27,7 @@ LISTEN_S = 5.0
 #: Reads within that time: each is a point of the line that measures the unit's period.
 READS = 20
 #: A quiet unit that still gives more than this share of lost, damaged or bad readings is not fit for a campaign.
-MOST_BAD = 0.01
+MAX_BAD_SHARE = 0.01
 
 
 def ask_table(table: RateTable, report: DeviceReport) -> None:
@@ -167,9 +167,9 @@ def _judge_readings(gyro: Gyro, readings: Readings, report: DeviceReport) -> Non
     invalid = int((~readings.valid).sum())
     text = f"{rate_hz:.6g} readings/s, {readings.lost} lost, {readings.damaged} damaged, {invalid} marked bad"
     wrong = readings.lost + readings.damaged + invalid
-    if wrong > MOST_BAD * n:
+    if wrong > MAX_BAD_SHARE * n:
         text += f" of {n}: check cable, shield and bit rate, and that the unit is warm and within its range"
-    state: State = "bad" if wrong > MOST_BAD * n else "good"
+    state: State = "bad" if wrong > MAX_BAD_SHARE * n else "good"
     report.add([Finding("readings", text, state, value=rate_hz, unit="1/s")])
 
 

@@ -18,7 +18,7 @@ REPLY_S = 1.0
 LATE_LETTERS = lines.ACCEPTED + lines.FINISHED
 LINE_END = b"\r\n"
 #: More of them belong to no earlier move.
-MOST_LATE_LETTERS = 20
+MAX_LATE_LETTERS = 20
 LINE_IS_BUSY = (
     "letters arrive that answer no command; find what else sends on this line, or switch the controller off and on"
 )
@@ -85,8 +85,8 @@ class C4Link:
                 if letter and letter not in LINE_END and letter.decode("latin-1") not in skip:
                     return letter.decode("latin-1")
                 skipped += len(letter)
-                if self._clock.now_s() >= deadline_s - 1e-9 and (not letter or skipped > MOST_LATE_LETTERS):
-                    advice = LINE_IS_BUSY if skipped > MOST_LATE_LETTERS else "check power, cable and baud rate"
+                if self._clock.now_s() >= deadline_s - 1e-9 and (not letter or skipped > MAX_LATE_LETTERS):
+                    advice = LINE_IS_BUSY if skipped > MAX_LATE_LETTERS else "check power, cable and baud rate"
                     raise NoReply(self._device, f"{self._settings.port} gave no answer in {timeout_s:.1f} s; {advice}")
         except BROKEN as error:
             self._fail(error)

@@ -17,7 +17,7 @@ from instruments.protocols.stim300.frames import COUNTS_PER_S, LAYOUTS, Scan, la
 from instruments.protocols.stim300.settings import DatagramOptions
 
 #: This many intact frames or lines, with no damage but incomplete ones at both ends, identify an instrument.
-LEAST_FRAMES = 4
+MIN_FRAMES = 4
 SERIAL = "the unit's serial number, from its label"
 RATE = "the largest rate of the unit, deg/s, from its data sheet"
 
@@ -25,13 +25,13 @@ RATE = "the largest rate of the unit, deg/s, from its data sheet"
 def _stim300(data: bytes, baudrate: int) -> Recognised | None:
     best: tuple[int, Scan, DatagramOptions] | None = None
     for datagram in LAYOUTS:
-        if data.count(datagram) < LEAST_FRAMES:
+        if data.count(datagram) < MIN_FRAMES:
             continue
         for crlf in (False, True):
             options = DatagramOptions.model_validate({"datagram": datagram, "crlf": crlf, "baudrate": baudrate})
             frames = scan(data, layout_of(options))
             score = len(frames.frames) - frames.damaged
-            if len(frames.frames) >= LEAST_FRAMES and (best is None or score > best[0]):
+            if len(frames.frames) >= MIN_FRAMES and (best is None or score > best[0]):
                 best = score, frames, options
     if best is None:
         return None
@@ -52,7 +52,7 @@ def _lines(data: bytes, line: LineFormat) -> int:
     whole = data.split(b"\n")[1:-1]
     pattern = re.compile(line.pattern)
     fit = [parse_line(each.rstrip(b"\r").decode("latin-1"), pattern, line.length) for each in whole]
-    return len(fit) if all(fit) and len(fit) >= LEAST_FRAMES else 0
+    return len(fit) if all(fit) and len(fit) >= MIN_FRAMES else 0
 
 
 def _dsp3000(data: bytes, baudrate: int) -> Recognised | None:

@@ -8,7 +8,7 @@ from typing import Literal
 
 WordOrder = Literal["little", "big"]  #: of 32-bit floats: low word first, or high word first
 
-LEAST_NORMAL = 2.0**-126  #: of a 32-bit float
+MIN_NORMAL = 2.0**-126  #: of a 32-bit float
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Register:
 
     def is_plausible(self, value: float) -> bool:
         """Return whether a value can be a measurement: in range, and no denormal float (exchanged words give those)."""
-        return self.holds(value) and not 0 < abs(value) < LEAST_NORMAL
+        return self.holds(value) and not 0 < abs(value) < MIN_NORMAL
 
     def decode(self, words: list[int], order: WordOrder) -> float:
         """Return the value of unsigned words, in `unit` or counts."""

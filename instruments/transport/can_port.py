@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 #: A frame is sent within this time, s of real time, or the bus does not take it.
 SEND_S = 1.0
 #: One emptying takes at most this many frames: on a full bus it has an end.
-MOST_FRAMES = 1 << 14
+MAX_FRAMES = 1 << 14
 
 
 def open_can(url: str, *, timeout_s: float) -> CanPort:
@@ -69,7 +69,7 @@ class CanPort:
     @property
     def in_waiting(self) -> int:
         """Number of bytes that can be read without waiting."""
-        for _ in range(MOST_FRAMES):
+        for _ in range(MAX_FRAMES):
             if not self._receive(0.0):
                 break
         return len(self._unread)

@@ -27,7 +27,7 @@ from instruments.transport.stream_reader import PolledReader, StreamReader, Thre
 from instruments.transport.tcp_client import TcpClient
 
 #: A call of gRPC may take this long, s of real time: a busy computer is no silent instrument.
-LEAST_CALL_S = 1.0
+MIN_CALL_S = 1.0
 
 
 class LinkFactory(Protocol):
@@ -101,7 +101,7 @@ class HardwareLinks:
 
     def rpc_channel(self, host: str, tcp_port: int, *, timeout_s: float) -> RpcChannel:
         """Return an open gRPC channel to a real host, without encryption; raises ImportError without grpcio."""
-        return TimedChannel(host, tcp_port, max(self._clock.wall_s(timeout_s), LEAST_CALL_S))
+        return TimedChannel(host, tcp_port, max(self._clock.wall_s(timeout_s), MIN_CALL_S))
 
 
 class Ports:

@@ -24,7 +24,7 @@ from instruments.transport.serial import BROKEN, SerialPort
 
 SHORTEST_RTU_BYTES = 5
 #: This many printable characters in a row are the greeting of another kind of server; it is shown up to this length.
-LEAST_TEXT, LONGEST_TEXT = 6, 40
+MIN_TEXT, LONGEST_TEXT = 6, 40
 LINE = "check line settings and cable"
 ADDRESS = "check host and tcp_port in the bench file"
 
@@ -59,8 +59,8 @@ def other_server(received: bytes) -> str:
     """Return what answered where bytes begin as those of no Modbus instrument do; empty where they may be of one."""
     if received.startswith(b"HTTP/") or b"<html" in received[:200].lower():
         return f"an HTTP server answered, not a Modbus instrument; {ADDRESS}"
-    beginning = received[:LEAST_TEXT]
-    if len(beginning) == LEAST_TEXT and beginning.isascii() and beginning.decode().isprintable():
+    beginning = received[:MIN_TEXT]
+    if len(beginning) == MIN_TEXT and beginning.isascii() and beginning.decode().isprintable():
         return (
             f"text arrived ({one_line(received[:LONGEST_TEXT].decode('latin-1'))}) instead of a Modbus reply; {ADDRESS}"
         )

@@ -12,7 +12,7 @@ from instruments.transport.latency import lower_latency
 from instruments.transport.serial import PARITIES, Line, SerialPort
 
 #: A write may take this long, s of real time: pyserial calls one that a busy computer interrupted a failed one.
-LEAST_WRITE_S = 1.0
+MIN_WRITE_S = 1.0
 
 
 def open_port(
@@ -24,7 +24,7 @@ def open_port(
     """
     settings: dict[str, Any] = {
         "baudrate": baudrate, "parity": PARITIES[line.parity], "stopbits": line.stop_bits, "timeout": timeout_s,
-        "write_timeout": max(timeout_s, LEAST_WRITE_S), "inter_byte_timeout": inter_byte_timeout_s, "exclusive": True,
+        "write_timeout": max(timeout_s, MIN_WRITE_S), "inter_byte_timeout": inter_byte_timeout_s, "exclusive": True,
     }  # fmt: skip
     port: Any
     if line.rs485 is not None and line.rs485.by == "rts":

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 #: The line has to be silent for this much longer than the longest latency that was seen.
 SILENCE_FACTOR = 1.25
 #: Lower limit of the longest latency, s, the time-out of a request: a reply that did not come within it may come later.
-LEAST_LATENCY_S = 1.0
+MIN_LATENCY_S = 1.0
 #: Upper limit of the longest latency, s: one reply after minutes must not make every later failure take minutes.
 LARGEST_LATENCY_S = 5.0
 #: A line that is never silent is given up after this long, s.
@@ -45,7 +45,7 @@ class RtuLine:
         self._device, self._clock = device, clock
         self._sent = b""
         self._sent_s = 0.0
-        self._latency_s = LEAST_LATENCY_S
+        self._latency_s = MIN_LATENCY_S
         self._doubtful_since_s: float | None = None
         self._echoes = False
         self.remarks: list[str] = []

@@ -9,7 +9,7 @@ from instruments.errors import MalformedReply
 
 Whole = NDArray[np.int64]
 #: A counter that has not moved in this many readings is broken.
-MOST_STANDING = 50
+MAX_STANDING = 50
 
 
 class SampleCounter:
@@ -49,7 +49,7 @@ class SampleCounter:
     def advance(self, counts: Whole) -> Whole:
         """Return how many readings each of n >= 1 is from the one before, at least 1; raises MalformedReply.
 
-        A counter that comes to the same number has turned once; one that stands in MOST_STANDING readings is broken.
+        A counter that comes to the same number has turned once; one that stands in MAX_STANDING readings is broken.
         """
         moved = self._from_before(counts, counts[0] - self._step) % self._wrap
         self._newest = int(counts[-1])
@@ -74,7 +74,7 @@ class SampleCounter:
         """Raise MalformedReply where the counter has not moved for too long."""
         moved = np.flatnonzero(~standing)
         self._standing = self._standing + len(standing) if not len(moved) else len(standing) - 1 - int(moved[-1])
-        if self._standing >= MOST_STANDING:
+        if self._standing >= MAX_STANDING:
             raise MalformedReply(
                 self._device,
                 f"the sample counter on {self._port} does not advance: it is {int(counts[-1])} in {self._standing} "

@@ -22,15 +22,15 @@ UNKNOWN = 0.5
 #: A period that is known to this share, from so many points, is measured.
 MEASURED, ENOUGH_POINTS = 0.005, 8
 #: A line through fewer points than this is not followed: two points always lie on one.
-LEAST_POINTS = 3
+MIN_POINTS = 3
 #: The line under the arrivals is sought in at most so many, the least late ones of so many seconds each.
-MOST_POINTS, SPACING_S = 32, 0.25
+MAX_POINTS, SPACING_S = 32, 0.25
 #: A rate beyond the tolerance is believed where at least this share of the arrivals was on time by it.
 ON_TIME_SHARE = 0.5
 #: Points fade with this time constant, s.
 MEMORY_S = 600.0
 #: An arrival is never taken to be known better than this, s.
-LEAST_WIDTH_S = 1e-5
+MIN_WIDTH_S = 1e-5
 #: A point this much further from a known line than its width still counts as on time, s: a clock that drifts by 50 ppm
 #: in an hour, as in a chamber, is as far from a line of MEMORY_S.
 DRIFT_S = 0.005
@@ -117,13 +117,13 @@ class PeriodLine:
 
     def restart(self) -> None:
         """Begin a new stretch: the number of the next reading is not known."""
-        if self._present.points >= LEAST_POINTS and (self.is_known or not self._is_beyond):
+        if self._present.points >= MIN_POINTS and (self.is_known or not self._is_beyond):
             self._before.merge(self._present)
         self._forget_stretch()
 
     def add(self, number: int, t_s: float, width_s: float) -> None:
         """Take in that reading `number` arrived by clock time `t_s`: within `width_s` seconds, unless it was late."""
-        width_s = max(width_s, LEAST_WIDTH_S)
+        width_s = max(width_s, MIN_WIDTH_S)
         self._fade(t_s)
         x, z = float(number), t_s - number * self.nominal_s
         if self.is_known and not self._recent:
@@ -163,7 +163,7 @@ class PeriodLine:
                 self._recent[-1] = (x, z, width_s)
         else:
             self._group_x = x
-            self._recent = [*self._recent[1 - MOST_POINTS :], (x, z, width_s)]
+            self._recent = [*self._recent[1 - MAX_POINTS :], (x, z, width_s)]
         offset, slope = line_under([point[0] for point in self._recent], [point[1] for point in self._recent])
         self._present = Sums()
         for x_k, z_k, width_k in self._recent:
@@ -209,7 +209,7 @@ class PeriodLine:
 
     def _choose(self) -> None:
         """Choose the period in use."""
-        if self._points < LEAST_POINTS or self._sxx <= 0.0:
+        if self._points < MIN_POINTS or self._sxx <= 0.0:
             return
         if self.is_outside_tolerance:
             least_s, most_s = (1 - UNKNOWN) * self.nominal_s, (1 + UNKNOWN) * self.nominal_s

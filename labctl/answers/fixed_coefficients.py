@@ -13,10 +13,10 @@ from labctl.answers.base import LongText, Request
 from labctl.answers.recording_head import Axis, OutputUnit
 
 #: Most coefficients of an axis, most temperatures of a table, and the longest text.
-MOST_COEFFICIENTS, MOST_TEMPERATURES, LONGEST = 200, 1000, 200
+MAX_COEFFICIENTS, MAX_TEMPERATURES, LONGEST = 200, 1000, 200
 
 #: The largest size of a value, whose squares are summed, and the least u that differs from 0.
-LARGEST, LEAST_U = 1e12, 1e-30
+LARGEST, MIN_U = 1e12, 1e-30
 
 Number = Annotated[FiniteFloat, Field(strict=True, ge=-LARGEST, le=LARGEST)]
 NotNegative = Annotated[FiniteFloat, Field(strict=True, ge=0, le=LARGEST)]
@@ -27,15 +27,15 @@ Text = Annotated[str, Field(max_length=LONGEST)]
 class FixedCoefficient(Request):
     """A known coefficient: a number, or a list over temperatures."""
 
-    value: Number | Annotated[list[Number], Field(min_length=1, max_length=MOST_TEMPERATURES)] = Field(
+    value: Number | Annotated[list[Number], Field(min_length=1, max_length=MAX_TEMPERATURES)] = Field(
         description="Value of the coefficient, in `unit`; a list: one value for each of `temperature_c`."
     )
-    u: NotNegative | Annotated[list[NotNegative | None], Field(max_length=MOST_TEMPERATURES)] | None = Field(
+    u: NotNegative | Annotated[list[NotNegative | None], Field(max_length=MAX_TEMPERATURES)] | None = Field(
         default=None, description="Standard uncertainty, in the unit of the value; null: not stated."
     )
     unit: Text | None = Field(default=None, description="Checked against the unit that `labctl fit --json` gives.")
     effect: Text | None = Field(default=None, description="Effect of the coefficient; default: by its name.")
-    temperature_c: Annotated[list[Celsius], Field(max_length=MOST_TEMPERATURES)] | None = Field(
+    temperature_c: Annotated[list[Celsius], Field(max_length=MAX_TEMPERATURES)] | None = Field(
         default=None, description="Temperatures of a table, rising, deg C; null: one value for all temperatures."
     )
 
@@ -60,7 +60,7 @@ class FixedCoefficient(Request):
     def us(self) -> tuple[float, ...]:
         """The standard uncertainty of each value; NaN where it is not stated."""
         given = self.u if isinstance(self.u, list) else [self.u] * len(self.values)
-        return tuple(math.nan if u is None else u if u >= LEAST_U else 0.0 for u in given)
+        return tuple(math.nan if u is None else u if u >= MIN_U else 0.0 for u in given)
 
 
 def _with_value(given: object) -> object:
@@ -71,7 +71,7 @@ def _with_value(given: object) -> object:
 KnownCoefficient = Annotated[
     FixedCoefficient, BeforeValidator(_with_value, json_schema_input_type=FixedCoefficient | float)
 ]
-KnownCoefficients = Annotated[dict[Text, KnownCoefficient], Field(max_length=MOST_COEFFICIENTS)]
+KnownCoefficients = Annotated[dict[Text, KnownCoefficient], Field(max_length=MAX_COEFFICIENTS)]
 
 
 class FixedCoefficients(Request):

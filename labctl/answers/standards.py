@@ -23,7 +23,7 @@ from labctl.answers.common_fields import (
 
 TEXT = 2000
 #: No certificate states a smaller uncertainty; the square of a much smaller one has no number.
-LEAST_U = 1e-12
+MIN_U = 1e-12
 Name = Field(min_length=1, max_length=200)
 NOMINAL = "Nominal value that it holds for, in the unit of the standard; null: it holds for all."
 #: valid: may be used. no certificate: nothing is known. check it: an intermediate check is out of limits.
@@ -58,8 +58,8 @@ class CertifiedPointRequest(Request):
     correction: float | None = Field(
         default=None, allow_inf_nan=False, description="The error with the other sign, instead of `value`."
     )
-    u: float | None = Field(default=None, ge=LEAST_U, allow_inf_nan=False, description="Standard uncertainty.")
-    expanded: float | None = Field(default=None, ge=LEAST_U, allow_inf_nan=False, description="Expanded uncertainty.")
+    u: float | None = Field(default=None, ge=MIN_U, allow_inf_nan=False, description="Standard uncertainty.")
+    expanded: float | None = Field(default=None, ge=MIN_U, allow_inf_nan=False, description="Expanded uncertainty.")
     k: float = Field(default=2.0, gt=0, allow_inf_nan=False, description="Coverage factor of `expanded`.")
 
     @model_validator(mode="after")

@@ -65,7 +65,7 @@ ROUTERS = (
 #: Which of their routes take a key; every route of the others does.
 SAY_THEMSELVES = (health, swagger_ui)
 #: The parser's own bound on parts of a form: a recording has at most three files.
-MOST_FILES = 4
+MAX_FILES = 4
 
 
 @cache
@@ -103,7 +103,7 @@ def create_app(service: LabService, access: AccessPolicy | None = None, keys: Ke
         lifespan=lifespan,
         docs_url=None,  # the framework's own pages load their scripts from outside
         redoc_url=None,
-        form_limits={"max_files": MOST_FILES, "max_fields": MOST_FILES},
+        form_limits={"max_files": MAX_FILES, "max_fields": MAX_FILES},
     )
     app.state.service = service
     problems.install(app)

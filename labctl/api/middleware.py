@@ -23,7 +23,7 @@ from labctl.services.lab_service import LabService
 from labctl.web import is_page
 
 #: Uploads at once: while one comes, each of its files is a file here.
-MOST_UPLOADS = 8
+MAX_UPLOADS = 8
 
 
 class AccessMiddleware:
@@ -74,9 +74,9 @@ class AccessMiddleware:
                 "the limit of connections that this service answers at once is reached; try again in a few seconds"
             )
         uploads = bool(scope["path"] in UPLOADS and not reads)
-        if uploads and self._uploads >= MOST_UPLOADS:
+        if uploads and self._uploads >= MAX_UPLOADS:
             raise Overloaded(
-                f"{MOST_UPLOADS} recordings are being received already, the limit of this service; send this "
+                f"{MAX_UPLOADS} recordings are being received already, the limit of this service; send this "
                 "recording again when one of the others is complete"
             )
         return uploads

@@ -25,7 +25,7 @@ log = get_logger()
 
 REQUEST_ID = "X-Request-ID"
 #: Records in ten minutes: of requests that were done, and of those that were refused, by status.
-MOST_DONE, MOST_REFUSED = 300, 30
+MAX_DONE, MAX_REFUSED = 300, 30
 LONGEST_PATH = 200
 
 
@@ -46,7 +46,7 @@ class RequestLogMiddleware:
 
     def __init__(self, app: ASGIApp, figures: RequestFigures, clock: Clock | None = None) -> None:
         self._app, self._figures, self._clock = app, figures, clock or SystemClock()
-        self._done, self._refused = RepetitionLimit(MOST_DONE), RepetitionLimit(MOST_REFUSED)
+        self._done, self._refused = RepetitionLimit(MAX_DONE), RepetitionLimit(MAX_REFUSED)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, and say how it ended."""

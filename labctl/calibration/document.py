@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # need pydantic, which costs as much to load as the rest of a
 
 SCHEMA = "labctl-calibration/1"
 #: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
-MOST_BYTES = 64 << 20
+MAX_BYTES = 64 << 20
 
 
 @dataclass(frozen=True)
@@ -197,9 +197,9 @@ def read_calibration(source: Path | bytes) -> Calibration:
 
 def _content(path: Path) -> bytes:
     with path.open("rb") as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise ValueError(f"larger than the limit of {MOST_BYTES} bytes; check that it is a calibration file")
+        content = file.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise ValueError(f"larger than the limit of {MAX_BYTES} bytes; check that it is a calibration file")
     return content
 
 

@@ -32,7 +32,7 @@ PLACES = {
 }
 MINUS = "−"
 #: A probability below this is written as a bound.
-LEAST_RISK = 1e-4
+MIN_RISK = 1e-4
 #: Marks a standard uncertainty without the standards of the bench.
 FIT_ALONE = " *"
 
@@ -314,8 +314,8 @@ def _conformity(certificate: Certificate) -> Mapping[str, object] | None:
 
 def percent(probability: float) -> str:
     """Return a probability in percent, to two digits; one that is too small to matter as a bound."""
-    if probability < LEAST_RISK:
-        return f"below {100.0 * LEAST_RISK:g} %"
+    if probability < MIN_RISK:
+        return f"below {100.0 * MIN_RISK:g} %"
     return f"{100.0 * probability:.2g} %" if probability < 0.99 else "above 99 %"
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from labctl.answers.campaigns import CampaignResponse
 
 #: Widths of the bar: the other columns of its line take 27 characters.
-BAR_WIDTH, LEAST_BAR_WIDTH, OTHER_COLUMNS = 28, 8, 27
+BAR_WIDTH, MIN_BAR_WIDTH, OTHER_COLUMNS = 28, 8, 27
 
 
 class _TwoLines(Progress):
@@ -35,7 +35,7 @@ class CampaignProgress:
     def __init__(self, *, quiet: bool = False, title: str = "", console: Console = stderr) -> None:
         self._title = title
         self._progress = _TwoLines(
-            BarColumn(bar_width=min(BAR_WIDTH, max(LEAST_BAR_WIDTH, console.width - OTHER_COLUMNS))),
+            BarColumn(bar_width=min(BAR_WIDTH, max(MIN_BAR_WIDTH, console.width - OTHER_COLUMNS))),
             TaskProgressColumn(),
             TimeElapsedColumn(),
             TextColumn("left"),

@@ -14,7 +14,7 @@ from labctl.config import DATABASE_VARIABLE, KEY_VARIABLE
 REMOVED = "***"
 #: Of a value; a traceback may be longer, and keeps its end.
 LONGEST, LONGEST_TRACEBACK = 1_000, 12_000
-DEEPEST, MOST_ITEMS = 5, 100
+DEEPEST, MAX_ITEMS = 5, 100
 #: A shorter secret would also be part of other words.
 SHORTEST_SECRET = 4
 
@@ -62,7 +62,7 @@ class Redaction:
 
     def fields(self, fields: Mapping[str, Any], depth: int = 0) -> dict[str, Any]:
         """Return the fields of a record without secrets."""
-        return {str(name): self._field(str(name), value, depth) for name, value in list(fields.items())[:MOST_ITEMS]}
+        return {str(name): self._field(str(name), value, depth) for name, value in list(fields.items())[:MAX_ITEMS]}
 
     def _field(self, name: str, value: Any, depth: int) -> Any:
         if name == "exception" and isinstance(value, str):
@@ -77,5 +77,5 @@ class Redaction:
         if isinstance(value, Mapping) and depth < DEEPEST:
             return self.fields(value, depth + 1)
         if isinstance(value, list | tuple | set | frozenset) and depth < DEEPEST:
-            return [self._value(each, depth + 1) for each in list(value)[:MOST_ITEMS]]
+            return [self._value(each, depth + 1) for each in list(value)[:MAX_ITEMS]]
         return self.text(str(value))

@@ -11,7 +11,7 @@ from instruments.clock import Clock, SystemClock
 
 PER_S = 600.0
 #: Of records of other libraries, from one line of their code.
-MOST_FOREIGN = 10
+MAX_FOREIGN = 10
 
 
 @dataclass

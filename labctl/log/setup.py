@@ -18,7 +18,7 @@ from structlog.stdlib import ExtraAdder, ProcessorFormatter, add_logger_name
 from labctl.log import get_logger
 from labctl.log.redaction import Redaction, secrets_of
 from labctl.log.rendering import Rendering
-from labctl.log.repetition import MOST_FOREIGN, ForeignRecordLimit, RepetitionLimit
+from labctl.log.repetition import MAX_FOREIGN, ForeignRecordLimit, RepetitionLimit
 from labctl.log.settings import is_read_by_a_person, level_asked
 from labctl.log.silence import be_silent
 from labctl.log.writer import LogWriter
@@ -164,7 +164,7 @@ def _log_to(output: int | None, process: str, level: int, locations: Iterable[st
     redaction = Redaction(secrets_of(locations=locations))
     brief = level_asked() is None
     rendering = Rendering(process, redaction, for_a_person=by_person, brief=brief, colors=colors)
-    limit = RepetitionLimit(MOST_FOREIGN)
+    limit = RepetitionLimit(MAX_FOREIGN)
 
     def notes(lost: int) -> Iterator[str]:
         if lost:

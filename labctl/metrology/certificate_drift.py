@@ -18,7 +18,7 @@ from labctl.errors import BadInput
 
 YEAR = timedelta(days=365.25)
 #: Certificates without which a drift is not known.
-LEAST_CERTIFICATES = 2
+MIN_CERTIFICATES = 2
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def predicted(certificates: Sequence[CertifiedValue], on: date) -> Prediction:
     before = next((each for each in reversed(ordered) if each.on <= on), ordered[0])
     same = _since_adjustment(ordered, before)
     valued = [each for each in same if each.value is not None]
-    if len({each.on for each in valued}) < LEAST_CERTIFICATES:
+    if len({each.on for each in valued}) < MIN_CERTIFICATES:
         return Prediction(on, before.value, before.u, None, _why(same, valued))
     return _on_line(valued, before, on)
 

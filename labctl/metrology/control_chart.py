@@ -23,7 +23,7 @@ D2 = 1.128
 WARNING, ACTION = 2.0, 3.0
 #: Values of a history without which it gives no limits. By limits from 8 values one good value in 33 is out (from 6
 #: one in 22, of limits that are known one in 370).
-LEAST_HISTORY = 8
+MIN_HISTORY = 8
 
 State = Literal["in", "warning", "out", "unknown"]
 Basis = Literal["history", "stated u"]
@@ -113,5 +113,5 @@ def _limits(point: ChartPoint, history: Sequence[ChartPoint]) -> Iterator[Limits
         u_centre = math.sqrt(sum(u**2 for u in u_values)) / len(history)
         yield Limits("stated u", centre, math.hypot(point.u, u_centre), len(history))
     values = [each.value for each in history]
-    if len(history) >= LEAST_HISTORY and len(set(values)) > 1:  # equal values, as coarse steps give, say nothing of it
+    if len(history) >= MIN_HISTORY and len(set(values)) > 1:  # equal values, as coarse steps give, say nothing of it
         yield limits_from_history(values)

@@ -13,7 +13,7 @@ from labctl.plots.theme import DIMMED_BELOW, SCALE, SCALE_LIMITS, grid_of, place
 
 T = TypeVar("T")
 #: Cells that fill less than this share of their rows and columns are drawn where they are, not in a grid.
-LEAST_FILLED = 0.3
+MIN_FILLED = 0.3
 HOVER = "%{x} deg/s, %{y} deg C: %{z:.2f} floors<br>data set %{customdata}<extra></extra>"
 DIM = "rgba(128,128,128,0.5)"
 
@@ -50,7 +50,7 @@ def _panel(figure: go.Figure, picture: ResidualMap, placement: Mapping[str, int]
     mean = {cell: sum(picture["over_floor"][k] for k in sets) / len(sets) for cell, sets in cells.items()}
     named = {cell: ", ".join(str(picture["dataset"][k]) for k in sets) for cell, sets in cells.items()}
     dim = {cell: 1 for cell, sets in cells.items() if abs(mean[cell]) * sqrt(len(sets)) < DIMMED_BELOW}
-    if len(cells) < LEAST_FILLED * len(columns) * len(rows):
+    if len(cells) < MIN_FILLED * len(columns) * len(rows):
         _scattered(figure, cells, mean, named, dim, placement)
         return
 

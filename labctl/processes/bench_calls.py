@@ -29,7 +29,7 @@ log = get_logger()
 #: A watcher gets a sign of life this often, s,
 BEAT_S = 1.0
 #: and of changes at most this often, s.
-LEAST_BEAT_S = 0.1
+MIN_BEAT_S = 0.1
 #: Calls that are under way when the process ends have so long to be answered, s.
 UNDER_WAY_S = 2.0
 
@@ -112,7 +112,7 @@ class BenchCalls:
                     connection.send_bytes(answer(form, beat))
                     changed.wait(BEAT_S)
                     changed.clear()
-                    never.wait(LEAST_BEAT_S)
+                    never.wait(MIN_BEAT_S)
         finally:
             self._watchers.discard(connection)
             remove()

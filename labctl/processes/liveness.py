@@ -13,7 +13,7 @@ from labctl.errors import LabctlError
 #: database (at most 45 s). One that asked for none in so long hangs, s.
 ENGINE_SILENT_S = 180.0
 #: Processes that end so often within a quarter of an hour are not started again.
-MOST_RESTARTS, RESTARTS_WITHIN_S = 5, 900.0
+MAX_RESTARTS, RESTARTS_WITHIN_S = 5, 900.0
 
 
 class Elapsed:
@@ -107,7 +107,7 @@ class Restarts:
         """Count one. Raises LabctlError when there are too many."""
         now_s = self._age.s
         self._at_s = [at_s for at_s in self._at_s if now_s - at_s < RESTARTS_WITHIN_S] + [now_s]
-        if len(self._at_s) > MOST_RESTARTS:
+        if len(self._at_s) > MAX_RESTARTS:
             raise LabctlError(
                 f"{what} ended {len(self._at_s)} times within {RESTARTS_WITHIN_S / 60:g} min; labctl stops. Read the "
                 "log for the cause, then start labctl again"

@@ -17,7 +17,7 @@ from labctl.errors import BadRecording
 from labctl.recording.info import RecordingInfo
 
 #: Highest power of temperature in a surface, and of the rate.
-TEMPERATURE_POWER, MOST_RATE_POWER = 2, 5
+TEMPERATURE_POWER, MAX_RATE_POWER = 2, 5
 SCALE_OFFSET, MATRIX, SURFACE = "scale factor and offset", "matrix K and bias B", "polynomial C"
 POLYNOMIALS = "polynomials in temperature"
 
@@ -48,7 +48,7 @@ def _matrix(info: RecordingInfo, _: Collection[str]) -> list[str]:
 def _surface(info: RecordingInfo, columns: Collection[str]) -> list[str]:
     """Powers i of the output and j of the temperature less `reference_c`; deg/s per (deg/s)^i K^j."""
     powers = [int(matches[1]) for matches in (_CELL.fullmatch(name) for name in columns) if matches is not None]
-    highest = min(max(powers, default=0), MOST_RATE_POWER)
+    highest = min(max(powers, default=0), MAX_RATE_POWER)
     cells = [f"c_r{i}_t{j}" for i in range(highest + 1) for j in range(TEMPERATURE_POWER + 1)]
     axis = ["axis"] if len(info.axes) > 1 else []
     return [*axis, *cells, "reference_c", "temperature_low_c", "temperature_high_c"]

@@ -15,7 +15,7 @@ from labctl.recording.recording import Columns
 
 #: Measured: 13 s of one core for so many of one reading, in 154 transactions; each is a row for every channel too.
 #: The published schedules have up to 630.
-MOST_DATA_SETS = 50_000
+MAX_DATA_SETS = 50_000
 #: The largest number that every database keeps in such a column: 2^31 - 1.
 LARGEST_NUMBER = (1 << 31) - 1
 NUMBERS = ("dataset", "run", "mounting", "n")
@@ -27,9 +27,9 @@ def refuse_too_many_data_sets(where: Path | str, info: RecordingInfo, columns: C
         return
     numbers = np.asarray(columns["dataset"], dtype=np.int64)
     sets = len(numbers) if info.kind == "points" else len(dataset_starts(numbers)) if len(numbers) else 0
-    if sets > MOST_DATA_SETS:
+    if sets > MAX_DATA_SETS:
         raise BadRecording(
-            f"{where}: {sets} data sets; at most {MOST_DATA_SETS} are imported at once; divide the recording, or give "
+            f"{where}: {sets} data sets; at most {MAX_DATA_SETS} are imported at once; divide the recording, or give "
             "readings at one rate and temperature one data set number (a data set is a series of readings, not a "
             "single reading)"
         )

@@ -23,7 +23,7 @@ from labctl.recording.recording import Column, Recording
 
 #: Temperatures of the table: between them a calibration goes on a parabola, which leaves under 1e-5 of the cubic.
 NODES = 41
-MOST_BYTES = 1 << 20
+MAX_BYTES = 1 << 20
 AXES: tuple[Axis, ...] = ("x", "y", "z")
 REFERENCE_C, SCALE = 35.0, 1e-6  #: of ArduPilot's cubic
 
@@ -92,7 +92,7 @@ def _refuse_cut(path: Path, text: str) -> None:
 
 def _text(path: Path) -> str:
     with path.open("rb") as file:
-        return file.read(MOST_BYTES).decode("utf-8", errors="replace").replace("\r\n", "\n")
+        return file.read(MAX_BYTES).decode("utf-8", errors="replace").replace("\r\n", "\n")
 
 
 def _kind(text: str) -> tuple[str, int] | None:

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
+from labctl.recording.spread import MIN_FOR_SPECTRUM, white_std
 
 #: What coarse steps of the output leave in a mean, as a standard deviation: suffix of the output's column.
 QUANTISATION = "_quantisation_std"
 #: Readings of a data set that are searched for codes; with more different ones than this there is no coarse step.
-CODE_READINGS, MOST_CODES, LEAST_READINGS = 256, 32, 16
+CODE_READINGS, MAX_CODES, MIN_READINGS = 256, 32, 16
 #: Share of the data sets that must take few codes, and of those the share that shows two codes or more.
 COARSE_SHARE, STEP_SHARE = 0.5, 0.2
 #: Codes closer than this share of the largest are one.
@@ -38,14 +38,14 @@ def codes_of(values: NDArray[np.float64]) -> Codes:
     """Return what the readings of one data set, (n,), show of a converter's steps, in their unit."""
     std = float(values.std()) if len(values) else 0.0
     some = values[:CODE_READINGS]
-    if np.isfinite(std) and len(set(some[: MOST_CODES + 1].tolist())) > MOST_CODES:  # a fine converter, mostly
+    if np.isfinite(std) and len(set(some[: MAX_CODES + 1].tolist())) > MAX_CODES:  # a fine converter, mostly
         return Codes(np.nan, np.nan, std, std)
     codes = np.unique(some)
-    if len(some) < LEAST_READINGS or len(codes) > min(MOST_CODES, len(some) // 4):
+    if len(some) < MIN_READINGS or len(codes) > min(MAX_CODES, len(some) // 4):
         return Codes(np.nan, np.nan, std, std)
     steps = np.diff(codes)
     apart = steps[steps > SAME_CODE * max(float(np.abs(codes).max()), 1e-300)]
-    white = min(white_std(values), std) if len(values) >= LEAST_FOR_SPECTRUM else std
+    white = min(white_std(values), std) if len(values) >= MIN_FOR_SPECTRUM else std
     return Codes(float(apart.min()) if len(apart) else 0.0, float(codes[0]), std, white)
 
 

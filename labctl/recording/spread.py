@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 #: The median of an exponential distribution, over its mean: a periodogram's lines do not move its median.
 _MEDIAN_TO_MEAN = float(np.log(2.0))
 #: Too few readings for a spectrum.
-LEAST_FOR_SPECTRUM = 32
+MIN_FOR_SPECTRUM = 32
 
 
 def white_std(values: NDArray[np.float64]) -> float:

@@ -9,7 +9,7 @@ from pathlib import Path
 from labctl.errors import BadRecording
 
 #: A file of which more than this share cannot be read is refused.
-MOST_UNREAD = 0.5
+MAX_UNREAD = 0.5
 #: Places that a sentence names.
 SHOWN_PLACES = 3
 TAKE_AGAIN = "copy the log again from where it was recorded, and check its size"
@@ -39,9 +39,9 @@ def share_text(share: float) -> str:
 
 def refuse_unread(path: Path, unread: Unread | None, advice: str = TAKE_AGAIN) -> None:
     """Raise BadRecording for a file of which too much could not be read."""
-    if unread is not None and unread.share > MOST_UNREAD:
+    if unread is not None and unread.share > MAX_UNREAD:
         raise BadRecording(
-            f"{path}: {unread.text}; at most {MOST_UNREAD:.0%} may be missing from a file that is imported; {advice}"
+            f"{path}: {unread.text}; at most {MAX_UNREAD:.0%} may be missing from a file that is imported; {advice}"
         )
 
 

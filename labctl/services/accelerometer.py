@@ -21,7 +21,7 @@ from labctl.fitting.poses.at_rest.rests import Rests, find_rests
 from labctl.fitting.poses.at_rest.temperature import OverTemperature, calibrate_over_temperature
 from labctl.fitting.poses.description import alignment_json, alignment_text
 from labctl.fitting.poses.fit import Solved, solve
-from labctl.fitting.poses.readings import AXES, GAP, LEAST_READINGS, PoseReadings, readings_of
+from labctl.fitting.poses.readings import AXES, GAP, MIN_READINGS, PoseReadings, readings_of
 from labctl.fitting.poses.triad import UPPER
 from labctl.recording import RecordingInfo
 from labctl.recording.data_files import read_table
@@ -100,8 +100,8 @@ def _readings(path: Path, source: Source) -> PoseReadings:
     table = read_table(path)
     warm = [] if source.temperature is None else [source.temperature]
     rows = numbers_of(path, table, [*source.columns, *warm], "time, x, y and z" + ", and temperature" * len(warm))
-    if len(rows) < LEAST_READINGS:
-        raise BadRecording(f"{path}: {len(rows)} rows; rests in poses need at least {LEAST_READINGS}; record longer")
+    if len(rows) < MIN_READINGS:
+        raise BadRecording(f"{path}: {len(rows)} rows; rests in poses need at least {MIN_READINGS}; record longer")
     steps = np.diff(rows[:, 0])
     back = np.flatnonzero(steps <= 0)
     if len(back):

@@ -28,7 +28,7 @@ UNITS: dict[Result, str] = {"bias": "deg/s", "scale_factor": "1"}
 #: Temperature of a unit whose model knows none, deg C.
 ROOM_C = 25.0
 #: Results in memory: a monitor asks for every check gyro each time.
-MOST_RESULTS = 1024
+MAX_RESULTS = 1024
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _results(store: Store, serial: str, at_c: float, first: date | None) -> tupl
     return results, left_out
 
 
-@lru_cache(maxsize=MOST_RESULTS)
+@lru_cache(maxsize=MAX_RESULTS)
 def _values(
     _hash: str, document: bytes, at_c: float
 ) -> tuple[tuple[tuple[str, Result], tuple[float, float | None]], ...]:

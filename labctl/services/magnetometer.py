@@ -13,7 +13,7 @@ from labctl.answers.magnetometer import Estimate, MagnetometerResponse
 from labctl.answers.poses import FieldAlignmentJson
 from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.fitting.magnetometer.alignment import FieldAlignment, align_field
-from labctl.fitting.magnetometer.calibrate import AXES, MOST_LEFT_OUT, Magnetometer, calibrate_magnetometer
+from labctl.fitting.magnetometer.calibrate import AXES, MAX_LEFT_OUT, Magnetometer, calibrate_magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.readings import PoseReadings, readings_of
@@ -175,7 +175,7 @@ def _text(result: Magnetometer, *, given: bool) -> Iterator[str]:
     )
     if result.verdict == "adequate":
         return
-    if result.left_out_share > MOST_LEFT_OUT:
+    if result.left_out_share > MAX_LEFT_OUT:
         yield (
             f"{100 * result.left_out_share:.0f} % of the readings are on no ellipsoid with the others: the field was "
             "disturbed while the unit turned"

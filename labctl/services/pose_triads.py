@@ -8,7 +8,7 @@ import numpy as np
 
 from labctl.answers.accelerometer import AccelerometerResponse, EarlierVersion
 from labctl.errors import BadInput, NotEnoughData
-from labctl.fitting.poses.at_rest.accelerometer import LEAST_POSES
+from labctl.fitting.poses.at_rest.accelerometer import MIN_POSES
 from labctl.fitting.poses.at_rest.fewer_poses import DISAGREE, ByFewer, Known, by_fewer_poses
 from labctl.fitting.poses.at_rest.rests import Rests, find_rests
 from labctl.fitting.poses.at_rest.temperature import OverTemperature, at_reference, calibrate_over_temperature
@@ -103,6 +103,6 @@ def solve_with_earlier(readings: PoseReadings, rests: Rests, earlier: Earlier, f
         raise NotEnoughData(
             f"{readings.info.serial}: the rests do not agree with version {earlier.version} of the accelerometer (p = "
             f"{fewer.p_value:.1g}, limit {DISAGREE:g}), by which the turns are compared; lay the unit down in at least "
-            f"{LEAST_POSES} poses and calibrate it without the earlier version"
+            f"{MIN_POSES} poses and calibrate it without the earlier version"
         )
     return solve(readings, (rests, fewer.found))

@@ -17,7 +17,7 @@ from labctl.answers.validity import (
 from labctl.errors import BadInput
 from labctl.store import RoomReading, RoomSpan, Store
 
-MOST_READINGS = 1000
+MAX_READINGS = 1000
 #: The clock of a logger may be ahead of that of the service by so much.
 AHEAD = timedelta(minutes=5)
 
@@ -88,7 +88,7 @@ def environment(store: Store, first: datetime, last: datetime, bench: str = "") 
                 measured_at=reading.measured_at, bench=reading.bench_name, quantity=reading.quantity, unit=reading.unit,
                 value=reading.value, source=reading.source,
             )
-            for reading in store.room_environment.readings(first, last, bench, MOST_READINGS)
+            for reading in store.room_environment.readings(first, last, bench, MAX_READINGS)
         ],
     )  # fmt: skip
 

@@ -26,7 +26,7 @@ STANDS_WITHIN_S = 60.0
 #: From here on it is reported that the bench is not stopped yet, s after the one who asks has begun.
 LATE_S = 4.0
 #: A computer that was busy until then has at least this long for the stop itself, s.
-LEAST_S = 0.5
+MIN_S = 0.5
 #: A latch on a disk that stands still does not keep a stop waiting, s.
 LATCH_S = 0.3
 ENDS_WITHIN_S = 2.0
@@ -179,7 +179,7 @@ def stop_bench(
     busy computer a command needs seconds to begin.
     """
     attempt = StopAttempt(place, stop)
-    if (result := attempt.result(max(LATE_S - begun_s, LEAST_S))) is None:
+    if (result := attempt.result(max(LATE_S - begun_s, MIN_S))) is None:
         say(f"{NOT_STOPPED} yet: bench {place.name}: {attempt.text}. {SWITCH}.")
     result = result or attempt.result()
     assert result is not None

@@ -31,9 +31,9 @@ from labctl.stop.wire import LAST, Stopping, Word, phases
 PATIENCE_S = 5.0
 #: A stop is answered after this at the latest, with how far it is, s.
 ANSWER_S = 4.0
-MOST_CALLERS = 32
+MAX_CALLERS = 32
 #: Requests that wait for the web process, and for how long, s.
-MOST_WAITING, WAITS_S = 200, 60.0
+MAX_WAITING, WAITS_S = 200, 60.0
 #: A web process that was only late is back within this, s.
 WEB_BACK_S = 1.0
 BODY_BYTES = 16 * 1024
@@ -89,8 +89,8 @@ class StopPage:
         self._relays, self._closed = relays, threading.Event()
         self._last: Stopping | None = None  # the stop that was asked for here last
         self._waker, self._woken = socket.socketpair()
-        self._callers = threading.Semaphore(MOST_CALLERS)
-        self._waiting = threading.Semaphore(MOST_WAITING)
+        self._callers = threading.Semaphore(MAX_CALLERS)
+        self._waiting = threading.Semaphore(MAX_WAITING)
         self._thread = threading.Thread(target=self._accept, name="stop-page", daemon=True)
 
     def start(self) -> None:

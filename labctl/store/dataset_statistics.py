@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.columns import READING_TIMES, VERIFICATION
-from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
+from labctl.recording.spread import MIN_FOR_SPECTRUM, white_std
 
 #: Columns that are no measured channel, so have no mean of their own.
 NOT_CHANNELS = frozenset(
@@ -51,7 +51,7 @@ def statistics(values: NDArray[np.float64], *, spectrum: bool) -> Statistics:
     return Statistics(
         float(values.mean()),
         float(values.std(ddof=1)) if n > 1 else None,
-        white_std(values) if spectrum and n >= LEAST_FOR_SPECTRUM else None,
+        white_std(values) if spectrum and n >= MIN_FOR_SPECTRUM else None,
         n,
     )
 

@@ -21,7 +21,7 @@ from labctl.store.manifests.digests import block_digests
 WHOLE_TABLE = 0
 #: What one part holds at most. Measured: one transaction takes 20 ms of one core with this many bytes, 33 ms with this
 #: many rows.
-MOST_ROWS, MOST_BYTES = 2000, 1 << 21
+MAX_ROWS, MAX_BYTES = 2000, 1 << 21
 #: Readings of one block, before they are packed: of a long data set several blocks are made.
 BLOCK_BYTES = 2 << 20
 
@@ -47,7 +47,7 @@ class ImportPart:
 
     def takes(self, n: int, size: int) -> bool:
         """Whether `n` more rows, with blocks of `size` bytes, still fit; an empty part takes anything."""
-        return not self.n or (self.n + n <= MOST_ROWS and self.packed_bytes + size <= MOST_BYTES)
+        return not self.n or (self.n + n <= MAX_ROWS and self.packed_bytes + size <= MAX_BYTES)
 
 
 def import_parts(number: int, recording: Recording) -> Iterator[ImportPart]:

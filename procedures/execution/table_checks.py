@@ -18,7 +18,7 @@ from procedures.monitoring.step_clock import LARGEST_CHANGE_PPM, MeasuredClock
 from procedures.planning.clock_runs import FIRST_RUNS, run_lengths_s
 
 #: So many runs are added where those that were planned disagree, and a run is repeated where this computer stalled.
-MOST_ADDED, STALLED_ATTEMPTS = 8, 5
+MAX_ADDED, STALLED_ATTEMPTS = 8, 5
 QUIETEN = "end other work on this computer, and set the latency of the table's USB adapter to 1 ms"
 
 
@@ -36,7 +36,7 @@ def measure_clock(context: ExecutionContext, step: MeasureClock) -> dict[str, fl
     for steady_s in lengths_s:
         _add_run(context, table, step.rate_dps, steady_s, block)
     clock_result = step_clock.measured(context.clock_runs, table.step_clock)
-    for n in range(MOST_ADDED):
+    for n in range(MAX_ADDED):
         if clock_result is not None and clock_result.expanded_ppm <= table.limits.clock_limit_ppm:
             break
         _add_run(context, table, step.rate_dps, lengths_s[n % len(lengths_s)], block)

@@ -18,13 +18,13 @@ from procedures.monitoring.campaign_time import CampaignTime
 Array = NDArray[np.float64]
 
 #: Replies in a row that may be lost.
-MOST_LOST = 2
+MAX_LOST = 2
 #: For each coefficient that is fitted so many angles are read at least.
 ANGLES_EACH = 3
 #: A table that is this far from where it was commanded has stopped, degrees and share of the angle turned either way.
 STOPPED_DEG, STOPPED_SHARE = 5.0, 0.05
 #: Angles that scatter about what is fitted by more than their uncertainty times this follow no course.
-MOST_EXCESS = 5.0
+MAX_EXCESS = 5.0
 #: A measured rate that differs from the commanded one by more than this share of the largest is said.
 NEWS_SHARE = 0.02
 #: The smallest singular value that counts, as a share of the largest: a ramp tells a delay from no offset.
@@ -47,7 +47,7 @@ class CourseLog:
             reading = self._table.read_course_angle(run)
         except NoReply:
             self._lost += 1
-            if self._lost > MOST_LOST:
+            if self._lost > MAX_LOST:
                 raise
             return
         self._lost = 0
@@ -82,10 +82,10 @@ class CourseLog:
         )
         design = regressors(run.course, since_s)
         fitted, covariance, excess = _fitted(design, angle_deg - run.course.angle_deg(since_s), u_deg)
-        if excess > MOST_EXCESS:
+        if excess > MAX_EXCESS:
             raise StepFailed(
                 f"{self._name}: the angles of its encoder scatter by {excess:.1f} times their uncertainty about a "
-                f"{run.course.text} (limit {MOST_EXCESS:g}): it does not follow this course; check load and tuning, or "
+                f"{run.course.text} (limit {MAX_EXCESS:g}): it does not follow this course; check load and tuning, or "
                 "make the course slower"
             )
         measured = MeasuredCourse(run.course, time.of(run.began_s), tuple(fitted.tolist()))

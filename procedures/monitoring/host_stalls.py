@@ -15,7 +15,7 @@ from procedures.contracts.journal import Event
 
 PERIOD_S = 0.1
 #: A shorter delay is the usual one of a scheduler, s of real time.
-LEAST_S = 0.1
+MIN_S = 0.1
 #: A stall is said from this length on, s of real time, and at most so often.
 SAID_FROM_S, SAY_EVERY_S = 0.5, 60.0
 #: A duration with which a clock tells how fast it runs, s.
@@ -100,7 +100,7 @@ class HostStalls:
             return
         now_s = self._wall.now_s()
         late_s, self._looked_s = now_s - self._looked_s - PERIOD_S, now_s
-        if late_s >= LEAST_S:
+        if late_s >= MIN_S:
             self._total_s += late_s
             self._unsaid_s += late_s
             self._longest_s = max(self._longest_s, late_s)

@@ -19,7 +19,7 @@ READ_EVERY_S = 1.0
 #: A line through fewer angles is no measurement.
 LEAST = 3
 #: Replies in a row that may be lost.
-MOST_LOST = 2
+MAX_LOST = 2
 #: Standard uncertainties by which two rates may differ.
 COVERAGE = 3.0
 
@@ -43,7 +43,7 @@ class EncoderLog:
             self._lost = 0
         except NoReply:
             self._lost += 1
-            if self._lost > MOST_LOST:
+            if self._lost > MAX_LOST:
                 raise
 
     def result(self, spin: Spin, gate_from_s: float, time: CampaignTime) -> TableAngles | None:

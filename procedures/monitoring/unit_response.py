@@ -14,9 +14,9 @@ from instruments.positions import Position
 from procedures.monitoring.turn_course import Nominal
 
 #: Rates that differ by less say nothing, deg/s: drift is no answer.
-LEAST_CHANGE_DPS = 5.0
+MIN_CHANGE_DPS = 5.0
 #: Limits of the change of the output over that of the rate.
-LEAST_SHARE, LARGEST_SHARE = 0.5, 2.0
+MIN_SHARE, LARGEST_SHARE = 0.5, 2.0
 #: A rate that comes to less was not measured as a rate.
 NOTHING_SHARE = 0.2
 
@@ -65,16 +65,16 @@ class UnitResponse:
         earlier = self._earlier.setdefault(name, [])
         before = max(earlier, key=lambda each: abs(each[0] - rate_dps), default=None)
         earlier.append((rate_dps, now))
-        if before is None or abs(rate_dps - before[0]) < LEAST_CHANGE_DPS:
+        if before is None or abs(rate_dps - before[0]) < MIN_CHANGE_DPS:
             return ""
         change_dps = position.sign * (rate_dps - before[0])
         shares = {axis: (mean - before[1][axis]) / change_dps for axis, mean in now.items()}
         share = shares[position.axis]
-        if LEAST_SHARE <= share <= LARGEST_SHARE:
+        if MIN_SHARE <= share <= LARGEST_SHARE:
             return ""
         return (
             f"from {before[0]:g} to {rate_dps:.5g} deg/s of the table its output about {position.axis} changed by "
-            f"{share * change_dps:+.3g} deg/s, {100 * share:.3g} % of that, limits {100 * LEAST_SHARE:g} and "
+            f"{share * change_dps:+.3g} deg/s, {100 * share:.3g} % of that, limits {100 * MIN_SHARE:g} and "
             f"{100 * LARGEST_SHARE:g} %; {_advice(shares, position)}"
         )
 
@@ -82,9 +82,9 @@ class UnitResponse:
 def _advice(shares: Mapping[str, float], position: Position) -> str:
     share = shares[position.axis]
     other = max(shares, key=lambda axis: abs(shares[axis]))
-    if other != position.axis and abs(shares[other]) >= LEAST_SHARE:
+    if other != position.axis and abs(shares[other]) >= MIN_SHARE:
         return f"its output about {other} shows the rate: mount the unit with {position.end} up"
-    if -LARGEST_SHARE <= share <= -LEAST_SHARE:
+    if -LARGEST_SHARE <= share <= -MIN_SHARE:
         return f"its sign is reversed: mount the unit with {position.end} up, or correct the sign of its scale"
     if abs(share) < NOTHING_SHARE:
         return (

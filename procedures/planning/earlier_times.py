@@ -16,9 +16,9 @@ from statistics import median
 from procedures.contracts.steps import CheckHome, Home, Mount, MoveChamber, Step
 
 #: Ways that differ by less tell no ramp, K.
-LEAST_SPREAD_C = 5.0
+MIN_SPREAD_C = 5.0
 #: A ramp that is further from the stated one than by this factor is none of this chamber.
-MOST_FACTOR = 4.0
+MAX_FACTOR = 4.0
 
 
 @dataclass(frozen=True)
@@ -105,10 +105,10 @@ def _moves(ways: Sequence[tuple[float, float]], stated_c_per_min: float) -> Cham
     slopes = [
         (took_s - other_s) / (way_c - other_c)
         for (way_c, took_s), (other_c, other_s) in combinations(ways, 2)
-        if abs(way_c - other_c) >= LEAST_SPREAD_C
+        if abs(way_c - other_c) >= MIN_SPREAD_C
     ]
     ramp = None
-    if slopes and (slope := median(slopes)) > 0 and 1 / MOST_FACTOR < 60.0 / slope / stated_c_per_min < MOST_FACTOR:
+    if slopes and (slope := median(slopes)) > 0 and 1 / MAX_FACTOR < 60.0 / slope / stated_c_per_min < MAX_FACTOR:
         ramp = 60.0 / slope
     settling_s = median(took_s - 60.0 * way_c / (ramp or stated_c_per_min) for way_c, took_s in ways)
     return ChamberMoves(ramp, settling_s, len(ways))

@@ -30,7 +30,7 @@ from procedures.planning.step_writer import write_steps
 from procedures.planning.turn_steps import DATA_SETS_OF_TURN
 from procedures.recipe.recipe import Recipe
 
-MOST_DATASETS = 100_000  #: half a year of data sets of two minutes
+MAX_DATASETS = 100_000  #: half a year of data sets of two minutes
 _BENCH_FIGURES = {"expected_s"}  #: what depends on the bench's speed, not on what is done
 
 
@@ -179,6 +179,6 @@ def _refuse_endless(recipe: Recipe) -> None:
         data_sets += len(verify.positions or recipe.positions) * verify.temperatures * verify.rates
     if recipe.turns is not None:
         data_sets = DATA_SETS_OF_TURN * len(recipe.positions) * len(recipe.turns.turns_deg) * recipe.turns.repeats
-    if data_sets > MOST_DATASETS:
-        text = f"about {data_sets} data sets, but a campaign may have at most {MOST_DATASETS}"
+    if data_sets > MAX_DATASETS:
+        text = f"about {data_sets} data sets, but a campaign may have at most {MAX_DATASETS}"
         raise PlanRefused(recipe.name, [text], "Ask for fewer rates, temperatures or repeats.")

@@ -10,7 +10,7 @@ from procedures.recipe.rules import Number, Table, Yes
 
 #: Names are known to what fits, not to a recipe: `labctl campaign plan` and the start of a campaign check them.
 ModelName = Annotated[str, Field(min_length=1, max_length=100)]
-MOST_COMPARED = 10
+MAX_COMPARED = 10
 
 
 class FitLimits(Table):
@@ -27,7 +27,7 @@ class FitRules(Table):
 
     model: ModelName | None = None  #: absent: the effects alone
     effects: tuple[ModelName, ...] = Field(default=(), max_length=50)  #: beside the model
-    compare: tuple[ModelName, ...] = Field(default=(), max_length=MOST_COMPARED)  #: further models, fitted, not kept
+    compare: tuple[ModelName, ...] = Field(default=(), max_length=MAX_COMPARED)  #: further models, fitted, not kept
     criticise: Yes = True  #: whether a verdict is made
     against: Yes = True  #: whether the version in force is applied without refitting, and its drift computed
     limits: FitLimits = FitLimits()

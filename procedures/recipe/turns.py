@@ -12,7 +12,7 @@ from procedures.recipe.rules import Number, Table, Whole
 
 #: What a text may name: the axis that points up, the angle without its sign, and its sense in words.
 WORDS = {"position", "axis", "degrees", "sense"}
-MOST_DEG = 36_000.0
+MAX_DEG = 36_000.0
 
 
 def _text(text: str) -> str:
@@ -29,8 +29,8 @@ def _text(text: str) -> str:
 
 
 def _angle(turn_deg: float) -> float:
-    if not 0 < abs(turn_deg) <= MOST_DEG:
-        raise ValueError(f"the size of a turn must be above 0 deg and at most {MOST_DEG:g} deg, in either direction")
+    if not 0 < abs(turn_deg) <= MAX_DEG:
+        raise ValueError(f"the size of a turn must be above 0 deg and at most {MAX_DEG:g} deg, in either direction")
     return turn_deg
 
 

@@ -36,7 +36,7 @@ def now() -> float:
 class Table:
     """One rotary stage on an ESP301: trapezoids of rate, an error buffer, CR in and CR LF out."""
 
-    MOST_RATE, MOST_ACCELERATION = 80.0, 160.0
+    MAX_RATE, MAX_ACCELERATION = 80.0, 160.0
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
@@ -109,7 +109,7 @@ class Table:
 
     def limit(self, name: str, value: float) -> None:
         """Set velocity or acceleration."""
-        if not 0 < value <= (self.MOST_RATE if name == "VA" else self.MOST_ACCELERATION):
+        if not 0 < value <= (self.MAX_RATE if name == "VA" else self.MAX_ACCELERATION):
             self.errors.append(110 if name == "VA" else 111)
         elif name == "VA":
             self.speed = value

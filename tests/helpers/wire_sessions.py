@@ -21,7 +21,7 @@ from tests.helpers.paths import ROOT
 FOLDER = ROOT / "tests" / "wire_logs"
 SUFFIX = ".jsonl.gz"
 #: A file of the folder is not larger.
-MOST_BYTES = 60_000
+MAX_BYTES = 60_000
 RECIPE = """\
 format = "labctl-recipe/1"
 name = "wire-log"

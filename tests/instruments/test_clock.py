@@ -35,9 +35,9 @@ def test_the_clock_is_no_faster_than_its_speed(speed: float, sleep_s: float) -> 
     clock = clock_of(wall, speed)
     for _ in range(500):
         clock.sleep(sleep_s)
-        assert clock.now_s() <= speed * (wall.now_s() + PacedClock.LEAST_WAIT_S) + 1e-9
+        assert clock.now_s() <= speed * (wall.now_s() + PacedClock.MIN_WAIT_S) + 1e-9
     assert clock.now_s() == pytest.approx(500 * sleep_s)
-    assert wall.now_s() == pytest.approx(clock.now_s() / speed, abs=PacedClock.LEAST_WAIT_S)
+    assert wall.now_s() == pytest.approx(clock.now_s() / speed, abs=PacedClock.MIN_WAIT_S)
 
 
 @pytest.mark.parametrize("speed", [3.0, math.inf])

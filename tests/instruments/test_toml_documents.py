@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from instruments.toml_documents import DEEPEST, MOST_BYTES, listed, parse_toml, read_toml, shown
+from instruments.toml_documents import DEEPEST, MAX_BYTES, listed, parse_toml, read_toml, shown
 from labctl.errors import BadBench, BadInput
 from labctl.fitting.effects import formulas
 from labctl.services.planning.loading import load_bench, own_text
@@ -48,7 +48,7 @@ def test_what_is_nested_too_deeply_is_refused_before_it_is_parsed(text: str, tmp
         ("a = " + "1" * 5000, "4300 digits"),
         ("a = 2026-02-30", "date"),
         ("a = 1\na = 2", "overwrite"),
-        ("a = '" + "x" * MOST_BYTES + "'", f"is {MOST_BYTES} characters"),
+        ("a = '" + "x" * MAX_BYTES + "'", f"is {MAX_BYTES} characters"),
     ],
 )
 def test_what_is_no_toml_is_said(text: str, said: str) -> None:
@@ -58,10 +58,10 @@ def test_what_is_no_toml_is_said(text: str, said: str) -> None:
 
 def test_a_file_is_read_up_to_its_bound(tmp_path: Path) -> None:
     file = tmp_path / "long.toml"
-    file.write_bytes(b"#" * (MOST_BYTES + 1))
-    with pytest.raises(tomllib.TOMLDecodeError, match=f"larger than {MOST_BYTES} bytes"):
+    file.write_bytes(b"#" * (MAX_BYTES + 1))
+    with pytest.raises(tomllib.TOMLDecodeError, match=f"larger than {MAX_BYTES} bytes"):
         read_toml(file)
-    with pytest.raises(RecipeError, match=f"larger than {MOST_BYTES} bytes"):
+    with pytest.raises(RecipeError, match=f"larger than {MAX_BYTES} bytes"):
         own_text(str(file))
 
 

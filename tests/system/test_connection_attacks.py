@@ -21,7 +21,7 @@ pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 OPEN_FILES, HALF_SENT = 256, 300
 MIB = 1 << 20
 #: An endless header is sent no further than this, bytes.
-MOST_SENT = 64 * MIB
+MAX_SENT = 64 * MIB
 WAIT_S = 60.0
 
 
@@ -109,7 +109,7 @@ def test_headers_that_never_end_and_readers_that_never_read_cost_no_memory(servi
             stack.enter_context(connection(service, watch))
         ends = [pool.submit(send_endless_header, service) for _ in range(4)]
         run_campaign(service)
-        assert all(each.result() < MOST_SENT for each in ends)  # the service has closed them
+        assert all(each.result() < MAX_SENT for each in ends)  # the service has closed them
     assert most_memory_mib(service) - before < 30
 
 
@@ -117,9 +117,9 @@ def send_endless_header(service: ServiceProcess) -> int:
     """Send one header until the service closes the connection; returns how much was sent, bytes."""
     piece = b"a" * 65536
     with connection(service, "GET /health HTTP/1.1\r\nHost: HERE\r\nX: ") as client:
-        for sent in range(0, MOST_SENT, len(piece)):
+        for sent in range(0, MAX_SENT, len(piece)):
             try:
                 client.sendall(piece)
             except OSError:
                 return sent
-    return MOST_SENT
+    return MAX_SENT

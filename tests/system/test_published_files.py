@@ -21,7 +21,7 @@ from tests.helpers.profiles import profile_recording, ramp, sweep
 from tests.helpers.written_logs import write_ulog
 
 PAGE = ROOT / "docs" / "how-to" / "from-a-file-to-a-calibration.md"
-MOST_COMMANDS = 3
+MAX_COMMANDS = 3
 #: Files that were published as text -> name, separator, whether it has a header.
 TEXTS = {
     "pan-cooldown": ("TVCtest3_7_20.csv", ",", True),
@@ -61,7 +61,7 @@ def test_each_kind_takes_three_commands_at_most_and_no_script() -> None:
     kinds = blocks()
     assert len(kinds) == 9
     for commands in kinds.values():
-        assert len(commands) <= MOST_COMMANDS
+        assert len(commands) <= MAX_COMMANDS
         assert [words[:2] for words in commands] == [["labctl", each] for each in ("import", "fit", "calibration")]
 
 

@@ -36,11 +36,11 @@ class CourseFollower:
 
     def check(self, course: RateCourse) -> None:
         """Raise LimitError for a sweep whose frequencies the oscillator does not have."""
-        if isinstance(course, SineSweep) and min(course.from_hz, course.to_hz) < acl.LEAST_HZ:
+        if isinstance(course, SineSweep) and min(course.from_hz, course.to_hz) < acl.MIN_HZ:
             raise LimitError(
                 self._device,
                 f"a sine of {min(course.from_hz, course.to_hz):g} Hz is below the limit of its oscillator, "
-                f"{acl.LEAST_HZ:g} Hz; raise from_hz and to_hz",
+                f"{acl.MIN_HZ:g} Hz; raise from_hz and to_hz",
             )
 
     def begin(self, course: RateCourse) -> CourseRun:

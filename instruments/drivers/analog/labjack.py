@@ -194,7 +194,7 @@ class LabJackGyro:
     @property
     def _scans_per_packet(self) -> int:
         """Scans of a packet: whole readings where they fit."""
-        average, most = self.settings.options.average, lj.MOST_SAMPLES_PER_PACKET // len(self._inputs)
+        average, most = self.settings.options.average, lj.MAX_SAMPLES_PER_PACKET // len(self._inputs)
         scans = min(max(round(self.scans_per_s / PACKETS_PER_S), 1), most)
         return scans if average > scans else scans - scans % average
 

@@ -14,7 +14,7 @@ from instruments.protocols.request_reply.templates import filled
 from instruments.transport.line_link import TRIES, LineLink
 
 #: Errors of earlier requests that an instrument may still hold.
-MOST_OLD_ERRORS = 20
+MAX_OLD_ERRORS = 20
 SHOWN = 60
 NONE: Mapping[str, object] = MappingProxyType({})
 
@@ -138,7 +138,7 @@ class Dialogue:
         check = self._line.check
         if not self._errors_are_old or check is None:
             return
-        for _ in range(MOST_OLD_ERRORS):
+        for _ in range(MAX_OLD_ERRORS):
             said = self.text(check, "say what errors it holds")
             if re.fullmatch(check.passes, said):
                 self._errors_are_old = False

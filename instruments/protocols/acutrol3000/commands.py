@@ -23,7 +23,7 @@ DONE = "OK"
 #: Letters of the profiler modes (TM-8004 page 137).
 OFF, RATE, POSITION, SYNTHESIS = "O", "R", "P", "S"
 #: Lowest frequency of the oscillator where it changes by the same factor in equal times, Hz (TM-8004 page 82).
-LEAST_HZ = 0.001
+MIN_HZ = 0.001
 #: First letters of the states of an interlock (TM-8004 page 133).
 CLOSED, OPEN, FAULT = "C", "O", "F"
 #: Bits of the register A(n)DYN (TM-8004 page 214).

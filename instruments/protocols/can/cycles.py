@@ -7,7 +7,7 @@ import numpy as np
 from instruments.protocols.can.frames import BUS_OFF, ERROR, ERROR_CLASSES, FRAME_BYTES, CanFrame, FrameScanner
 from instruments.protocols.can.signals import COUNTER, CanLayout
 from instruments.protocols.stream_formats.document import BINARY_STEP
-from instruments.protocols.stream_formats.readings import MOST_STEPS, Decoded
+from instruments.protocols.stream_formats.readings import MAX_STEPS, Decoded
 
 Numbers = dict[str, int]
 
@@ -125,7 +125,7 @@ class CycleDecoder:
         if isinstance(value, int):
             return value
         steps = value / BINARY_STEP
-        if not abs(steps) < MOST_STEPS:  # also for one that is no number
+        if not abs(steps) < MAX_STEPS:  # also for one that is no number
             self._is_fit = False
             return 0
         return round(steps)

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from instruments.errors import one_line
-from instruments.protocols.can.frames import EXTENDED, MOST_DATA
+from instruments.protocols.can.frames import EXTENDED, MAX_DATA
 from instruments.toml_documents import listed
 
 if TYPE_CHECKING:
     from cantools.database.can import Database, Message, Signal
 
 #: The text of a DBC file is kept with each campaign.
-MOST_CHARACTERS = 1 << 19
+MAX_CHARACTERS = 1 << 19
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,10 @@ class CanDatabase:
         signals = {each.name: each for each in message.signals}
         if name not in signals:
             raise ValueError(f"{path!r}: {_choice(f'message {message_name}', 'signal', name, list(signals))}")
-        if message.length > MOST_DATA:
+        if message.length > MAX_DATA:
             raise ValueError(
                 f"{path!r}: message {message_name} has {message.length} bytes, but a frame of classical CAN holds at "
-                f"most {MOST_DATA}; CAN FD is not read: configure the unit for classical CAN"
+                f"most {MAX_DATA}; CAN FD is not read: configure the unit for classical CAN"
             )
         return _signal(message, signals[name])
 
@@ -107,9 +107,9 @@ def _signal(message: Message, signal: Signal) -> CanSignal:
 
 @functools.lru_cache(maxsize=8)
 def _parsed(text: str) -> Database:
-    if len(text) > MOST_CHARACTERS:
+    if len(text) > MAX_CHARACTERS:
         raise ValueError(
-            f"the DBC text has {len(text)} characters, the limit is {MOST_CHARACTERS}; keep only the messages of the "
+            f"the DBC text has {len(text)} characters, the limit is {MAX_CHARACTERS}; keep only the messages of the "
             "unit in the file"
         )
     try:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 EXTENDED, REQUEST, ERROR = 0x80000000, 0x40000000, 0x20000000
-FRAME_BYTES, MOST_DATA = 16, 8
+FRAME_BYTES, MAX_DATA = 16, 8
 STANDARD_IDS, EXTENDED_IDS = 0x7FF, 0x1FFFFFFF
 #: Classes of an error frame: bits of its identifier (linux/can/error.h).
 BUS_OFF = 0x40
@@ -35,8 +35,8 @@ class CanFrame(NamedTuple):
 
 def packed(frame: CanFrame) -> bytes:
     """Return the 16 bytes of a frame; raises ValueError for more than 8 data bytes."""
-    if len(frame.data) > MOST_DATA:
-        raise ValueError(f"a CAN frame holds at most {MOST_DATA} data bytes, not {len(frame.data)}; shorten the data")
+    if len(frame.data) > MAX_DATA:
+        raise ValueError(f"a CAN frame holds at most {MAX_DATA} data bytes, not {len(frame.data)}; shorten the data")
     return _LAYOUT.pack(frame.id, len(frame.data), frame.data)
 
 
@@ -51,10 +51,10 @@ def frame_of_text(text: str) -> CanFrame:
     except ValueError:
         id_, content, mark = 0, b"", ""
     highest = {3: STANDARD_IDS, 8: EXTENDED_IDS}.get(len(digits), -1)
-    if not mark or not 0 <= id_ <= highest or len(content) > MOST_DATA:
+    if not mark or not 0 <= id_ <= highest or len(content) > MAX_DATA:
         raise ValueError(
             f"{text!r} is not a CAN frame; write three (standard) or eight (extended) hexadecimal digits, #, and up to "
-            f"{MOST_DATA} bytes, such as 000#0100"
+            f"{MAX_DATA} bytes, such as 000#0100"
         )
     return CanFrame(id_ | (EXTENDED if len(digits) == 8 else 0), content)
 
@@ -93,15 +93,15 @@ class FrameScanner:
 
 
 def _is_frame(data: bytes, at: int) -> bool:
-    return data[at + 4] <= MOST_DATA and bool(_good(np.frombuffer(data, _RECORD, 1, at))[0])
+    return data[at + 4] <= MAX_DATA and bool(_good(np.frombuffer(data, _RECORD, 1, at))[0])
 
 
 def _good(records: np.ndarray) -> np.ndarray:
     """Return which records (n,) are frames: identifier, length and unused bytes are what they must be."""
     ids, lengths = records["id"], records["length"]
     standard = (ids & (EXTENDED | ERROR)) == 0
-    unused = np.arange(MOST_DATA) >= lengths[:, None]
-    good: np.ndarray = (lengths <= MOST_DATA) & ~records["zero"].any(axis=1)
+    unused = np.arange(MAX_DATA) >= lengths[:, None]
+    good: np.ndarray = (lengths <= MAX_DATA) & ~records["zero"].any(axis=1)
     good &= ~(standard & ((ids & EXTENDED_IDS) > STANDARD_IDS))
     good &= ~((records["data"] != 0) & unused).any(axis=1)
     return good

@@ -34,7 +34,7 @@ SCAN_LIST = Register(4100, "stream address", "uint32", access="rw", source=SOURC
 ENABLE = Register(4990, "stream enable", "uint32", access="rw", source=SOURCE)
 #: The device takes a power of two up to this.
 LARGEST_BUFFER = 32768
-MOST_SAMPLES_PER_PACKET = 512
+MAX_SAMPLES_PER_PACKET = 512
 
 FLASH_POINTER = Register(61810, "flash pointer", "uint32", access="rw", source=SOURCE)
 FLASH = Register(61812, "flash", "float32", source=SOURCE)

@@ -16,7 +16,7 @@ HEADER = struct.Struct(">HHHBBBBHHH")
 UNIT, FUNCTION, TYPE = 1, 76, 16
 #: Bytes of the length field's count that are no codes.
 BEFORE_CODES = HEADER.size - 6
-MOST_BYTES = HEADER.size + 2 * 512
+MAX_BYTES = HEADER.size + 2 * 512
 NUMBERS = 1 << 16  #: transaction numbers
 #: A scan that was not taken: the device was recovering from a full buffer.
 DUMMY = 0xFFFF
@@ -49,7 +49,7 @@ def split(data: bytes) -> tuple[list[Packet], bytes, int]:
         number, protocol, length, unit, function, kind, _, backlog, status, info = HEADER.unpack_from(data, at)
         size = 6 + length
         is_packet = (protocol, unit, function, kind) == (0, UNIT, FUNCTION, TYPE)
-        if not is_packet or not HEADER.size <= size <= MOST_BYTES or length % 2:
+        if not is_packet or not HEADER.size <= size <= MAX_BYTES or length % 2:
             damaged += not in_damage
             in_damage, at = True, at + 1
             continue

@@ -20,7 +20,7 @@ from instruments.protocols.stream_formats.units import UNITS
 
 Whole = NDArray[np.int64]
 #: A number that does not fit into this many steps is no reading.
-MOST_STEPS = 2.0**62
+MAX_STEPS = 2.0**62
 
 
 class Scale(NamedTuple):
@@ -109,7 +109,7 @@ def pulse_ticks(format_: StreamFormat) -> PulseTicks | None:
 def whole_numbers(values: NDArray[np.float64], step: float) -> tuple[Whole, NDArray[np.bool_]]:
     """Return numbers (n,) in whole steps, and which of them are numbers that fit."""
     steps = values / step
-    good = np.abs(steps) < MOST_STEPS  # not for one that is no number
+    good = np.abs(steps) < MAX_STEPS  # not for one that is no number
     return np.rint(np.where(good, steps, 0.0)).astype(np.int64), good
 
 

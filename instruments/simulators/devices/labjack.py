@@ -18,7 +18,7 @@ from instruments.simulators.physics.world import SimulatedGyro
 from instruments.simulators.setup import InstrumentSetup
 
 #: Packets that the device makes at once at most; it has lost older ones.
-MOST_PACKETS = 60
+MAX_PACKETS = 60
 #: Nominal constants of the +-10 V range, and of the others, from LabJack's C examples: slopes, centre, offset.
 NOMINAL = [
     value
@@ -145,7 +145,7 @@ class SimulatedT7Stream:
             self.stream.skipped += self.overflow_scans - 1
             self._recovered, self.overflow_scans = self.overflow_scans, 0
         newest = self.stream.packets_by(t_s)
-        first = max(self.stream.sent, newest - MOST_PACKETS)
+        first = max(self.stream.sent, newest - MAX_PACKETS)
         self.stream.sent = max(newest, self.stream.sent)
         if newest <= first:
             return b""

@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 #: From one write to the next, s of real time.
 FLUSH_S = 0.25
 #: Queued bytes from which the thread writes at once, and at which who adds an event waits.
-WRITE_FROM_BYTES, MOST_QUEUED_BYTES = 1 << 20, 16 << 20
+WRITE_FROM_BYTES, MAX_QUEUED_BYTES = 1 << 20, 16 << 20
 #: Memory of an event beside its bytes, about.
 EVENT_BYTES = 300
 #: Longest wait for the disk of who adds an event, and at the end of the session, s of real time.
@@ -52,7 +52,7 @@ class WireLogFile:
     def note(self, event: Event) -> None:
         """Queue an event; raises nothing."""
         with self._changed:
-            if self._queued_bytes > MOST_QUEUED_BYTES and not self._is_stalled:
+            if self._queued_bytes > MAX_QUEUED_BYTES and not self._is_stalled:
                 self._changed.notify_all()
                 self._is_stalled = not self._changed.wait_for(self._has_room, STALL_S)
             if self.failure or self._is_stalled or self._is_closing:
@@ -89,7 +89,7 @@ class WireLogFile:
             self._file.close()
 
     def _has_room(self) -> bool:
-        return self._queued_bytes <= MOST_QUEUED_BYTES or bool(self.failure)
+        return self._queued_bytes <= MAX_QUEUED_BYTES or bool(self.failure)
 
     def _run(self) -> None:
         while True:

@@ -6,7 +6,7 @@ import numpy as np
 
 from labctl.cli.demo.runner import DemoRunner
 from labctl.cli.output import table
-from labctl.error_per_turn import LEAST_RATE_DPS, error_per_turn
+from labctl.error_per_turn import MIN_RATE_DPS, error_per_turn
 from labctl.fitting import fit, fit_data_of
 
 SERIAL = "FOG-0001"
@@ -28,7 +28,7 @@ def play(demo: DemoRunner) -> None:
         "RMS over all temperatures", "rate, deg/s", "error, deg/s", "compensated", "per turn, deg (less static bias)",
         "per turn, compensated", numbers=5,
     )  # fmt: skip
-    for nominal_dps in np.unique(np.round(rate[np.abs(rate) >= LEAST_RATE_DPS], 0))[::4]:
+    for nominal_dps in np.unique(np.round(rate[np.abs(rate) >= MIN_RATE_DPS], 0))[::4]:
         here = np.abs(rate - nominal_dps) < 0.5
         before, after = raw[here], result.residual_dps["z"][here]
         turns = (_rms(error_per_turn(errors, rate[here])) for errors in (before - bias, after))

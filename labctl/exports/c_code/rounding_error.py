@@ -36,7 +36,7 @@ ENDS = 2
 #: Share for what is beyond first order.
 BEYOND = 1.05
 #: Without a range the bound is stated for these, deg/s and deg C; forces up to this, g.
-UNLIMITED_DPS, UNLIMITED_C, MOST_G = 2048.0, 100.0, 128.0
+UNLIMITED_DPS, UNLIMITED_C, MAX_G = 2048.0, 100.0, 128.0
 #: Series of the sine near 0, as a share of the rate.
 SERIES = 1e-14
 
@@ -64,7 +64,7 @@ def range_of(calibration: Calibration) -> Range:
 
 
 def rounding_dps(calibration: Calibration, roundoff: float) -> float:
-    """Return the bound of a header's corrected rate, deg/s, computed with a unit roundoff; with forces to `MOST_G`."""
+    """Return the bound of a header's corrected rate, deg/s, computed with a unit roundoff; with forces to `MAX_G`."""
     fitted, memory = split_memory(calibration.fitted, calibration.axes)
     over = range_of(calibration)
     surface = surface_of(fitted, calibration.axes)
@@ -168,5 +168,5 @@ def _of_memory(memory: Memory | None, over: Range, roundoff: float) -> float:
 def _of_force(force: ForceSensitivity | None, over: Range, roundoff: float) -> float:
     if force is None:
         return 0.0
-    largest = np.abs(force.known_per_g).sum(axis=1) * MOST_G + np.abs(force.known_per_g2) * MOST_G**2
+    largest = np.abs(force.known_per_g).sum(axis=1) * MAX_G + np.abs(force.known_per_g2) * MAX_G**2
     return float(roundoff * (8 * largest.max() + over.output_dps))

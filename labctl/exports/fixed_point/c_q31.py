@@ -17,7 +17,7 @@ from labctl.exports.static_part import TEMPERATURES, StaticPart, all_turning, ne
 from labctl.fitting.numeric.arrays import Array
 
 NAME = "c-q31"
-NODES, MOST_NODES = 65, 1025
+NODES, MAX_NODES = 65, 1025
 #: Outputs of each axis at which the difference from the calibration is looked for.
 OUTPUTS = 25
 
@@ -84,7 +84,7 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
         calibration, NAME, "the error of this calibration is the same at every temperature; use format c or json"
     )
     part = static_part(calibration, NAME, carries="the table of this format depends on output and temperature only")
-    nodes = whole_number(options, "temperatures", (2, MOST_NODES), NODES, NAME)
+    nodes = whole_number(options, "temperatures", (2, MAX_NODES), NODES, NAME)
     fixed = fixed_point(part, nodes, NAME)
     force = None
     if calibration.force_sensitivity is not None:
@@ -153,5 +153,5 @@ FORMAT = Format(
     "text/x-c",
     "h",
     write,
-    {"temperatures": f"nodes of the table over temperature, 2 to {MOST_NODES}; default {NODES}"},
+    {"temperatures": f"nodes of the table over temperature, 2 to {MAX_NODES}; default {NODES}"},
 )

@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import BadInput
-from labctl.exports.fixed_point.whole_numbers import MOST_Q31, Q16, Q31, FixedPoint, Whole, product
+from labctl.exports.fixed_point.whole_numbers import MAX_Q31, Q16, Q31, FixedPoint, Whole, product
 from labctl.exports.force_text import size_line
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.force_sensitivity import ForceSensitivity
 
 #: Forces up to this are taken, g: no sum and no product leaves its 64 bits.
-MOST_G = 128
+MAX_G = 128
 #: Bits by which a coefficient is finer than the rates, at most.
-MOST_SHIFT = 24
+MAX_SHIFT = 24
 
 SOURCE = """
 /* {head}.
@@ -77,13 +77,13 @@ class FixedForce:
 
     def corrected(self, raw_q31: Whole, temperature_q16: Whole, force_q16: Whole) -> tuple[Whole, NDArray[np.bool_]]:
         """Return corrected rates (n, axes) of outputs (n, axes) at temperatures (n,) and forces (n, 3), and outside."""
-        held = np.clip(force_q16, -MOST_G << Q16, MOST_G << Q16)
+        held = np.clip(force_q16, -MAX_G << Q16, MAX_G << Q16)
         own = held[:, [BODY_AXES.index(axis) for axis in self.force.axes]]
         error = product(
             held @ self.per_g.T + product(own, own, Q16) * self.per_g2, np.ones(1, dtype=np.int64), Q16 + self.shift
         )
         rate, outside = self.fixed.corrected(raw_q31, temperature_q16) if self.is_direct else (raw_q31, None)
-        limited = np.clip(rate - error, -MOST_Q31 - 1, MOST_Q31)
+        limited = np.clip(rate - error, -MAX_Q31 - 1, MAX_Q31)
         beyond = np.any(held != force_q16, axis=1) | np.any(limited != rate - error, axis=1)
         if outside is not None:
             return limited, outside | beyond
@@ -91,14 +91,14 @@ class FixedForce:
         return turning_q31, outside | beyond
 
     def rounding_dps(self) -> float:
-        """Return what rounding can add, deg/s, at forces up to `MOST_G`: of forces, squares, coefficients and sums.
+        """Return what rounding can add, deg/s, at forces up to `MAX_G`: of forces, squares, coefficients and sums.
 
         Half a unit each, and what the correction of the output makes of it.
         """
         unit = self.fixed.full_scale_dps / 2.0**Q31
         linear, square = np.abs(self.force.known_per_g).sum(axis=1), np.abs(self.force.known_per_g2)
-        of_force = 2.0 ** -(Q16 + 1) * (linear + square * (2 * MOST_G + 1))
-        most = 3 * MOST_G * (linear > 0) + MOST_G**2 * (square > 0)
+        of_force = 2.0 ** -(Q16 + 1) * (linear + square * (2 * MAX_G + 1))
+        most = 3 * MAX_G * (linear > 0) + MAX_G**2 * (square > 0)
         added = of_force + most * unit * 2.0 ** -(self.shift + 1) + unit / 2
         gain = 1.0 if self.is_direct else 1.0 + self.fixed.steepest
         return float(gain * added.max())
@@ -109,7 +109,7 @@ class FixedForce:
         for before, after in AFTER if self.is_direct else ():
             text = text.replace(before, after)
         return text.format(
-            name=name, axes=len(self.per_g), most=MOST_G, most_q16=MOST_G << Q16, shift=self.shift,
+            name=name, axes=len(self.per_g), most=MAX_G, most_q16=MAX_G << Q16, shift=self.shift,
             bits=Q16 + self.shift, head=size_line(self.force, f"{name}_q31_correct_with_force"),
             per_g="{" + ", ".join(_row(row) for row in self.per_g.tolist()) + "}", per_g2=_row(self.per_g2.tolist()),
             own=_row([BODY_AXES.index(axis) for axis in self.force.axes]),
@@ -122,8 +122,8 @@ def fixed_force(fixed: FixedPoint, force: ForceSensitivity, format_name: str, *,
     Raises BadInput for coefficients beyond the full scale.
     """
     per_g, per_g2 = force.known_per_g, force.known_per_g2
-    largest = max(float(np.abs(per_g).max()), float(np.abs(per_g2).max()), fixed.full_scale_dps * 2.0**-MOST_SHIFT)
-    shift = min(MOST_SHIFT, math.floor(math.log2(fixed.full_scale_dps / largest * (1 - 2.0**-20))))
+    largest = max(float(np.abs(per_g).max()), float(np.abs(per_g2).max()), fixed.full_scale_dps * 2.0**-MAX_SHIFT)
+    shift = min(MAX_SHIFT, math.floor(math.log2(fixed.full_scale_dps / largest * (1 - 2.0**-20))))
     if shift < 0:
         raise BadInput(
             f"format {format_name}: a g-sensitivity of {largest:.3g} deg/s/g is more than the full scale of "

@@ -20,10 +20,10 @@ from labctl.fitting.numeric.arrays import Array
 
 Whole = NDArray[np.int64]
 Q31, Q16, POSITION_BITS, RECIPROCAL_BITS = 31, 16, 24, 32
-MOST_Q31 = 2**31 - 1
+MAX_Q31 = 2**31 - 1
 #: Highest order of the polynomials; the lowest order that is within NEAR of the calibration is taken, and the highest
 #: has to be within NEAR_ENOUGH, both as shares of the full scale; so has what several axes cause only together.
-MOST_ORDER, NEAR, NEAR_ENOUGH = 11, 2.0**-30, 2.0**-18
+MAX_ORDER, NEAR, NEAR_ENOUGH = 11, 2.0**-30, 2.0**-18
 #: Coefficients of an axis may add up to this share of the full scale: no sum and no product leaves its 64 bits.
 FILLED = 0.99
 #: Full scale where the calibration has no range of rates, deg/s.
@@ -67,7 +67,7 @@ class FixedPoint:
                     total += row[node] + product(row[node + 1] - row[node], part, POSITION_BITS)
                 error += total
             scaled = error if self.shift == 0 else (error + (1 << (self.shift - 1))) >> self.shift
-            rate_q31[:, axis] = np.clip(raw_q31[:, axis] - scaled, -MOST_Q31 - 1, MOST_Q31)
+            rate_q31[:, axis] = np.clip(raw_q31[:, axis] - scaled, -MAX_Q31 - 1, MAX_Q31)
         return rate_q31, outside
 
     def rate_dps(self, raw_dps: Array, temperature_c: Array) -> Array:
@@ -90,7 +90,7 @@ class FixedPoint:
 
     def as_q31(self, rate_dps: Array) -> Whole:
         """Return rates in Q31 of the full scale."""
-        return np.clip(np.rint(rate_dps * (2.0**Q31 / self.full_scale_dps)), -(2.0**Q31), MOST_Q31).astype(np.int64)
+        return np.clip(np.rint(rate_dps * (2.0**Q31 / self.full_scale_dps)), -(2.0**Q31), MAX_Q31).astype(np.int64)
 
 
 def product(a: Whole, b: Whole, bits: int) -> Whole:
@@ -105,13 +105,13 @@ def fixed_point(part: StaticPart, nodes: int, format_name: str) -> FixedPoint:
     low, high = part.calibration.temperature_c
     low_q16, high_q16 = math.floor(low * 2**Q16), max(math.ceil(high * 2**Q16), math.floor(low * 2**Q16) + 1)
     temperatures_c = np.linspace(low_q16, high_q16, nodes) / 2.0**Q16
-    for order in range(MOST_ORDER + 1) if part.has_rates else (0,):
+    for order in range(MAX_ORDER + 1) if part.has_rates else (0,):
         coefficients, off = _polynomials(part, temperatures_c, (slowest, fastest), full_scale, order)
         if off <= NEAR * full_scale:
             break
     if off > NEAR_ENOUGH * full_scale:
         raise BadInput(
-            f"format {format_name}: polynomials of order {MOST_ORDER} in the output differ from model "
+            f"format {format_name}: polynomials of order {MAX_ORDER} in the output differ from model "
             f"{part.calibration.fitted.model.name} by up to {off:.2g} deg/s; use format c or json"
         )
     if (joint := _of_several_axes(part)) > NEAR_ENOUGH * full_scale:

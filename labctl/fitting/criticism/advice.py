@@ -36,7 +36,7 @@ PARTS = 4
 BEYOND_K = 1.0
 #: What is exported has to become better by this share: less is chance. A record at rest has few independent errors: a
 #: drift that is correlated over half an hour has a dozen in three hours of three axes.
-LEAST_GAIN, LEAST_GAIN_AT_REST = 0.01, 0.15
+MIN_GAIN, MIN_GAIN_AT_REST = 0.01, 0.15
 #: From so many parts on the gain also has to exceed what their scatter explains, at this probability (Student's t).
 PARTS_THAT_SCATTER, CERTAIN = 3, 0.95
 Mask = NDArray[np.bool_]
@@ -48,7 +48,7 @@ class Exported:
 
     before_dps: float | None
     after_dps: float | None
-    least_gain: float = LEAST_GAIN
+    least_gain: float = MIN_GAIN
     is_chance: bool = False  #: whether the gain differs so from part to part that it may be none
 
     @property
@@ -134,7 +134,7 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
         for parts, values in zip(errors, axis_rms, strict=True):
             parts.append(values)
     before, after = (_pooled(parts) for parts in errors)
-    least_gain = LEAST_GAIN if np.any(data.channels.table_rate_dps()) else LEAST_GAIN_AT_REST
+    least_gain = MIN_GAIN if np.any(data.channels.table_rate_dps()) else MIN_GAIN_AT_REST
     return Exported(before, after, least_gain, _is_chance(*errors))
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.joined import trend_t_s
-from labctl.fitting.effects.acceleration import LEAST_CHANGE_G, change_g
+from labctl.fitting.effects.acceleration import MIN_CHANGE_G, change_g
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import OWN_DATASET, RATE_TIME_U, READING_TIMES, RECORDING, WITHIN_S
 
@@ -54,7 +54,7 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
         if name not in NO_CHANNELS and values.dtype.kind in "fiu" and not name.startswith("gyro_")
     }
     for body, name in FORCES.items():
-        if name in channels and change_g(data.nodes, body) < LEAST_CHANGE_G:  # a support that leans, and no cause
+        if name in channels and change_g(data.nodes, body) < MIN_CHANGE_G:  # a support that leans, and no cause
             del channels[name]
     channels["table_rate_dps"] = data.nodes.rate_dps(axis)
     if "t_s" in channels:

@@ -22,7 +22,7 @@ from labctl.fitting.criticism.residuals import Residuals, residuals_of
 from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.slow_process import slow_process, with_hypothesis, without_harm
-from labctl.fitting.criticism.suspects import LEAST_CAUSE, Suspect, is_only_shape, suspects_of, without_shapes
+from labctl.fitting.criticism.suspects import MIN_CAUSE, Suspect, is_only_shape, suspects_of, without_shapes
 from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, family_or_hint, with_family
 from labctl.fitting.criticism.verdict import FAR, Verdict
 from labctl.fitting.criticism.visibility import not_testable
@@ -69,13 +69,13 @@ def with_quantization(verdict: Verdict, data: ReducedRecording, left: Mapping[st
 
 
 #: Data sets beyond the base's coefficients that a verdict needs.
-LEAST_SPARE = 6
+MIN_SPARE = 6
 #: The drift counts as larger than the data sheet says where the least that it may be is this many times as large.
 LARGE_DRIFT = 1.5
 #: From this chance on that noise leaves as much as a residual, the residual may be noise.
 BY_CHANCE = 0.05
 #: No model is adequate that leaves more than this many times the noise floor, whatever the evidence for any one cause.
-MOST_OVER_FLOOR = 3.0
+MAX_OVER_FLOOR = 3.0
 
 
 @dataclass(frozen=True)
@@ -310,7 +310,7 @@ def _without_weak_names(found: Criticism, suspects: Sequence[Suspect], forward: 
         group for names in verdict.groups if (group := tuple(name for name in names if name not in shapes) or names)
     )
     named = [each for each in suspects if each.candidate.id in verdict.named]
-    weak = all(each.candidate.log_bf < FAR and each.share_removed < LEAST_CAUSE for each in named)
+    weak = all(each.candidate.log_bf < FAR and each.share_removed < MIN_CAUSE for each in named)
     error = found.base.error if found.base is not None else None
     above = error is not None and (error.rms_dps or 0.0) > (error.noise_floor_dps or np.inf)
     if named and weak and above and (found.lack_of_fit[1] or 0.0) >= BY_CHANCE:
@@ -324,7 +324,7 @@ def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict
     if verdict.form != "adequate" or base is None:
         return verdict
     left, floor = base.error.rms_dps, base.error.noise_floor_dps
-    if left is None or not floor or left <= MOST_OVER_FLOOR * floor:
+    if left is None or not floor or left <= MAX_OVER_FLOOR * floor:
         return verdict
     return replace(verdict, form="unexplained", further=())
 
@@ -358,11 +358,11 @@ def _too_little(data: ReducedRecording, model: ErrorModel) -> str | None:
     """Return what is missing for a verdict, in words, or None."""
     axis = data.info.axes[0]
     columns = sum(1 for _, c in model.columns(data.nodes, axis) if np.any(c.values))
-    needed = columns * (len(getattr(model.temperature, "nodes_c", ())) or 1) + LEAST_SPARE
+    needed = columns * (len(getattr(model.temperature, "nodes_c", ())) or 1) + MIN_SPARE
     rows = int(data.present.sum())
     if len(data) < needed and rows < 4 * needed:
         return (
-            f"{len(data)} data sets are too few for a model of {needed - LEAST_SPARE} coefficients per axis: measure "
+            f"{len(data)} data sets are too few for a model of {needed - MIN_SPARE} coefficients per axis: measure "
             f"at least {needed - len(data)} more data sets, at other rates and temperatures"
         )
     return None

@@ -23,7 +23,7 @@ ROUNDS, CLOSE = 8, 0.08
 #: Largest step of the search, in the logarithm of the size.
 LARGEST_STEP = 4.0
 #: Range of d log z / d log size.
-LEAST_SLOPE, MOST_SLOPE = 0.3, 6.0
+MIN_SLOPE, MAX_SLOPE = 0.3, 6.0
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,6 @@ def size_for_z(z_of: Callable[[float], float], z: float, start: float) -> float 
         logs.append((at, float(np.log(max(z_at_size, 1e-3)))))
         if len(logs) > 1 and abs(logs[-1][0] - logs[-2][0]) > 1e-6:
             secant = (logs[-1][1] - logs[-2][1]) / (logs[-1][0] - logs[-2][0])
-            slope = float(np.clip(secant, LEAST_SLOPE, MOST_SLOPE))
+            slope = float(np.clip(secant, MIN_SLOPE, MAX_SLOPE))
         at += float(np.clip((np.log(z) - logs[-1][1]) / slope, -LARGEST_STEP, LARGEST_STEP))
     return None

@@ -28,7 +28,7 @@ from labctl.progress import report_stage
 REESTIMATE_FROM = 6.0
 ROBUST = 1.4826
 #: Least variance of a mean, (deg/s)^2: data without any scatter, as formulas make them, must not divide by zero.
-LEAST_VAR = 1e-20
+MIN_VAR = 1e-20
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def _noise_of(data: ReducedRecording, design: Design, y: NDArray[np.float64], ax
     """Return the white variance of each mean, (m,) (deg/s)^2, and the drifts to average over."""
     stability = data.info.stability_dps
     white_var = data.white_var
-    white = white_var[axis] if white_var is not None else np.full(len(data), max(_floor_squared(design, y), LEAST_VAR))
+    white = white_var[axis] if white_var is not None else np.full(len(data), max(_floor_squared(design, y), MIN_VAR))
     level = float(np.sqrt(np.median(white)))
     return white, noise_grid(data.info.technology or "", stability, level, data.instability_dps(axis))
 
@@ -135,7 +135,7 @@ def _growing(
 
 
 #: A formula of which the base leaves less than this share is not orthogonalised.
-LEAST_ORTHOGONAL_SHARE = 1e-5
+MIN_ORTHOGONAL_SHARE = 1e-5
 #: A column of which this share or less is left is constant but for rounding.
 ROUNDING = 1e-12
 #: Spacing of data sets, s, where the recording has no times.
@@ -242,7 +242,7 @@ def orthogonalised(option: CandidateShape, base: NDArray[np.float64]) -> Candida
     rows = option.rows - base @ coordinates
     return (
         replace(option, rows=rows)
-        if np.linalg.norm(rows) > LEAST_ORTHOGONAL_SHARE * np.linalg.norm(option.rows)
+        if np.linalg.norm(rows) > MIN_ORTHOGONAL_SHARE * np.linalg.norm(option.rows)
         else option
     )
 

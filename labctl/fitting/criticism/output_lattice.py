@@ -21,7 +21,7 @@ from labctl.recording.output_steps import output_steps
 #: Harmonics of the sawtooth.
 HARMONICS = (1, 2, 3)
 #: The steps matter where they leave this share of the variance of a mean, or more.
-LEAST_SHARE = 0.25
+MIN_SHARE = 0.25
 
 
 def steps_of(recording: Recording, white_var: Mapping[str, Array] | None) -> dict[str, OutputStep]:
@@ -32,7 +32,7 @@ def steps_of(recording: Recording, white_var: Mapping[str, Array] | None) -> dic
     step_by_channel: dict[str, OutputStep] = {}
     for axis, step in output_steps(recording).items():
         noise = 0.0 if white_var is None else float(np.median(white_var[axis]))
-        if step.left_dps**2 > LEAST_SHARE * noise:
+        if step.left_dps**2 > MIN_SHARE * noise:
             step_by_channel[axis] = {"step_dps": step.step_dps, "left_dps": step.left_dps}
     return step_by_channel
 

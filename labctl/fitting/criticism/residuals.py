@@ -22,7 +22,7 @@ from labctl.fitting.numeric.arrays import Array, over
 #: Bins of a channel over which residuals are averaged.
 BINS = 8
 #: A bin is reported from this z on, and at most this many bins are.
-LEAST_Z = 3.0
+MIN_Z = 3.0
 LINES = 12
 #: Temperatures went one way only when they came back by less than this share of their span.
 BACK_SHARE = 0.25
@@ -98,7 +98,7 @@ def where_it_fails(data: ReducedRecording, axis_residuals: Mapping[str, Residual
             for low, high, rows in _bins(values):
                 score = residuals.score[rows]
                 z = float(abs(score.mean()) * np.sqrt(len(score)))
-                if z >= LEAST_Z:
+                if z >= MIN_Z:
                     rms = float(np.sqrt(np.mean(residuals.means[rows] ** 2)))
                     failing_ranges.append(
                         {"axis": axis, "channel": name, "from": low, "to": high, "rms_dps": rms, "z": z}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.answers.criticism import Advice, SlowProcess
-from labctl.fitting.criticism.advice import LEAST_GAIN_AT_REST
+from labctl.fitting.criticism.advice import MIN_GAIN_AT_REST
 from labctl.fitting.criticism.channel_functions import TIMES
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.residuals import Residuals
@@ -21,8 +21,8 @@ from labctl.fitting.criticism.verdict import ENOUGH, FAR, Verdict
 from labctl.fitting.numeric.arrays import Array
 
 #: Correlation of neighbouring data sets from which on a residual is slow: it goes on longer than the data sets last.
-LEAST_CORRELATION = 0.3
-LEAST_SETS = 16
+MIN_CORRELATION = 0.3
+MIN_SETS = 16
 TEMPERATURE = "temperature_c"
 #: A second effect has to take off this share of the squared error on parts left out that was there before the first:
 #: less is what the wrong shape of the first leaves, as all follow one course of the temperature.
@@ -32,7 +32,7 @@ NEXT_SHARE = 0.05
 def slow_process(comparison: Comparison, axis_residuals: Mapping[str, Residuals]) -> SlowProcess | None:
     """Return the slow process in the residuals of a record at rest; None of another record, or where they are noise."""
     nodes = comparison.data.nodes
-    if np.any(nodes.table_rate_dps()) or "t_s" not in nodes or len(comparison.data) < LEAST_SETS:
+    if np.any(nodes.table_rate_dps()) or "t_s" not in nodes or len(comparison.data) < MIN_SETS:
         return None
     design = next(iter(comparison.designs.values()))
     order = np.lexsort((design.t_s, design.run))
@@ -52,7 +52,7 @@ def _time_constant_s(course: Array, t_s: Array, run: NDArray[np.int64]) -> float
     """Return the time over which a course falls to 1 / e of its correlation, s; None where it is not slow."""
     same = run[1:] == run[:-1]
     size = float(np.mean(course**2))
-    if size <= 0 or not same.any() or float(np.mean((course[1:] * course[:-1])[same])) < LEAST_CORRELATION * size:
+    if size <= 0 or not same.any() or float(np.mean((course[1:] * course[:-1])[same])) < MIN_CORRELATION * size:
         return None
     spacing_s = float(np.median(np.diff(t_s)[same]))
     for lag in range(1, len(course) // 2):
@@ -124,7 +124,7 @@ def _fails(advice: Advice, first_dps: float | None) -> bool:
     if before is None or after is None:
         return False
     if first_dps is None:
-        return after > (1.0 - LEAST_GAIN_AT_REST) * before
+        return after > (1.0 - MIN_GAIN_AT_REST) * before
     return before**2 - after**2 < NEXT_SHARE * first_dps**2
 
 

@@ -35,7 +35,7 @@ SHOWN = 6
 UNPHYSICAL_SHOWN = 2
 
 #: What takes off less than this share of the error above the noise floor is no cause of it.
-LEAST_CAUSE = 0.1
+MIN_CAUSE = 0.1
 #: A fit with another effect that leaves this share more is worse, and not only weighed otherwise.
 WORSE_BY = 0.01
 
@@ -91,7 +91,7 @@ def suspects_of(
 
 def is_only_shape(suspect: Suspect, model: ErrorModel) -> bool:
     """Return whether a suspect is another shape of an effect that the model has, and lowers the error hardly at all."""
-    return suspect.candidate.id in model.effect_ids and suspect.share_removed < LEAST_CAUSE
+    return suspect.candidate.id in model.effect_ids and suspect.share_removed < MIN_CAUSE
 
 
 def without_shapes(suspects: Sequence[Suspect], model: ErrorModel) -> tuple[Suspect, ...]:

@@ -28,7 +28,7 @@ RIVALS = ("temperature_rate", "thermal_hysteresis")
 FAMILY = frozenset({LAG, *RIVALS})
 #: A response is there where it leaves less than this share of the chi2 of stretches left out, and may be there where it
 #: leaves less than the second.
-MOST_LEFT, MOST_LEFT_OF_HINT = 0.25, 0.75
+MAX_REMAINING, MAX_REMAINING_OF_HINT = 0.25, 0.75
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class ThermalFamily:
     @property
     def is_certain(self) -> bool:
         """Whether it predicts so much that it is named; else it is a hint."""
-        return self.after.chi2 <= MOST_LEFT * self.before.chi2
+        return self.after.chi2 <= MAX_REMAINING * self.before.chi2
 
     def with_shapes(self, shapes: Mapping[str, dict[str, Coefficient]]) -> ThermalFamily:
         """Return the same with the time constants of a fit with it, effect -> name -> value with u."""
@@ -91,7 +91,7 @@ class ThermalFamily:
             return ""
         return (
             f"it takes {100 * (1 - self.after.chi2 / self.before.chi2):.0f} % of the chi2 of these stretches, and less "
-            f"than {100 * (1 - MOST_LEFT):.0f} % may be the wrong shape of something else"
+            f"than {100 * (1 - MAX_REMAINING):.0f} % may be the wrong shape of something else"
         )
 
     @property
@@ -153,7 +153,7 @@ def thermal_family(data: FitData, model: ErrorModel, verdict: Verdict) -> Therma
     if response is None:
         return None
     after = response.held_out[response.structure.id]
-    if after.chi2 > MOST_LEFT_OF_HINT * response.held_out[NONE.id].chi2:
+    if after.chi2 > MAX_REMAINING_OF_HINT * response.held_out[NONE.id].chi2:
         return None
     rivals = {name: _rival(data, model, name) for name in RIVALS}
     if any(rival.is_below(after) for rival in rivals.values()):

@@ -43,7 +43,7 @@ EXPLAINED = 0.90
 EXPLAINED_TIME = 0.75
 SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
 #: An effect that takes off less than this share of the excess chi2 is not named alone at the first step.
-LEAST_SHARE = 0.3
+MIN_SHARE = 0.3
 #: A time constant of at least this share of the longest (the shortest: of its inverse) is at the end of its range.
 NEAR_END = 0.9
 #: Columns that are the same up to rounding have the same evidence within this.
@@ -109,7 +109,7 @@ def judge(comparison: Comparison, *, first: bool = True) -> Step:
         return Step("unexplained", (), smooth, depends)
     share = share_removed(comparison, effect)
     group = alias_group(comparison, effect)
-    if len(group) == 1 and first and 0.0 < share < LEAST_SHARE:
+    if len(group) == 1 and first and 0.0 < share < MIN_SHARE:
         return Step("ambiguous", group, effect, depends, share)
     return Step("missing" if len(group) == 1 else "ambiguous", group, effect, depends, share)
 

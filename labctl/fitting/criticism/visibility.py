@@ -26,7 +26,7 @@ from labctl.fitting.models.presets import usual_model
 from labctl.recording import Recording
 
 #: An effect of which less than this share is visible beside the model cannot be shown by the schedule.
-LEAST_VISIBLE = 0.15
+MIN_VISIBLE = 0.15
 #: Size of a just detectable effect, in noise units.
 DETECTABLE_Z = 5.0
 #: Contains several other effects, and so is never what is missing.
@@ -108,13 +108,13 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
                 continue
             here = visible_share(schedule.left[axis], option_rows)
             share = max(share, here)
-            if here < LEAST_VISIBLE:
+            if here < MIN_VISIBLE:
                 continue
             norms = np.sqrt(np.maximum(np.diag(schedule.left[axis].gram)[option_rows], 0.0))
             best = int(np.argmax(norms))
             size = DETECTABLE_Z / max(float(norms[best]), 1e-300)
             sizes[option.units[best]] = min(size, sizes.get(option.units[best], np.inf))
-    if share < LEAST_VISIBLE:
+    if share < MIN_VISIBLE:
         return EffectVisibility(effect_id, False, share, why="schedule", experiment=CATALOGUE[effect_id].experiment)
     unit = next(iter(sizes), "")  # of the lowest order that is visible
     return EffectVisibility(effect_id, True, share, sizes.get(unit), unit)
@@ -130,7 +130,7 @@ def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> lis
     for kind in catalogue.values():
         if kind.id in absent or kind.id in comparison.model.effect_ids or kind.id == NEVER_MISSING:
             continue
-        if shares.get(kind.id, 0.0) < LEAST_VISIBLE:
+        if shares.get(kind.id, 0.0) < MIN_VISIBLE:
             untestable.append({"effect": kind.id, "why": "schedule", "needs": [], "visible": shares.get(kind.id, 0.0)})
     return untestable
 

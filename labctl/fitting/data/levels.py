@@ -11,14 +11,14 @@ from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
 
 #: Rates closer than this are one: a share of the rate itself, and no less than a table can hold, deg/s.
-SAME_RATE, LEAST_RATE_STEP_DPS = 1e-3, 1e-3
+SAME_RATE, MIN_RATE_STEP_DPS = 1e-3, 1e-3
 #: Temperatures closer than this are one: what a thermometer repeats, deg C.
 SAME_TEMPERATURE_C = 0.25
 
 
 def rate_levels(table_rate_dps: Array) -> NDArray[np.int64]:
     """Return the level of each rate, (n,) from 0 rising: within 0.1 % of the rate, at least 0.001 deg/s."""
-    return _levels(table_rate_dps, lambda first: max(SAME_RATE * abs(first), LEAST_RATE_STEP_DPS))
+    return _levels(table_rate_dps, lambda first: max(SAME_RATE * abs(first), MIN_RATE_STEP_DPS))
 
 
 def temperature_rows(

@@ -17,7 +17,7 @@ from scipy.special import fdtrc
 
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.levels import SAME_TEMPERATURE_C
-from labctl.fitting.data.rich_surface import LEAST_FREE, rich_surface, with_levels_of_temperature
+from labctl.fitting.data.rich_surface import MIN_FREE, rich_surface, with_levels_of_temperature
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Drift, Scatter, whitened
 from labctl.fitting.numeric.least_squares import drift_beside
@@ -81,7 +81,7 @@ def _with_known_white(
     errors_dps: Mapping[str, Array],
     scatter: Mapping[str, Scatter],
 ) -> NoiseFloor:
-    enough = all(len(surface) - surface.shape[1] >= LEAST_FREE for surface in surfaces.values())
+    enough = all(len(surface) - surface.shape[1] >= MIN_FREE for surface in surfaces.values())
     stability = next(iter(scatter.values())).datasheet_drift_dps
     axes = {}
     for axis, surface in surfaces.items():
@@ -135,7 +135,7 @@ def _of_scatter(m: int, scatter_dps: Mapping[str, float], source: str) -> NoiseF
 
 def _scatter_dps(residual: Array, surface: NDArray[np.float64]) -> float | None:
     freedom = len(residual) - surface.shape[1]
-    return float(np.sqrt(residual @ residual / freedom)) if freedom >= LEAST_FREE else None
+    return float(np.sqrt(residual @ residual / freedom)) if freedom >= MIN_FREE else None
 
 
 def repeats_dps(channels: Channels, residual: Mapping[str, Array]) -> float | None:

@@ -24,7 +24,7 @@ BEND_STEPS, SLOPE_STEPS = 64, 8
 #: Readings off an even spacing by more than this share of it are interpolated onto one, and back.
 EVEN_SHARE = 1e-3
 #: Means over windows that are kept for another time: 0.2 MB each.
-MOST_KNOWN = 128
+MAX_CACHED = 128
 #: Names of the coefficients of a response.
 DELAY, TIME_CONSTANT = "delay", "time_constant"
 #: A factor on a spectrum: angular frequencies (k,) rad/s to complex numbers (k,).
@@ -84,7 +84,7 @@ class _Motion:
                 for begin, end in zip(self.stretches, ends, strict=True)
             ])  # fmt: skip
             counts = np.diff(np.append(self.windows, len(values)))
-            if len(self.known) >= MOST_KNOWN:
+            if len(self.known) >= MAX_CACHED:
                 self.known.pop(next(iter(self.known)))
             self.known[key] = np.add.reduceat(values, self.windows) / counts
         return self.known[key]

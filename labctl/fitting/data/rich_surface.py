@@ -22,7 +22,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import OWN_DATASET, RATE_TIME_U, READING_TIMES, RECORDING, WITHIN_S
 
 #: Largest number of columns, as a share of the number of data sets (also with levels), and least degrees of freedom.
-MOST_SHARE, MOST_SHARE_WITH_LEVELS, LEAST_FREE = 0.5, 0.7, 8
+MAX_SHARE, MAX_SHARE_WITH_LEVELS, MIN_FREE = 0.5, 0.7, 8
 #: Largest degree in temperature of the bias, of the scale factor and of the terms quadratic and cubic in the rate.
 DEGREES = (6, 4, 2, 2)
 #: Time constants of a warm-up after power-on, s.
@@ -32,12 +32,12 @@ LAGS_S, WIDTHS_K = (150.0, 400.0, 1000.0, 2500.0), (2.0, 6.0, 15.0)
 #: A table measures on ramps where half of the data sets have at least this rate of change, K/min, over so long, s.
 RAMP_K_MIN, RAMP_S = 0.1, 300.0
 #: A column of which those before it leave less than this share says nothing new.
-LEAST_NEW = 1e-2
+MIN_NEW = 1e-2
 #: Delays and time constants, s, whose mixtures follow any response of a gyro: the surface of a rate that changes.
 DELAYS_S = (1e-3, -1e-3, 3e-3, 1e-2, 2e-2, 5e-2)
 TIME_CONSTANTS_S = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 1.0, 5.0)
 #: The same share for those: they are nearly alike, and what distinguishes them is large beside the noise.
-LEAST_NEW_OF_RESPONSE = 1e-6
+MIN_NEW_OF_RESPONSE = 1e-6
 #: Logged columns that cause no error themselves, or that the surface has in another form.
 NO_SURROUNDINGS = frozenset({
     "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
@@ -58,12 +58,12 @@ def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
             channels.rate_dps(axis)[:, None],
         )
         return _orthonormal(
-            iter([temperature_basis[:, 1:4], temperature_basis[:, 1:3] * rate]), _linear(channels), MOST_SHARE
+            iter([temperature_basis[:, 1:4], temperature_basis[:, 1:3] * rate]), _linear(channels), MAX_SHARE
         )
     responses = _orthonormal(
-        iter([_of_responses(channels, axis)]), np.zeros((len(channels), 0)), MOST_SHARE, LEAST_NEW_OF_RESPONSE
+        iter([_of_responses(channels, axis)]), np.zeros((len(channels), 0)), MAX_SHARE, MIN_NEW_OF_RESPONSE
     )
-    return _orthonormal(_blocks(channels, axis), responses, MOST_SHARE)
+    return _orthonormal(_blocks(channels, axis), responses, MAX_SHARE)
 
 
 def with_levels_of_temperature(surface: NDArray[np.float64], channels: Channels, axis: str) -> NDArray[np.float64]:
@@ -74,14 +74,14 @@ def with_levels_of_temperature(surface: NDArray[np.float64], channels: Channels,
     """
     rate = _scaled(channels.rate_dps(axis), about_zero=True)
     levels = _levels_of_temperature(channels.temperature_c(axis), rate)
-    return _orthonormal(iter([levels]), surface, MOST_SHARE_WITH_LEVELS)
+    return _orthonormal(iter([levels]), surface, MAX_SHARE_WITH_LEVELS)
 
 
 def _orthonormal(
-    blocks: Iterator[NDArray[np.float64]], begin: NDArray[np.float64], share: float, least_new: float = LEAST_NEW
+    blocks: Iterator[NDArray[np.float64]], begin: NDArray[np.float64], share: float, least_new: float = MIN_NEW
 ) -> NDArray[np.float64]:
     m, k = begin.shape
-    most = min(int(share * m), m - LEAST_FREE)
+    most = min(int(share * m), m - MIN_FREE)
     orthonormal = np.empty((m, max(most, k)), order="F")
     orthonormal[:, :k] = begin
     for block in blocks:
@@ -97,7 +97,7 @@ def _linear(channels: Channels) -> NDArray[np.float64]:
     places = [rows.astype(np.float64) for _, rows in channels.positions()]
     independent = np.zeros((len(channels), 0))
     for column in (*places, *channels.rates.values()):
-        if (new := _new_part(column, independent, LEAST_NEW)) is not None:
+        if (new := _new_part(column, independent, MIN_NEW)) is not None:
             independent = np.column_stack([independent, new])
     return independent
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.answers.noise import AllanJson, NoiseFigure, StaticRecordJson
-from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, Figure, allan
+from labctl.fitting.numeric.allan import MIN_READINGS, Allan, Figure, allan
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 from labctl.recording import Recording
@@ -110,7 +110,7 @@ def longest_stretch(recording: Recording) -> slice | None:
 
 def stretch_of(columns: Columns) -> slice | None:
     """Return the rows of the longest static stretch of columns with `t_s`; at rest all along where no rate is given."""
-    if "t_s" not in columns or len(columns["t_s"]) < LEAST_READINGS:
+    if "t_s" not in columns or len(columns["t_s"]) < MIN_READINGS:
         return None
     t_s = np.asarray(columns["t_s"], dtype=np.float64)
     steps = np.diff(t_s)
@@ -135,7 +135,7 @@ def stretch_of(columns: Columns) -> slice | None:
         first, last = _steady(temperature_c[begin:end])
         if last - first > best.stop - best.start:
             best = slice(int(begin + first), int(begin + last))
-    return best if best.stop - best.start >= LEAST_READINGS else None
+    return best if best.stop - best.start >= MIN_READINGS else None
 
 
 def _steady(temperature_c: Array) -> tuple[int, int]:

@@ -15,7 +15,7 @@ from labctl.fitting.effects.catalogue import (
 )
 from labctl.fitting.effects.formula import (
     Formula as Formula,
-    MOST_FORMULAS as MOST_FORMULAS,
+    MAX_FORMULAS as MAX_FORMULAS,
     checked_formulas as checked_formulas,
     formulas as formulas,
     read_formula as read_formula,

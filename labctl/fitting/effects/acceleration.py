@@ -14,7 +14,7 @@ from labctl.fitting.numeric.arrays import Array
 GRAVITY = 9.80665
 #: Specific force along an axis that changes by less, g, is the tilt of a support and the drift of an accelerometer with
 #: temperature, tens of mg for a low-cost one (its data sheet), and no change of pose.
-LEAST_CHANGE_G = 0.1
+MIN_CHANGE_G = 0.1
 #: Between these quantiles of a logged force the change counts, so that a knock does not.
 QUANTILES = (0.01, 0.99)
 
@@ -27,11 +27,11 @@ class _Acceleration(Effect):
 
     def undetermined_by(self, channels: Channels, axis: str) -> str:
         changes = {body: change_g(channels, body) for body in self.felt_along(axis)}
-        if not changes or max(changes.values()) >= LEAST_CHANGE_G:
+        if not changes or max(changes.values()) >= MIN_CHANGE_G:
             return ""
         changes_text = ", ".join(f"{body} by {change:.2g} g" for body, change in changes.items())
         return (
-            f"no change of pose: the specific force changes less than {LEAST_CHANGE_G} g ({changes_text}), as a "
+            f"no change of pose: the specific force changes less than {MIN_CHANGE_G} g ({changes_text}), as a "
             "support tilts "
             "or an accelerometer drifts; measure each axis up and down"
         )

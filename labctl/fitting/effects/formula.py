@@ -45,7 +45,7 @@ LONGEST = 500
 #: Operations inside each other; a sum of as many terms, too.
 DEEPEST = 100
 #: At most so many formulas of a request or a command; each is fitted beside every other.
-MOST_FORMULAS = 20
+MAX_FORMULAS = 20
 #: CPython 3.11 counts how deep a tree is in one place for all threads: two that parse at once fail with a SystemError.
 _PARSER = threading.Lock()
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
@@ -185,13 +185,13 @@ def _names(tree: ast.Expression) -> set[str]:
 
 def read_formulas(lines: Sequence[str]) -> list[Formula]:
     """Read lines `name: formula`; raises BadInput for one that cannot be read, for too many, and for a name twice."""
-    return checked_formulas([read_formula(line) for line in lines[: MOST_FORMULAS + 1]])
+    return checked_formulas([read_formula(line) for line in lines[: MAX_FORMULAS + 1]])
 
 
 def checked_formulas(written: list[Formula]) -> list[Formula]:
     """Return the formulas of one request; raises BadInput for too many, and for two of one name."""
-    if len(written) > MOST_FORMULAS:
-        raise BadInput(f"more than {MOST_FORMULAS} formulas were given, the limit of one comparison; leave some out")
+    if len(written) > MAX_FORMULAS:
+        raise BadInput(f"more than {MAX_FORMULAS} formulas were given, the limit of one comparison; leave some out")
     names = [each.id for each in written]
     for name in names:
         if names.count(name) > 1:

@@ -17,7 +17,7 @@ from labctl.fitting.numeric.open_loop_sine import sine_ratio, sine_ratio_slope
 #: Parameter of a sine response whose size was fitted beside K: calibrations until 0.1 hold such.
 FREE_AMPLITUDE = "free_amplitude"
 #: Below this K^2 the law is its tangent.
-LEAST_K_SQUARED = 1e-6
+MIN_K_SQUARED = 1e-6
 
 
 #: Order in temperature of the surface of Ojeda, Chung and Borenstein (ICRA 2000, eqs. 10 to 12).
@@ -166,7 +166,7 @@ class SineResponse(Effect):
             return cube * sine_ratio_slope(k_squared * rate**2)
 
         there = np.full(len(rate), at)
-        shape = error_dps(there) / at if abs(at) > LEAST_K_SQUARED else slope(there)
+        shape = error_dps(there) / at if abs(at) > MIN_K_SQUARED else slope(there)
         return [Column("k_squared", "(rad/(rad/s))^2", shape, law=Law(error_dps, slope), start=at)]
 
     def shaped_by(self, term: Term, coefficients: Mapping[str, float]) -> Term:

@@ -18,7 +18,7 @@ from labctl.fitting.numeric.arrays import Array
 DELAYS_S = tuple(float(at) for at in np.arange(-0.05, 0.2001, 0.005))
 TIME_CONSTANTS_S = tuple(float(at) for at in np.geomspace(1e-4, 0.3, 15))
 #: A time constant beside a delay: a step leaves at least this share of it.
-LEAST_LEFT = 0.25
+MIN_REMAINING = 0.25
 #: No step goes farther than this, s: data that do not tell a delay from a bias would send it anywhere.
 LONGEST_S = 1.0
 
@@ -65,7 +65,7 @@ def next_response(before: Response, target: Response, model: ErrorModel, u_s: fl
     if TimeDelay.id not in model.effect_ids or Bandwidth.id not in model.effect_ids:
         return _within_reach(target)
     seen_s = float(np.sqrt(before.time_constant_s * u_s)) if np.isfinite(u_s) else before.time_constant_s
-    least = max(LEAST_LEFT * before.time_constant_s, seen_s)
+    least = max(MIN_REMAINING * before.time_constant_s, seen_s)
     if target.time_constant_s >= least:
         return _within_reach(target)
     lag_s = target.delay_s + target.time_constant_s

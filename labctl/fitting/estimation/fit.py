@@ -47,7 +47,7 @@ from labctl.recording import Recording
 # asks what a law of temperature alone can never answer: whether the way back is like the way there.
 
 #: Data sets that a leg needs, and legs up to which each is left out in turn.
-LEAST_SETS, MOST_LEGS = 4, 12
+MIN_SETS, MAX_LEGS = 4, 12
 #: A leg is tested within the temperatures that the others were fitted at, and so far beyond, K.
 BEYOND_K = 1.0
 
@@ -62,14 +62,14 @@ def errors_by_leg(data: FitData, preset: Preset, solutions: Mapping[str, Solutio
     run = np.asarray(data.channels["run"], dtype=np.int64) if "run" in data.channels else np.ones(len(data), dtype=int)
     legs = legs_of(data.temperature_c, run)
     up, down = legs > 0, legs < 0
-    if min(int(up.sum()), int(down.sum())) < LEAST_SETS:
+    if min(int(up.sum()), int(down.sum())) < MIN_SETS:
         return []
     leg_errors = [
         _tested(data, preset, solutions, [(up, down)], ("heating", "cooling")),
         _tested(data, preset, solutions, [(down, up)], ("cooling", "heating")),
     ]
     numbers, counts = np.unique(legs[legs != 0], return_counts=True)
-    if 2 < len(numbers) <= MOST_LEGS and counts.min() >= LEAST_SETS:
+    if 2 < len(numbers) <= MAX_LEGS and counts.min() >= MIN_SETS:
         pairs = [((legs != 0) & (legs != number), legs == number) for number in numbers]
         leg_errors.append(_tested(data, preset, solutions, pairs, ("all legs but one", "each leg in turn")))
     return leg_errors
@@ -110,7 +110,7 @@ def _answer(names: tuple[str, str], rms_dps: float | None, datasets: int, reason
 
 
 #: Data sets at which regressors are compared, and rates, as shares of the fastest measured one.
-MOST_ROWS, SHARES = 64, (-1.0, -0.5, 0.0, 0.5, 1.0)
+MAX_ROWS, SHARES = 64, (-1.0, -0.5, 0.0, 0.5, 1.0)
 #: A pair of rates in JSON: null means that there is no limit.
 RateLimits = tuple[float | None, float | None]
 
@@ -135,7 +135,7 @@ def depends_on_rate(model: ErrorModel, data: FitData, *, held: bool = True) -> b
 
     Without `held`, the regressors of held coefficients do not count.
     """
-    rows = np.unique(np.linspace(0, len(data) - 1, min(len(data), MOST_ROWS)).astype(np.int64))
+    rows = np.unique(np.linspace(0, len(data) - 1, min(len(data), MAX_ROWS)).astype(np.int64))
     channels = data.channels.take(rows)
     fastest = max(1.0, *(abs(end) for axis in data.outputs for end in data.covered.rate_dps[axis]))
     channels_at_rates = [_at_rate(channels, share * fastest) for share in SHARES]

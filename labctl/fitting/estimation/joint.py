@@ -27,7 +27,7 @@ from labctl.fitting.numeric.least_squares import Solution
 #: The effects that a shift between recordings adds to, by kind of shift.
 SHIFTED = {kind.effect: kind for kind in KINDS.values()}
 #: A direction whose variance is below this share of the largest is no direction of its own.
-LEAST_VARIANCE = 1e-12
+MIN_VARIANCE = 1e-12
 #: Probability of so different coefficients from noise alone below which recordings disagree, over all effects.
 DISAGREE = 0.01
 
@@ -141,7 +141,7 @@ def _scatter(parts: list[tuple[Array, NDArray[np.float64]]], shift: NDArray[np.f
     if keep.shape[1] == 0:
         return _Scatter()
     variances, vectors = np.linalg.eigh(sum(covariance for _, covariance in scaled))
-    seen_vectors = vectors[:, variances > LEAST_VARIANCE * max(float(variances.max()), 1e-300)]
+    seen_vectors = vectors[:, variances > MIN_VARIANCE * max(float(variances.max()), 1e-300)]
     scaled = [(seen_vectors.T @ v, seen_vectors.T @ c @ seen_vectors) for v, c in scaled]
     inverses = [np.linalg.pinv(covariance) for _, covariance in scaled]
     weight = sum(inverses)

@@ -29,9 +29,9 @@ APART = 4
 #: much more in units of its scatter.
 BETTER_BY, BETTER_TO = 0.02, 9.0
 #: Columns that the base explains but for this share of their square are not tried; two that differ by less are one.
-LEAST_LEFT = 1e-6
+MIN_REMAINING = 1e-6
 #: Steps by Gauss and Newton from the grid's best, for a stretch left out and for all data; difference of a logarithm.
-FEW_STEPS, MOST_STEPS, STEP = 2, 12, 0.01
+FEW_STEPS, MAX_STEPS, STEP = 2, 12, 0.01
 LOG_BOUNDS = (float(np.log(SHORTEST_S)), float(np.log(LONGEST_S)))
 #: Axis -> name -> time constant, s.
 Taus = Mapping[str, Mapping[str, float]]
@@ -188,7 +188,7 @@ class Projected:
         alone = other_columns[:, : len(PARTS) * len(GRID_S)]  # columns that are also tried in twos
         self._gram, self._pull = alone.T @ alone, other_columns[:, :-1].T @ other_columns[:, -1]
         size = (other_columns[:, :-1] ** 2).sum(axis=0)
-        self._kept = size > LEAST_LEFT * np.maximum(whole[:-1], 1e-300)
+        self._kept = size > MIN_REMAINING * np.maximum(whole[:-1], 1e-300)
         self._single = self._pull**2 / np.where(self._kept, size, np.inf)
 
     def gains(self, columns: NDArray[np.int64]) -> Array:
@@ -198,7 +198,7 @@ class Projected:
         i, j = columns.T
         a, b, c = self._gram[i, i], self._gram[j, j], self._gram[i, j]
         determinant = a * b - c**2
-        good = self._kept[i] & self._kept[j] & (determinant > LEAST_LEFT * a * b)
+        good = self._kept[i] & self._kept[j] & (determinant > MIN_REMAINING * a * b)
         both = b * self._pull[i] ** 2 - 2 * c * self._pull[i] * self._pull[j] + a * self._pull[j] ** 2
         return np.where(good, both / np.where(good, determinant, 1.0), np.maximum(self._single[i], self._single[j]))
 

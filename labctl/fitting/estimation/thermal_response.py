@@ -20,7 +20,7 @@ from labctl.fitting.effects.thermal_lag import Lag
 from labctl.fitting.estimation.thermal_flows import (
     APART,
     GRID_S,
-    MOST_STEPS,
+    MAX_STEPS,
     NONE,
     STRUCTURES,
     Axis,
@@ -39,11 +39,11 @@ from labctl.fitting.numeric.blas_threads import single_threaded
 
 #: Time constants of warming and cooling differ by more than so many standard uncertainties of their ratio, where the
 #: data tell both.
-TOLD_APART, MOST_CONDITION = 3.0, 1e12
+TOLD_APART, MAX_CONDITION = 3.0, 1e12
 #: Chi2 by which a structure of one axis leaves less of all data for each coefficient more, over the noise.
 SEEN = 16.0
 #: Data sets that a stretch needs, legs up to which each is left out, and how far beyond the others it is tested, K.
-LEAST_SETS, MOST_LEGS, BEYOND_K = 4, 12, 1.0
+MIN_SETS, MAX_LEGS, BEYOND_K = 4, 12, 1.0
 #: What stands for structures that differ from axis to axis.
 BY_AXIS = "by_axis"
 
@@ -123,7 +123,7 @@ def _is_seen(
 
     Few stretches are left out of one axis, and the errors within one are those of one extrapolation: chance.
     """
-    simple_s = best_taus([axis], simplest, all_rows, MOST_STEPS)[axis.name]
+    simple_s = best_taus([axis], simplest, all_rows, MAX_STEPS)[axis.name]
     full_chi2, simple = (
         float(np.sum(axis.left_over_noise(axis.columns(each, taus), all_rows) ** 2))
         for each, taus in ((structure, taus_s), (simplest, simple_s))
@@ -146,7 +146,7 @@ def _told_apart(
     tried = list(structures)
     while True:
         chosen = _chosen(tried, held_out)
-        taus = best_taus(axes, chosen, all_rows, MOST_STEPS)
+        taus = best_taus(axes, chosen, all_rows, MAX_STEPS)
         if are_told_apart(axes, chosen, taus, all_rows):
             return chosen, taus
         tried.remove(chosen)
@@ -180,7 +180,7 @@ def _ways_differ(axis: Axis, structure: Structure, taus_s: Mapping[str, float], 
     (part,) = moved_around([axis], structure, in_fit, logarithms)
     freedom = max(len(part.residual) - axis.base.shape[1] - len(structure.columns) - len(logarithms), 1)
     information = part.slopes.T @ part.slopes / (part.chi2 / freedom)
-    if np.linalg.cond(information) > MOST_CONDITION:
+    if np.linalg.cond(information) > MAX_CONDITION:
         return False
     apart = np.array([1.0 if name == "tau" else -1.0 for name in structure.constants])
     u = float(np.sqrt(apart @ np.linalg.solve(information, apart)))
@@ -199,7 +199,7 @@ def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool
     run = np.asarray(data.channels["run"], dtype=np.int64) if "run" in data.channels else np.ones(len(data), dtype=int)
     legs = legs_of(data.temperature_c, run)
     numbers = [int(number) for number in np.unique(legs) if number]
-    if len(numbers) < 2 or len(numbers) > MOST_LEGS:
+    if len(numbers) < 2 or len(numbers) > MAX_LEGS:
         return []
     whole = [legs == number for number in numbers]
     parts = []
@@ -212,7 +212,7 @@ def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool
         in_fit, temperature_c = ~part, data.temperature_c
         low, high = float(temperature_c[in_fit].min()) - BEYOND_K, float(temperature_c[in_fit].max()) + BEYOND_K
         tested = part & (temperature_c >= low) & (temperature_c <= high)
-        if tested.sum() >= LEAST_SETS:
+        if tested.sum() >= MIN_SETS:
             stretches.append((in_fit, tested))
     return stretches if len(stretches) > 1 else []
 

@@ -4,4 +4,4 @@ from labctl.fitting.live.state import (
     LiveState as LiveState,
     PoseRequest as PoseRequest,
 )
-from labctl.fitting.live.target import MOST_POSES as MOST_POSES, Target as Target
+from labctl.fitting.live.target import MAX_POSES as MAX_POSES, Target as Target

@@ -29,7 +29,7 @@ from labctl.fitting.live.state import (
 from labctl.fitting.live.target import Target
 from labctl.fitting.models.presets import POSES
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.at_rest.rests import LEAST_IN_WINDOW, MARGIN, WINDOW_S, find_rests
+from labctl.fitting.poses.at_rest.rests import MARGIN, MIN_IN_WINDOW, WINDOW_S, find_rests
 from labctl.fitting.poses.readings import GAP, PoseReadings, readings_of
 from labctl.fitting.poses.triad import unit
 from labctl.recording import Recording, RecordingInfo
@@ -140,11 +140,11 @@ def needs_of_turns(up: NDArray[np.float64]) -> Array:
 
 
 #: Poses that are named in one message.
-MOST_NAMED = 6
+MAX_NAMED = 6
 #: The present pose is that of the specific force over so long, s.
 NEWEST_S = 0.25
 #: Between these sizes lies the specific force at rest, by an accelerometer before its calibration, g.
-LEAST_G, MOST_G = 0.7, 1.4
+MIN_G, MAX_G = 0.7, 1.4
 
 
 @dataclass(frozen=True)
@@ -216,18 +216,18 @@ class LiveCalibration:
 
     def _rests(self, readings: PoseReadings) -> _Rests:
         rests = find_rests(readings)
-        cut_s = MARGIN * max(WINDOW_S, LEAST_IN_WINDOW * readings.spacing_s)  # of both ends, by `find_rests`
+        cut_s = MARGIN * max(WINDOW_S, MIN_IN_WINDOW * readings.spacing_s)  # of both ends, by `find_rests`
         since_s = float(readings.t_s[-1] - readings.t_s[rests.end[-1] - 1]) if len(rests) else np.inf
         goes_on = since_s <= cut_s + GAP * readings.spacing_s
         long = rests.duration_s + 2 * cut_s >= self.target.rest_s
         still_s = float(rests.duration_s[-1]) + cut_s + since_s if goes_on else 0.0
         size = np.linalg.norm(rests.accel_g, axis=1)
-        if len(size) and not LEAST_G <= np.median(size) <= MOST_G:
+        if len(size) and not MIN_G <= np.median(size) <= MAX_G:
             raise NotEnoughData(
                 f"the specific force at rest is {np.median(size):.3g} g where gravity is 1 g: check unit and scale of "
                 "the accelerometer"
             )
-        return _Rests(unit(rests.accel_g[long & (size > LEAST_G)]), len(rests), still_s)
+        return _Rests(unit(rests.accel_g[long & (size > MIN_G)]), len(rests), still_s)
 
     def _fit(self, recording: Recording) -> tuple[FitResult | None, str]:
         try:
@@ -288,5 +288,5 @@ def _up(readings: PoseReadings) -> tuple[float, float, float] | None:
 def _poses_text(absent: list[str], target: Target) -> str:
     if not absent:
         return ""
-    named = "; ".join(absent[:MOST_NAMED]) + ("; ..." if len(absent) > MOST_NAMED else "")
+    named = "; ".join(absent[:MAX_NAMED]) + ("; ..." if len(absent) > MAX_NAMED else "")
     return f"{len(absent)} of {target.poses} poses are missing, by the axes that point up: {named}"

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from labctl.errors import BadInput
 from labctl.fitting.live.directions import DIRECTIONS
-from labctl.fitting.poses.at_rest.accelerometer import LEAST_POSES
+from labctl.fitting.poses.at_rest.accelerometer import MIN_POSES
 
 #: Poses that can be asked for: six faces, twelve edges, eight corners of a cube.
-MOST_POSES = len(DIRECTIONS)
+MAX_POSES = len(DIRECTIONS)
 #: Least and longest rest that can be asked for, s: two windows of the search for rests, and no drift in it.
 SHORTEST_REST_S, LONGEST_REST_S = 1.0, 60.0
 
@@ -31,10 +31,10 @@ class Target:
         for name, value in (("target", self.u), ("target-bias", self.bias_dps)):
             if value is not None and not (value > 0 and math.isfinite(value)):
                 raise BadInput(f"--{name} {value:g}: an uncertainty must be above 0; give such as 0.001")
-        if not LEAST_POSES <= self.poses <= MOST_POSES:
+        if not MIN_POSES <= self.poses <= MAX_POSES:
             raise BadInput(
-                f"--poses {self.poses}: give {LEAST_POSES} to {MOST_POSES}; the accelerometer takes {LEAST_POSES}, and "
-                f"{MOST_POSES} are six faces, twelve edges and eight corners"
+                f"--poses {self.poses}: give {MIN_POSES} to {MAX_POSES}; the accelerometer takes {MIN_POSES}, and "
+                f"{MAX_POSES} are six faces, twelve edges and eight corners"
             )
         if not SHORTEST_REST_S <= self.rest_s <= LONGEST_REST_S:  # also true for NaN
             raise BadInput(f"--rest {self.rest_s:g} s: give {SHORTEST_REST_S:g} to {LONGEST_REST_S:g} s")

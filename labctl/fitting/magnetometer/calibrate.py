@@ -14,14 +14,14 @@ from labctl.fitting.magnetometer.ellipsoid import PARAMETERS, PLACES, Ellipsoid,
 from labctl.fitting.numeric.arrays import Array
 
 AXES = ("x", "y", "z")
-LEAST_READINGS = 60
+MIN_READINGS = 60
 #: An offset relative to the field, or an element of the matrix, that is less certain than this is not determined.
 LARGEST_U = 0.02
 #: A reading further from the ellipsoid than this many robust standard deviations is left out.
 WRONG = 5.0
 ROUNDS = 8
 #: More than this share of readings left out is a disturbed field.
-MOST_LEFT_OUT = 0.05
+MAX_LEFT_OUT = 0.05
 #: Left-out readings are predicted from the others in this many blocks of time.
 BLOCKS = 10
 #: Error of left-out readings over their noise from which on the model leaves more than noise.
@@ -70,7 +70,7 @@ class Magnetometer:
     def verdict(self) -> Verdict:
         alike = self.repetition > ALIKE_SHARE * np.count_nonzero(self.used)
         more = alike and self.heldout_ut > UNEXPLAINED * self.noise_ut
-        return "unexplained" if more or self.left_out_share > MOST_LEFT_OUT else "adequate"
+        return "unexplained" if more or self.left_out_share > MAX_LEFT_OUT else "adequate"
 
 
 def calibrate_magnetometer(
@@ -80,9 +80,9 @@ def calibrate_magnetometer(
 
     `field_ut` is its size; without it the matrix has the determinant 1. Raises NotEnoughData, naming what to do.
     """
-    if len(readings_ut) < LEAST_READINGS:
+    if len(readings_ut) < MIN_READINGS:
         raise NotEnoughData(
-            f"{subject}: {len(readings_ut)} readings of a magnetometer; nine parameters need {LEAST_READINGS} and "
+            f"{subject}: {len(readings_ut)} readings of a magnetometer; nine parameters need {MIN_READINGS} and "
             "more: "
             "turn it slowly through all directions"
         )
@@ -123,7 +123,7 @@ def _robust(subject: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDA
         every = at(readings, ellipsoid.centre, ellipsoid.matrix, ellipsoid.noise).distance
         usual = 1.4826 * float(np.median(np.abs(every[is_used])))
         right = np.abs(every) <= WRONG * max(usual, 1e-12)
-        if np.array_equal(right, is_used) or np.count_nonzero(right) < LEAST_READINGS:
+        if np.array_equal(right, is_used) or np.count_nonzero(right) < MIN_READINGS:
             break
         is_used = right
     assert ellipsoid is not None

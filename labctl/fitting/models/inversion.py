@@ -17,7 +17,7 @@ FIXED_POINT_STEPS, FIXED_POINT_STEP_DPS = 60, 1e-12
 #: The fixed-point iteration diverges when a step is this many times the one before.
 DIVERGING = 3.0
 #: Newton's method: steps, the step of its numerical derivative in deg/s, and the least slope of output over rate.
-NEWTON_STEPS, SLOPE_STEP_DPS, LEAST_SLOPE = 40, 1e-4, 1e-3
+NEWTON_STEPS, SLOPE_STEP_DPS, MIN_SLOPE = 40, 1e-4, 1e-3
 #: Bisection: rounds over the axes, halvings of an interval, and the step in deg/s at which the rounds have converged.
 ROUNDS, HALVINGS, ROUND_STEP_DPS = 8, 50, 1e-9
 #: Half of the interval of a bisection: this share of the largest output, plus this many deg/s; where it holds no root
@@ -59,7 +59,7 @@ def _by_newton(outputs: Mapping[str, Array], error_dps: ErrorOfRates) -> dict[st
         for axis, output in outputs.items():
             here = error_dps(rates, axis)
             slope = (error_dps({**rates, axis: rates[axis] + SLOPE_STEP_DPS}, axis) - here) / SLOPE_STEP_DPS
-            if not np.all(slope > LEAST_SLOPE - 1.0):
+            if not np.all(slope > MIN_SLOPE - 1.0):
                 return None
             nearer[axis] = rates[axis] - (rates[axis] + here - output) / (1.0 + slope)
         change = _largest_change(nearer, rates)

@@ -19,7 +19,7 @@ from labctl.fitting.numeric.allan_bounds import is_filtered_white, largest_coeff
 from labctl.fitting.numeric.allan_terms import (
     DEG_PER_HOUR,
     KINDS,
-    LEAST_OCTAVES,
+    MIN_OCTAVES,
     REPORTED,
     SMOOTHED,
     SMOOTHED_SHARE,
@@ -110,7 +110,7 @@ def hiding_step(readings: Array) -> float | None:
 
 
 #: Fewer readings than this say nothing about noise.
-LEAST_READINGS = 300
+MIN_READINGS = 300
 #: The longest averaging time is this share of the record.
 LONGEST_SHARE = 0.25
 CONFIDENCE = 0.95
@@ -126,7 +126,7 @@ KNOWN = 3.0
 #: Where a term shows, the fitted curve lies within intervals that hold such noise at all octaves with this chance.
 FAMILY_CONFIDENCE = 0.99
 #: Least part of white noise at which a filter's law holds beside the part that the law lowers as far as it can.
-LEAST_UNSMOOTHED = 0.1
+MIN_UNSMOOTHED = 0.1
 #: Variances at neighbouring octaves of one record share readings; found by simulation, it makes u cover as it should.
 NEIGHBOURS = 1.6
 
@@ -179,7 +179,7 @@ def allan(rate_dps: Array, period_s: float) -> Allan | None:
     deviation is added to the fitted curve.
     """
     n = len(rate_dps)
-    if n < LEAST_READINGS or not np.ptp(rate_dps) > 0:
+    if n < MIN_READINGS or not np.ptp(rate_dps) > 0:
         return None
     m = np.exp2(np.arange(int(np.log2(n * LONGEST_SHARE)) + 1, dtype=np.float64))
     tau = np.asarray(m * period_s, dtype=np.float64)
@@ -241,7 +241,7 @@ class _Fitted:
     @property
     def is_smoothed_beyond(self) -> bool:
         """Whether white noise is lowered by more than the terms can follow: by a filter longer than these octaves."""
-        return bool(self.shows[SMOOTHED] and self.terms[WHITE] < LEAST_UNSMOOTHED * self.terms[SMOOTHED])
+        return bool(self.shows[SMOOTHED] and self.terms[WHITE] < MIN_UNSMOOTHED * self.terms[SMOOTHED])
 
     def columns(self, j: int) -> list[int]:
         """Return the columns of the design whose coefficients together are a term's."""
@@ -290,7 +290,7 @@ class _Octaves:
         if (whole.is_followed(everywhere) and not whole.is_smoothed_beyond) or _shows_white(whole, 1):
             return whole
         likeliest = likeliest_correlation(self.variance, self.tau, self.m, self.phases)
-        later = (self.fit(k) for k in range(1, len(self.m) - LEAST_OCTAVES + 1))
+        later = (self.fit(k) for k in range(1, len(self.m) - MIN_OCTAVES + 1))
         rivals = itertools.chain([self.fit(0, likeliest)], later)
         explained = (fit for fit in rivals if _shows_white(fit, PREVAILING_OCTAVES) and self._explained_before(fit))
         return next(explained, whole)

@@ -28,7 +28,7 @@ TOLERANCE = 0.02
 #: At the first octave smoothing lowers white noise by at most this share: with more the filter's exact form shows.
 SMOOTHED_SHARE = 0.4
 #: Octaves that a fit needs.
-LEAST_OCTAVES = 5
+MIN_OCTAVES = 5
 #: A model of the variances has converged when none changes by more than this share and this amount, (deg/s)^2.
 CONVERGED, CONVERGED_VAR = 1e-8, 1e-8
 DEG_PER_ROOT_HOUR = 60.0

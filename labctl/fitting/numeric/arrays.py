@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 #: Double-precision array; the shape and the unit stand in the docstring of each function that takes or returns one.
 Array = NDArray[np.float64]
 #: A ratio to a noise floor ends here: readings without scatter leave no floor, and anything is infinitely above it.
-MOST_OVER = 1e6
+MAX_OVER = 1e6
 
 
 def over(values: Array, floor: Array) -> Array:
     """Return values in units of a noise floor, (n,), within -1e6 to 1e6; nothing above a floor of nothing is 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.clip(np.where((values == 0) & (floor == 0), 0.0, values / floor), -MOST_OVER, MOST_OVER)
+        return np.clip(np.where((values == 0) & (floor == 0), 0.0, values / floor), -MAX_OVER, MAX_OVER)

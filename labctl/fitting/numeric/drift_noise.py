@@ -25,7 +25,7 @@ LARGEST = 12.0
 #: The usual bias stability, deg/s, where no data sheet says it.
 USUAL_STABILITY_DPS = 0.004
 #: Share of the evidence that a statement about the size of the drift needs.
-MOST_EVIDENCE = 0.9
+MAX_EVIDENCE = 0.9
 #: Prior width of the drift about half the data sheet's bias stability: a factor.
 PRIOR_FACTOR = 2.5
 
@@ -57,7 +57,7 @@ class Drift:
     drift_dps: float
     tau_s: float
     per_rate: float = 0.0  #: standard deviation per deg/s of table rate
-    least_dps: float = 0.0  #: of a drift that was found: `MOST_EVIDENCE` is for this size or a larger one
+    least_dps: float = 0.0  #: of a drift that was found: `MAX_EVIDENCE` is for this size or a larger one
 
 
 def whitened(

@@ -27,7 +27,7 @@ NEGLIGIBLE = 1e-20
 #: The same where the spread of random effects is averaged over at each of them.
 NEGLIGIBLE_NOISE = 1e-3
 #: The least standard deviation of a random effect, in the unit of its coefficient.
-LEAST_SPREAD = 1e-9
+MIN_SPREAD = 1e-9
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class _Fits:
         size_dps = np.array([drift.drift_dps for drift in self.drifts])
         found_dps = np.sqrt(self.scale) * size_dps
         rising = np.argsort(found_dps)
-        least = np.searchsorted(np.cumsum(weights[rising]), 1.0 - drift_noise.MOST_EVIDENCE)
+        least = np.searchsorted(np.cumsum(weights[rising]), 1.0 - drift_noise.MAX_EVIDENCE)
         return Drift(
             float(np.sqrt(np.sum(weights * self.scale * size_dps**2))),
             best.tau_s,
@@ -260,7 +260,7 @@ def _tightened(solution: Solution, random: RandomEffects | None) -> Array:
     """Return what the found spread of each random effect adds to the root of its prior's precision, (q,)."""
     if random is None:
         return np.zeros(0)
-    spread = np.maximum(np.array([component.value for component in solution.components])[random.kind], LEAST_SPREAD)
+    spread = np.maximum(np.array([component.value for component in solution.components])[random.kind], MIN_SPREAD)
     return np.asarray(np.sqrt(np.maximum(spread**-2.0 - random.wide**-2.0, 0.0)))
 
 

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 
 #: Results below 10^-4 or from 10^6 on are written with a power of ten.
-LEAST_POWER, MOST_POWER = -4, 5
-MOST_DECIMALS = 12
+MIN_POWER, MAX_POWER = -4, 5
+MAX_DECIMALS = 12
 #: Significant digits of a value without an uncertainty.
 DIGITS = 4
 #: Digits of a bound that is said; it is rounded up.
@@ -37,11 +37,11 @@ def rounded_to_uncertainty(value: float, uncertainty: float | None) -> Rounded:
     u = float(f"{uncertainty:.1e}") if has_u else 0.0  # two significant digits, so 0.0999 is 0.10
     largest = max(abs(value), u)
     size = math.floor(math.log10(largest)) if largest > 0 else 0
-    exponent = size if size < LEAST_POWER or size > MOST_POWER else 0
+    exponent = size if size < MIN_POWER or size > MAX_POWER else 0
     if not has_u:
         return Rounded(f"{float(f'{value / 10.0**exponent:.{DIGITS}g}'):.12g}", None, exponent)
     place = int(f"{u:.1e}".split("e")[1]) - exponent - 1  # of the second significant digit
-    decimals, unit = min(max(-place, 0), MOST_DECIMALS), 10.0 ** max(place, 0)
+    decimals, unit = min(max(-place, 0), MAX_DECIMALS), 10.0 ** max(place, 0)
     texts = [f"{round(number / 10.0**exponent / unit) * unit:.0f}" if place > 0 else
              f"{number / 10.0**exponent:.{decimals}f}" for number in (value, u)]  # fmt: skip
     return Rounded(texts[0], texts[1], exponent)

@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 from labctl.fitting.numeric.arrays import Array
 
 #: Points without which a slope has no uncertainty.
-LEAST_POINTS = 3
+MIN_POINTS = 3
 #: Probability of the intervals.
 LEVEL = 0.95
 #: How far ahead a line is followed, in units of its times, and in how many steps.

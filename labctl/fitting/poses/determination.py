@@ -12,11 +12,11 @@ from labctl.fitting.poses.moves import Moves
 from labctl.fitting.poses.readings import AXES
 
 #: Moves that nine coefficients take at least: two equations each, and some must be left to tell how well they fit.
-LEAST_MOVES = 9
+MIN_MOVES = 9
 #: A coefficient that the moves leave less certain than this is not determined.
 LARGEST_U = 0.03
 #: Moves that turn about an axis by less than this in all show nothing of it, deg.
-LEAST_TURN_DEG = 90.0
+MIN_TURN_DEG = 90.0
 #: The condition above which the normal equations in scaled columns lose their meaning.
 LARGEST_CONDITION = 1e5
 
@@ -24,11 +24,11 @@ LARGEST_CONDITION = 1e5
 def require_moves(serial: str, moves: Moves) -> None:
     """Raise NotEnoughData where fewer moves can be used than nine coefficients take, with why the others cannot."""
     usable = int(np.count_nonzero(moves.usable))
-    if usable >= LEAST_MOVES:
+    if usable >= MIN_MOVES:
         return
     reasons = "; ".join(sorted({reason for reason in moves.why_not if reason}))
     raise NotEnoughData(
-        f"{serial}: {usable} turns between rests can be used; nine coefficients of the gyro need at least {LEAST_MOVES}"
+        f"{serial}: {usable} turns between rests can be used; nine coefficients of the gyro need at least {MIN_MOVES}"
         f"{f' ({len(moves) - usable} cannot: {reasons[:200]})' if reasons else ''}: turn the unit by 90 deg or more "
         "from "
         "rest to rest, about each axis, both ways"
@@ -36,11 +36,11 @@ def require_moves(serial: str, moves: Moves) -> None:
 
 
 def require_rests(serial: str, rests: int) -> None:
-    """Raise NotEnoughData for fewer rests than LEAST_MOVES turns between them take."""
-    if rests <= LEAST_MOVES:
+    """Raise NotEnoughData for fewer rests than MIN_MOVES turns between them take."""
+    if rests <= MIN_MOVES:
         raise NotEnoughData(
             f"{serial}: {rests} rests have {max(rests - 1, 0)} turns between them; nine coefficients of the gyro need "
-            f"at least {LEAST_MOVES}: turn the unit by 90 deg or more from rest to rest, about each axis, both ways"
+            f"at least {MIN_MOVES}: turn the unit by 90 deg or more from rest to rest, about each axis, both ways"
         )
 
 
@@ -63,12 +63,12 @@ def require_determined(serial: str, moves: Moves, equations: Equations, noise: N
     if float(u.max()) <= LARGEST_U and condition_of(equations.jacobian, noise) <= LARGEST_CONDITION:
         return
     turned = turned_deg(moves)
-    column = int(np.argmin(turned)) if turned.min() < LEAST_TURN_DEG else int(np.argmax(u.max(axis=0)))
+    column = int(np.argmin(turned)) if turned.min() < MIN_TURN_DEG else int(np.argmax(u.max(axis=0)))
     row = int(np.argmax(u[:, column]))
     term_name = f"scale_factor of {AXES[row]}" if row == column else f"misalignment_{AXES[column]} of {AXES[row]}"
     reason = (
         f"in all moves together the unit turned about {AXES[column]} by only {turned[column]:.0f} deg"
-        if turned[column] < LEAST_TURN_DEG
+        if turned[column] < MIN_TURN_DEG
         else f"gravity changed too little in the turns about {AXES[column]}"
     )
     raise NotEnoughData(

@@ -13,7 +13,7 @@ from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
 from labctl.fitting.poses.at_rest.bias import Bias
 from labctl.fitting.poses.between import components, gls
 from labctl.fitting.poses.covariance import move_covariance
-from labctl.fitting.poses.determination import LEAST_MOVES
+from labctl.fitting.poses.determination import MIN_MOVES
 from labctl.fitting.poses.equations import Equations, equations_of
 from labctl.fitting.poses.held_out import HeldOut, held_out_moves
 from labctl.fitting.poses.moves import Moves
@@ -67,7 +67,7 @@ def fit_gyroscope(
         agrees = held_out.chi2 <= chdtri(2, FALSE_ALARM)
         if turn > 0 and (np.array_equal(agrees, used) or agrees.tobytes() in seen):
             break
-        if np.count_nonzero(agrees) >= LEAST_MOVES:
+        if np.count_nonzero(agrees) >= MIN_MOVES:
             seen.append(used.tobytes())
             used = agrees
     rows = np.repeat(used, 2)

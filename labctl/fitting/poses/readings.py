@@ -15,7 +15,7 @@ from labctl.recording.points import temperature_of
 
 AXES: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")
 #: A data set in poses has at least so many readings: two rests of a second and a turn between them, at 10 Hz.
-LEAST_READINGS = 30
+MIN_READINGS = 30
 #: Readings further apart than this many usual spacings have a gap between them.
 GAP = 2.5
 
@@ -64,10 +64,10 @@ def readings_of(recording: Recording) -> PoseReadings:
         )
     columns = recording.columns
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
-    if np.count_nonzero(valid) < LEAST_READINGS:
+    if np.count_nonzero(valid) < MIN_READINGS:
         raise NotEnoughData(
             f"{serial}: the recording has {np.count_nonzero(valid)} valid readings; rests and turns need at least "
-            f"{LEAST_READINGS}; record more"
+            f"{MIN_READINGS}; record more"
         )
     temperature_c = temperature_of(columns)
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]

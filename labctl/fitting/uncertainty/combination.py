@@ -13,15 +13,15 @@ from labctl.fitting.numeric.arrays import Array
 #: Probability of an interval of two standard uncertainties of a normal distribution.
 LEVEL = 0.9545
 #: Degrees of freedom beyond which a t-distribution is a normal one, and below which its factor has no meaning.
-MOST_FREEDOM, LEAST_FREEDOM = 1e6, 1.0
+MAX_FREEDOM, MIN_FREEDOM = 1e6, 1.0
 #: Share of the variance that is not normal below which the factor is that of a normal distribution.
-LEAST_SHARE = 0.1
+MIN_SHARE = 0.1
 #: A standard uncertainty of this share of the whole is added to what is not normal, so that its integral converges.
 SMOOTHING = 0.02
 #: Nodes of that integral, and how far it goes in units of one over the normal part.
 NODES, REACH = 6000, 5.0
 #: Where the factor is looked for, and how exactly.
-LEAST_K, MOST_K, TOLERANCE = 0.5, 6.0, 1e-8
+MIN_K, MAX_K, TOLERANCE = 0.5, 6.0, 1e-8
 
 
 def combined_u(contributions: Array, correlation: Array | None = None) -> float:
@@ -50,7 +50,7 @@ def student_factor(freedom: float | None, level: float = LEVEL) -> float:
     """Return the factor of Student's t for a coverage probability (GUM table G.2); of a normal one without freedom."""
     if freedom is None:
         return float(ndtri((1 + level) / 2))
-    return float(stdtrit(min(max(freedom, LEAST_FREEDOM), MOST_FREEDOM), (1 + level) / 2))
+    return float(stdtrit(min(max(freedom, MIN_FREEDOM), MAX_FREEDOM), (1 + level) / 2))
 
 
 def coverage_factor(
@@ -66,7 +66,7 @@ def coverage_factor(
     total = float(np.sqrt(size @ size))
     normal = np.array([name not in _CHARACTERISTIC for name in distributions])
     widening = student_factor(freedom, level) / student_factor(None, level)
-    if total == 0 or float(size[~normal] @ size[~normal]) < LEAST_SHARE * total**2:
+    if total == 0 or float(size[~normal] @ size[~normal]) < MIN_SHARE * total**2:
         return student_factor(None, level) * widening
     shares = size / total
     spread = math.hypot(float(np.sqrt(shares[normal] @ shares[normal])), SMOOTHING)
@@ -82,7 +82,7 @@ def coverage_factor(
 
     from scipy.optimize import brentq
 
-    return float(brentq(excess, LEAST_K, MOST_K, xtol=TOLERANCE)) * widening
+    return float(brentq(excess, MIN_K, MAX_K, xtol=TOLERANCE)) * widening
 
 
 def half_width(expanded: float, offset: float, level: float = LEVEL) -> float:

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.special import stdtrit
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.uncertainty.combination import LEVEL, MOST_FREEDOM, half_width
+from labctl.fitting.uncertainty.combination import LEVEL, MAX_FREEDOM, half_width
 
 #: Units without which nothing is said of a population: two degrees of freedom, and k = 4.5.
-LEAST_UNITS = 3
+MIN_UNITS = 3
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class DriftPrediction:
     @property
     def spread_dps(self) -> Array:
         """Half width about the mean that covers as often as U, (places,), by Student's t (GUM G.3)."""
-        return np.asarray(stdtrit(np.clip(self.freedom, 1.0, MOST_FREEDOM), 0.5 * (1.0 + LEVEL)) * self.u_dps)
+        return np.asarray(stdtrit(np.clip(self.freedom, 1.0, MAX_FREEDOM), 0.5 * (1.0 + LEVEL)) * self.u_dps)
 
 
 def of_item(rates_dps: Array) -> DriftPrediction:

@@ -11,7 +11,7 @@ from labctl.fitting.models.presets import POSES
 from labctl.fitting.uncertainty.budget import BudgetLine
 from labctl.fitting.uncertainty.local_model_error import (
     FARTHEST,
-    LEAST_SHARE,
+    MIN_SHARE,
     NO_TURNED_AXES,
     NONE_LEFT_OUT,
     NONE_NEAR,
@@ -45,7 +45,7 @@ def slope_error(model_error: LocalModelError, temperature_c: float, across: str 
     column = 1 if across is None else 2 + list(model_error.across_dps or {}).index(across)
     turned = weight * (squares[:, column] > 0)
     noise = float(weight @ model_error.white_var[is_finite] / weight.sum()) + slope_variance[0]
-    unseen = LEAST_SHARE * np.sqrt(2 / effective_number(turned)) * noise * turned.sum() / (turned @ squares[:, column])
+    unseen = MIN_SHARE * np.sqrt(2 / effective_number(turned)) * noise * turned.sum() / (turned @ squares[:, column])
     return float(np.sqrt(max(slope_variance[column], unseen)))
 
 

@@ -9,7 +9,7 @@ from labctl.fitting.data.temperature.channel import STAND_IN_C
 #: Rates of a grid are at least this share of the fastest apart.
 RATES_APART = 0.02
 #: A calibration over less is one temperature, K.
-LEAST_SPAN_K = 1.0
+MIN_SPAN_K = 1.0
 
 
 def grid_rates(low_dps: float, high_dps: float) -> list[float]:
@@ -30,4 +30,4 @@ def grid_temperatures(low_c: float, high_c: float) -> list[float]:
     if not math.isfinite(high_c - low_c):
         return [STAND_IN_C]
     middle = (low_c + high_c) / 2
-    return [low_c, middle, high_c] if high_c - low_c >= LEAST_SPAN_K else [middle]
+    return [low_c, middle, high_c] if high_c - low_c >= MIN_SPAN_K else [middle]

@@ -10,21 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.uncertainty.grid import LEAST_SPAN_K
+from labctl.fitting.uncertainty.grid import MIN_SPAN_K
 
 #: Width of the neighbourhood, as a share of the range of rates and of temperatures (standard deviation of the weight).
 NEAR_SHARE = 0.12
 #: Data sets, weighted, that a neighbourhood needs.
-LEAST_NEAR = 3.0
+MIN_NEAR = 3.0
 #: Where fewer are near, as in a plan with one data set at each place, the neighbourhood grows by these factors in turn.
 WIDENED = (1.0, 1.5, 2.0, 3.0)
 #: Farther than this many widths from every data set nothing is known.
 FARTHEST = 2.0
 #: The least variance that is stated, as a share of the standard uncertainty of the estimate itself: a smaller one could
 #: not be seen.
-LEAST_SHARE = 0.25
+MIN_SHARE = 0.25
 #: Data sets beyond this many are averaged in groups of neighbours, of temperatures in so many groups.
-MOST_KEPT, TEMPERATURES = 2000, 10
+MAX_KEPT, TEMPERATURES = 2000, 10
 
 
 NO_TURNED_AXES = (
@@ -74,7 +74,7 @@ class LocalModelError:
         weight /= weight.sum()
         residual_var = float(weight @ self.left_var[is_finite])
         noise = float(weight @ self.white_var[is_finite])
-        unseen = LEAST_SHARE * np.sqrt(2 / near) * max(residual_var, noise)
+        unseen = MIN_SHARE * np.sqrt(2 / near) * max(residual_var, noise)
         return float(max(residual_var - noise, unseen))
 
     def thinned(self) -> LocalModelError:
@@ -84,7 +84,7 @@ class LocalModelError:
         much as any other.
         """
         finite_rows = np.flatnonzero(np.isfinite(self.left_var))
-        if len(self.left_var) <= MOST_KEPT or len(finite_rows) == 0:
+        if len(self.left_var) <= MAX_KEPT or len(finite_rows) == 0:
             return self
         across = self.across_dps or {}
         rates = np.stack([self.rate_dps, *across.values()])
@@ -95,7 +95,7 @@ class LocalModelError:
             for level in np.array_split(
                 _sorted(finite_rows[about[finite_rows] == axis], self.temperature_c), TEMPERATURES
             )
-            for group in np.array_split(_sorted(level, rates[axis]), MOST_KEPT // (10 * TEMPERATURES))
+            for group in np.array_split(_sorted(level, rates[axis]), MAX_KEPT // (10 * TEMPERATURES))
             if len(group)
         ]
 
@@ -145,7 +145,7 @@ class LocalModelError:
 
     def warmth_away(self, temperature_c: float) -> Array:
         """Return how far a temperature is from that of each data set, (m,) widths of the neighbourhood."""
-        return np.abs(_scaled(self.temperature_c, temperature_c, LEAST_SPAN_K / 2))
+        return np.abs(_scaled(self.temperature_c, temperature_c, MIN_SPAN_K / 2))
 
     def _distance(self, rates: list[Array], temperature_c: float) -> Array:
         away = np.linalg.norm([*rates, self.warmth_away(temperature_c)], axis=0)
@@ -156,8 +156,8 @@ def _unknown(distance: Array) -> str | None:
     """Return why nothing is known so far, in widths, from the data sets; None where something is."""
     if distance.min() > FARTHEST:
         return NONE_NEAR
-    if effective_number(near_weights(distance)) < LEAST_NEAR:
-        return f"fewer than {LEAST_NEAR:g} data sets were measured near there"
+    if effective_number(near_weights(distance)) < MIN_NEAR:
+        return f"fewer than {MIN_NEAR:g} data sets were measured near there"
     return None
 
 
@@ -169,7 +169,7 @@ def near_weights(distance: Array) -> Array:
     """Return the weights of data sets so far away, in widths: of the narrowest neighbourhood with enough of them."""
     for factor in WIDENED:
         weight = np.exp(-0.5 * (distance / factor) ** 2)
-        if effective_number(weight) >= LEAST_NEAR:
+        if effective_number(weight) >= MIN_NEAR:
             break
     return np.asarray(weight)
 

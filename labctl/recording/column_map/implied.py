@@ -13,9 +13,9 @@ FASTEST_HZ = 50_000.0
 #: A thermal stream warms a part by some kelvin in a second, and no chamber does.
 STEEPEST_K_S = 20.0
 #: A change of temperature counts from here on, K: below, it may be the resolution of a thermometer.
-LEAST_CHANGE_K = 0.3
+MIN_CHANGE_K = 0.3
 #: A log is divided into so many blocks, of at least so many readings.
-_BLOCKS, _LEAST_READINGS = 10, 20
+_BLOCKS, _MIN_READINGS = 10, 20
 #: A change of the mean counts beyond so many of its standard deviations.
 _TIMES_NOISE = 6.0
 
@@ -26,7 +26,7 @@ def steepest_k_s(t_s: Array, temperature_c: Array) -> float:
     From the mean temperature (n,) of one block of readings to that of the next, by the times (n,) in s.
     """
     n = len(t_s)
-    blocks = min(_BLOCKS, n // _LEAST_READINGS)
+    blocks = min(_BLOCKS, n // _MIN_READINGS)
     if blocks < 2 or not np.isfinite(temperature_c).all():
         return 0.0
     edges = np.linspace(0, n, blocks + 1).astype(np.int64)
@@ -37,7 +37,7 @@ def steepest_k_s(t_s: Array, temperature_c: Array) -> float:
     steepest = 0.0
     for width in (1, blocks - 1):
         change = np.abs(means[width:] - means[:-width])
-        counted = (change > LEAST_CHANGE_K) & (change > _TIMES_NOISE * noise / np.sqrt(counts.min()))
+        counted = (change > MIN_CHANGE_K) & (change > _TIMES_NOISE * noise / np.sqrt(counts.min()))
         steep = change[counted] / np.maximum((at[width:] - at[:-width])[counted], 1e-12)
         steepest = max(steepest, float(steep.max(initial=0.0)))
     return steepest

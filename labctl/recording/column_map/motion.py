@@ -17,9 +17,9 @@ from labctl.recording.sanity.finding import Finding
 
 Array = NDArray[np.float64]
 #: Poses that gravity distinguishes, from which on a gyro can be calibrated by them (imu_tk asks for 9 and more).
-LEAST_POSES = 6
+MIN_POSES = 6
 #: Findings of a log that is refused that are named, at most.
-MOST_NAMED = 3
+MAX_NAMED = 3
 
 
 def motion_of(columns: Columns, kind: str, movement: Movement, t_s: Array) -> Motion | None:
@@ -35,7 +35,7 @@ def motion_of(columns: Columns, kind: str, movement: Movement, t_s: Array) -> Mo
         return "rates" if change is None else "profile"
     if movement.is_rest:
         return "rest"
-    return "poses" if _poses(columns, movement, t_s) >= LEAST_POSES else None
+    return "poses" if _poses(columns, movement, t_s) >= MIN_POSES else None
 
 
 def free_motion(columns: Columns, movement: Movement, t_s: Array, at_rest: Sequence[Finding]) -> str:
@@ -44,21 +44,21 @@ def free_motion(columns: Columns, movement: Movement, t_s: Array, at_rest: Seque
     `at_rest` is what an inspection of the readings finds if the unit is taken to rest.
     """
     n = _poses(columns, movement, t_s)
-    poses_text = f"; its accelerometer shows {n} poses at rest, {LEAST_POSES} are needed" if n else ""
+    poses_text = f"; its accelerometer shows {n} poses at rest, {MIN_POSES} are needed" if n else ""
     spread = f"its output varies by {movement.spread_dps:.3g} deg/s"
     return (
         f"the unit moves in {100 * movement.share:.0f} % of the time ({spread}) and no column gives the rate or the "
         f"angle{poses_text}: free motion without a reference cannot calibrate a gyro; add a column with the table's "
         "rate "
         "(table_rate_dps), the angle of each turn (turn_deg), an accelerometer with rests in at least "
-        f"{LEAST_POSES} poses (accel_x_g, accel_y_g, accel_z_g), or a log at rest; if the unit was to rest, write "
+        f"{MIN_POSES} poses (accel_x_g, accel_y_g, accel_z_g), or a log at rest; if the unit was to rest, write "
         f'motion = "rest" in a map{_named(at_rest)}'
     )
 
 
 def _named(findings: Sequence[Finding]) -> str:
-    findings_text = "; ".join(f"{finding.what}: {finding.where}: {finding.said}" for finding in findings[:MOST_NAMED])
-    more = f"; and {len(findings) - MOST_NAMED} more" if len(findings) > MOST_NAMED else ""
+    findings_text = "; ".join(f"{finding.what}: {finding.where}: {finding.said}" for finding in findings[:MAX_NAMED])
+    more = f"; and {len(findings) - MAX_NAMED} more" if len(findings) > MAX_NAMED else ""
     return f". Taken to rest, its readings have this wrong: {findings_text}{more}" if findings else ""
 
 

@@ -13,13 +13,13 @@ from labctl.recording.sanity.readings.series import code_step
 Array = NDArray[np.float64]
 
 #: Readings are judged in windows of about this time, s, and of at least so many readings.
-WINDOW_S, LEAST_READINGS = 0.5, 8
+WINDOW_S, MIN_READINGS = 0.5, 8
 #: Noise that a gyro at rest may have, deg/s: what is above is taken for movement also where all of a log has it.
-MOST_NOISE_DPS = 0.5
+MAX_NOISE_DPS = 0.5
 #: A window moves where its spread is beyond so many times the usual, and beyond this, deg/s.
-TIMES_USUAL, LEAST_SPREAD_DPS = 5.0, 0.1
+TIMES_USUAL, MIN_SPREAD_DPS = 5.0, 0.1
 #: The output of a still unit may differ this much from its usual value by temperature, deg/s.
-MOST_DRIFT_DPS = 5.0
+MAX_DRIFT_DPS = 5.0
 #: A unit that moves in more than this share of its windows was moved; less are knocks.
 KNOCKS = 0.02
 #: A rest lasts at least so long, s; two poses differ by at least this angle, deg.
@@ -45,20 +45,20 @@ def movement(rates_dps: Array, t_s: Array) -> Movement:
     n = len(t_s)
     rates_dps = np.nan_to_num(rates_dps)
     step = float(np.median(np.diff(t_s))) if n > 1 else 1.0
-    size = int(min(max(round(WINDOW_S / max(step, 1e-9)), LEAST_READINGS), n))
+    size = int(min(max(round(WINDOW_S / max(step, 1e-9)), MIN_READINGS), n))
     starts = np.arange(0, n, size)
     counts = np.diff(np.append(starts, n))
     means = np.add.reduceat(rates_dps, starts, axis=0) / counts[:, None]
     centred = rates_dps - np.repeat(means, counts, axis=0)
     spread = np.sqrt(np.add.reduceat(centred**2, starts, axis=0) / counts[:, None])
-    usual = np.minimum(np.percentile(spread, 20, axis=0), MOST_NOISE_DPS)
+    usual = np.minimum(np.percentile(spread, 20, axis=0), MAX_NOISE_DPS)
     steps = [code_step(column) for column in rates_dps.T]  # a still output that lies between two codes spreads by one
-    moves = (spread > np.maximum(TIMES_USUAL * usual, np.maximum(LEAST_SPREAD_DPS, steps))).any(axis=1)
+    moves = (spread > np.maximum(TIMES_USUAL * usual, np.maximum(MIN_SPREAD_DPS, steps))).any(axis=1)
     if not moves.all():
         quiet = means[~moves]
         slowest = np.argsort(np.linalg.norm(quiet, axis=1))[: max(1, len(quiet) // 2)]
         level = np.median(quiet[slowest], axis=0)  # also where a steady turn lasts as long as the rests do
-        moves |= (np.abs(means - level) > MOST_DRIFT_DPS).any(axis=1)
+        moves |= (np.abs(means - level) > MAX_DRIFT_DPS).any(axis=1)
     still = np.repeat(~moves, counts)
     low, high = np.percentile(rates_dps, [0.1, 99.9], axis=0)
     return Movement(still, float(np.average(moves, weights=counts)), float((high - low).max()))

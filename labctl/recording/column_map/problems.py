@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from labctl.errors import BadFile
 
 #: Problems that are listed of one file.
-MOST_PROBLEMS = 20
+MAX_PROBLEMS = 20
 #: Rows that one problem names.
-MOST_ROWS = 5
+MAX_ROWS = 5
 
 
 class Problems:
@@ -30,8 +30,8 @@ class Problems:
 
     def listed(self) -> list[str]:
         """Return the lines, bounded."""
-        more = len(self.lines) - MOST_PROBLEMS
-        return self.lines[:MOST_PROBLEMS] + ([f"and {more} more problems"] if more > 0 else [])
+        more = len(self.lines) - MAX_PROBLEMS
+        return self.lines[:MAX_PROBLEMS] + ([f"and {more} more problems"] if more > 0 else [])
 
     def raise_if_any(self) -> None:
         """Raise BadFile where something is wrong."""
@@ -45,6 +45,6 @@ def rows_text(wrong: NDArray[np.bool_] | Sequence[int], total: int | None = None
     n = len(wrong_rows) if total is None else total
     if n == 1:
         return f"row {wrong_rows[0]}"
-    shown_rows = wrong_rows[:MOST_ROWS]
+    shown_rows = wrong_rows[:MAX_ROWS]
     more = n - len(shown_rows)
     return f"rows {', '.join(map(str, shown_rows))}" + (f" and {more} more" if more > 0 else "")

@@ -29,7 +29,7 @@ from labctl.recording.raw_table import RawColumn, RawTable
 
 Array = NDArray[np.float64]
 #: A data set of one rate has at least so many readings on average.
-LEAST_READINGS = 10
+MIN_READINGS = 10
 #: A log in bursts: gaps of at least so many usual steps, and of so many seconds.
 GAP_STEPS, GAP_S = 100.0, 30.0
 _SEPARATORS = {"\t": "tab", " ": "space"}
@@ -257,4 +257,4 @@ def _data_sets(table: RawTable, columns: dict[str, MappedColumn], sources_by_tar
 def _long_stretches(column: RawColumn) -> bool:
     values: Any = column.words if column.words is not None else column.values
     changes = int((values[1:] != values[:-1]).sum())
-    return changes > 0 and len(values) >= LEAST_READINGS * (changes + 1)
+    return changes > 0 and len(values) >= MIN_READINGS * (changes + 1)

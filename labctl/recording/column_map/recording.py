@@ -31,7 +31,7 @@ from labctl.recording.recording import Recording
 from labctl.recording.sanity.readings import examine
 
 #: Readings of a thermometer that are needed, and the longest time between two, or beyond the first and last, s.
-LEAST_KNOWN, LONGEST_S = 2, 120.0
+MIN_KNOWN, LONGEST_S = 2, 120.0
 
 
 def is_thermometer(target: str) -> bool:
@@ -52,7 +52,7 @@ def fill_between(columns: dict[str, NDArray[np.generic]], t_s: Array, problems: 
         n = int((~is_finite).sum())
         if n == 0:
             continue
-        if is_finite.sum() < LEAST_KNOWN:
+        if is_finite.sum() < MIN_KNOWN:
             problems.add(
                 f"{name}: {n} of {len(values)} cells are empty; leave the column out of the map, or fill it in"
             )
@@ -82,7 +82,7 @@ def fill_between(columns: dict[str, NDArray[np.generic]], t_s: Array, problems: 
 
 Array = NDArray[np.float64]
 #: Readings that a recording has at least.
-LEAST_ROWS = 2
+MIN_ROWS = 2
 #: Keys of recording.toml that the map has in places of its own, or that the data decide.
 _TAKEN = frozenset(
     {
@@ -111,8 +111,8 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
     for line in (*table.problems, *idle_entries(table, column_map)):
         problems.add(line)
     raw_columns = sources(table, column_map, problems)
-    if table.rows < LEAST_ROWS:
-        problems.add(f"{table.rows} row of readings; a recording needs at least {LEAST_ROWS}, of one unit in one run")
+    if table.rows < MIN_ROWS:
+        problems.add(f"{table.rows} row of readings; a recording needs at least {MIN_ROWS}, of one unit in one run")
     if not column_map.axes:
         problems.add(
             "no column is known to be the output of a gyro (it has "

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 #: Whole intervals between stamps that are needed to see how many readings each has.
-LEAST_INTERVALS = 3
+MIN_INTERVALS = 3
 #: Readings of one interval may differ from those of another by one, or by this share.
 EVEN_WITHIN = 0.02
 #: A packet begins after a step of so many usual ones; so many packets, which have most of the time between them, tell.
-LONG_STEP, LEAST_PACKETS, MOST_BETWEEN = 2.5, 400, 0.5
+LONG_STEP, MIN_PACKETS, MAX_BETWEEN = 2.5, 400, 0.5
 #: The readings of packets are of one rate where number and time run apart by less than this share of a random walk of
 #: the same steps (range of a Brownian bridge: Kuiper 1960; below 0.4 with a probability under 1e-6), ...
 OF_RANDOM_WALK = 0.4
@@ -41,7 +41,7 @@ def spread_between(t_s: Array) -> Spread | str | None:
     if len(steps) == 0 or not np.isfinite(steps).all() or (steps < 0).any() or (steps > 0).mean() > 0.5:
         return None
     edges = np.flatnonzero(steps > 0) + 1  # the first reading of each stamp but the first
-    if len(edges) <= LEAST_INTERVALS:
+    if len(edges) <= MIN_INTERVALS:
         return None
     counts, stamps = np.diff(edges), t_s[edges]
     apart = float(np.median(np.diff(stamps)))
@@ -68,12 +68,12 @@ def spread_packets(t_s: Array) -> Spread | None:
     with the time. Where readings were lost, or a logger slept, it does not.
     """
     steps = np.diff(t_s)
-    if len(steps) < LEAST_PACKETS or not np.isfinite(steps).all() or (steps <= 0).any():
+    if len(steps) < MIN_PACKETS or not np.isfinite(steps).all() or (steps <= 0).any():
         return None
     long = steps > LONG_STEP * float(np.median(steps))
     begin = np.flatnonzero(long) + 1  # the first reading of each packet but the first
     span_s = float(t_s[-1] - t_s[0])
-    if len(begin) < LEAST_PACKETS or float(steps[long].sum()) < MOST_BETWEEN * span_s:
+    if len(begin) < MIN_PACKETS or float(steps[long].sum()) < MAX_BETWEEN * span_s:
         return None
     stamps = t_s[begin]
     period_s = float((stamps[-1] - stamps[0]) / (begin[-1] - begin[0]))

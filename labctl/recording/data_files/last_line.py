@@ -10,7 +10,7 @@ from labctl.recording.unread import Unread
 #: A last column of anything else may have any length.
 _NUMBER = re.compile(r"[-+]?[0-9]*[.,]?[0-9]*([eE][-+]?[0-9]*)?")
 #: What is read of the end of a file, bytes, and the least lines in it that a last line is compared with.
-TAIL_BYTES, LEAST_LINES = 1 << 16, 20
+TAIL_BYTES, MIN_LINES = 1 << 16, 20
 
 
 def cut_last_line(path: Path, encoding: str, separator: str) -> Unread | None:
@@ -26,7 +26,7 @@ def cut_last_line(path: Path, encoding: str, separator: str) -> Unread | None:
     text = tail.decode("utf-16" if encoding == "utf-16" and len(tail) == size else encoding, errors="replace")
     *lines, last = text.splitlines(keepends=True) or [""]
     before = [line.rstrip("\r\n") for line in lines[1:] if line.strip()]
-    if last.endswith(("\n", "\r")) or not last.strip() or len(before) < LEAST_LINES:
+    if last.endswith(("\n", "\r")) or not last.strip() or len(before) < MIN_LINES:
         return None
     fields = _fields(last, separator)
     others = [_fields(line, separator) for line in before]

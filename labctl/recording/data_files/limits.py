@@ -8,11 +8,11 @@ from pathlib import Path
 from labctl.errors import BadRecording
 
 #: Rows times columns of one file; each takes 8 bytes in memory, so 800 MB.
-MOST_VALUES = 100_000_000
-MOST_COLUMNS = 256
+MAX_VALUES = 100_000_000
+MAX_COLUMNS = 256
 VALUE_BYTES = 8
 #: Largest unpacked size of all pages of a file: its values with their dictionaries.
-MOST_UNPACKED_BYTES = 2_000_000_000
+MAX_UNPACKED_BYTES = 2_000_000_000
 #: Whole numbers up to here are exact in every reader of the answers: 2^53 - 1.
 LARGEST_WHOLE = (1 << 53) - 1
 
@@ -24,7 +24,7 @@ class Space:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._left = MOST_VALUES * VALUE_BYTES
+        self._left = MAX_VALUES * VALUE_BYTES
 
     def take(self, column: str, size: int) -> None:
         """Count `size` bytes of a column; raises BadRecording when the file has no room for them."""
@@ -32,24 +32,24 @@ class Space:
         if self._left < 0:
             raise BadRecording(
                 f"{self._path}: column {column[:80]!r}: the file's values take more than "
-                f"{MOST_VALUES * VALUE_BYTES / 1e6:g} MB, the limit of one file; {_ADVICE}, or shorten its texts"
+                f"{MAX_VALUES * VALUE_BYTES / 1e6:g} MB, the limit of one file; {_ADVICE}, or shorten its texts"
             )
 
 
 def refuse_too_many(path: Path, rows: int, columns: int) -> None:
     """Raise BadRecording where a file has more values than are imported at once."""
-    if rows * columns > MOST_VALUES:
+    if rows * columns > MAX_VALUES:
         raise BadRecording(
-            f"{path}: {rows} rows x {columns} columns = {rows * columns} values; at most {MOST_VALUES} are read from "
+            f"{path}: {rows} rows x {columns} columns = {rows * columns} values; at most {MAX_VALUES} are read from "
             f"one file; {_ADVICE}"
         )
 
 
 def refuse_too_large(path: Path, size: int) -> None:
     """Raise BadRecording where the unpacked size, in bytes, is above the limit, as by long words or padding."""
-    if size > MOST_UNPACKED_BYTES:
+    if size > MAX_UNPACKED_BYTES:
         raise BadRecording(
-            f"{path}: has an unpacked size of {size / 1e6:g} MB; at most {MOST_UNPACKED_BYTES / 1e6:g} MB are read "
+            f"{path}: has an unpacked size of {size / 1e6:g} MB; at most {MAX_UNPACKED_BYTES / 1e6:g} MB are read "
             "from "
             f"one file; {_ADVICE}, or shorten its texts"
         )
@@ -57,9 +57,9 @@ def refuse_too_large(path: Path, size: int) -> None:
 
 def checked_names(path: Path, names: Sequence[str]) -> None:
     """Raise BadRecording for columns that are too many, or of one name."""
-    if len(names) > MOST_COLUMNS:
+    if len(names) > MAX_COLUMNS:
         raise BadRecording(
-            f"{path}: {len(names)} columns, but at most {MOST_COLUMNS} are allowed; remove those that are not needed"
+            f"{path}: {len(names)} columns, but at most {MAX_COLUMNS} are allowed; remove those that are not needed"
         )
     names_seen: set[str] = set()
     for name in names:

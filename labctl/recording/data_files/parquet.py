@@ -21,7 +21,7 @@ PIECE_ROWS = 1 << 16
 #: Bytes that are read at a time from each column of a row group.
 BUFFER_BYTES = 1 << 20
 #: Above this, no footer of so few columns is one: 256 columns of 100,000 rows a group need a tenth of it.
-MOST_FOOTER_BYTES = 16 << 20
+MAX_FOOTER_BYTES = 16 << 20
 MAGIC = b"PAR1"
 
 
@@ -91,9 +91,9 @@ def _refuse_large_footer(path: Path) -> None:
         file.seek(max(0, path.stat().st_size - 8))
         tail = file.read(8)
     size = int.from_bytes(tail[:4], "little")
-    if tail[4:] == MAGIC and size > MOST_FOOTER_BYTES:
+    if tail[4:] == MAGIC and size > MAX_FOOTER_BYTES:
         raise BadRecording(
-            f"{path}: its footer has {size} bytes; at most {MOST_FOOTER_BYTES} are read; write larger row groups"
+            f"{path}: its footer has {size} bytes; at most {MAX_FOOTER_BYTES} are read; write larger row groups"
         )
 
 

@@ -16,7 +16,7 @@ from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names
 from labctl.recording.data_files.values import ColumnValues
 
 #: The longest header that is read.
-MOST_HEADER_BYTES = 1 << 16
+MAX_HEADER_BYTES = 1 << 16
 
 
 def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
@@ -57,10 +57,10 @@ def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
 
 def _header(path: Path) -> list[str]:
     with path.open("rb") as file:
-        line = re.split(rb"[\r\n]", file.read(MOST_HEADER_BYTES + 1), maxsplit=1)[0]
-    if len(line) > MOST_HEADER_BYTES:
+        line = re.split(rb"[\r\n]", file.read(MAX_HEADER_BYTES + 1), maxsplit=1)[0]
+    if len(line) > MAX_HEADER_BYTES:
         raise BadRecording(
-            f"{path}: the first line is longer than {MOST_HEADER_BYTES} bytes; expected a text file that begins with a "
+            f"{path}: the first line is longer than {MAX_HEADER_BYTES} bytes; expected a text file that begins with a "
             "line of column names; check that this is the right file"
         )
     try:

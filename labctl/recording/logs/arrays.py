@@ -21,11 +21,11 @@ from labctl.recording.column_map.names import is_unit, name_says
 from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.data_files.limits import checked_names, refuse_too_large, refuse_too_many
 from labctl.recording.importer import TableImporter, TableOptions
-from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
+from labctl.recording.logs.recognition import MAX_LOG_BYTES, head_of, refuse_large
 from labctl.recording.raw_table import RawColumn, RawTable
 
 #: Columns that one array may have; the longer side of an array is its rows.
-MOST_WIDE = 32
+MAX_WIDE = 32
 #: _Arrays that a message lists.
 _SHOWN = 10
 INSTALL = "pip install h5py"
@@ -43,7 +43,7 @@ def read(path: Path, _: TableOptions) -> RawTable:
     reader = _reader(path)
     if reader is None:
         raise BadRecording(f"{path}: the file is no .npy, .npz, .mat or HDF5 file; import it without --format")
-    refuse_large(path, MOST_LOG_BYTES)
+    refuse_large(path, MAX_LOG_BYTES)
     kind, arrays = reader
     with parsed_by_library(path, kind, "write it again, or write its arrays as CSV"):
         arrays_read = arrays(path)
@@ -96,7 +96,7 @@ def _columns(name: str, values: NDArray[Any], unit: str) -> Iterator[RawColumn]:
         yield _column(name or "array", values, unit)
         return
     table = values if values.shape[0] >= values.shape[1] else values.T
-    if table.shape[1] <= MOST_WIDE:
+    if table.shape[1] <= MAX_WIDE:
         for number in range(table.shape[1]):
             called = f"{name}[{number}]" if name else f"column {number + 1}"
             yield _column(called, table[:, number], unit)

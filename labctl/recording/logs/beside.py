@@ -17,7 +17,7 @@ from labctl.recording.unread import of_several
 
 Array = NDArray[np.float64]
 #: How far the nearest reading of a further file may be from a reading of the log, in its usual steps of time.
-MOST_STEPS = 5.0
+MAX_STEPS = 5.0
 #: A column without a name in its file.
 _NAMELESS = "column "
 
@@ -88,14 +88,14 @@ def _refuse_apart(table: RawTable, at: Array, other: RawTable, theirs: Array) ->
             other,
             f"its times, or the times of {table.path.name}, do not increase from row to row; correct or sort the rows",
         )
-    most = MOST_STEPS * float(np.median(steps))
+    most = MAX_STEPS * float(np.median(steps))
     nearest = theirs[np.searchsorted((theirs[:-1] + theirs[1:]) / 2, at)]
     apart = np.abs(nearest - at) > most
     if apart.any():
         row = int(np.argmax(apart))
         raise _refused(
             other,
-            f"there is no reading within {MOST_STEPS:.0f} steps of time {at[row]:.9g} of {table.path.name} (row "
+            f"there is no reading within {MAX_STEPS:.0f} steps of time {at[row]:.9g} of {table.path.name} (row "
             f"{row + 1}; {int(apart.sum())} rows without a reading): the times of the other file go from "
             f"{theirs[0]:.9g} to {theirs[-1]:.9g}, in steps of {np.median(steps):.3g}. Give both files the same clock "
             "and the same unit of time",

@@ -16,7 +16,7 @@ from labctl.errors import BadRecording
 from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.importer import TableImporter
 from labctl.recording.logs import arrays, parquet, spreadsheet
-from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_other
+from labctl.recording.logs.recognition import MAX_TEXT_BYTES, head_of, refuse_other
 from labctl.recording.logs.text import TextOptions, read_text
 from labctl.recording.raw_table import RawTable
 
@@ -72,9 +72,9 @@ def _unpack(path: Path, name: str, opened: Callable[[Path], Any], inside: Path) 
     with parsed_by_library(path, f"{name} file", "copy it again"), opened(path) as packed, inside.open("wb") as file:
         while block := packed.read(_BLOCK_BYTES):
             size += len(block)
-            if size > MOST_TEXT_BYTES:
+            if size > MAX_TEXT_BYTES:
                 raise BadRecording(
-                    f"{path}: more than {MOST_TEXT_BYTES / 1e6:.0f} MB when unpacked, the most that is read of one "
+                    f"{path}: more than {MAX_TEXT_BYTES / 1e6:.0f} MB when unpacked, the most that is read of one "
                     "file; divide it"
                 )
             file.write(block)

@@ -19,7 +19,7 @@ from labctl.recording.unread import share_text
 #: No instrument gives a number above this; random bits do.
 LARGEST_NUMBER = 1e30
 #: Zeros in a row that no noise gives, among readings of which more than this share differ from each other.
-LEAST_ZEROS, MOST_EQUAL = 64, 0.5
+MIN_ZEROS, MIN_DISTINCT_SHARE = 64, 0.5
 
 
 def probe(path: Path) -> float:
@@ -79,9 +79,9 @@ def _zeroed(values: NDArray[np.generic]) -> tuple[int, int] | None:
     longest = int(np.argmax(ends - starts))
     first, after = int(starts[longest]), int(ends[longest])
     others = np.concatenate([values[:first], values[after:]])
-    if after - first < LEAST_ZEROS or len(others) < LEAST_ZEROS:
+    if after - first < MIN_ZEROS or len(others) < MIN_ZEROS:
         return None
-    return (first, after) if len(np.unique(others)) > MOST_EQUAL * len(others) else None
+    return (first, after) if len(np.unique(others)) > MIN_DISTINCT_SHARE * len(others) else None
 
 
 def _column(name: str, values: np.ndarray, *, is_boolean: bool) -> RawColumn:

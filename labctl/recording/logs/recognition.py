@@ -8,9 +8,9 @@ from pathlib import Path
 from labctl.errors import BadRecording
 
 #: The largest text file that is read: about ten bytes for each value that an import takes.
-MOST_TEXT_BYTES = 1_000_000_000
+MAX_TEXT_BYTES = 1_000_000_000
 #: A binary log is held in memory whole by its reader.
-MOST_LOG_BYTES = 1_000_000_000
+MAX_LOG_BYTES = 1_000_000_000
 HEAD_BYTES = 1 << 16
 
 #: R's own command, which any installation of R has.

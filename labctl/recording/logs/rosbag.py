@@ -18,14 +18,14 @@ from pydantic import Field
 from labctl.errors import BadInput, BadRecording
 from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.importer import TableImporter, TableOptions
-from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
+from labctl.recording.logs.recognition import MAX_LOG_BYTES, head_of, refuse_large
 from labctl.recording.raw_table import RawColumn, RawTable
 from labctl.recording.unread import Unread, refuse_unread
 
 #: Sizes that no number of such a message has, but random bits do.
 SMALLEST, LARGEST = 1e-30, 1e12
 #: A time stamp that departs from those of its neighbours by more than this, against their arrival, is damaged, s.
-MOST_APART_S = 1.0
+MAX_APART_S = 1.0
 #: Messages that a message is compared with: itself and two on either side.
 NEIGHBOURS = 5
 
@@ -78,7 +78,7 @@ def with_damaged_times(
         late_s = (at_ns - arrived_ns) / NS
         padded = np.pad(late_s, NEIGHBOURS // 2, mode="edge")
         usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
-        is_wrong |= np.abs(late_s - usual) > MOST_APART_S
+        is_wrong |= np.abs(late_s - usual) > MAX_APART_S
     return is_wrong
 
 
@@ -135,7 +135,7 @@ def probe(path: Path) -> float:
 def read(path: Path, options: BagOptions) -> RawTable:
     """Return time, output, specific force and temperature of one topic; raises BadRecording, BadInput."""
     for each in [path] if path.is_file() else sorted(path.iterdir()):
-        refuse_large(each, MOST_LOG_BYTES)
+        refuse_large(each, MAX_LOG_BYTES)
     if path.is_file() and head_of(path).startswith(ROS1) and path.suffix != ".bag":
         raise BadRecording(f"{path}: a ROS 1 bag whose name does not end in .bag; rename it")
     with _opened(path) as bag:

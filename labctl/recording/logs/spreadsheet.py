@@ -19,7 +19,7 @@ from labctl.recording.logs.text import TextOptions, read_text
 from labctl.recording.raw_table import RawTable
 
 #: Unpacked size of a workbook that is read: a sheet has at most 1,048,576 rows.
-MOST_BYTES = 500_000_000
+MAX_BYTES = 500_000_000
 #: First bytes of an .xls file.
 _OLD = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _PARTS = ("xl/workbook.xml", "xl/workbook.bin", "content.xml")
@@ -98,9 +98,9 @@ def _refuse_large(path: Path) -> None:
     if head_of(path).startswith(b"PK"):
         with parsed_by_library(path, "workbook", "save it again"), zipfile.ZipFile(path) as archive:
             size = sum(each.file_size for each in archive.infolist())
-    if size > MOST_BYTES:
+    if size > MAX_BYTES:
         raise BadRecording(
-            f"{path}: {size / 1e6:.0f} MB when unpacked; at most {MOST_BYTES / 1e6:.0f} MB of a workbook are read; "
+            f"{path}: {size / 1e6:.0f} MB when unpacked; at most {MAX_BYTES / 1e6:.0f} MB of a workbook are read; "
             "save the sheet as CSV"
         )
 

@@ -17,18 +17,18 @@ from labctl.errors import BadRecording
 from labctl.recording.column_map.model import FileKeys
 from labctl.recording.column_map.problems import rows_text
 from labctl.recording.data_files.last_line import cut_last_line
-from labctl.recording.data_files.limits import MOST_COLUMNS, refuse_too_many
+from labctl.recording.data_files.limits import MAX_COLUMNS, refuse_too_many
 from labctl.recording.importer import TableImporter, TableOptions
 from labctl.recording.logs.encoding import TextStream
 from labctl.recording.logs.layout import layout_of, split
-from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_large, refuse_other
+from labctl.recording.logs.recognition import MAX_TEXT_BYTES, head_of, refuse_large, refuse_other
 from labctl.recording.raw_table import SHOWN_ROWS, FileLayout, RawColumn, RawTable
 
 #: Cells that say that there is no number.
 _MISSING = pa.array(["", "nan", "na", "n/a", "null", "none", "-nan"])
 _NUMBER = r"^[+-]?([0-9]+([.][0-9]*)?|[.][0-9]+)([eE][+-]?[0-9]+)?$|^[+-]?(?i:inf|infinity)$"
 #: Wrong cells that are remembered.
-MOST_WRONG = 20
+MAX_WRONG_CELLS = 20
 #: A column is of words where more than this share of its cells are no numbers.
 WORDS = 0.5
 LONGEST_WORD = 64
@@ -40,7 +40,7 @@ def column_of(name: str, pieces: Sequence[pa.Array], decimal: str, unit: str = "
     numbers, n_wrong, row = [], 0, 0
     for piece in pieces:
         values, wrong_cells, count = _numbers(piece, decimal)
-        wrong += [(row + index + 1, text) for index, text in wrong_cells[: MOST_WRONG - len(wrong)]]
+        wrong += [(row + index + 1, text) for index, text in wrong_cells[: MAX_WRONG_CELLS - len(wrong)]]
         numbers.append(values)
         n_wrong += count
         row += len(piece)
@@ -65,7 +65,7 @@ def _numbers(piece: pa.Array, decimal: str) -> tuple[Any, list[tuple[int, str]],
     number = pc.match_substring_regex(text, _NUMBER)
     values = pc.if_else(number, text, "nan").cast(pa.float64())
     bad = np.flatnonzero(~np.asarray(pc.or_(number, missing)))
-    return np.asarray(values), [(int(row), piece[int(row)].as_py()) for row in bad[:MOST_WRONG]], len(bad)
+    return np.asarray(values), [(int(row), piece[int(row)].as_py()) for row in bad[:MAX_WRONG_CELLS]], len(bad)
 
 
 def _words(pieces: Sequence[pa.Array]) -> np.ndarray[Any, np.dtype[np.str_]]:
@@ -103,7 +103,7 @@ def read_text(path: Path, options: TextOptions) -> RawTable:
     """Return the table of a text file, all columns; raises BadRecording for what is no table of numbers."""
     head = head_of(path)
     refuse_other(path, head)
-    refuse_large(path, MOST_TEXT_BYTES)
+    refuse_large(path, MAX_TEXT_BYTES)
     layout, header = layout_of(path, head, options.file)
     names = header.names
     _refuse_names(path, names)
@@ -142,9 +142,9 @@ def _without_last(blocks: list[Any], ragged: list[tuple[int, int]]) -> tuple[lis
 
 
 def _refuse_names(path: Path, names: list[str]) -> None:
-    if len(names) > MOST_COLUMNS:
+    if len(names) > MAX_COLUMNS:
         raise BadRecording(
-            f"{path}: the file has {len(names)} columns, but at most {MOST_COLUMNS} are allowed; remove the "
+            f"{path}: the file has {len(names)} columns, but at most {MAX_COLUMNS} are allowed; remove the "
             "columns that are not needed"
         )
     doubled = sorted({name for name in names if names.count(name) > 1})

@@ -21,7 +21,7 @@ from pydantic import Field
 from labctl.errors import BadInput, BadRecording
 from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.importer import TableImporter, TableOptions
-from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
+from labctl.recording.logs.recognition import MAX_LOG_BYTES, head_of, refuse_large
 from labctl.recording.raw_table import RawColumn, RawTable
 from labctl.recording.unread import Unread, refuse_unread
 
@@ -39,9 +39,9 @@ SYNC_BODY = bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12])
 #: So many messages in a row show where a log goes on after damage.
 IN_A_ROW = 4
 #: What is searched for such a place, bytes; beyond it the rest is lost.
-MOST_SEARCHED = 1 << 24
+MAX_SEARCHED = 1 << 24
 #: Bodies have at least so many bytes: number and time; instance, number and a name.
-LEAST_DATA, LEAST_SUBSCRIPTION = 10, 4
+MIN_DATA, MIN_SUBSCRIPTION = 10, 4
 #: A message of another kind than data is shorter than this, bytes.
 LONGEST = 10_000
 
@@ -64,11 +64,11 @@ class _Walk:
         if size == 0 or end > len(content) or kind not in KINDS:
             return 0
         if kind == DATA:
-            is_sound = size >= LEAST_DATA and self.sizes.get(content[at + 3] | content[at + 4] << 8) in (0, size)
+            is_sound = size >= MIN_DATA and self.sizes.get(content[at + 3] | content[at + 4] << 8) in (0, size)
         elif kind == SYNC:
             is_sound = content[at + MESSAGE : end] == SYNC_BODY
         elif kind == SUBSCRIPTION:
-            is_sound = size >= LEAST_SUBSCRIPTION and content[at + MESSAGE + 3 : end].isascii()
+            is_sound = size >= MIN_SUBSCRIPTION and content[at + MESSAGE + 3 : end].isascii()
         else:
             is_sound = size < LONGEST
         return end if is_sound else 0
@@ -86,7 +86,7 @@ class _Walk:
     def goes_on(self, after: int) -> int:
         """Return the first place at or after one where messages follow each other again; the end without one."""
         end = len(self.content)
-        for at in range(after, min(end, after + MOST_SEARCHED)):
+        for at in range(after, min(end, after + MAX_SEARCHED)):
             place = at
             for _ in range(IN_A_ROW):
                 place = self.end_of(place)
@@ -165,9 +165,9 @@ TOPICS = (GYRO, INTEGRATED, COMBINED)
 #: Topics with the time of day; a receiver without a fix sends 0. Nothing was logged before 2001, us.
 RECEIVERS, EARLIEST_US = ("vehicle_gps_position", "sensor_gps"), 1e15
 #: The length of a message is a number of 16 bits, and no value is smaller than a byte; types in types go this deep.
-MOST_VALUES, MOST_NESTED = 0xFFFF, 16
+MAX_VALUES, MAX_NESTED = 0xFFFF, 16
 #: Readings of an accelerometer this far apart in time belong to no reading of the gyro, s.
-MOST_APART_S = 0.5
+MAX_APART_S = 0.5
 
 Array = NDArray[np.float64]
 
@@ -190,7 +190,7 @@ def probe(path: Path) -> float:
 def read(path: Path, options: ULogOptions) -> RawTable:
     """Return time, output, temperature and specific force of one gyro; raises BadRecording, BadInput."""
     head_of(path)
-    refuse_large(path, MOST_LOG_BYTES)
+    refuse_large(path, MAX_LOG_BYTES)
     with parsed_by_library(path, "ULog file", "take the log off the card again"):
         return _read(path, options)  # damaged names and types of fields show here, not in the parser
 
@@ -241,15 +241,15 @@ def _parsed(path: Path) -> tuple[Any, Unread | None]:
 
 def _values_of(path: Path, kind: str, formats: Mapping[str, Any], within: tuple[str, ...] = ()) -> int:
     """Return how many values a message of a type holds. Raises BadRecording for more than a message has bytes."""
-    if kind in within or len(within) > MOST_NESTED:
+    if kind in within or len(within) > MAX_NESTED:
         raise BadRecording(f"{path}: the type {kind} of the log contains itself; take the log off the card again")
     values = 0
     for field_kind, count, _ in formats[kind].fields:
         of_one = _values_of(path, field_kind, formats, (*within, kind)) if field_kind in formats else 1
         values += max(count, 1) * of_one
-        if values > MOST_VALUES:
+        if values > MAX_VALUES:
             raise BadRecording(
-                f"{path}: a message of type {kind} would hold more than {MOST_VALUES} values, the limit of a ULog "
+                f"{path}: a message of type {kind} would hold more than {MAX_VALUES} values, the limit of a ULog "
                 "message; take the log off the card again"
             )
     return max(values, 1)
@@ -304,7 +304,7 @@ def _add_force(columns: dict[str, Array], data: Mapping[tuple[str, int], Any], i
     if not len(stamps):
         return
     nearest = np.abs(np.interp(columns["timestamp"], stamps, stamps) - columns["timestamp"])
-    if nearest.max() > 1e6 * MOST_APART_S:
+    if nearest.max() > 1e6 * MAX_APART_S:
         return
     for axis in "xyz":
         columns[f"accel_{axis}"] = _at(columns["timestamp"], source, axis)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from labctl.recording.points import dataset_starts
 
 #: A rate may vary by this share of itself plus this much, deg/s: a servo's or an encoder's ripple.
-SHARE, LEAST_DPS = 0.01, 0.05
+SHARE, MIN_DPS = 0.01, 0.05
 #: Pieces of a data set whose mean rates are compared, and noises of such a mean that do not count.
 PIECES, NOISES = 8, 6.0
 
@@ -37,7 +37,7 @@ def rate_change(
     rate, number = rate_dps[rows], dataset[rows]
     starts = dataset_starts(number)
     low, high = np.minimum.reduceat(rate, starts), np.maximum.reduceat(rate, starts)
-    allowed = SHARE * np.maximum(np.abs(low), np.abs(high)) + LEAST_DPS
+    allowed = SHARE * np.maximum(np.abs(low), np.abs(high)) + MIN_DPS
     ends = np.append(starts[1:], len(rate))
     for k in np.flatnonzero(high - low > allowed):
         here = rate[starts[k] : ends[k]]

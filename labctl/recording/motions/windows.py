@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.recording import Columns
-from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
+from labctl.recording.spread import MIN_FOR_SPECTRUM, white_std
 
 #: Windows of a recording, about: a window is as many readings as it takes to stay below.
-MOST_WINDOWS = 20_000
+MAX_WINDOWS = 20_000
 #: Readings further apart than this many usual steps have a gap between them: no window goes across it.
 GAP_STEPS = 3.0
 #: The beginning and the end of a stretch are left out, this long, s, and at most this share of it: an output with a
@@ -50,7 +50,7 @@ def window_labels(columns: Columns) -> NDArray[np.int64]:
     begins[stretch_starts(columns)] = True
     starts = np.flatnonzero(begins)
     ordinal = np.arange(n) - np.repeat(starts, np.diff(np.append(starts, n)))
-    return np.cumsum(begins | (ordinal % (-(-n // MOST_WINDOWS)) == 0)).astype(np.int64) - 1
+    return np.cumsum(begins | (ordinal % (-(-n // MAX_WINDOWS)) == 0)).astype(np.int64) - 1
 
 
 def kept_windows(columns: Columns, labels: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -76,7 +76,7 @@ def white_std_of_profile(columns: Columns, output: NDArray[np.float64]) -> NDArr
     for begin, size in zip(starts.tolist(), sizes.tolist(), strict=True):
         for first in range(begin, begin + size, PIECE):
             here = slice(first, min(first + PIECE, begin + size))
-            if here.stop - here.start >= LEAST_FOR_SPECTRUM + 6 * LAGS:
+            if here.stop - here.start >= MIN_FOR_SPECTRUM + 6 * LAGS:
                 white_std_dps[here] = white_std(_not_followed(rate[here], output[here]))
     is_finite = np.isfinite(white_std_dps)
     if not is_finite.any():

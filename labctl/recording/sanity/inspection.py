@@ -33,7 +33,7 @@ SLOW_STEP_S, LONG_S = 60.0, 1e7
 #: Whole numbers are what a counter of ms or us has: of them readings are in question that are this far apart, s.
 WHOLE_STEP_S = 5.0
 #: Readings within a data set that slow are no data set of a minute.
-LEAST_READINGS = 16
+MIN_READINGS = 16
 #: Time stamps that begin later than this after `started_at`, s, count from somewhere else.
 LATE_S = 1e8
 
@@ -67,7 +67,7 @@ def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
     span = float(summary["t_end_s"][-1] - summary["t_begin_s"][0])
     slow = (
         summary.info.sample_rate_hz is None and usual > (WHOLE_STEP_S if _whole(summary) else SLOW_STEP_S)
-        and float(np.median(np.asarray(summary["n"], dtype=np.float64))) >= LEAST_READINGS
+        and float(np.median(np.asarray(summary["n"], dtype=np.float64))) >= MIN_READINGS
     )  # fmt: skip
     if slow or span > LONG_S:
         text = (
@@ -126,7 +126,7 @@ def _origin(summary: Summary, first_s: float) -> Iterator[Finding]:
 
 Array = NDArray[np.float64]
 #: A rate below this share of the fastest is taken as that share; data sets that must agree, and their share.
-LEAST_SHARE, LEAST_AGREEING, AGREEING_SHARE = 0.1, 3, 0.5
+MIN_SHARE, MIN_AGREEING, AGREEING_SHARE = 0.1, 3, 0.5
 #: An output disagrees that is off by this share of the rate; the jumps of one that wraps differ by at most this share.
 OFF_SHARE, SAME_JUMP = 0.3, 0.03
 
@@ -146,17 +146,17 @@ def _of_position(sets: Summary, along: Position) -> Iterator[Finding]:
     rate = along.sign * np.asarray(sets["table_rate_dps"], dtype=np.float64)
     output = np.asarray(sets.of_axis("mean", along.axis), dtype=np.float64)
     fast = float(np.abs(rate).max(initial=0.0))
-    if fast < LEAST_DPS or not np.isfinite(output).all():
+    if fast < MIN_DPS or not np.isfinite(output).all():
         return
     numbers = np.asarray(sets["dataset"], dtype=np.float64)
-    slow = np.abs(rate) <= LEAST_SHARE * fast
+    slow = np.abs(rate) <= MIN_SHARE * fast
     if slow.any() and (wrapped := _wrapped(along, numbers, rate, output, float(np.median((output - rate)[slow])))):
         yield wrapped
         return
     apart = rate - (output - float(np.median(output - rate)))
-    is_off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * fast)
+    is_off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), MIN_SHARE * fast)
     agreeing = int((~is_off).sum())
-    if not is_off.any() or agreeing < LEAST_AGREEING or agreeing < AGREEING_SHARE * len(is_off):
+    if not is_off.any() or agreeing < MIN_AGREEING or agreeing < AGREEING_SHARE * len(is_off):
         return
     for row in np.flatnonzero(is_off):
         stated_dps, shown_dps = float(rate[row]), float(rate[row] - apart[row])
@@ -176,8 +176,8 @@ def _wrapped(along: Position, numbers: Array, rate: Array, output: Array, bias_d
     `bias_dps` is that of the slow data sets: of the fast ones most may be wrapped.
     """
     apart = rate - (output - bias_dps)
-    is_off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * float(np.abs(rate).max()))
-    if is_off.sum() < 2 or (~is_off).sum() < LEAST_AGREEING:
+    is_off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), MIN_SHARE * float(np.abs(rate).max()))
+    if is_off.sum() < 2 or (~is_off).sum() < MIN_AGREEING:
         return None
     jump = float(np.median(np.abs(apart[is_off])))
     top = float(np.abs(output).max())
@@ -195,9 +195,9 @@ def _wrapped(along: Position, numbers: Array, rate: Array, output: Array, bias_d
 
 
 #: Slower data sets say nothing of a ratio, deg/s.
-LEAST_DPS = 1.0
+MIN_DPS = 1.0
 #: Data sets of one direction that are compared, at least, where no uncertainty of the angle's rate is known.
-LEAST_SETS = 3
+MIN_SETS = 3
 #: What counts as no error, ppm; beyond the largest it is no ratio but another unit or a wrapped angle.
 NO_PPM, LARGEST_PPM = 20.0, 1e4
 COVERAGE = 3.0
@@ -213,12 +213,12 @@ def check_reference(summary: Summary) -> list[Finding]:
     rate, turning, u = (
         np.asarray(summary[name], dtype=np.float64) for name in ("table_rate_dps", "turning_dps", "turning_u_dps")
     )
-    usable = np.isfinite(turning) & (np.abs(rate) >= LEAST_DPS)
+    usable = np.isfinite(turning) & (np.abs(rate) >= MIN_DPS)
     ways = {"forwards": usable & (rate > 0), "backwards": usable & (rate < 0)}
     deviations = {
         way: 1e6 * np.array(_deviation(rate[here], turning[here], u[here]))
         for way, here in ways.items()
-        if np.count_nonzero(here) >= (LEAST_SETS if np.isnan(u[here]).any() else 1)
+        if np.count_nonzero(here) >= (MIN_SETS if np.isnan(u[here]).any() else 1)
     }
     off = [way for way, (ppm, u_ppm) in deviations.items() if max(NO_PPM, COVERAGE * u_ppm) < abs(ppm)]
     if not off or max(abs(ppm) for ppm, _ in deviations.values()) > LARGEST_PPM:
@@ -242,7 +242,7 @@ def _deviation(rate: NDArray[np.float64], turning: NDArray[np.float64], u: NDArr
     weight = rate**2
     off = float(np.sum(rate * (turning - rate)) / np.sum(weight))
     residual = turning - (1 + off) * rate
-    scatter = float(np.sqrt(residual @ residual / (len(rate) - 1) / weight.sum())) if len(rate) >= LEAST_SETS else 0.0
+    scatter = float(np.sqrt(residual @ residual / (len(rate) - 1) / weight.sum())) if len(rate) >= MIN_SETS else 0.0
     u_mean = float(np.sqrt(np.sum((rate * np.nan_to_num(u)) ** 2)) / np.sum(weight))
     return off, max(scatter, u_mean)
 

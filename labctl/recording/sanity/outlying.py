@@ -14,18 +14,18 @@ from labctl.recording.sanity.response import ROBUST, Response
 from labctl.recording.sanity.summary import Summary
 
 #: Data sets of a position below which none can be said to disagree.
-LEAST_SETS = 6
+MIN_SETS = 6
 #: A data set disagrees when it is this many times the usual scatter off, and more than this share of the fastest rate;
 #: where its output is that of another rate of the schedule, a smaller share is enough.
 SCATTERS, GROSS_SHARE, SMALL_SHARE = 12.0, 0.05, 0.01
 #: Rates closer than this share of the fastest are one.
 SAME_RATE = 2e-3
 #: More than this share of data sets off is no longer a matter of single ones.
-MOST_SHARE = 0.25
+MAX_SHARE = 0.25
 #: The output's rate is that of the schedule when it is so many scatters, or this share of the fastest rate, from it.
 MATCH_SCATTERS, MATCH_SHARE = 4.0, 5e-3
 #: Different data sets that are reported one by one.
-MOST_TOLD = 5
+MAX_REPORTED = 5
 
 
 def check_outlying(summary: Summary, responses_by_axis: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
@@ -33,7 +33,7 @@ def check_outlying(summary: Summary, responses_by_axis: Mapping[str, Mapping[str
     for position, outputs in responses_by_axis.items():
         axis = Position.of(position).axis
         one = outputs.get(axis)
-        if one is None or not POSSIBLE[0] <= abs(one.gain) <= POSSIBLE[1] or int(one.rows.sum()) < LEAST_SETS:
+        if one is None or not POSSIBLE[0] <= abs(one.gain) <= POSSIBLE[1] or int(one.rows.sum()) < MIN_SETS:
             continue
         yield from _of_response(summary.take(one.rows), one)
 
@@ -56,12 +56,12 @@ def _of_response(sets: Summary, response: Response) -> Iterator[Finding]:
     gross = far & (np.abs(off) > GROSS_SHARE * fast)
     small = far & matches & (np.abs(off) > SMALL_SHARE * fast)
     rows = np.flatnonzero(gross | small)
-    if len(rows) > MOST_SHARE * len(rate):
+    if len(rows) > MAX_SHARE * len(rate):
         return
-    for row in rows[np.argsort(-np.abs(off[rows]))][:MOST_TOLD]:
+    for row in rows[np.argsort(-np.abs(off[rows]))][:MAX_REPORTED]:
         yield _finding(sets, response, int(row), float(meant[row]), certain=bool(gross[row] and matches[row]))
-    if len(rows) > MOST_TOLD:
-        yield _rest(sets, response, len(rows) - MOST_TOLD)
+    if len(rows) > MAX_REPORTED:
+        yield _rest(sets, response, len(rows) - MAX_REPORTED)
 
 
 def _finding(sets: Summary, response: Response, row: int, meant: float, *, certain: bool) -> Finding:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from labctl.recording.sanity.summary import Summary
 
 #: Rates that differ by less than this in all, deg/s, do not determine a gain.
-LEAST_SPAN_DPS = 1.0
+MIN_SPAN_DPS = 1.0
 #: Two data sets alone determine a gain from this difference of rates on, deg/s.
 TWO_POINT_SPAN_DPS = 20.0
 #: Data sets per column from which temperature enters, and the span of temperature, K.
-SETS_PER_COLUMN, LEAST_WARMTH_K = 3, 1.0
-ROUNDS, LEAST_RESIDUAL = 40, 1e-6
+SETS_PER_COLUMN, MIN_WARMTH_K = 3, 1.0
+ROUNDS, MIN_RESIDUAL = 40, 1e-6
 ROBUST = 1.4826
 
 
@@ -45,7 +45,7 @@ def responses(summary: Summary) -> dict[str, dict[str, Response]]:
         rows = position == there
         rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)[rows]
         span = float(np.ptp(rate))
-        if span < LEAST_SPAN_DPS or (len(rate) == 2 and span < TWO_POINT_SPAN_DPS):
+        if span < MIN_SPAN_DPS or (len(rate) == 2 and span < TWO_POINT_SPAN_DPS):
             continue
         fast = float(np.abs(rate).max())
         design = _design(rate / fast, np.asarray(summary["temperature_c"], dtype=np.float64)[rows])
@@ -63,7 +63,7 @@ def _design(share: NDArray[np.float64], temperature_c: NDArray[np.float64]) -> N
     """
     columns = [share, np.ones_like(share)]
     span = float(np.ptp(temperature_c)) if np.isfinite(temperature_c).all() else 0.0
-    if span > LEAST_WARMTH_K:
+    if span > MIN_WARMTH_K:
         u = 2.0 * (temperature_c - temperature_c.mean()) / span
         more = [u, u * share, u**2, u**3]
         columns += more[: max(len(share) // SETS_PER_COLUMN - len(columns), 0)]
@@ -90,7 +90,7 @@ def _least_absolute(
     By iteratively reweighted least squares.
     """
     weight = np.ones(len(output))
-    least = LEAST_RESIDUAL * max(float(np.abs(output).max()), 1e-9)
+    least = MIN_RESIDUAL * max(float(np.abs(output).max()), 1e-9)
     for _ in range(ROUNDS):
         root = np.sqrt(weight)
         coefficients, *_ = np.linalg.lstsq(design * root[:, None], output * root, rcond=1e-9)

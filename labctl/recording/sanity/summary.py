@@ -23,7 +23,7 @@ from labctl.recording.recording import Columns, Recording
 from labctl.recording.verification import is_marked
 
 #: Blocks of a data set between which its level is compared, and readings that one block needs.
-LEVEL_BLOCKS, LEAST_PER_BLOCK, LEAST_BLOCKS = 16, 2, 8
+LEVEL_BLOCKS, MIN_PER_BLOCK, MIN_BLOCKS = 16, 2, 8
 #: A change of level is sudden where the blocks on either side scatter by less than this many noises of a block's
 #: mean, or than this share of the change: a creeping output does not.
 STILL_NOISES, STILL_SHARE = 3.0, 0.01
@@ -67,8 +67,8 @@ def level_change(values: NDArray[np.float64], noise: float) -> Change:
 
     The block in which the change falls is left out. The first block alone is no level: a unit may creep to its rate.
     """
-    blocks = min(LEVEL_BLOCKS, len(values) // LEAST_PER_BLOCK)
-    if blocks < LEAST_BLOCKS:
+    blocks = min(LEVEL_BLOCKS, len(values) // MIN_PER_BLOCK)
+    if blocks < MIN_BLOCKS:
         return NO_CHANGE
     means = block_means(values, blocks)
     noise_of_block = noise / np.sqrt(len(values) / blocks)
@@ -95,7 +95,7 @@ def wander(values: NDArray[np.float64], temperature_c: NDArray[np.float64] | Non
 
     A cubic in time and in temperature, and decays after the start, do not count: those are drift.
     """
-    blocks = min(WANDER_BLOCKS, len(values) // LEAST_PER_BLOCK)
+    blocks = min(WANDER_BLOCKS, len(values) // MIN_PER_BLOCK)
     if blocks < WANDER_BLOCKS // 2:
         return 0.0
     means = block_means(values, blocks)

@@ -21,7 +21,7 @@ MOVED_SHARE = 0.02
 CHANGE_DPS, CHANGE_SHARE = 0.2, 0.01
 CHANGED_DPS, CHANGED_SHARE = 1.0, 0.05
 #: For means alone: a spread this many times that of the data sets at a like rate.
-SPREAD_TIMES, LEAST_PEERS = 10.0, 3
+SPREAD_TIMES, MIN_PEERS = 10.0, 3
 #: Quantisation shows in the means when its standard deviation is above this share of the step.
 SHOWN_SHARE = 0.05
 
@@ -37,7 +37,7 @@ def check_at_rest(summary: Summary) -> Iterator[Finding]:
         wander = summary.of_axis("wander", axis)
         if np.isnan(wander).all():
             continue
-        usual = float(np.nanmedian(wander[still])) if still.sum() >= LEAST_PEERS else 0.0
+        usual = float(np.nanmedian(wander[still])) if still.sum() >= MIN_PEERS else 0.0
         moving = still & (wander > max(MOVES_DPS, MOVES_SHARE * fast, MOVES_TIMES * usual))
         if moving.any():
             most = float(wander[moving].max())

@@ -29,7 +29,7 @@ BLOCK_S = 0.25
 WITHIN_S, FOLLOW_S = 60.0, 2.0
 #: A unit moves when the RMS of its rates, less those at rest, exceeds both limits: one in deg/s, and one as a multiple
 #: of its scatter at rest.
-LEAST_DPS, TIMES_SCATTER = 5.0, 10.0
+MIN_DPS, TIMES_SCATTER = 5.0, 10.0
 #: A further unit that moves more than this share of the fastest was turned too.
 ALSO_SHARE = 0.2
 
@@ -47,7 +47,7 @@ class AtRest:
     @property
     def limit_dps(self) -> float:
         """Root mean square of the rates, less those at rest, above which the unit counts as moving, deg/s."""
-        return max(LEAST_DPS, TIMES_SCATTER * self.scatter_dps)
+        return max(MIN_DPS, TIMES_SCATTER * self.scatter_dps)
 
 
 def wiggle(source: str, say: Say) -> WiggleResponse:
@@ -102,7 +102,7 @@ class _Test:
                 raise BadInput(f"{name}: {len(rates)} readings in {REST_S:g} s at rest; run `labctl bench check` first")
             mean = np.mean(rates, axis=0)
             scatter = float(np.std(rates, axis=0, ddof=1).max())
-            if scatter > LEAST_DPS:
+            if scatter > MIN_DPS:
                 raise BadInput(
                     f"{name}: the unit moved ({scatter:.2g} deg/s) during the time in which it must "
                     "be at rest; start again, and leave it at rest"

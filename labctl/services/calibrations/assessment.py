@@ -16,7 +16,7 @@ from labctl.services.standards.usage import Notices
 from labctl.store import CalibrationRecord, Store
 
 #: The least length of a reason for an override: a sentence.
-LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS = 20, 3
+MIN_REASON_CHARACTERS, MIN_REASON_WORDS = 20, 3
 
 
 def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
@@ -39,8 +39,8 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
         error=_errors(row),
         objections=objections,
         override_needed=bool(objections),
-        least_reason_characters=LEAST_REASON_CHARACTERS,
-        least_reason_words=LEAST_REASON_WORDS,
+        least_reason_characters=MIN_REASON_CHARACTERS,
+        least_reason_words=MIN_REASON_WORDS,
         due_days=due_days,
         due_from=due_from,
     )

@@ -16,7 +16,7 @@ from labctl.answers.certification import (
     RevokeRequest,
 )
 from labctl.errors import BadInput, CertificationRefused
-from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
+from labctl.services.calibrations.assessment import MIN_REASON_CHARACTERS, MIN_REASON_WORDS, assess
 from labctl.services.calibrations.due import interval_days
 from labctl.services.calibrations.fetch_log import fetched_by
 from labctl.services.calibrations.release import ask_for_release, key_of_person, needs_second_person, waiting_request
@@ -144,16 +144,16 @@ def refusal(known: AssessmentResponse) -> str:
     return (
         f"certification of version {known.version} of {known.serial} is refused: {objections}{more}. To do: {todo}. "
         "To certify it nevertheless:"
-        f" --override (override: true), with a reason of at least {LEAST_REASON_CHARACTERS} "
-        f"characters and {LEAST_REASON_WORDS} words"
+        f" --override (override: true), with a reason of at least {MIN_REASON_CHARACTERS} "
+        f"characters and {MIN_REASON_WORDS} words"
     )
 
 
 def _refuse_short(reason: str) -> None:
     """Raise BadInput for a reason that is no sentence."""
     words = reason.split()
-    if len(words) < LEAST_REASON_WORDS or len(" ".join(words)) < LEAST_REASON_CHARACTERS:
+    if len(words) < MIN_REASON_WORDS or len(" ".join(words)) < MIN_REASON_CHARACTERS:
         raise BadInput(
             f"--reason {reason!r} is too short for an override: say in a sentence of at least "
-            f"{LEAST_REASON_CHARACTERS} characters and {LEAST_REASON_WORDS} words why this version is used nevertheless"
+            f"{MIN_REASON_CHARACTERS} characters and {MIN_REASON_WORDS} words why this version is used nevertheless"
         )

@@ -19,7 +19,7 @@ ANONYMOUS = "anonymous"
 #: How well the time of the last fetch is known when a service is killed.
 LAST_KNOWN_TO = timedelta(hours=1)
 #: Keys and versions in memory; one of more is written at each fetch.
-MOST_KNOWN = 10_000
+MAX_CACHED = 10_000
 
 _Key = tuple[str, int, str]
 
@@ -62,7 +62,7 @@ class FetchLog:
                 get_logger().warning("fetches.not_written", said=str(error))
                 return
             with self._lock:
-                if len(self._written) + len(rows) > MOST_KNOWN:
+                if len(self._written) + len(rows) > MAX_CACHED:
                     self._written.clear()
                 self._written.update((key, row.last_at) for key, row in rows.items())
         finally:
@@ -73,7 +73,7 @@ class FetchLog:
             for key, row in rows.items():
                 if (later := self._pending.get(key)) is not None:
                     self._pending[key] = FetchRow(*key, row.first_at, later.last_at)
-                elif len(self._pending) < MOST_KNOWN:
+                elif len(self._pending) < MAX_CACHED:
                     self._pending[key] = row
 
 

@@ -25,7 +25,7 @@ from labctl.services.recordings.loading import newest_row
 from labctl.store import Store
 
 #: Points of a course that is sent.
-MOST_POINTS = 2000
+MAX_POINTS = 2000
 TABLES = frozenset({".csv", ".parquet"})
 
 
@@ -138,7 +138,7 @@ def _follow(
         before = float(t_s[row])
     seconds = float(t_s[moving[-1]] - t_s[moving[0]]) if len(moving) else 0.0
     shown_rows = (
-        moving[np.unique(np.linspace(0, len(moving) - 1, min(len(moving), MOST_POINTS)).astype(int))]
+        moving[np.unique(np.linspace(0, len(moving) - 1, min(len(moving), MAX_POINTS)).astype(int))]
         if len(moving)
         else moving
     )

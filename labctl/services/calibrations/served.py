@@ -16,7 +16,7 @@ from labctl.errors import BadInput, NotFound
 from labctl.exports import Loss, format_named, written_calibration
 from labctl.exports.noise.figures import DPS_RTHZ_PER_DEG_RTH, DPS_S_RTHZ_PER_DEG_H_RTH, RATE, WALK, WHITE
 from labctl.services.calibrations.certification import version_in_force
-from labctl.services.recordings.allan import MOST_RECORDINGS, noise_of_recordings
+from labctl.services.recordings.allan import MAX_RECORDINGS, noise_of_recordings
 from labctl.store import ServedCalibration, Store
 from labctl.withdrawal import HEADER, Withdrawn, quoted
 
@@ -64,7 +64,7 @@ def _noise(store: Store, document: bytes, wanted: Mapping[str, str]) -> dict[str
         rows = store.recordings.of_unit(calibration.serial)
     except NotFound:  # a file of a unit that is not in this database
         return {}
-    newest = sorted(rows, key=lambda row: row.id, reverse=True)[:MOST_RECORDINGS]
+    newest = sorted(rows, key=lambda row: row.id, reverse=True)[:MAX_RECORDINGS]
     answer = noise_of_recordings(store, newest)
     if answer is None:
         return {}
@@ -91,7 +91,7 @@ def noise_options(axes: Sequence[AllanJson]) -> dict[str, str]:
 #: State of a version that was never certified.
 NOT_CERTIFIED: Final = "not-certified"
 #: Calibration files with their certifications in memory; one has some 20 kB.
-MOST_FILES = 256
+MAX_FILES = 256
 
 
 @dataclass(frozen=True)
@@ -205,4 +205,4 @@ def _certification(served: ServedCalibration) -> Certification | None:
 
 
 #: Files of certified versions, with their hashes, as they were served last.
-_certified = lru_cache(maxsize=MOST_FILES)(with_certification)
+_certified = lru_cache(maxsize=MAX_FILES)(with_certification)

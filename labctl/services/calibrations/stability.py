@@ -21,9 +21,9 @@ from labctl.services.calibrations.type_drift import TypeDrift, drift_of_type
 from labctl.store import CalibrationRecord, CertifiedVersion, Store
 
 #: Calibrations of a unit closer than this say nothing of the years: their difference is that of two measurements.
-LEAST_APART = timedelta(days=14)
+MIN_INTERVAL = timedelta(days=14)
 #: Intervals at each place from which on a unit's own history suffices, whatever is known of its type.
-LEAST_INTERVALS = 2
+MIN_INTERVALS = 2
 NO_HISTORY = "this item has no earlier certified calibration of other measurements, two weeks apart or more"
 NOT_COMPARABLE = "its earlier calibrations do not cover all of the range, or have other axes or a model that needs more"
 
@@ -72,8 +72,8 @@ def stability_of(store: Store, serial: str, version: int, about: About = "own ax
     calibration = read_calibration(store.calibrations.get(serial, version).document)
     assert last is not None
     grid = ErrorGrid.of(calibration, about)
-    own = _own(store, versions_apart(certified, last, LEAST_APART), grid)
-    if isinstance(own, Stability) and own.intervals >= LEAST_INTERVALS:
+    own = _own(store, versions_apart(certified, last, MIN_INTERVAL), grid)
+    if isinstance(own, Stability) and own.intervals >= MIN_INTERVALS:
         return own
     drift = drift_of_type(store, last, calibration, grid)
     if isinstance(drift, str):

@@ -12,17 +12,17 @@ import numpy as np
 from instruments.standards import SIMULATED
 from labctl.calibration import Calibration
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.uncertainty.drift_prediction import LEAST_UNITS, DriftPrediction, of_type
+from labctl.fitting.uncertainty.drift_prediction import MIN_UNITS, DriftPrediction, of_type
 from labctl.services.benches.bench_clock import has_simulated_instrument
 from labctl.services.calibrations.certified_intervals import calibrations_of, rates_of, versions_apart
 from labctl.services.calibrations.error_grid import ErrorGrid
 from labctl.store import CertifiedVersion, Store
 
 #: Calibrations of other units closer than this say more of two measurements than of the years.
-LEAST_APART = timedelta(days=90)
+MIN_INTERVAL = timedelta(days=90)
 #: Units of a model that are evaluated, those first that were certified last, and versions of each, the newest: what a
 #: certificate takes does not grow with the fleet.
-MOST_UNITS, MOST_VERSIONS = 40, 5
+MAX_UNITS, MAX_VERSIONS = 40, 5
 NO_MODEL = "the model of the item is not stated, so that it has no type"
 NEVER = datetime.min.replace(tzinfo=UTC)
 TOO_FEW = (
@@ -61,9 +61,9 @@ def drift_of_type(store: Store, own: CertifiedVersion, calibration: Calibration,
     every = _histories(store, own, calibration, model, grid)
     grids = [each for each in every if np.isfinite(each.rates_dps).any()]
     units = int(np.min(np.sum([np.isfinite(each.rates_dps).any(axis=0) for each in grids], axis=0))) if grids else 0
-    if units < LEAST_UNITS:
+    if units < MIN_UNITS:
         noun = "unit has" if units == 1 else "units have"
-        return TOO_FEW.format(model=model, units=units or "no", noun=noun, days=LEAST_APART.days, least=LEAST_UNITS)
+        return TOO_FEW.format(model=model, units=units or "no", noun=noun, days=MIN_INTERVAL.days, least=MIN_UNITS)
     most = max(len(each.years) for each in grids)
     rates = np.full((len(grids), most, grids[0].rates_dps.shape[1]), np.nan)
     years = np.zeros((len(grids), most))
@@ -98,8 +98,8 @@ def _chosen(versions: Sequence[CertifiedVersion]) -> Iterator[list[CertifiedVers
         if not of_unit:
             continue
         last = max(of_unit, key=lambda each: (each.measured_at or NEVER, each.version))
-        apart = versions_apart(of_unit, last, LEAST_APART)[-MOST_VERSIONS:]
-        if len(apart) > 1 and units < MOST_UNITS:
+        apart = versions_apart(of_unit, last, MIN_INTERVAL)[-MAX_VERSIONS:]
+        if len(apart) > 1 and units < MAX_UNITS:
             units += 1
             yield apart
 

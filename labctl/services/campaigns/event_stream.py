@@ -16,7 +16,7 @@ HEARTBEAT_S = 10.0
 #: What changes all the time, as a unit's output does, is read this often.
 LIVE_S = 1.0
 #: Changes within this time are one to a client: a bench in virtual time reports hundreds a second.
-LEAST_S = 0.05
+MIN_S = 0.05
 #: What one client received counts for the others this long, unless the bench rings.
 FRESH_S = 0.5
 
@@ -50,7 +50,7 @@ class StatusCache:
 
 
 class Bell:
-    """Rung by the bench's thread, waited for by one client: it rings LEAST_S after the first change."""
+    """Rung by the bench's thread, waited for by one client: it rings MIN_S after the first change."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -61,7 +61,7 @@ class Bell:
         """Note that something has changed. Raises RuntimeError where the client's event loop has ended."""
         if not self._rung:
             self._rung = True
-            self._loop.call_soon_threadsafe(self._loop.call_later, LEAST_S, self._event.set)
+            self._loop.call_soon_threadsafe(self._loop.call_later, MIN_S, self._event.set)
 
     def clear(self) -> None:
         """Ring again at the next change: what has changed until now is about to be read."""
@@ -95,7 +95,7 @@ class CampaignEventStream:
         that the stream lives, until the campaign has ended and its drafts are made, or it is `over` for another reason.
 
         A client that reads slowly gets the newest status next, never a queue of old ones; the bench only rings a bell,
-        at most every LEAST_S.
+        at most every MIN_S.
         """
         bell = Bell()
         last_sent: CampaignResponse | None = None

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: The form of the signature over a file itself.
 OWN = {"pdf": "PAdES", "xml": "XAdES"}
 #: A number that a laboratory can have has at most so many characters.
-MOST_DIGITS = 100
+MAX_DIGITS = 100
 #: Where a file states its number: in the metadata of a PDF, which are readable in PDF/A, and in a DCC. The last counts.
 _NUMBER = {
     "pdf": re.compile(rb"<rdf:li[^>]*>" + TITLE.encode() + rb" ([^<]+)</rdf:li>"),
@@ -116,7 +116,7 @@ def _number_in(content: bytes, form: CertificateFormat) -> str | None:
         else:
             numbers = _NUMBER[form].findall(content)
             number = html.unescape(numbers[-1].decode()) if numbers else ""
-        return number if 0 < len(number) <= MOST_DIGITS and number.isprintable() else None
+        return number if 0 < len(number) <= MAX_DIGITS and number.isprintable() else None
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
 

@@ -35,7 +35,7 @@ from labctl.services.recordings.loading import motion_of, newest_row, source_of
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 #: Rows of one axis that a picture of a profile takes.
-MOST_ROWS = 6000
+MAX_ROWS = 6000
 #: axis -> (m,) corrected minus true rate, deg/s; None without a version.
 Errors = Mapping[str, Array] | None
 _Rows = dict[str, list[Any]]
@@ -91,7 +91,7 @@ def turn_columns(data: FitData, errors: Errors) -> TurnColumns:
 
 
 def profile_columns(data: FitData, errors: Errors, responses: Mapping[str, Response]) -> ProfileColumns:
-    """Return the windows of a profile, axis by axis, at most `MOST_ROWS` of each; `responses` are a version's."""
+    """Return the windows of a profile, axis by axis, at most `MAX_ROWS` of each; `responses` are a version's."""
     rows = picked(len(data))
     m = len(rows)
 
@@ -119,8 +119,8 @@ def _joined(data: FitData, errors: Errors, of: Callable[[str], _Rows]) -> _Rows:
 
 
 def picked(n: int) -> NDArray[np.int64]:
-    """Return the rows that are drawn: all of n, or `MOST_ROWS` of them evenly."""
-    return np.unique(np.linspace(0, n - 1, min(n, MOST_ROWS)).round().astype(np.int64))
+    """Return the rows that are drawn: all of n, or `MAX_ROWS` of them evenly."""
+    return np.unique(np.linspace(0, n - 1, min(n, MAX_ROWS)).round().astype(np.int64))
 
 
 def _left(errors: Errors, axis: str) -> Array | None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from labctl.answers.comparison import ComparisonColumns, ComparisonResponse, ModelLines
 from labctl.calibration import Calibration, read_calibration
-from labctl.error_per_turn import AT_REST_DPS, LEAST_RATE_DPS, bias_at_rest, turn_errors
+from labctl.error_per_turn import AT_REST_DPS, MIN_RATE_DPS, bias_at_rest, turn_errors
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.data.earth import up_rate_dps
@@ -33,7 +33,7 @@ from labctl.store import Store
 #: Points of a line, besides those at the measured rates or temperatures themselves.
 POINTS = 61
 #: Lines of one panel; of more levels these many, evenly picked.
-MOST_LINES = 24
+MAX_LINES = 24
 DIGITS = 8
 
 
@@ -75,9 +75,9 @@ def lines_over(
 
 def _picked(levels: Array, keep: float | None = None) -> Array:
     """Return all levels, or of many some evenly picked ones, and that nearest to `keep`."""
-    if len(levels) <= MOST_LINES:
+    if len(levels) <= MAX_LINES:
         return levels
-    rows = np.linspace(0, len(levels) - 1, MOST_LINES // 2).round().astype(np.int64)
+    rows = np.linspace(0, len(levels) - 1, MAX_LINES // 2).round().astype(np.int64)
     if keep is not None:
         rows = np.append(rows, np.argmin(np.abs(levels - keep)))
     return levels[np.unique(rows)]
@@ -134,7 +134,7 @@ def compare_version(
         serial=serial, version=version, recording=measured.row.id, recordings=list(measured.recordings),
         fitted_to=row.recording, source=_source(calibration, row.recordings, measured),
         held=held, left_out=list(calibration.document["left_out"]),
-        least_turn_rate_dps=LEAST_RATE_DPS, at_rest_dps=AT_REST_DPS,
+        least_turn_rate_dps=MIN_RATE_DPS, at_rest_dps=AT_REST_DPS,
         columns=_columns(data, errors, measured.row.id), over_rate=over_rate, over_temperature=over_temperature,
     )  # fmt: skip
 

@@ -29,7 +29,7 @@ from procedures.recipe.recipe import Recipe
 #: At most this many rivals are separated from the leader, and this many experiments are shown.
 PAIRS, SHOWN = 6, 4
 #: More separation (chi2) than this does not count: the answer is as good as certain.
-MOST_CHI2 = 40.0
+MAX_CHI2 = 40.0
 
 
 def experiments_for(store: Store, campaign: int | None, criticism: Criticism) -> list[Experiment]:
@@ -82,7 +82,7 @@ def _experiment(
         "toml": tomli_w.dumps(document),
         "power": separation_power(least),
         "hours": hours,
-        "per_hour": min(least, MOST_CHI2) / hours,
+        "per_hour": min(least, MAX_CHI2) / hours,
     }
 
 

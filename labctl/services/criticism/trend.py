@@ -13,7 +13,7 @@ from labctl.calibration import read_calibration
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.trend_line import LEAST_POINTS, TrendLine, trend_line
+from labctl.fitting.numeric.trend_line import MIN_POINTS, TrendLine, trend_line
 from labctl.recording.info import GIVE_DATE, measured_at, ordered_at
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.measurements import Measurements
@@ -28,7 +28,7 @@ from labctl.services.criticism.versions import version_of
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 #: Recordings that begin less than this after the end of an earlier one are of one occasion.
-LEAST_APART = timedelta(days=1)
+MIN_INTERVAL = timedelta(days=1)
 
 
 def in_time(rows: Iterable[RecordingRow]) -> tuple[list[RecordingRow], list[RecordingRow]]:
@@ -43,7 +43,7 @@ def occasions_of(store: Store, measured: Sequence[RecordingRow]) -> list[list[in
     reached = None
     for row in measured:
         begun = ordered_at(row.info)
-        if reached is None or begun >= reached + LEAST_APART:
+        if reached is None or begun >= reached + MIN_INTERVAL:
             occasions.append([])
         occasions[-1].append(row.id)
         ends = [data_set.t_until_s for data_set in store.recordings.data_sets(row.id) if data_set.t_until_s is not None]
@@ -56,7 +56,7 @@ def occasions_text(occasions: Sequence[Sequence[int]], *, drifted: bool) -> Iter
     """Yield why recordings of one occasion show no drift."""
     if len(occasions) == 1 and len(occasions[0]) > 1:
         yield (
-            f"Recordings {_numbers(occasions[0])} overlap in time or are less than {LEAST_APART.days * 24} h apart: "
+            f"Recordings {_numbers(occasions[0])} overlap in time or are less than {MIN_INTERVAL.days * 24} h apart: "
             "they are one occasion, and show no drift over the years; record the unit again on another day."
         )
     elif len(occasions) > 1 and not drifted:
@@ -79,7 +79,7 @@ def _numbers(numbers: Sequence[int]) -> str:
 
 YEAR = timedelta(days=365.25)
 #: Data sets at less different rates than this show no scale factor.
-LEAST_RATES = 2
+MIN_RATES = 2
 #: Points of a drawn line; it goes on to this many times the span of the recordings, beyond the time at which the limit
 #: is reached by this factor, and no farther than this many spans.
 DRAWN, BEYOND, REACHED, FARTHEST = 61, 1.5, 1.1, 4.0
@@ -161,7 +161,7 @@ def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measureme
 
 def line_left(error_dps: Array, rate_dps: Array) -> AxisPoint:
     """Return what is left of bias and scale factor on one axis: a straight line over the rate, by least squares."""
-    turned = len(np.unique(np.round(rate_dps, 3))) >= LEAST_RATES
+    turned = len(np.unique(np.round(rate_dps, 3))) >= MIN_RATES
     columns = np.column_stack([np.ones(len(rate_dps)), rate_dps] if turned else [np.ones(len(rate_dps))])
     coefficients, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
     residual = error_dps - columns @ coefficients
@@ -250,7 +250,7 @@ def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
         text = f"Axis {drift.axis}, {drift.what}" if drift.axis != "all" else "RMS error over all axes"
         if drift.u is None or drift.low is None or drift.high is None:
             figure = f"{text}: {drift.per_year:.2g} {drift.unit}"
-            yield f"{figure} from two recordings; its uncertainty needs {LEAST_POINTS} recordings."
+            yield f"{figure} from two recordings; its uncertainty needs {MIN_POINTS} recordings."
         else:
             is_drift = "drifts by" if drift.significant else "no drift beyond repeatability:"
             yield f"{text}: {is_drift} {drift.per_year:.2g} {drift.unit} (95 %: {drift.low:.2g} to {drift.high:.2g})."

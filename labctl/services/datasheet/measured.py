@@ -32,7 +32,7 @@ from labctl.recording.positions import Position, axis_in
 #: Figures at one temperature are at the level nearest to this, deg C.
 USUAL_C = 25.0
 #: Different rates of the table that a line takes.
-LEAST_RATES = 2
+MIN_RATES = 2
 PAIRS = ("xy", "xz", "yz")
 
 
@@ -77,7 +77,7 @@ class _Columns:
 
         The Earth's rate differs from position to position: it is no rate that a line could be drawn over.
         """
-        if different_rates(self.table_dps[rows]) < LEAST_RATES:
+        if different_rates(self.table_dps[rows]) < MIN_RATES:
             return None
         return straight_line(self.data.true_rate_dps(about)[rows], self.data.outputs[axis][rows])
 
@@ -125,7 +125,7 @@ def _of_rates(seen: _Columns, axis: str) -> Iterator[Figure]:
     yield Figure("scale_factor", axis, _with(line.scale_factor, standards), here)
     yield Figure("bias", axis, line.bias_dps, here)
     rate = seen.data.true_rate_dps(axis)[here]
-    if different_rates(seen.table_dps[here]) > LEAST_RATES:
+    if different_rates(seen.table_dps[here]) > MIN_RATES:
         white = seen.data.white_var
         u = None if white is None else np.sqrt(white[axis][here])
         yield Figure("scale_factor_nonlinearity", axis, nonlinearity_ppm(line, float(np.max(np.abs(rate))), u), here)

@@ -18,7 +18,7 @@ from labctl.progress import report_stage
 from labctl.recording import RecordingInfo
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.datasheet.measured import Figure, figures_of
-from labctl.services.recordings.allan import MOST_RECORDINGS, noise_of_recordings
+from labctl.services.recordings.allan import MAX_RECORDINGS, noise_of_recordings
 from labctl.services.recordings.loading import points_of
 from labctl.store import RecordingRow, Store, Unit
 
@@ -102,7 +102,7 @@ Key = tuple[str, str, str]  #: id, axis, axis of the force
 def datasheet(store: Store, serial: str) -> DatasheetResponse:
     """Return the data sheet of a unit, from its own recordings. Raises NotFound, BadInput for a unit without any."""
     unit = store.units.get(serial)
-    rows = sorted(store.recordings.of_unit(unit.serial), key=lambda row: row.id, reverse=True)[:MOST_RECORDINGS]
+    rows = sorted(store.recordings.of_unit(unit.serial), key=lambda row: row.id, reverse=True)[:MAX_RECORDINGS]
     if not rows:
         raise BadInput(f"unit {unit.serial} has no recording: import one, or run a campaign")
     compute(UNNAMED)

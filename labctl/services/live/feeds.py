@@ -10,7 +10,7 @@ from websockets.exceptions import ConnectionClosed, InvalidURI, WebSocketExcepti
 from websockets.sync.client import ClientConnection, connect
 
 from labctl.errors import BadInput
-from labctl.services.live.line_feed import MOST_BYTES, DescriptorFeed, LineFeed, SocketFeed, TcpFeed
+from labctl.services.live.line_feed import MAX_BYTES, DescriptorFeed, LineFeed, SocketFeed, TcpFeed
 
 # Messages of a ROS topic by rosbridge: JSON over WebSocket (protocol v2), one line for each message.
 #
@@ -20,7 +20,7 @@ SCHEMES = ("ws://", "wss://")
 #: So long connecting, and closing, may take, s.
 CONNECT_WITHIN_S, CLOSE_WITHIN_S = 10.0, 1.0
 #: Messages that one call takes at most: more waits for the next.
-MOST_MESSAGES = 4096
+MAX_MESSAGES = 4096
 #: An error of the server is quoted up to here.
 QUOTED = 200
 
@@ -56,7 +56,7 @@ class RosbridgeFeed:
         """Return the messages that have arrived, one a line; None at the end. Raises BadInput for its error."""
         messages: list[bytes] = []
         try:
-            while self._connection is not None and len(messages) < MOST_MESSAGES:
+            while self._connection is not None and len(messages) < MAX_MESSAGES:
                 if line := self._line(self._connection.recv(timeout=0)):
                     messages.append(line)
         except TimeoutError:  # nothing more has arrived
@@ -126,7 +126,7 @@ class UdpFeed(SocketFeed):
     def take(self) -> bytes | None:
         """Return the lines that have arrived, each whole: a datagram without a line end is a line. It has no end."""
         datagram = b""
-        while self._socket is not None and len(datagram) < MOST_BYTES:
+        while self._socket is not None and len(datagram) < MAX_BYTES:
             try:
                 data, sender = self._socket.recvfrom(LARGEST)
                 if not self._is_known:

@@ -11,7 +11,7 @@ from typing import Protocol
 from labctl.errors import BadInput
 
 #: Bytes that one call takes at most: more waits for the next.
-MOST_BYTES = 1 << 20
+MAX_BYTES = 1 << 20
 CONNECT_WITHIN_S = 10.0
 TCP = "tcp://"
 
@@ -53,7 +53,7 @@ class DescriptorFeed:
 
     def take(self) -> bytes | None:
         found = b""
-        while len(found) < MOST_BYTES and select.select([self._descriptor], [], [], 0)[0]:
+        while len(found) < MAX_BYTES and select.select([self._descriptor], [], [], 0)[0]:
             data = os.read(self._descriptor, 1 << 16)
             if not data:
                 return found or None
@@ -106,7 +106,7 @@ class TcpFeed(SocketFeed):
 
     def take(self) -> bytes | None:
         found = b""
-        while self._socket is not None and len(found) < MOST_BYTES:
+        while self._socket is not None and len(found) < MAX_BYTES:
             try:
                 data = self._socket.recv(1 << 16)
             except BlockingIOError:

@@ -16,7 +16,7 @@ from labctl.services.live.line_feed import LineFeed
 from labctl.services.live.source import Block, StreamEnded
 
 #: Times further apart than this many of their usual spacings, which so many steps show, have a reading lost between.
-GAP, LEAST_STEPS = 1.5, 5
+GAP, MIN_STEPS = 1.5, 5
 #: A stream without a reading for so long has ended, s; before the first it may take longer to begin.
 SILENCE_S, FIRST_WITHIN_S = 10.0, 60.0
 
@@ -76,7 +76,7 @@ class LineSource:
             return 0
         t_s = np.concatenate([self._newest_s, np.asarray(columns["t_s"], dtype=np.float64)])
         self._newest_s, steps = t_s[-1:], np.diff(t_s)
-        self._spacing_s = self._spacing_s or (float(np.median(steps)) if len(steps) >= LEAST_STEPS else 0.0)
+        self._spacing_s = self._spacing_s or (float(np.median(steps)) if len(steps) >= MIN_STEPS else 0.0)
         if self._spacing_s <= 0:
             return 0
         return int(np.sum(np.rint(steps[steps > GAP * self._spacing_s] / self._spacing_s) - 1))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from labctl.store import Store
 
 #: Of how many campaigns, the newest ones: a bench changes.
-MOST_CAMPAIGNS = 20
+MAX_CAMPAIGNS = 20
 KINDS = ("home", "check_home", "mount", "move_chamber")
 _STEP: TypeAdapter[Home | CheckHome | Mount | MoveChamber] = TypeAdapter(Home | CheckHome | Mount | MoveChamber)
 
@@ -33,7 +33,7 @@ def times_on_bench(store: Store | None, bench: BenchFile) -> EarlierTimes | None
         return None
     done: list[DoneStep] = []
     with suppress(StoreError):
-        for row in store.campaigns.done_steps(bench.name, KINDS, MOST_CAMPAIGNS):
+        for row in store.campaigns.done_steps(bench.name, KINDS, MAX_CAMPAIGNS):
             step = _STEP.validate_python(row.body)
             if _is_same(row.bench, bench, "chamber" if isinstance(step, MoveChamber) else "table"):
                 done.append(DoneStep(row.campaign, cast(Step, step), row.took_s))

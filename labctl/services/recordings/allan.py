@@ -9,7 +9,7 @@ import numpy as np
 from labctl.answers.recordings import AllanResponse
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.static_record import StaticRecord, static_record
-from labctl.fitting.numeric.allan import LEAST_READINGS, allan
+from labctl.fitting.numeric.allan import MIN_READINGS, allan
 from labctl.progress import report_stage
 from labctl.recording import Columns, Recording, RecordingInfo
 from labctl.recording.points import temperature_of
@@ -17,7 +17,7 @@ from labctl.services.cache import cached
 from labctl.store import RecordingRow, Store
 
 #: Of a unit with many recordings the newest are used.
-MOST_RECORDINGS = 32
+MAX_RECORDINGS = 32
 #: What a static record is looked for in, beside the outputs.
 NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "temperature_c", "chamber_c", "valid")
 
@@ -86,9 +86,9 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
     n = len(recording)
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(n, dtype=bool)
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]
-    if len(t_s) < LEAST_READINGS:
+    if len(t_s) < MIN_READINGS:
         raise NotEnoughData(
-            f"data set {dataset} has {len(t_s)} valid readings; name a data set with {LEAST_READINGS} or more"
+            f"data set {dataset} has {len(t_s)} valid readings; name a data set with {MIN_READINGS} or more"
         )
     period_s = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
     deviations = {str(axis): allan(recording.gyro_dps(axis)[valid], period_s) for axis in recording.info.axes}
@@ -150,6 +150,6 @@ def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
     aside = at_rest - len(still)
     beside = f" beside the {aside} data sets at rest that were measured to verify a calibration" if aside else ""
     raise NotEnoughData(
-        f"recording {recording} has no section of {LEAST_READINGS} readings at rest and at one temperature{beside}; "
+        f"recording {recording} has no section of {MIN_READINGS} readings at rest and at one temperature{beside}; "
         "name a data set, or record the unit at rest"
     )

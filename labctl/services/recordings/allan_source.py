@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labctl.answers.recordings import AllanResponse
 from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.fitting.data.static_record import ONE_TEMPERATURE_K, StaticRecord, static_record, stretch_of
-from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, allan
+from labctl.fitting.numeric.allan import MIN_READINGS, Allan, allan
 from labctl.recording import Recording, RecordingInfo, read_recording
 from labctl.recording.column_map import ColumnMap
 from labctl.recording.data_files import read_table
@@ -83,7 +83,7 @@ def _of_recording(recording: Recording, column: str | None, number: int | None) 
         record = static_record(recording)
         if record is None:
             raise NotEnoughData(
-                f"{recording.info.serial}: no {LEAST_READINGS} successive readings are at rest, at one temperature "
+                f"{recording.info.serial}: no {MIN_READINGS} successive readings are at rest, at one temperature "
                 "and without a gap; record the unit at rest"
             )
         return _answer(record, number, dict(recording.info.datasheet))
@@ -124,7 +124,7 @@ def _of_course(what: str, courses: dict[str, NDArray[np.float64]], columns: Colu
     if rows is None:
         raise NotEnoughData(
             f"{what}: no section at rest, at one temperature (within {ONE_TEMPERATURE_K:g} K) and without a gap has "
-            f"{LEAST_READINGS} readings (it has {len(t_s)} readings in all); record the unit at rest for longer"
+            f"{MIN_READINGS} readings (it has {len(t_s)} readings in all); record the unit at rest for longer"
         )
     n = rows.stop - rows.start
     period_s = float((t_s[rows][-1] - t_s[rows][0]) / (n - 1))

@@ -16,7 +16,7 @@ from labctl.services.cache import FileCache
 from labctl.store import Store
 
 #: Bins of a data set: so many, or one for this many readings where it is far longer than others, up to a limit.
-LEAST_BINS, READINGS_A_BIN, MOST_BINS = 64, 128, 4096
+MIN_BINS, READINGS_A_BIN, MAX_BINS = 64, 128, 4096
 #: A file has some 24 bytes a bin, and a recording up to a dozen files.
 ENVELOPES = FileCache("envelopes", ".npz", most=200)
 #: Columns that are no measured channel over time.
@@ -38,7 +38,7 @@ class Envelope:
 
 def bins_of(readings: int) -> int:
     """Return how many bins a data set of so many readings has."""
-    return min(max(LEAST_BINS, readings // READINGS_A_BIN), MOST_BINS, readings)
+    return min(max(MIN_BINS, readings // READINGS_A_BIN), MAX_BINS, readings)
 
 
 def courses_of(columns: dict[str, NDArray[np.generic]]) -> list[str]:

@@ -18,7 +18,7 @@ from labctl.recording.column_map import ColumnMap, FileKeys
 from labctl.recording.data_files.damaged_files import refuse_computer_errors
 from labctl.recording.importer import Importer, TableImporter
 from labctl.recording.logs.layout import layout_of
-from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_large, refuse_other
+from labctl.recording.logs.recognition import MAX_TEXT_BYTES, head_of, refuse_large, refuse_other
 from labctl.recording.raw_table import RawTable
 from labctl.recording.sanity.readings import without
 from labctl.services.recordings.logs import Accept, MappedFile, given_layout, mapped_file
@@ -97,7 +97,7 @@ def surest(path: Path) -> str:
     sure = {name: _confidence(name, importer, path) for name, importer in IMPORTERS.all().items()}
     best = max(sure.values(), default=0.0)
     if best <= 0.0 and path.is_file():
-        refuse_large(path, MOST_TEXT_BYTES)
+        refuse_large(path, MAX_TEXT_BYTES)
         refuse_other(path, head_of(path))
         layout_of(path, head_of(path), FileKeys())  # says why it is no text with columns
     names = [name for name, confidence in sure.items() if confidence == best]

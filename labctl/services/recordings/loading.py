@@ -21,7 +21,7 @@ from labctl.services.recordings.warnings import warning_of
 from labctl.store import RecordingRow, Store
 
 #: Recordings that are fitted together, at most.
-MOST_TOGETHER = 32
+MAX_TOGETHER = 32
 
 
 def points_of(
@@ -123,9 +123,9 @@ def chosen_rows(
             f"recording {recording} and recordings {', '.join(map(str, numbers))} were both requested: give "
             "one of the two"
         )
-    if len(numbers) > MOST_TOGETHER:
+    if len(numbers) > MAX_TOGETHER:
         raise BadInput(
-            f"{len(numbers)} recordings were given, but at most {MOST_TOGETHER} can be fitted together; name fewer"
+            f"{len(numbers)} recordings were given, but at most {MAX_TOGETHER} can be fitted together; name fewer"
         )
     if len(numbers) < 2:
         newest = numbers[0] if numbers else recording

@@ -24,7 +24,7 @@ from labctl.services.recordings.warnings import warning_of
 from labctl.store import Store
 
 #: Bins of a trace, and columns that have one.
-BINS, MOST_TRACES = 300, 24
+BINS, MAX_TRACES = 300, 24
 #: Columns of a recording that a log does not have: made by the import, or belonging to means and coefficients.
 _NOT_OF_LOGS = ("dataset", "scale_factor", "offset", "axis", "n")
 
@@ -96,7 +96,7 @@ def _traces(table: RawTable, mapped: MappedFile) -> list[LogTrace]:
     if mapped.log is not None and "t_s" in mapped.log.recording.columns:
         t_s = np.asarray(mapped.log.recording.columns["t_s"], dtype=np.float64)
         x = t_s if len(t_s) == n else x
-    numbers = [column for column in table.columns.values() if column.is_number][:MOST_TRACES]
+    numbers = [column for column in table.columns.values() if column.is_number][:MAX_TRACES]
     starts = np.unique(np.linspace(0, n, BINS + 1).astype(np.int64)[:-1])
     middle = x[np.minimum(starts + np.diff(np.append(starts, n)) // 2, n - 1)]
     return [

@@ -15,7 +15,7 @@ from labctl.services.recordings.envelopes import Array, Envelope, bins_of, cours
 from labctl.store import DataSetRow, Store
 
 #: More readings than this are not read for one picture; their envelope is drawn.
-MOST_RAW = 2_000_000
+MAX_RAW = 2_000_000
 
 
 def trace(
@@ -95,7 +95,7 @@ def _is_few(inside: list[DataSetRow], low: float | None, high: float | None, poi
             lasted = max(row.t_until_s - row.t_from_s, 1e-9)
             share = min(max((min(high, row.t_until_s) - max(low, row.t_from_s)) / lasted, 0.0), 1.0)
         bins += share * bins_of(row.n)
-    return bins < points and sum(row.n for row in inside) <= MOST_RAW
+    return bins < points and sum(row.n for row in inside) <= MAX_RAW
 
 
 def _readings(store: Store, recording: int, channel: str, rows: list[DataSetRow]) -> Envelope:

@@ -12,7 +12,7 @@ from labctl.services.reproduction.findings import Findings, Missing, Value
 from labctl.services.reproduction.ojeda_surface import Surface
 
 #: Data sets within one kelvin are of one temperature, and so many rates draw a line over the rate.
-LEVEL_C, LEAST_RATES = 1.0, 5
+LEVEL_C, MIN_RATES = 1.0, 5
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ def lines_of(surface: Surface) -> Lines | None:
     for number in np.unique(level):
         here = level == number
         rate, error = surface.rate_dps[here], surface.raw_dps[here]
-        if len(np.unique(np.round(rate))) < LEAST_RATES:
+        if len(np.unique(np.round(rate))) < MIN_RATES:
             continue
         slope, bias = np.polyfit(rate, error, 1)
         residual_dps = float(np.sqrt(np.mean((error - slope * rate - bias) ** 2)))

@@ -17,7 +17,7 @@ from procedures.planning.plan import Plan
 #: Readings per second at which a plan is walked through: its channels are slow.
 WALK_HZ = 1.0
 #: Readings of the shortest data set, at least: fewer do not show how large their white noise is.
-LEAST_READINGS = 10
+MIN_READINGS = 10
 SEED = 1
 #: A file has up to a megabyte for each 10,000 s of readings.
 WALKS = FileCache("walks", ".npz", most=60)
@@ -40,7 +40,7 @@ def _walk(plan: Plan, bench: BenchFile) -> Recording:
 
 def _walk_hz(plan: Plan) -> float:
     shortest_s = min((step.duration_s for step in plan.steps if step.kind == "acquire"), default=np.inf)
-    return max(WALK_HZ, LEAST_READINGS / shortest_s)
+    return max(WALK_HZ, MIN_READINGS / shortest_s)
 
 
 def _encoded(walk: Recording) -> bytes:

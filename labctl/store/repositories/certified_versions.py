@@ -15,7 +15,7 @@ from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 
 #: Units of a model that are searched, those first that were certified last.
-MOST_UNITS = 400
+MAX_UNITS = 400
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class CertifiedVersions:
             .group_by(x.serial)
             .having(sa.func.count(sa.distinct(x.version)) > 1)
             .order_by(newest.desc())
-            .limit(MOST_UNITS)
+            .limit(MAX_UNITS)
             .subquery()
         )
         query = _heads().join(several, several.c.serial == c.serial).where(_certified())

@@ -21,7 +21,7 @@ from labctl.errors import Conflict
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
-from labctl.store.import_parts import MOST_BYTES, MOST_ROWS, TABLES, ImportPart
+from labctl.store.import_parts import MAX_BYTES, MAX_ROWS, TABLES, ImportPart
 from labctl.store.manifests.contents import RECORDING
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.records_by_name import records_of
@@ -182,7 +182,7 @@ def _delete_rows(connection: sa.Connection, table: sa.Table, key: str, recording
     """Delete some rows of a recording, those of the lowest keys; returns whether any were there."""
     mine, keys = table.c.recording_id == recording, table.c[key]
     query = sa.select(keys).where(mine).order_by(keys).limit(1)
-    last = connection.scalar(query.offset(MOST_ROWS - 1))
+    last = connection.scalar(query.offset(MAX_ROWS - 1))
     some = mine if last is None else sa.and_(mine, keys <= last)
     return connection.execute(sa.delete(table).where(some)).rowcount > 0
 
@@ -193,9 +193,9 @@ def _delete_blocks(connection: sa.Connection, recording: int) -> bool:
     query = sa.select(b.id, sa.func.length(b.data)).where(b.recording_id == recording)
     chosen: list[int] = []
     size = 0
-    for block, length in connection.execute(query.order_by(b.number, b.seq).limit(MOST_ROWS)).all():
+    for block, length in connection.execute(query.order_by(b.number, b.seq).limit(MAX_ROWS)).all():
         size += length
-        if chosen and size > MOST_BYTES:
+        if chosen and size > MAX_BYTES:
             break
         chosen.append(block)
     if chosen:

@@ -19,12 +19,12 @@ from instruments.simulators.links.modbus_device import ModbusDevice, constant, i
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Registers
 from instruments.transport.modbus_link import RETRY_PAUSES_S, Client, RefusedRegister
-from instruments.transport.rtu import LEAST_LATENCY_S, SILENCE_FACTOR
+from instruments.transport.rtu import MIN_LATENCY_S, SILENCE_FACTOR
 
 AIR = Register(100, "air temperature", "int16", "counts")
 SETPOINT = Register(300, "set point", "int16", "counts", low=-400, high=1500, access="rw")
 #: Three time-outs and what lies between them: pauses, or on RTU the wait for silence.
-ALL_TRIES_S = {"tcp": 3 * 1.0 + sum(RETRY_PAUSES_S), "rtu": 3 * 1.0 + 2 * SILENCE_FACTOR * LEAST_LATENCY_S}
+ALL_TRIES_S = {"tcp": 3 * 1.0 + sum(RETRY_PAUSES_S), "rtu": 3 * 1.0 + 2 * SILENCE_FACTOR * MIN_LATENCY_S}
 
 
 class Bench:

@@ -92,7 +92,7 @@ def test_a_disk_that_stands_still_delays_one_event_and_leaves_the_others_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("instruments.transport.wire_log.log_file.STALL_S", 0.001)
-    monkeypatch.setattr("instruments.transport.wire_log.log_file.MOST_QUEUED_BYTES", 1000)
+    monkeypatch.setattr("instruments.transport.wire_log.log_file.MAX_QUEUED_BYTES", 1000)
     monkeypatch.setattr(WireLogFile, "_run", lambda _: None)  # its thread never writes
     log = WireLogFile(tmp_path / "log.gz", HEADER)
     for n in range(100):

@@ -114,7 +114,7 @@ def test_a_profile_has_delay_and_bandwidth_and_says_how_many_windows_are_drawn(
 ) -> None:
     recording = profile_recording(sweep(30.0, 0.5, 20.0, 100.0, 100.0), delay_s=0.005, bandwidth_hz=40.0, scale=1e-3)
     effects = ["bias", "scale_factor", "time_delay", "bandwidth"]
-    monkeypatch.setattr(page, "MOST_ROWS", 700)
+    monkeypatch.setattr(page, "MAX_ROWS", 700)
     _, found = by_motion(client, recording, effects=effects, accept_warnings=True)
     assert found["rows"] == 700 == len(found["profile"]["t_s"])
     assert 2900 < found["of"] < 3000

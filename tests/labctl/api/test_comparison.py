@@ -12,7 +12,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from labctl.calibration import read_calibration
-from labctl.error_per_turn import LEAST_RATE_DPS
+from labctl.error_per_turn import MIN_RATE_DPS
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.recording import Recording
 from tests.helpers.paths import EXAMPLES
@@ -94,14 +94,14 @@ def test_lines_of_nine_panels_are_the_model_at_their_points(three: tuple[TestCli
 def test_before_a_turn_only_the_static_bias_is_taken_off(three: tuple[TestClient, Recording]) -> None:
     client, _ = three
     answer = compared(client)
-    assert answer["least_turn_rate_dps"] == LEAST_RATE_DPS
+    assert answer["least_turn_rate_dps"] == MIN_RATE_DPS
     rows = [dict(zip(answer["columns"], row, strict=True)) for row in zip(*answer["columns"].values(), strict=True)]
     own = [row for row in rows if row["axis"] == row["position"] == "y"]
     rest = [row for row in own if abs(row["table_rate_dps"]) < answer["at_rest_dps"]]
     warm, bias = zip(*sorted((row["temperature_c"], row["measured_error_dps"]) for row in rest), strict=True)
     seen = 0
     for row in own:
-        fast = abs(row["table_rate_dps"]) >= LEAST_RATE_DPS
+        fast = abs(row["table_rate_dps"]) >= MIN_RATE_DPS
         assert (row["turn_before_deg"] is not None) == fast
         if fast:
             left = row["measured_error_dps"] - np.interp(row["temperature_c"], warm, bias)

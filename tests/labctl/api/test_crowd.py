@@ -16,7 +16,7 @@ from instruments.clock import WallClock
 from labctl.answers.admin import KeyRequest, Role
 from labctl.api.access_policy import UPLOAD, AccessPolicy
 from labctl.api.connection_limits import RESERVED
-from labctl.api.middleware import MOST_UPLOADS, AccessMiddleware
+from labctl.api.middleware import MAX_UPLOADS, AccessMiddleware
 from labctl.services.admin.api_keys import create_key
 from labctl.services.lab_service import LabService
 from labctl.store import open_store
@@ -124,7 +124,7 @@ def test_few_recordings_come_at_once(service: LabService, in_a_loop: Loop) -> No
     async def ask() -> None:
         app = WaitingApp()
         middleware = AccessMiddleware(app, service, AccessPolicy())
-        first = [asyncio.ensure_future(answer(middleware, "POST", UPLOAD)) for _ in range(MOST_UPLOADS)]
+        first = [asyncio.ensure_future(answer(middleware, "POST", UPLOAD)) for _ in range(MAX_UPLOADS)]
         await asyncio.sleep(0)  # each has begun
         assert (await answer(middleware, "POST", UPLOAD))[0] == 503
         app.go.set()

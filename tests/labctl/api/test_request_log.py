@@ -10,8 +10,8 @@ from fastapi.testclient import TestClient
 from starlette.types import ASGIApp
 
 from labctl.api.connection_limits import ConnectionLimits
-from labctl.api.request_log import MOST_REFUSED, RequestFigures, RequestLogMiddleware
-from labctl.log.repetition import MOST_FOREIGN
+from labctl.api.request_log import MAX_REFUSED, RequestFigures, RequestLogMiddleware
+from labctl.log.repetition import MAX_FOREIGN
 from tests.helpers.bounded_server import bounded_server, request, rest_of
 from tests.helpers.log_records import logged
 
@@ -50,8 +50,8 @@ def test_refused_requests_are_bounded_and_counted(client: TestClient, tmp_path: 
     with logged(tmp_path) as records:
         for _ in range(500):
             client.get("/api/units/NO_SERVICE")
-    assert len(records.named("request.ended")) == MOST_REFUSED
-    assert f"labctl_log_records_held_back_total {500 - MOST_REFUSED}.0" in client.get("/metrics").text
+    assert len(records.named("request.ended")) == MAX_REFUSED
+    assert f"labctl_log_records_held_back_total {500 - MAX_REFUSED}.0" in client.get("/metrics").text
 
 
 def test_an_error_of_the_program_is_logged_with_its_traceback_and_the_number_of_the_request(
@@ -85,6 +85,6 @@ def test_a_flood_of_requests_that_cannot_be_read_is_a_few_records(
             with server.connect(b"NO HTTP AT ALL\r\n\r\n") as client:
                 assert b"400" in rest_of(client)
     reported = [each for each in records.all() if each.get("logger") == "uvicorn.error"]
-    assert len(reported) == MOST_FOREIGN
+    assert len(reported) == MAX_FOREIGN
     (held_back,) = records.named("log.held_back")
-    assert held_back["records"] == 200 - MOST_FOREIGN
+    assert held_back["records"] == 200 - MAX_FOREIGN

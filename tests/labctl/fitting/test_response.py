@@ -58,7 +58,7 @@ def test_without_them_the_scale_factor_is_off_and_says_so_by_its_uncertainty(swe
 
 def test_windows_of_several_readings_give_the_same(swept: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
     one = fit(swept, None, [*PLAIN, "time_delay", "bandwidth"])
-    monkeypatch.setattr("labctl.recording.motions.windows.MOST_WINDOWS", 3000)
+    monkeypatch.setattr("labctl.recording.motions.windows.MAX_WINDOWS", 3000)
     four = fit(swept, None, [*PLAIN, "time_delay", "bandwidth"])
     for name in ("delay", "time_constant", "scale_factor", "bias"):
         value, u = value_and_u(four, name)

@@ -12,7 +12,7 @@ from labctl.fitting import fit
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.thermal_lag import lag_elements
-from labctl.fitting.estimation.thermal_flows import MOST_STEPS, STRUCTURES, Axis, best_taus
+from labctl.fitting.estimation.thermal_flows import MAX_STEPS, STRUCTURES, Axis, best_taus
 from labctl.fitting.estimation.thermal_response import are_told_apart, stretches_of, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.recording import Recording
@@ -105,7 +105,7 @@ def test_warming_and_cooling_are_one_time_constant_unless_the_data_tell_two(law:
     axes = [Axis(data, ErrorModel("", (Term("bias"), Term("bias_temperature", 2))), "z")]
     (structure,) = (each for each in STRUCTURES if each.two_ways)
     every = np.ones(len(data), dtype=bool)
-    found = best_taus(axes, structure, every, MOST_STEPS)
+    found = best_taus(axes, structure, every, MAX_STEPS)
     assert are_told_apart(axes, structure, found, every) == differs
 
 

@@ -27,7 +27,7 @@ from procedures.planning.plan import make_plan
 from tests.helpers.log_records import Record, Records, logged
 from tests.helpers.recording_journal import RecordingJournal
 
-DAY_S, MOST_BYTES_A_DAY = 86_400.0, 10_000_000
+DAY_S, MAX_BYTES_A_DAY = 86_400.0, 10_000_000
 
 
 def run_with(folder: Path, *, fault: tuple[str, float] | None = None, recipe: str = "short") -> CampaignResponse:
@@ -158,7 +158,7 @@ def test_a_day_of_a_bench_is_less_than_ten_megabytes(tmp_path: Path) -> None:
         answer = run_here(str(tmp_path / "lab.sqlite"), StartRequest(recipe="short"))
     assert answer.state == "done"
     assert answer.t_s is not None
-    assert records.path.stat().st_size / answer.t_s * DAY_S < MOST_BYTES_A_DAY / 4
+    assert records.path.stat().st_size / answer.t_s * DAY_S < MAX_BYTES_A_DAY / 4
 
 
 def test_a_log_that_nobody_reads_does_not_hold_the_engine(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from labctl.config import LOG_LEVEL_VARIABLE
 from labctl.errors import BadInput
 from labctl.log import get_logger
 from labctl.log.context import for_campaign, for_request
-from labctl.log.repetition import MOST_FOREIGN, PER_S, RepetitionLimit
+from labctl.log.repetition import MAX_FOREIGN, PER_S, RepetitionLimit
 from labctl.log.settings import LEVELS, is_read_by_a_person, level_asked
 from labctl.log.setup import held_back, running_log
 from tests.helpers.log_records import logged
@@ -141,11 +141,11 @@ def test_a_flood_of_another_library_is_counted_not_written(tmp_path: Path) -> No
         for _ in range(5000):
             logging.getLogger("uvicorn.error").warning("Invalid HTTP request received.")
         logging.getLogger("uvicorn.error").error("another line of its code")
-        assert held_back() == (0, 5000 - MOST_FOREIGN)
+        assert held_back() == (0, 5000 - MAX_FOREIGN)
     found = records.all()
-    assert [each["event"] for each in found].count("Invalid HTTP request received.") == MOST_FOREIGN
+    assert [each["event"] for each in found].count("Invalid HTTP request received.") == MAX_FOREIGN
     assert found[-2]["event"] == "another line of its code"
-    assert (found[-1]["event"], found[-1]["records"]) == ("log.held_back", 5000 - MOST_FOREIGN)
+    assert (found[-1]["event"], found[-1]["records"]) == ("log.held_back", 5000 - MAX_FOREIGN)
     assert found[-1]["source"].startswith("uvicorn.error, test_setup line ")
 
 

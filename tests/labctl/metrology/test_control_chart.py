@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from labctl.errors import BadInput
-from labctl.metrology.control_chart import LEAST_HISTORY, ChartPoint, judged, limits_from_history
+from labctl.metrology.control_chart import MIN_HISTORY, ChartPoint, judged, limits_from_history
 
 #: NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2, Individuals Control Charts: ten batches.
 FLOW_RATES = [49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1]
@@ -40,7 +40,7 @@ def test_a_value_widens_no_limit_by_which_it_is_judged() -> None:
     random = np.random.default_rng(7)
     values = [*random.normal(10.0, 0.1, 20), 11.0, *random.normal(10.0, 0.1, 3)]
     found = judged([ChartPoint(float(value), None) for value in values])
-    assert [one.state for one in found[:LEAST_HISTORY]] == ["unknown"] * LEAST_HISTORY
+    assert [one.state for one in found[:MIN_HISTORY]] == ["unknown"] * MIN_HISTORY
     assert found[20].state == "out"
     assert "out" not in {one.state for one in found[21:]}
     # the value that was out is in no later limits
@@ -72,6 +72,6 @@ def test_without_an_expected_value_it_is_judged_by_the_mean_of_those_before() ->
 
 def test_equal_values_of_a_coarse_display_give_no_limits() -> None:
     """Eight times 0.01, then one step more: a moving range of 0 would call it out of any limits."""
-    found = judged([ChartPoint(0.01, 0.02)] * LEAST_HISTORY + [ChartPoint(0.02, 0.02)])
+    found = judged([ChartPoint(0.01, 0.02)] * MIN_HISTORY + [ChartPoint(0.02, 0.02)])
     assert [each.basis for each in found[-1].limits] == ["stated u"]
     assert found[-1].state == "in"

@@ -133,7 +133,7 @@ def test_a_service_that_cannot_say_where_it_is_ends_its_processes(tmp_path: Path
 
 
 def test_a_process_that_ends_again_and_again_ends_the_service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(liveness, "MOST_RESTARTS", 0)
+    monkeypatch.setattr(liveness, "MAX_RESTARTS", 0)
     location = str(tmp_path / "lab.sqlite")
     reported: list[supervisor.Ready] = []
 

@@ -55,7 +55,7 @@ def test_400_million_constant_rows_take_no_memory(tmp_path: Path) -> None:
 
 
 def test_what_is_just_allowed_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limits, "MOST_VALUES", 20)
+    monkeypatch.setattr(limits, "MAX_VALUES", 20)
     with_column(tmp_path, "gyro_z", GOOD["gyro_z"])
     assert len(read_recording(tmp_path)) == 4
     with_column(tmp_path, "power_s", GOOD["t_s"])
@@ -64,7 +64,7 @@ def test_what_is_just_allowed_is_read(tmp_path: Path, monkeypatch: pytest.Monkey
     (tmp_path / "samples.parquet").unlink()
     with_datasets(tmp_path, "1", "2")
     assert len(read_recording(tmp_path)) == 4
-    monkeypatch.setattr(limits, "MOST_VALUES", 19)
+    monkeypatch.setattr(limits, "MAX_VALUES", 19)
     with pytest.raises(BadRecording, match=r"samples\.csv: 4 rows x 5 columns = 20 values; at most 19"):
         read_recording(tmp_path)
 
@@ -73,7 +73,7 @@ def test_padding_counts_by_what_it_unpacks_to(tmp_path: Path, monkeypatch: pytes
     file = tmp_path / "samples.parquet"
     words = pa.array([f"{n}" + "x" * 5000 for n in range(100)])
     pq.write_table(pa.table({"note": words}), file, compression="zstd", use_dictionary=False)
-    monkeypatch.setattr(limits, "MOST_UNPACKED_BYTES", 400_000)
+    monkeypatch.setattr(limits, "MAX_UNPACKED_BYTES", 400_000)
     with pytest.raises(BadRecording, match=r"has an unpacked size of 0\.5\d* MB; at most 0\.4 MB are read"):
         read_table(file)
 

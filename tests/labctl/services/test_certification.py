@@ -11,7 +11,7 @@ import pytest
 from labctl.answers.criticism import CriticismResponse
 from labctl.recording import to_points, write_recording
 from labctl.services.calibrations import assessment
-from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
+from labctl.services.calibrations.assessment import MIN_REASON_CHARACTERS, MIN_REASON_WORDS, assess
 from labctl.store import open_store
 from tests.helpers.certifying import OVERRIDE, OVERRIDE_OPTIONS, REASON
 from tests.helpers.lab import Lab
@@ -59,7 +59,7 @@ def test_what_lacks_something_is_refused_in_one_line_unless_overridden(lab: Lab)
     assert "(RMS error 0.536" in refused
     assert "deg/s, noise floor 0.0333" in refused
     assert "labctl criticise OSU-FOG-2024 --version 1" in refused
-    assert f"at least {LEAST_REASON_CHARACTERS} characters and {LEAST_REASON_WORDS} words" in refused
+    assert f"at least {MIN_REASON_CHARACTERS} characters and {MIN_REASON_WORDS} words" in refused
     for reason in ("x", "two words are not enough"[:9], "abcdefghijklmnopqrstuvwxyz", "a b c", "a b c" + 40 * " "):
         short = lab.run("certify", FOG, "1", *BY, "--reason", reason, "--override", status=2).stderr
         assert "is too short for an override" in short

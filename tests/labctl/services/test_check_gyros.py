@@ -13,7 +13,7 @@ import pytest
 from labctl.answers.calibrations import FitRequest
 from labctl.answers.validity import CheckGyroRequest
 from labctl.errors import NotEnoughData
-from labctl.metrology.control_chart import LEAST_HISTORY
+from labctl.metrology.control_chart import MIN_HISTORY
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.check_gyros import alarms, check_gyro, list_check_gyros, set_check_gyro
 from labctl.store import Store, check, open_store
@@ -52,14 +52,14 @@ def mark(store: Store, **changed: object) -> None:
 
 def test_a_bench_that_changes_is_alarmed_by_the_history(store: Store) -> None:
     random = np.random.default_rng(4)
-    for week in range(LEAST_HISTORY + 1):
+    for week in range(MIN_HISTORY + 1):
         measure(store, week, float(random.normal(0.0, 1e-4)))
     mark(store)
     quiet = check_gyro(store, SERIAL)
     assert not quiet.alarm
     assert alarms(store) == 0
     assert quiet.text[0].endswith("every result is within the control limits.")
-    measure(store, LEAST_HISTORY + 1, 2e-3)
+    measure(store, MIN_HISTORY + 1, 2e-3)
     found = check_gyro(store, SERIAL)
     assert found.alarm
     assert alarms(store) == 1
@@ -68,16 +68,16 @@ def test_a_bench_that_changes_is_alarmed_by_the_history(store: Store) -> None:
     by_history = bias.points[-1].limits[-1]
     assert by_history.basis == "history"
     assert by_history.high - by_history.low < 2e-3
-    assert found.text[0].startswith(f"ALARM, check gyro {SERIAL}, recording {LEAST_HISTORY + 2}, bias of axis z at")
+    assert found.text[0].startswith(f"ALARM, check gyro {SERIAL}, recording {MIN_HISTORY + 2}, bias of axis z at")
     (scale,) = [chart for chart in found.charts if chart.result == "scale_factor"]
     assert scale.points[-1].state in {"in", "warning"}
 
 
 def test_a_change_of_the_scale_factor_is_told_from_one_of_the_bias(store: Store) -> None:
     random = np.random.default_rng(5)
-    for week in range(LEAST_HISTORY):
+    for week in range(MIN_HISTORY):
         measure(store, week, float(random.normal(0.0, 1e-4)), float(random.normal(0.0, 1e-6)))
-    measure(store, LEAST_HISTORY, 0.0, 5e-4)
+    measure(store, MIN_HISTORY, 0.0, 5e-4)
     states = {chart.result: chart.points[-1].state for chart in check_gyro(store, SERIAL).charts}
     assert states["scale_factor"] == "out"
     assert states["bias"] != "out"

@@ -43,7 +43,7 @@ def test_short_data_sets_have_enough_readings_to_show_their_noise() -> None:
     bench = load_bench("single-axis-sim")
     plan = make_plan(quick, limits_of(bench))
     counts = np.unique(walks.walked(plan, bench).columns["dataset"], return_counts=True)[1]
-    assert counts.min() >= walks.LEAST_READINGS - 1
+    assert counts.min() >= walks.MIN_READINGS - 1
     assert planned_schedule(plan, bench).data.white_var is not None
 
 

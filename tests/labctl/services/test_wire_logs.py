@@ -11,7 +11,7 @@ import pytest
 from labctl.errors import BadInput
 from labctl.services.wire_replay import replay
 from tests.helpers.lab import Lab
-from tests.helpers.wire_sessions import FOLDER, MOST_BYTES, SUFFIX, own_drivers
+from tests.helpers.wire_sessions import FOLDER, MAX_BYTES, SUFFIX, own_drivers
 
 FILES = sorted(FOLDER.glob(f"*{SUFFIX}"))
 ONE = FOLDER / f"kvh-dsp3000{SUFFIX}"
@@ -31,7 +31,7 @@ def changed(file: Path, old: bytes, new: bytes, *, nth: int = 0) -> None:
 
 def test_there_is_a_session_of_each_driver_and_none_is_large() -> None:
     assert {file.name.removesuffix(SUFFIX) for file in FILES} >= set(own_drivers())
-    assert [file.name for file in FILES if file.stat().st_size > MOST_BYTES] == []
+    assert [file.name for file in FILES if file.stat().st_size > MAX_BYTES] == []
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.name.removesuffix(SUFFIX))

@@ -111,7 +111,7 @@ def test_a_table_that_does_not_answer_is_not_called_stopped(
 ) -> None:
     """Also where the computer was busy for so long before the command began that no more time is left."""
     monkeypatch.setattr(client, "LATE_S", late_s)
-    monkeypatch.setattr(client, "LEAST_S", 0.0)
+    monkeypatch.setattr(client, "MIN_S", 0.0)
     slow = threading.Event()
 
     def silent(*_: object) -> InstrumentsLeft:

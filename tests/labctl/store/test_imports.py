@@ -91,7 +91,7 @@ def test_another_writer_gets_its_turn_during_an_import(store: Store, monkeypatch
         over.set()
         other.join()
     assert store.recordings.get(number).datasets == 20_000
-    assert max(seen.rows) <= import_parts.MOST_ROWS + BESIDE
+    assert max(seen.rows) <= import_parts.MAX_ROWS + BESIDE
     assert sum(seen.rows) > 80_000
     assert len(between) > 20
     assert max(between) <= 5  # transactions of the import that came before one of the other's
@@ -102,8 +102,8 @@ def test_parts_are_bounded_in_bytes(store: Store, monkeypatch: pytest.MonkeyPatc
     given = one_row_sets(2, per_set=200_000)
     seen = Transactions(monkeypatch, store)
     number = store.recordings.add_import(given, AT)
-    assert sum(seen.bytes) > 3 * import_parts.MOST_BYTES
-    assert max(seen.bytes) <= import_parts.MOST_BYTES + import_parts.BLOCK_BYTES
+    assert sum(seen.bytes) > 3 * import_parts.MAX_BYTES
+    assert max(seen.bytes) <= import_parts.MAX_BYTES + import_parts.BLOCK_BYTES
     back = store.recordings.samples(number)
     for name, values in given.columns.items():
         assert np.array_equal(back.columns[name], values), name
@@ -117,7 +117,7 @@ def test_parts_are_bounded_in_bytes(store: Store, monkeypatch: pytest.MonkeyPatc
         store.imports.add_part(ticket, part)
     seen.rows.clear()
     store.imports.discard(ticket)
-    assert max(seen.rows) <= import_parts.MOST_ROWS + BESIDE
+    assert max(seen.rows) <= import_parts.MAX_ROWS + BESIDE
     assert [row.id for row in store.recordings.all()] == [number]
 
 
@@ -162,7 +162,7 @@ def killed_import(store: Store, monkeypatch: pytest.MonkeyPatch, at: int) -> Non
         return real(database, synced=synced)
 
     with monkeypatch.context() as patched:
-        patched.setattr(import_parts, "MOST_ROWS", 100)
+        patched.setattr(import_parts, "MAX_ROWS", 100)
         patched.setattr(Database, "writing", writing)
         with pytest.raises(Killed):
             store.recordings.add_import(one_row_sets(300, "NEW"), AT)
@@ -211,7 +211,7 @@ def test_a_kill_between_parts_leaves_nothing_that_is_seen(
 def test_what_is_left_is_discarded_in_short_transactions(location: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_store(location, write=True) as store:
         killed_import(store, monkeypatch, 12)
-        monkeypatch.setattr("labctl.store.repositories.recording_writer.MOST_ROWS", 100)
+        monkeypatch.setattr("labctl.store.repositories.recording_writer.MAX_ROWS", 100)
         seen = Transactions(monkeypatch, store)
         assert store.imports.discard_unfinished() == 1
         assert store.imports.discard_unfinished() == 0
@@ -226,7 +226,7 @@ def test_a_process_that_is_killed_inside_an_import(location: str) -> None:
         import os, signal, sys
         from labctl.store import Imports, import_parts, open_store
         from tests.helpers.one_row_sets import AT, one_row_sets
-        import_parts.MOST_ROWS, add_part, parts = 100, Imports.add_part, []
+        import_parts.MAX_ROWS, add_part, parts = 100, Imports.add_part, []
         def dying(imports, ticket, part):
             add_part(imports, ticket, part)
             parts.append(part)
@@ -279,7 +279,7 @@ def test_a_failed_import_leaves_a_unit_that_was_known(store: Store, monkeypatch:
 def test_too_many_data_sets_are_refused_before_anything_is_written(
     store: Store, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    monkeypatch.setattr(data_set_limits, "MOST_DATA_SETS", 100)
+    monkeypatch.setattr(data_set_limits, "MAX_DATA_SETS", 100)
     recording = one_row_sets(101)
     before = rows_of(store.location)
     with pytest.raises(BadRecording, match="101 data sets; at most 100 are imported at once; divide the recording"):

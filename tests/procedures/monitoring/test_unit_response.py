@@ -11,7 +11,7 @@ from procedures.monitoring.turn_course import nominal_outputs
 from procedures.monitoring.unit_response import UnitResponse
 
 CHANNELS = tuple(Channel(f"gyro_{axis}", "deg/s", 1e-3) for axis in "xyz")
-MOST_DPS = 400.0
+MAX_DPS = 400.0
 
 
 def readings(**rates_dps: float) -> Readings:
@@ -31,7 +31,7 @@ def complaints(position: str, *sets: tuple[float, dict[str, float]]) -> list[str
     for rate_dps, output in sets:
         response.begin((1, 1))
         response.add("fog", readings(**output))
-        found.append(response.complaint("fog", rate_dps, Position.of(position), MOST_DPS))
+        found.append(response.complaint("fog", rate_dps, Position.of(position), MAX_DPS))
     return found
 
 
@@ -67,7 +67,7 @@ def test_rates_outside_the_judged_range_are_not_judged() -> None:
     for rate_dps in (0.0, 90.0):
         response.begin((1, 1))
         response.add("piezo", readings())
-        assert not response.complaint("piezo", rate_dps, Position.of("z"), MOST_DPS)
+        assert not response.complaint("piezo", rate_dps, Position.of("z"), MAX_DPS)
 
 
 def test_another_mounting_is_not_compared_with_the_one_before() -> None:
@@ -76,4 +76,4 @@ def test_another_mounting_is_not_compared_with_the_one_before() -> None:
     for mounting, rate_dps in ((1, 90.0), (2, 0.0)):
         response.begin((mounting, 1))
         response.add("fog", readings(z=90.0))
-        assert not response.complaint("fog", rate_dps, Position.of("z"), MOST_DPS)
+        assert not response.complaint("fog", rate_dps, Position.of("z"), MAX_DPS)

@@ -8,7 +8,7 @@ from acme_gyro.protocol import C_PER_COUNT, DPS_PER_COUNT, encode
 from instruments.simulators.setup import InstrumentSetup
 
 #: Lines that a port can hold; older ones are lost.
-MOST_LINES = 400
+MAX_LINES = 400
 
 
 class SimulatedG1:
@@ -27,7 +27,7 @@ class SimulatedG1:
         newest = self._newest(t_s)
         if newest <= self._sent:
             return b""
-        index = np.arange(max(self._sent + 1, newest - MOST_LINES + 1), newest + 1)
+        index = np.arange(max(self._sent + 1, newest - MAX_LINES + 1), newest + 1)
         self._sent = newest
         sample = self._unit.sample(index / self._rate_hz)
         rates = np.rint(sample.rate_dps[:, 0] / DPS_PER_COUNT).astype(int)

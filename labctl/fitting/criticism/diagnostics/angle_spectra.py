@@ -8,7 +8,7 @@ from scipy.special import chdtri
 
 from labctl.answers.views import AngleLine, AngleSpectrum, FrequencySpectrum, StartProfile
 from labctl.fitting.criticism.diagnostics.axis import BAND
-from labctl.fitting.criticism.diagnostics.within_dataset import LEAST_READINGS, Residual, Within
+from labctl.fitting.criticism.diagnostics.within_dataset import MIN_READINGS, Residual, Within
 from labctl.fitting.criticism.reduction import STEP_LINES
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
@@ -16,9 +16,9 @@ from labctl.fitting.numeric.json_numbers import plain, plain_list
 #: Waves in the angle are computed over data sets of at least this many turns ...
 TURNS = 2.0
 #: ... up to this many cycles per turn, where the readings are close enough to resolve them ...
-MOST_PER_TURN = 208
+MAX_PER_TURN = 208
 #: ... and where there are at least this many such data sets.
-LEAST_SETS = 6
+MIN_SETS = 6
 ANGLE_BINS = 2048
 FREQUENCIES = 200
 PROFILE_POINTS = 40
@@ -33,18 +33,18 @@ def angle_lines(within: Within, residual: Residual, axis: str) -> list[AngleSpec
     count = within.there.sum(axis=1).astype(np.int64)
     last = np.take_along_axis(within.angle, np.maximum(count - 1, 0)[:, None], axis=1)[:, 0]
     turned = np.abs(last - within.angle[:, 0])
-    rows = np.flatnonzero((turned >= TURNS) & (count >= LEAST_READINGS))
-    if len(rows) < LEAST_SETS:
+    rows = np.flatnonzero((turned >= TURNS) & (count >= MIN_READINGS))
+    if len(rows) < MIN_SETS:
         return []
     window = _hann(count[rows], residual.dps.shape[1]) * residual.there[rows]
     bins = np.floor(np.mod(within.angle[rows], 1.0) * ANGLE_BINS).astype(np.int64) % ANGLE_BINS
     flat = bins + ANGLE_BINS * np.arange(len(rows))[:, None]
     sums = np.bincount(flat.ravel(), (residual.dps[rows] * window).ravel(), ANGLE_BINS * len(rows))
-    power = np.abs(np.fft.rfft(sums.reshape(len(rows), ANGLE_BINS), axis=1)[:, 1 : MOST_PER_TURN + 1]) ** 2
+    power = np.abs(np.fft.rfft(sums.reshape(len(rows), ANGLE_BINS), axis=1)[:, 1 : MAX_PER_TURN + 1]) ** 2
     energy, whole = (window**2).sum(axis=1)[:, None], window.sum(axis=1)[:, None]
-    cycles = np.arange(1, MOST_PER_TURN + 1)
+    cycles = np.arange(1, MAX_PER_TURN + 1)
     followed = cycles[None, :] < 0.5 * count[rows][:, None] / turned[rows][:, None]
-    enough = followed.sum(axis=0) >= LEAST_SETS
+    enough = followed.sum(axis=0) >= MIN_SETS
     cycles, sets = cycles[enough], followed.sum(axis=0)[enough]
     if not len(cycles):
         return []
@@ -93,7 +93,7 @@ def frequency_lines(within: Within, residual: Residual, axis: str) -> list[Frequ
     count = within.there.sum(axis=1).astype(np.int64)
     usual = int(np.median(count))
     rows = np.flatnonzero(count >= usual)
-    if usual < LEAST_READINGS or len(rows) < LEAST_SETS:
+    if usual < MIN_READINGS or len(rows) < MIN_SETS:
         return []
     window = _hann(np.full(len(rows), usual), usual)
     spectrum = np.abs(np.fft.rfft(residual.dps[rows, :usual] * window, axis=1)) ** 2

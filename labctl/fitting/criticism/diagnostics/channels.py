@@ -18,14 +18,14 @@ from labctl.fitting.numeric.json_numbers import plain, plain_list
 from labctl.recording.columns import OWN_DATASET, RECORDING
 
 #: Data sets that are drawn one by one; a longer recording is thinned to so many.
-MOST_DRAWN = 3000
+MAX_DRAWN = 3000
 #: With more strata than one in this many drawn data sets, neighbouring rates of one sign share a stratum.
-LEAST_PER_STRATUM = 8
+MIN_PER_STRATUM = 8
 GOLDEN = 0.6180339887498949
 
 
 def drawn_rows(
-    position: NDArray[np.str_], table_rate_dps: Array, temperature_c: Array, most: int = MOST_DRAWN
+    position: NDArray[np.str_], table_rate_dps: Array, temperature_c: Array, most: int = MAX_DRAWN
 ) -> NDArray[np.int64]:
     """Return which of n data sets are drawn, rising: all of them, or `most` of them.
 
@@ -35,7 +35,7 @@ def drawn_rows(
     n = len(table_rate_dps)
     if n <= most:
         return np.arange(n)
-    stratum = _strata(position, table_rate_dps, max(most // LEAST_PER_STRATUM, 1))
+    stratum = _strata(position, table_rate_dps, max(most // MIN_PER_STRATUM, 1))
     turn = np.empty(n)
     for number in np.unique(stratum):
         rows = np.flatnonzero(stratum == number)
@@ -75,13 +75,13 @@ LEAST = 6
 #: Levels are apart by a gap of this share of the whole, and no wider than their least gap; the finest that will do.
 LEVEL_GAPS = (1e-6, 1e-4, 1e-3, 1e-2)
 #: Fewer data sets than this have no runs test.
-LEAST_FOR_RUNS = 12
+MIN_FOR_RUNS = 12
 
 
 def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> DataSetColumns:
     """Return the data sets one by one as columns of equal length: what was logged, and each axis' residual.
 
-    `of` says how many the recording has; the columns have as many, or `MOST_DRAWN` of them (`drawn_rows`). Where no
+    `of` says how many the recording has; the columns have as many, or `MAX_DRAWN` of them (`drawn_rows`). Where no
     time is known (`timed`), the channel `order` counts the data sets from 1, and there is no `t_s`.
     """
     if not axes:
@@ -222,7 +222,7 @@ def runs_test(values: Array) -> tuple[float, float]:
     """
     above = values > np.median(values)
     n1, n2 = int(above.sum()), int((~above).sum())
-    if len(values) < LEAST_FOR_RUNS or not n1 or not n2:
+    if len(values) < MIN_FOR_RUNS or not n1 or not n2:
         return float("nan"), float("nan")
     n = n1 + n2
     runs = 1 + int(np.sum(above[1:] != above[:-1]))

@@ -11,7 +11,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain_list
 
 POINTS = 150
-LEAST_SETS = 16
+MIN_SETS = 16
 
 
 def between_sets(view: AxisView) -> BetweenSets | None:
@@ -21,7 +21,7 @@ def between_sets(view: AxisView) -> BetweenSets | None:
     """
     t_s = view.t_s
     steps = np.diff(np.unique(t_s))
-    if "t_s" not in view.data.nodes or len(view) < LEAST_SETS or len(steps) < LEAST_SETS:
+    if "t_s" not in view.data.nodes or len(view) < MIN_SETS or len(steps) < MIN_SETS:
         return None
     lowest, highest = 1.0 / np.ptp(t_s), 0.5 / float(np.median(steps))
     if highest <= 2 * lowest:

@@ -19,7 +19,7 @@ TURN_K = 2.0
 #: Data sets reached from below and from above are compared at temperatures as close as this.
 SAME_TEMPERATURE_K = 2.0
 #: Pairs that are drawn one by one; of more than these, some of every size of difference.
-MOST_PAIRS = 3000
+MAX_PAIRS = 3000
 
 
 def hysteresis_states(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -109,7 +109,7 @@ def repeats(view: AxisView) -> Repeats | None:
     scatter = float(np.sqrt(np.mean(difference**2) / 2))
     everything = np.arange(len(first))
     pairs_shown = (
-        everything if len(first) <= MOST_PAIRS else np.sort(np.argsort(difference)[_evenly(len(first), MOST_PAIRS)])
+        everything if len(first) <= MAX_PAIRS else np.sort(np.argsort(difference)[_evenly(len(first), MAX_PAIRS)])
     )
     repeats_json: Repeats = {
         "axis": view.axis,

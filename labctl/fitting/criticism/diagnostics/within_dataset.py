@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.reduction import LEAST_INDEPENDENT_SHARE, OUTLIER, STEP_LINES
+from labctl.fitting.criticism.reduction import MIN_INDEPENDENT_SHARE, OUTLIER, STEP_LINES
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.decimation import decimate
@@ -18,12 +18,12 @@ from labctl.recording.points import dataset_starts
 from labctl.recording.positions import Position, up_in
 
 #: At most this many readings of a data set are used, from its beginning.
-MOST_READINGS = 1200
-LEAST_READINGS = 32
+MAX_READINGS = 1200
+MIN_READINGS = 32
 
 
 #: A data set of which less than this share would be left is left as it is.
-LEAST_KEPT = 0.5
+MIN_KEPT = 0.5
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Within:
         inside = np.abs(values) <= OUTLIER * spread
         n_inside = (self.there * inside).sum(axis=1)
         # where most readings are equal, as of a coarse output, the usual spread says nothing of the others
-        inside |= (n_inside < LEAST_KEPT * self.there.sum(axis=1))[:, None]
+        inside |= (n_inside < MIN_KEPT * self.there.sum(axis=1))[:, None]
         return Residual(np.where(inside, values, 0.0), self.there * inside, inner[-1], spread, inner[1:-1])
 
     def _earth(self, values: NDArray[np.float64], axis: str) -> NDArray[np.float64]:
@@ -100,9 +100,9 @@ def within_of(recording: Recording) -> Within | None:
     thinned = decimate(recording)
     dataset = np.asarray(thinned.columns["dataset"], dtype=np.int64)
     starts = dataset_starts(dataset)
-    counts = np.minimum(np.diff(np.append(starts, len(dataset))), MOST_READINGS)
+    counts = np.minimum(np.diff(np.append(starts, len(dataset))), MAX_READINGS)
     n = int(counts.max(initial=0))
-    if n < LEAST_READINGS or "t_s" not in thinned.columns:
+    if n < MIN_READINGS or "t_s" not in thinned.columns:
         return None
     offset = np.arange(n)
     inside = offset[None, :] < counts[:, None]
@@ -117,7 +117,7 @@ def within_of(recording: Recording) -> Within | None:
     position = np.full(len(starts), recording.info.axes[0])
     if "position" in thinned.columns:
         position = np.asarray(thinned.columns["position"])[starts].astype(np.str_)
-    period_s = float(np.median(np.diff(t_s[:MOST_READINGS])))
+    period_s = float(np.median(np.diff(t_s[:MAX_READINGS])))
     return Within(
         thinned, there, index, since, angle, _basis(there, since, angle), position, rate,
         np.concatenate([[0.0], rate[:-1]]), period_s,
@@ -138,6 +138,6 @@ def _basis(
             inner = np.einsum("rmn,mn->rm", basis[:k], values)
             values = values - np.einsum("rm,rmn->mn", inner, basis[:k])
         norm = np.sqrt(np.einsum("mn,mn->m", values, values))
-        independent = norm > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+        independent = norm > np.maximum(MIN_INDEPENDENT_SHARE * size, 1e-9)
         basis[k] = np.where(independent[:, None], values / np.maximum(norm, 1e-300)[:, None], 0.0)
     return basis

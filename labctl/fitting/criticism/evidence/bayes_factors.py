@@ -20,7 +20,7 @@ from labctl.fitting.numeric.arrays import Array
 
 #: An option that follows another channel than those of the base (rate and temperature) does not compete where the base
 #: leaves less than this share of it: no shape is known so exactly that the rest would be evidence.
-LEAST_COMPETING = 0.1
+MIN_COMPETING = 0.1
 OF_BASE = frozenset({"temperature_c", "table_rate_dps"})
 
 
@@ -76,7 +76,7 @@ def evidence(
     best = int(np.argmax(log_p))
     eliminated = WhitenedBase(design, means.white_var, noises[best]).eliminate_from(everything[0], others)
     competes = [
-        _is_of_base(option) or visible_share(eliminated, option_rows) >= LEAST_COMPETING
+        _is_of_base(option) or visible_share(eliminated, option_rows) >= MIN_COMPETING
         for option, option_rows in zip(design.options, slices, strict=True)
     ]
     return AxisEvidence(

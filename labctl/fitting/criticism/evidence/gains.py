@@ -13,7 +13,7 @@ from labctl.fitting.criticism.evidence.design import EliminatedBase
 from labctl.fitting.numeric.arrays import Array
 
 #: Directions of an option that the base leaves less of than this (squared share) are taken as the base's.
-LEAST_LEFT = 1e-4
+MIN_REMAINING = 1e-4
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class OptionPairs:
             else:
                 values, vectors = np.linalg.eigh(scaled)
                 inner = np.einsum("oij,oi->oj", vectors, inner)
-            is_estimable = values > LEAST_LEFT
+            is_estimable = values > MIN_REMAINING
             gain[group.options] = np.where(is_estimable, inner**2 / np.where(is_estimable, values, 1.0), 0.0).sum(
                 axis=1
             )
@@ -95,7 +95,7 @@ def solve_option(base: EliminatedBase, option_rows: slice) -> tuple[Array, NDArr
     """Return the coefficients (k,) of an option beside the base, and their covariance (k, k)."""
     size = np.sqrt(np.maximum(base.squared_norms[option_rows], 1e-300))
     values, vectors = np.linalg.eigh(base.gram[option_rows, option_rows] / np.outer(size, size))
-    is_estimable = values > LEAST_LEFT
+    is_estimable = values > MIN_REMAINING
     inverse = (vectors[:, is_estimable] / values[is_estimable]) @ vectors[:, is_estimable].T
     coefficients = inverse @ (base.data_products[option_rows] / size) / size
     return coefficients, inverse / np.outer(size, size)
@@ -118,5 +118,5 @@ def reproduced(base: EliminatedBase, signal: slice, values: Array, by: slice) ->
     inner = base.gram[by, signal] @ values
     scale = np.sqrt(np.maximum(base.squared_norms[by], 1e-300))
     sizes, vectors = np.linalg.eigh(base.gram[by, by] / np.outer(scale, scale))
-    is_estimable = sizes > LEAST_LEFT
+    is_estimable = sizes > MIN_REMAINING
     return float(((vectors[:, is_estimable].T @ (inner / scale)) ** 2 / sizes[is_estimable]).sum())

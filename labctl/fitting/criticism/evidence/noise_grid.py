@@ -23,7 +23,7 @@ PRIOR_FACTOR = 2.5
 MIXTURE_S = (120.0, 700.0, 3600.0)
 #: Where data sets are closer than this share of a time constant, or not in the order of time, the inverse of their
 #: correlation is too large, or not tridiagonal.
-LEAST_LAG = 1e-6
+MIN_LAG = 1e-6
 #: Drift of this size, in three equal parts, has an Allan deviation as high as a bias instability of 1 has.
 DRIFT_PER_INSTABILITY = 1.35
 #: Half of the usual bias stability, deg/s, where no data sheet says it.
@@ -148,7 +148,7 @@ def _of_one_run(t_s: Array, tau_s: float, white_dps: Array) -> tuple[Array, NDAr
     decomposition takes n^2 instead of n^3 steps.
     """
     lag = np.diff(t_s) / tau_s if tau_s > 0 else np.zeros(len(t_s) - 1)
-    if len(lag) == 0 or lag.min() < LEAST_LAG:
+    if len(lag) == 0 or lag.min() < MIN_LAG:
         return np.linalg.eigh(correlation(t_s, tau_s) / np.outer(white_dps, white_dps))
     next_to, step_share = np.exp(-lag), -np.expm1(-2 * lag)
     diagonal = np.append(1 / step_share, 1.0) + np.append(0.0, next_to**2 / step_share)

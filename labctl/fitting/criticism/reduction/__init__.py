@@ -5,7 +5,7 @@ angle; the readings' coordinates in it are kept. For white noise this loses noth
 could use. Slow regressors are evaluated at a few nodes per data set and brought to the same coordinates.
 """
 
-from labctl.fitting.criticism.reduction.basis import LEAST_INDEPENDENT_SHARE, STEP_LINES
+from labctl.fitting.criticism.reduction.basis import MIN_INDEPENDENT_SHARE, STEP_LINES
 from labctl.fitting.criticism.reduction.outliers import OUTLIER
 from labctl.fitting.criticism.reduction.points import reduce_points
 from labctl.fitting.criticism.reduction.profile import reduce_profile
@@ -15,7 +15,7 @@ from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.recording import Recording
 from labctl.recording.verification import fitted_part
 
-__all__ = ["LEAST_INDEPENDENT_SHARE", "OUTLIER", "STEP_LINES", "ReducedRecording", "reduce_recording"]
+__all__ = ["MIN_INDEPENDENT_SHARE", "OUTLIER", "STEP_LINES", "ReducedRecording", "reduce_recording"]
 
 
 def reduce_recording(recording: Recording, *, outliers: bool = True) -> ReducedRecording:

@@ -16,7 +16,7 @@ STEP_LINES = (200, 50)
 #: removed.
 STEADY = 0.3
 #: A function of which less than this share is independent of those before it is left out: slow rates turn only degrees.
-LEAST_INDEPENDENT_SHARE = 0.1
+MIN_INDEPENDENT_SHARE = 0.1
 
 
 def orthonormal_basis(
@@ -44,7 +44,7 @@ def orthonormal_basis(
             inner = np.einsum("rmn,mn->rm", basis[:k], values)
             values = values - np.einsum("rm,rmn->mn", inner, basis[:k])
         norm = np.sqrt((values**2).sum(axis=1))
-        present[k] = norm > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+        present[k] = norm > np.maximum(MIN_INDEPENDENT_SHARE * size, 1e-9)
         if k < len(lines):
             present[k] &= steady < STEADY
         basis[k] = np.where(present[k][:, None], values / np.maximum(norm, 1e-300)[:, None], 0.0)

@@ -12,7 +12,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording, to_points
 
 #: No mean is taken to be known better than to this share of the usual variance.
-LEAST_SHARE = 1e-6
+MIN_SHARE = 1e-6
 
 
 def reduce_points(recording: Recording) -> ReducedRecording:
@@ -39,7 +39,7 @@ def _white_of_points(points: Recording) -> dict[str, Array] | None:
         if variance is None or not np.any(variance > 0):
             return None
         if points.info.motion == "turns":  # a rest is known far better than a turn
-            white_by_axis[axis] = np.maximum(variance, LEAST_SHARE * float(np.median(variance)))
+            white_by_axis[axis] = np.maximum(variance, MIN_SHARE * float(np.median(variance)))
             continue
         n = np.maximum(np.asarray(points.columns["n"], dtype=np.float64), 1.0)
         quantisation_var = quantisation_var_of(points, axis)

@@ -20,7 +20,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording, to_points
 
 #: Pieces of a recording, about.
-MOST_PIECES = 300
+MAX_PIECES = 300
 #: Windows of different places or runs, or this many spacings apart, are of different pieces.
 GAP_SPACINGS = 3.0
 #: Responses in the span of which, with the rate itself, those of gyros are.
@@ -29,7 +29,7 @@ RESPONSES = (
     Response(0.0, 3.0),
 )  # fmt: skip
 #: A function of which less than this share is independent of those before it in its piece is left out.
-LEAST_INDEPENDENT_SHARE = 1e-3
+MIN_INDEPENDENT_SHARE = 1e-3
 
 
 def reduce_profile(recording: Recording) -> ReducedRecording:
@@ -67,7 +67,7 @@ def _pieces(points: Recording) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
             gap |= values[1:] != values[:-1]
     starts = np.concatenate([[0], np.flatnonzero(gap) + 1])
     sizes = np.diff(np.append(starts, n))
-    parts = np.maximum(np.rint(sizes * MOST_PIECES / n).astype(np.int64), 1)
+    parts = np.maximum(np.rint(sizes * MAX_PIECES / n).astype(np.int64), 1)
     groups = [
         group
         for start, size, number in zip(starts, sizes, parts, strict=True)
@@ -101,6 +101,6 @@ def _basis(
             inner = np.einsum("rmb,mb->rm", basis[:k], values)
             values = values - np.einsum("rm,rmb->mb", inner, basis[:k])
         norm = np.sqrt((values**2).sum(axis=1))
-        present[k] = norm > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+        present[k] = norm > np.maximum(MIN_INDEPENDENT_SHARE * size, 1e-9)
         basis[k] = np.where(present[k][:, None], values / np.maximum(norm, 1e-300)[:, None], 0.0)
     return basis, present

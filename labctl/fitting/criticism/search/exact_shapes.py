@@ -19,7 +19,7 @@ from labctl.fitting.numeric.arrays import Array
 #: Steps, and the change, as a share of the parameters, at which they end.
 STEPS, CLOSE = 15, 1e-6
 #: Least value of a parameter, in its unit, and the share of it that one step leaves.
-LEAST, LEAST_LEFT = 1e-6, 0.25
+LEAST, MIN_REMAINING = 1e-6, 0.25
 
 
 def exact_terms(terms: Iterable[Term]) -> tuple[Term, ...]:
@@ -41,7 +41,7 @@ def stepped_terms(comparison: Comparison, terms: tuple[Term, ...], axes: Iterabl
         data = comparison.data.through(response_of_terms(terms))
         steps = np.mean([_steps(comparison, data, smooth_model, axis, terms) for axis in chosen], axis=0)
         before = np.array([next(iter(term.parameters.values())) for term in terms])
-        after = np.maximum(before + steps, np.maximum(LEAST_LEFT * before, LEAST))
+        after = np.maximum(before + steps, np.maximum(MIN_REMAINING * before, LEAST))
         terms = tuple(
             replace(term, parameters={next(iter(term.parameters)): value})
             for term, value in zip(terms, after.tolist(), strict=True)

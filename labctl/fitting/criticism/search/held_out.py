@@ -22,9 +22,9 @@ RISES_BY, RISES_TO = 0.02, 9.0
 RATE_GROUPS = 8
 #: A fold narrower than this, K, is a temperature level: the table's node there, within the edge, is left out with it.
 NARROW_K, EDGE_K = 3.0, 0.5
-LEAST_EIGENVALUE = 1e-12
+MIN_EIGENVALUE = 1e-12
 #: A coefficient whose signal is less than this, in noise units, has the prior of one that is as large.
-LEAST_SIGNAL = 1e-3
+MIN_SIGNAL = 1e-3
 
 
 def held_out_rises(comparison: Comparison, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]) -> bool:
@@ -84,7 +84,7 @@ class _Axis:
         whole = np.concatenate([base, added], axis=2)
         precision = np.concatenate([design.precision, np.zeros(added.shape[2])])
         fitted = _solved(whole[data.present], y[data.present], precision)[base.shape[2] :]
-        least = LEAST_SIGNAL / np.maximum(np.linalg.norm(added[data.present], axis=0), LEAST_SIGNAL)
+        least = MIN_SIGNAL / np.maximum(np.linalg.norm(added[data.present], axis=0), MIN_SIGNAL)
         return _Axis(axis, scale, y, added, 1.0 / np.maximum(np.abs(fitted), least) ** 2)
 
     def errors(self, comparison: Comparison, mask: NDArray[np.bool_]) -> tuple[float, float]:
@@ -118,6 +118,6 @@ def _solved(rows: NDArray[np.float64], y: Array, precision: Array) -> Array:
     gram = rows.T @ rows + np.diag(precision)
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     values, vectors = np.linalg.eigh(gram / np.outer(size, size))
-    is_estimable = values > LEAST_EIGENVALUE
+    is_estimable = values > MIN_EIGENVALUE
     inner = vectors[:, is_estimable].T @ (rows.T @ y / size)
     return np.asarray(vectors[:, is_estimable] @ (inner / values[is_estimable]) / size)

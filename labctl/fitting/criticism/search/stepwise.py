@@ -46,7 +46,7 @@ NEXT_SHARE = 0.04
 #: The same after effects that could not be distinguished: one of the others may fit better than the one that was added.
 NEXT_SHARE_AMBIGUOUS = 0.08
 #: Least share of an effect that is assumed within data sets, and between them.
-LEAST_PART = 0.05
+MIN_PART = 0.05
 
 
 def is_shape_error(before: Comparison, named_step: Step, after: Comparison, step: Step) -> bool:
@@ -66,7 +66,7 @@ def is_shape_error(before: Comparison, named_step: Step, after: Comparison, step
     least = NEXT_SHARE if _are_one(before, named_step) else NEXT_SHARE_AMBIGUOUS
     of_new, of_old = _within_and_between(after, step.leader), _within_and_between(before, named_step.leader)
     there = int(np.argmax(of_new))
-    could = max(float(of_old[there]), LEAST_PART) * named_step.leader.log_bf
+    could = max(float(of_old[there]), MIN_PART) * named_step.leader.log_bf
     return bool(of_new[there] * step.leader.log_bf < least * could)
 
 
@@ -126,7 +126,7 @@ NOTICED = 1.0
 #: How many of the strongest are tried as the first of a pair.
 LEADERS = 4
 #: Where what is named leaves more than this share of the excess, it is not the cause.
-MOST_LEFT = 0.5
+MAX_REMAINING = 0.5
 #: An effect whose shape may be wrong by a few per cent explains at least this share of what a smooth function does.
 MOSTLY = 0.8
 
@@ -189,7 +189,7 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
         if channels := channels_of_free_shape(first, beside, with_findings, catalogue):
             return _unnamed(initial, (*channels, *(name for name in depends if name not in channels)))
     remainder = remainder_of(first, final, with_findings, catalogue) if findings else None
-    if remainder is not None and remainder["share"] > MOST_LEFT:
+    if remainder is not None and remainder["share"] > MAX_REMAINING:
         return _unnamed(initial, tuple(remainder["depends_on"]))
     terms = {term.effect: term for term in with_findings}
     channel_names = depends if findings or form == "unexplained" else ()

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from labctl.fitting.numeric.arrays import Array
 
 #: A turn back by less than this share of the range, or by less than this, deg C, does not count.
-LEAST_SHARE, LEAST_K = 0.2, 2.0
+MIN_SHARE, MIN_K = 0.2, 2.0
 
 
 def legs_of(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -18,7 +18,7 @@ def legs_of(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
     of its range and by 2 K. 0 where the temperature never moves by as much.
     """
     legs = np.zeros(len(temperature_c), dtype=np.int64)
-    least = max(LEAST_SHARE * float(np.ptp(temperature_c)), LEAST_K) if len(temperature_c) else LEAST_K
+    least = max(MIN_SHARE * float(np.ptp(temperature_c)), MIN_K) if len(temperature_c) else MIN_K
     counted = 0
     for number in np.unique(run):
         rows = np.flatnonzero(run == number)

@@ -22,7 +22,7 @@ from labctl.fitting.poses.triad import UPPER, corrected, unit
 
 PARAMETERS = 3 + len(UPPER)
 #: Rests in different directions that nine parameters take at least: some must be left to tell how well they fit.
-LEAST_POSES = 12
+MIN_POSES = 12
 #: Directions closer than this count as one pose, deg.
 SAME_POSE_DEG = 5.0
 #: A face counts as laid up where a pose is nearer to it than this, deg.
@@ -55,7 +55,7 @@ def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Acceleromet
     require_poses(readings.info.serial, rests)
     gravity = local_gravity_g(readings.info)
     law = SizeLaw(rests.accel_g)
-    theta, sigma, used = fit_sizes(law, gravity, rests.accel_white_var.mean(axis=1), LEAST_POSES)
+    theta, sigma, used = fit_sizes(law, gravity, rests.accel_white_var.mean(axis=1), MIN_POSES)
     jacobian = _jacobian(theta, rests.accel_g[used]) / sigma[used][:, None]
     covariance = _covariance(readings.info.serial, jacobian, rests.accel_g[used])
     left = _sizes(theta, rests.accel_g[used]) - gravity
@@ -177,12 +177,12 @@ def different_poses(directions: NDArray[np.float64]) -> int:
 
 
 def require_poses(serial: str, rests: Rests) -> None:
-    """Raise NotEnoughData for rests in fewer than LEAST_POSES different poses, with the faces that none has up."""
+    """Raise NotEnoughData for rests in fewer than MIN_POSES different poses, with the faces that none has up."""
     poses = different_poses(rests.accel_g)
-    if poses < LEAST_POSES:
+    if poses < MIN_POSES:
         raise NotEnoughData(
             f"{serial}: {len(rests)} rests in {poses} different poses; the accelerometer, by which the gyro is "
-            f"calibrated, needs at least {LEAST_POSES} for bias, scale factor and misalignment: lay the unit down "
+            f"calibrated, needs at least {MIN_POSES} for bias, scale factor and misalignment: lay the unit down "
             "for 2 s "
             "or more on each face, each edge and some corners"
             f"{_missing(rests.accel_g)}; free motion without rests is no reference"

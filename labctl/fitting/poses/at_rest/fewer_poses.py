@@ -29,7 +29,7 @@ from labctl.fitting.poses.readings import PoseReadings
 from labctl.fitting.poses.triad import corrected, unit
 
 #: Poses in different directions: one more than the three biases, so that something is left to tell a change.
-LEAST_POSES = 4
+MIN_POSES = 4
 #: Three of the nine parameters are free.
 FREE = 3
 #: The rests disagree with the earlier calibration where chance makes it so in fewer cases than this.
@@ -70,10 +70,10 @@ def by_fewer_poses(readings: PoseReadings, rests: Rests, known: Known) -> ByFewe
     Raises NotEnoughData where the poses do not determine the bias, with what to do.
     """
     poses, serial = different_poses(rests.accel_g), readings.info.serial
-    if poses < LEAST_POSES:
+    if poses < MIN_POSES:
         raise NotEnoughData(
             f"{serial}: {len(rests)} rests in {poses} different poses; with an earlier version the accelerometer needs "
-            f"at least {LEAST_POSES}: lay the unit down for 2 s or more on further faces"
+            f"at least {MIN_POSES}: lay the unit down for 2 s or more on further faces"
         )
     gravity, white = local_gravity_g(readings.info), rests.accel_white_var.mean(axis=1)
     freedom = len(rests) - FREE

@@ -17,7 +17,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.readings import PoseReadings
 
 #: Window in which a scatter is taken, s, and readings that it has at least.
-WINDOW_S, LEAST_IN_WINDOW = 0.5, 8
+WINDOW_S, MIN_IN_WINDOW = 0.5, 8
 #: A window rests where each channel scatters by less than this many times its static noise.
 FACTOR = 3.0
 #: No reading at rest scatters by more than this: what does is in motion throughout.
@@ -25,11 +25,11 @@ NOISIEST_G, NOISIEST_DPS = 0.05, 3.0
 #: The quietest share of windows, from which the static noise is found first, and rounds in which it settles.
 QUIETEST, ROUNDS = 0.1, 6
 #: Half seconds at rest, beyond one per rest, that show the noise of a mean; with fewer, readings count as independent.
-LEAST_BLOCKS = 20
+MIN_BLOCKS = 20
 #: Both ends of a quiet stretch are cut by this share of a window: the turn begins there.
 MARGIN = 0.5
 #: A rest lasts at least so long, s, after its ends were cut.
-LEAST_REST_S = 0.5
+MIN_REST_S = 0.5
 #: A rest whose gyro means differ from those of most rests by more than this, deg/s, and by so many deviations turns.
 TURNING_DPS, TURNING_DEVIATIONS = 2.0, 12.0
 
@@ -68,7 +68,7 @@ class Rests:
 
 def find_rests(readings: PoseReadings) -> Rests:
     """Return the rests of a recording. Raises NotEnoughData where nothing rests."""
-    size = max(round(WINDOW_S / readings.spacing_s), LEAST_IN_WINDOW)
+    size = max(round(WINDOW_S / readings.spacing_s), MIN_IN_WINDOW)
     if len(readings) < 3 * size:
         raise NotEnoughData(
             f"{readings.info.serial}: the recording lasts {readings.t_s[-1] - readings.t_s[0]:.3g} s, too short for "
@@ -83,12 +83,12 @@ def find_rests(readings: PoseReadings) -> Rests:
     begin, end = _stretches(inside & ~readings.breaks, inside)
     margin = round(MARGIN * size)
     begin, end = begin + margin, end - margin
-    least = max(round(LEAST_REST_S / readings.spacing_s), LEAST_IN_WINDOW)
+    least = max(round(MIN_REST_S / readings.spacing_s), MIN_IN_WINDOW)
     long = end - begin >= least
     begin, end = begin[long], end[long]
     if len(begin) == 0:
         raise NotEnoughData(
-            f"{readings.info.serial}: the recording has no rest of {LEAST_REST_S:g} s; lay the unit "
+            f"{readings.info.serial}: the recording has no rest of {MIN_REST_S:g} s; lay the unit "
             "down between turns for 2 s or more, in many poses"
         )
     accel, gyro = _means(readings.accel_g, begin, end), _means(readings.gyro_dps, begin, end)
@@ -119,7 +119,7 @@ def _density(
         squares += np.sum((means - means.mean(axis=0)) ** 2, axis=0)
         freedom += blocks - 1
     white = noise**2 * spacing_s
-    if freedom < LEAST_BLOCKS:
+    if freedom < MIN_BLOCKS:
         return np.asarray(white)
     # rounding leaves means that agree better than their readings allow
     return np.asarray(np.maximum(squares / freedom * size * spacing_s, white / 4))
@@ -127,7 +127,7 @@ def _density(
 
 def density_in_rests(channels: NDArray[np.float64], rests: Rests, spacing_s: float) -> Array:
     """Return the variance of a mean over one second of other channels (n, c) in the same rests, (c,)."""
-    size = max(round(WINDOW_S / spacing_s), LEAST_IN_WINDOW)
+    size = max(round(WINDOW_S / spacing_s), MIN_IN_WINDOW)
     variances = [channels[a:b].var(axis=0, ddof=1) for a, b in zip(rests.begin, rests.end, strict=True)]
     return _density(channels, rests.begin, rests.end, size, spacing_s, np.sqrt(np.median(variances, axis=0)))
 

@@ -29,13 +29,13 @@ from labctl.fitting.poses.readings import PoseReadings
 from labctl.fitting.poses.triad import unit
 
 #: Span of the rests' temperatures from which on a coefficient of temperature is fitted, K.
-LEAST_SPAN_K = 5.0
+MIN_SPAN_K = 5.0
 #: Temperatures further apart than this are different ones, K.
 SAME_TEMPERATURE_K = 2.0
 #: Largest powers of temperature: of the bias as both flight controllers have, of the scale factors.
 BIAS_ORDER, SCALE_ORDER = 3, 1
 #: Rests beyond the parameters that are left to tell how well they fit.
-LEAST_FREEDOM = 3
+MIN_FREEDOM = 3
 
 
 @dataclass(frozen=True)
@@ -152,22 +152,22 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
     warm = rest_temperatures(readings, rests)
     low, high = float(warm.min()), float(warm.max())
     levels = different_temperatures(warm)
-    if levels < 2 or high - low < LEAST_SPAN_K:
+    if levels < 2 or high - low < MIN_SPAN_K:
         raise NotEnoughData(
             f"{serial}: the rests are at {low:.1f} to {high:.1f} deg C; coefficients of temperature need poses at two "
-            f"and more temperatures that span {LEAST_SPAN_K:g} K: lay the unit down in its poses again, warmer or "
+            f"and more temperatures that span {MIN_SPAN_K:g} K: lay the unit down in its poses again, warmer or "
             "colder, or calibrate without a temperature"
         )
     orders = (min(BIAS_ORDER, levels - 1), SCALE_ORDER)
     reference, half = round((low + high) / 2, 1), (high - low) / 2
     law = TemperatureLaw(rests.accel_g, (warm - reference) / half, orders)
-    if len(rests) < law.parameters + LEAST_FREEDOM:
+    if len(rests) < law.parameters + MIN_FREEDOM:
         raise NotEnoughData(
             f"{serial}: {len(rests)} rests at {levels} temperatures; {law.parameters} coefficients need at least "
-            f"{law.parameters + LEAST_FREEDOM} rests: lay the unit down on more faces and edges at each temperature"
+            f"{law.parameters + MIN_FREEDOM} rests: lay the unit down on more faces and edges at each temperature"
         )
     gravity = local_gravity_g(readings.info)
-    theta, sigma, used = fit_sizes(law, gravity, rests.accel_white_var.mean(axis=1), law.parameters + LEAST_FREEDOM)
+    theta, sigma, used = fit_sizes(law, gravity, rests.accel_white_var.mean(axis=1), law.parameters + MIN_FREEDOM)
     kept = law.take(used)
     jacobian = kept.jacobian(theta) / sigma[used][:, None]
     covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)

@@ -11,11 +11,11 @@ from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series,
 
 #: Readings of a block in which the noise is found, least blocks of a data set, and the share of its largest third
 #: differences that do not count: single readings far off are another fault.
-BLOCK, LEAST_BLOCKS, OFF_SHARE = 40, 5, 0.1
+BLOCK, MIN_BLOCKS, OFF_SHARE = 40, 5, 0.1
 #: The noise changes where so many blocks in a row have so many times more or less than usual, and those beside not.
 LASTING, TIMES = 2, 3.0
 #: A whole data set is noisy that has so many times the noise of those at the same speed, of so many sets in all.
-SET_TIMES, LEAST_SETS = 6.0, 5
+SET_TIMES, MIN_SETS = 6.0, 5
 #: An output whose step is above so many noises has no noise that could be compared.
 COARSE = 1.5
 #: The time between readings changes where so many blocks in a row have so many times more or less.
@@ -57,7 +57,7 @@ def _noisy_sets(series: Series, values: Array) -> list[tuple[slice, float]]:
 
     The motor of a table shakes a unit at some speeds, but in each data set at them.
     """
-    if series.rate_dps is None or len(series.parts) < LEAST_SETS:
+    if series.rate_dps is None or len(series.parts) < MIN_SETS:
         return []
     noises = np.array([noise_of(values[part]) for part in series.parts])
     speed = np.abs([series.rate_dps[part.start] for part in series.parts])
@@ -77,7 +77,7 @@ def _other_noise(values: Array) -> tuple[Rows, float]:
     """Return which of (n,) readings of a data set have another noise, and how many times the usual they have."""
     rows = np.zeros(len(values), dtype=bool)
     blocks = len(values) // BLOCK
-    if blocks < LEAST_BLOCKS:
+    if blocks < MIN_BLOCKS:
         return rows, 1.0
     third = np.abs(np.diff(np.append(values, np.repeat(values[-1], 3)), 3))[: blocks * BLOCK].reshape(blocks, BLOCK)
     least = np.sort(third[:, :-3], axis=1)[:, : int((1 - OFF_SHARE) * BLOCK)]

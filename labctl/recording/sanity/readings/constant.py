@@ -10,14 +10,14 @@ from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, gain_of, rows_in_words, runs, spread_of
 
 #: The probability, for a whole channel, of a run of equal readings that is called frozen; and its least length.
-CHANCE, LEAST_RUN = 1e-6, 20
+CHANCE, MIN_RUN = 1e-6, 20
 #: Runs up to this length tell how often a reading equals the one before. An output is coarse whose step is above this
 #: many noises: it stays at a code by itself.
 USUAL_RUN, COARSE_NOISES = 50, 0.8
 #: A coarse output is frozen where the table's rate would move it by so many steps of its code.
 COARSE_STEPS = 5.0
 #: An output frozen in this share of the readings, or in most of a data set, makes a fit certainly wrong.
-CERTAIN_SHARE, MOST_OF_SET = 0.1, 0.9
+CERTAIN_SHARE, MAX_OF_SET = 0.1, 0.9
 #: An output comes in coarse steps from so many times its noise on; a value is a multiple of a step within this share.
 COARSE_LATTICE, ON_LATTICE = 1.9, 0.02
 #: Rows are written again where this share more of them equal the row before than equal that three rows before.
@@ -36,7 +36,7 @@ def check_frozen(series: Series) -> Iterator[Marked]:
         if steady and (step := step_of_one_code(series, name)) is not None:
             yield _one_code(series, name, step)
             continue
-        whole = not steady and any(rows[part].mean() > MOST_OF_SET for part in series.parts)
+        whole = not steady and any(rows[part].mean() > MAX_OF_SET for part in series.parts)
         sure = whole or CERTAIN_SHARE * len(series) < n < len(series)
         seconds = float(series.t_s[end - 1] - series.t_s[begin])
         yield Marked(
@@ -101,9 +101,9 @@ def frozen_rows(series: Series, name: str, values: Array) -> Rows:
     usual = [end - begin for begin, end in steady if end - begin <= USUAL_RUN]
     long = sum(end - begin for begin, end in steady if end - begin > USUAL_RUN)
     last_begin = len(values) - long
-    share = min(sum(length - 1 for length in usual) / last_begin, 0.9) if last_begin > LEAST_RUN else 0.9
+    share = min(sum(length - 1 for length in usual) / last_begin, 0.9) if last_begin > MIN_RUN else 0.9
     is_coarse = series.code_steps[name] > COARSE_NOISES * series.noises[name]
-    least = LEAST_RUN if is_coarse else max(LEAST_RUN, np.log(CHANCE / len(values)) / np.log(max(share, 1e-3)))
+    least = MIN_RUN if is_coarse else max(MIN_RUN, np.log(CHANCE / len(values)) / np.log(max(share, 1e-3)))
     ends = (float(values.min()), float(values.max()))
     gain = gain_of(values, series.rate_dps)
     for begin, end in steady:

@@ -120,7 +120,7 @@ def joined_courses(parts: Sequence[list[CourseJson]]) -> list[CourseJson]:
 #: An output is coarse whose step is above so many times the noise that its readings have, steps included.
 COARSE_STEP = 1.9
 #: Readings at the end of a range, at least: of an output in fine steps, of any other.
-LEAST_IN_STEPS, LEAST_EQUAL = 30, 8
+MIN_IN_STEPS, MIN_EQUAL = 30, 8
 #: An output is clipped where so many readings are expected beyond its last code, or the last code has this many times
 #: the readings of the code before. Steps above this many noises leave no shape that could tell.
 BEYOND, PILE, COARSE = 20.0, 2.5, 1.2
@@ -177,8 +177,8 @@ def _is_pile(values: Array, at_end: Rows, top: float, step: float, noise: float)
     if n_end == len(values) or (noise == 0 and step):
         return False
     if not step:
-        return n_end >= LEAST_EQUAL
-    if n_end < LEAST_IN_STEPS or step > COARSE * noise:
+        return n_end >= MIN_EQUAL
+    if n_end < MIN_IN_STEPS or step > COARSE * noise:
         return False
     width = step * max(round(0.5 * noise / step), 1)  # codes that are much finer than the noise hold too few readings
     below = top - 0.5 * step - width * np.arange(3)

@@ -12,8 +12,8 @@ import numpy as np
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.series import (
     GUARD,
-    LEAST_BESIDE,
-    MOST_BESIDE,
+    MAX_NEIGHBOURS,
+    MIN_NEIGHBOURS,
     Array,
     Marked,
     Series,
@@ -112,7 +112,7 @@ def _lasts(values: Array, row: int, factor: float) -> bool:
 
 def beside(values: Array, row: int) -> tuple[Array, Array]:
     """Return the readings before and after a row of (n,), without those next to it."""
-    return values[max(row - GUARD - MOST_BESIDE, 0) : max(row - GUARD, 0)], values[row + GUARD :][:MOST_BESIDE]
+    return values[max(row - GUARD - MAX_NEIGHBOURS, 0) : max(row - GUARD, 0)], values[row + GUARD :][:MAX_NEIGHBOURS]
 
 
 def edges_of(values: Array, row: int) -> tuple[float, float, float, float] | None:
@@ -121,7 +121,7 @@ def edges_of(values: Array, row: int) -> tuple[float, float, float, float] | Non
     An even drift on either side is followed to the row.
     """
     before, after = beside(values, row)
-    if min(len(before), len(after)) < LEAST_BESIDE:
+    if min(len(before), len(after)) < MIN_NEIGHBOURS:
         return None
     return *_at_edge(before, last=True), *_at_edge(after, last=False)
 
@@ -142,7 +142,7 @@ def _at_edge(values: Array, *, last: bool) -> tuple[float, float]:
     return middle + slope * (0.5 if last else -0.5), 2.0 * u / np.sqrt(n)
 
 
-@lru_cache(maxsize=MOST_BESIDE + 1)
+@lru_cache(maxsize=MAX_NEIGHBOURS + 1)
 def _evenly(n: int) -> tuple[Array, float]:
     """Return n places from -0.5 to 0.5, and the sum of their squares; the same of every stretch that long."""
     x = np.linspace(-0.5, 0.5, n)

@@ -12,24 +12,24 @@ from labctl.recording.sanity.readings.jumps import jump_of
 from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows, Series, noise_of, rows_in_words
 
 #: Blocks in which the noise of long data sets is compared, and readings of one.
-BLOCKS, LEAST_IN_BLOCK = 40, 50
+BLOCKS, MIN_IN_BLOCK = 40, 50
 #: The ratio of deg/s to rad/s, and how near to it, as a logarithm, a ratio of noises must be; that of
 #: one output alone.
 DEG_PER_RAD, NEAR, VERY_NEAR = 180.0 / np.pi, 0.4, 0.12
 #: The same of a gain, in which the bias of the outputs is too.
 GAIN_NEAR = 1.0
 #: Rates from this size on (root mean square), deg/s, show the gain of the outputs.
-LEAST_RATE_DPS = 1.0
+MIN_RATE_DPS = 1.0
 #: Third differences of a copy have at least this squared correlation with those of its source; and how many must move.
-COPY, LEAST_MOVING = 0.97, 50
+COPY, MIN_MOVING = 0.97, 50
 #: Two devices by turns: their readings differ by this many noises of readings of one.
 BY_TURNS = 3.0
 #: Two devices in any order: their levels are this many times the spread within one apart, and so many steps of a code;
 #: each has this share of the readings, and this share of them lie between two of the other. Levels are taken over so
 #: many readings, and at most this share of readings is in the middle between them.
-INTERMIXED, INTERMIXED_CODES, LEAST_SHARE, LEAST_TURNS, LEVEL_READINGS, BETWEEN = 6.0, 3.0, 0.1, 0.1, 101, 0.01
+INTERMIXED, INTERMIXED_CODES, MIN_SHARE, MIN_TURNS, LEVEL_READINGS, BETWEEN = 6.0, 3.0, 0.1, 0.1, 101, 0.01
 #: Two devices one after the other: both levels last so many readings, and are this many noises apart in two outputs.
-BESIDE, LEAST_BESIDE, APART = 60, 10, 3.5
+BESIDE, MIN_NEIGHBOURS, APART = 60, 10, 3.5
 #: One output alone changes its level by this many noises, with this share of the readings of its data set on each side.
 APART_ALONE, ALONE_SHARE = 6.0, 0.1
 #: And by so many times what such differences usually are: an output that a filter has smoothed differs by more.
@@ -96,7 +96,7 @@ def _gains_agree(series: Series, names: list[str], rows: Rows, *, off: float) ->
     At rest the noise of two outputs or more must do, or of one the noise and the level, or its noise alone if that is
     `off` the ratio, as a logarithm, by little.
     """
-    if series.rate_dps is None or min(_rms(series.rate_dps[rows]), _rms(series.rate_dps[~rows])) < LEAST_RATE_DPS:
+    if series.rate_dps is None or min(_rms(series.rate_dps[rows]), _rms(series.rate_dps[~rows])) < MIN_RATE_DPS:
         if any(_levels_differ(series.outputs[name], rows) for name in names):
             return False  # a filter lowers the noise, and leaves the level
         return len(names) > 1 or _levels_agree(series.outputs[names[0]], rows) or off < VERY_NEAR
@@ -113,7 +113,7 @@ def _gain_along(series: Series, names: list[str], rows: Rows) -> float:
     sizes = []
     for part in series.parts:
         speed = abs(float(np.median(series.rate_dps[part])))
-        if speed >= LEAST_RATE_DPS and rows[part].mean() > 0.5:
+        if speed >= MIN_RATE_DPS and rows[part].mean() > 0.5:
             sizes.append(max(abs(float(np.median(series.outputs[name][part]))) for name in names) / speed)
     return float(np.median(sizes)) if sizes else 0.0
 
@@ -129,9 +129,9 @@ def _levels_differ(values: Array, rows: Rows) -> bool:
     A filter that is switched leaves it, and the noise falls.
     """
     for row in np.flatnonzero(rows[1:] != rows[:-1]) + 1:
-        length = max(len(values) // BLOCKS, LEAST_IN_BLOCK)  # the row is known to a block
+        length = max(len(values) // BLOCKS, MIN_IN_BLOCK)  # the row is known to a block
         parts = [values[max(row - 3 * length, 0) : row - length], values[row + length : row + 3 * length]]
-        if min(len(part) for part in parts) < LEAST_IN_BLOCK // 2:
+        if min(len(part) for part in parts) < MIN_IN_BLOCK // 2:
             continue
         low, high = parts if rows[row - 1] else parts[::-1]
         spreads = [float(np.percentile(np.abs(part - np.median(part)), 90)) for part in (low, high)]
@@ -149,9 +149,9 @@ def _blocks(series: Series) -> list[slice]:
     blocks = []
     for part in series.parts:
         length = part.stop - part.start
-        size = max(length // BLOCKS, LEAST_IN_BLOCK) if len(series.parts) < BLOCKS // 4 else length
+        size = max(length // BLOCKS, MIN_IN_BLOCK) if len(series.parts) < BLOCKS // 4 else length
         edges = np.linspace(part.start, part.stop, max(length // size, 1) + 1).astype(np.int64)
-        blocks += [slice(int(a), int(b)) for a, b in pairwise(edges) if b - a >= LEAST_IN_BLOCK]
+        blocks += [slice(int(a), int(b)) for a, b in pairwise(edges) if b - a >= MIN_IN_BLOCK]
     return blocks
 
 
@@ -185,11 +185,11 @@ def check_copies(series: Series) -> Iterator[Marked]:
 def _scale_of_copy(a: Array, b: Array) -> float | None:
     """Return by which factor third differences b (n,) are those of a; None where they are no copy."""
     moving = (a != 0) | (b != 0)
-    if moving.sum() < LEAST_MOVING:
+    if moving.sum() < MIN_MOVING:
         return None
     limits = [8.0 * max(float(np.median(np.abs(each[moving]))), 1e-300) for each in (a, b)]
     usual = moving & (np.abs(a) < limits[0]) & (np.abs(b) < limits[1])  # a knock that all axes feel is no copy
-    if usual.sum() < LEAST_MOVING:
+    if usual.sum() < MIN_MOVING:
         return None
     product, power = float(a[usual] @ b[usual]), float(a[usual] @ a[usual])
     if power == 0 or product == 0 or product**2 < COPY * power * float(b[usual] @ b[usual]):
@@ -245,7 +245,7 @@ def _intermixed(values: Array, step: float) -> Rows | None:
     total = np.concatenate([[0.0], np.cumsum(padded)])
     off = values - (total[LEVEL_READINGS:] - total[:-LEVEL_READINGS]) / LEVEL_READINGS
     high = off > 0
-    if not LEAST_SHARE < high.mean() < 1 - LEAST_SHARE or np.mean(high[1:] != high[:-1]) < LEAST_TURNS:
+    if not MIN_SHARE < high.mean() < 1 - MIN_SHARE or np.mean(high[1:] != high[:-1]) < MIN_TURNS:
         return None
     levels = [float(np.median(off[rows])) for rows in (high, ~high)]
     spreads = [float(np.median(np.abs(off[rows] - level))) for rows, level in zip((high, ~high), levels, strict=True)]
@@ -277,7 +277,7 @@ def _alternates(values: Array) -> bool:
 def _after(series: Series) -> Iterator[Marked]:
     for part in series.parts:
         n = part.stop - part.start
-        if n < 4 * LEAST_BESIDE or not (series.still[part].all() or series.rate_dps is not None):
+        if n < 4 * MIN_NEIGHBOURS or not (series.still[part].all() or series.rate_dps is not None):
             continue  # turned by hand, a unit changes its rate on all axes at once
         steps_by_name = {
             name: _steps_of_level(values[part], series.noises[name]) for name, values in series.residuals.items()
@@ -350,14 +350,14 @@ def _steps_of_level(values: Array, noise: float) -> Array:
     low, high = np.maximum(at - BESIDE, 0), np.minimum(at + BESIDE, n)
     before, after = np.maximum(at - low, 1), np.maximum(high - at, 1)
     step = (total[high] - total[at]) / after - (total[at] - total[low]) / before
-    step[(at < LEAST_BESIDE) | (at > n - LEAST_BESIDE)] = 0.0
-    usual = STEPS_USUAL / APART * ROBUST * float(np.median(np.abs(step[LEAST_BESIDE : n - LEAST_BESIDE])))
+    step[(at < MIN_NEIGHBOURS) | (at > n - MIN_NEIGHBOURS)] = 0.0
+    usual = STEPS_USUAL / APART * ROBUST * float(np.median(np.abs(step[MIN_NEIGHBOURS : n - MIN_NEIGHBOURS])))
     return np.asarray(step / max(noise, usual))
 
 
 def _size_at(values: Array, row: int) -> float:
     """Return by how much the level of (n,) readings next to a row changes."""
-    before, after = values[max(row - 1 - LEAST_BESIDE, 0) : row - 1], values[row + 1 : row + 1 + LEAST_BESIDE]
+    before, after = values[max(row - 1 - MIN_NEIGHBOURS, 0) : row - 1], values[row + 1 : row + 1 + MIN_NEIGHBOURS]
     return float(np.median(after) - np.median(before))
 
 

@@ -21,7 +21,7 @@ SAME_CODE = 1e-9
 #: Readings that show the steps between the codes of a channel.
 CODE_READINGS = 20_000
 #: Readings on either side of a row that show level and noise, at least and at most, and those next to it left out.
-LEAST_BESIDE, MOST_BESIDE, GUARD = 12, 120, 3
+MIN_NEIGHBOURS, MAX_NEIGHBOURS, GUARD = 12, 120, 3
 #: Rows with the largest changes of each kind that are examined in a data set.
 CANDIDATES = 3
 
@@ -180,10 +180,10 @@ def code_step(values: Array) -> float:
 def largest_changes(values: Array) -> list[int]:
     """Return the rows at which the level, or the noise, of (n,) readings changes most; none of too few readings."""
     n = len(values)
-    if n < 2 * (LEAST_BESIDE + GUARD):
+    if n < 2 * (MIN_NEIGHBOURS + GUARD):
         return []
-    beside = int(np.clip(n // 8, LEAST_BESIDE, MOST_BESIDE // 2))
-    at = np.arange(LEAST_BESIDE, n - LEAST_BESIDE + 1)
+    beside = int(np.clip(n // 8, MIN_NEIGHBOURS, MAX_NEIGHBOURS // 2))
+    at = np.arange(MIN_NEIGHBOURS, n - MIN_NEIGHBOURS + 1)
     low, high = np.maximum(at - beside, 0), np.minimum(at + beside, n)
     third = np.abs(np.diff(values, 3))
     jerk = np.log(np.maximum(np.concatenate([third[:1], third, third[-2:]]), 1e-12 + float(np.median(third)) / 100.0))

@@ -12,7 +12,7 @@ from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Serie
 from labctl.recording.sanity.readings.thermometers import lasting_jumps
 
 #: Readings on either side of the ends of a stretch that show the levels there, and those that are needed.
-BESIDE, LEAST_BESIDE = 30, 8
+BESIDE, MIN_NEIGHBOURS = 30, 8
 #: A level is that of another column within so many standard deviations of its readings and this share; of a
 #: temperature, K.
 DEVIATIONS, SHARE, NEAR_K = 4.0, 0.02, 1.0
@@ -60,7 +60,7 @@ def _exchanged(series: Series, thermometer: str, begin: int, end: int) -> str:
         (slice(begin, min(begin + BESIDE, end)), slice(max(begin - BESIDE, 0), begin)),
         (slice(max(end - BESIDE, begin), end), slice(end, min(end + BESIDE, n))),
     ]
-    usable = [(inside, beside) for inside, beside in edges if _length(inside) and _length(beside) >= LEAST_BESIDE]
+    usable = [(inside, beside) for inside, beside in edges if _length(inside) and _length(beside) >= MIN_NEIGHBOURS]
     for factor in PER_DPS:
         columns = {name: values * factor for name, values in series.outputs.items()}
         columns[thermometer] = series.thermometers[thermometer]

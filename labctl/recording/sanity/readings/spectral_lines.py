@@ -11,11 +11,11 @@ from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.series import Array, Marked, Series, medians_of_five
 
 #: Readings of one piece of the spectrum; data sets with fewer are left out.
-MOST_READINGS, LEAST_READINGS = 2048, 128
+MAX_READINGS, MIN_READINGS = 2048, 128
 #: Bins beside a line in which the background is found, those left out, and the first bin that is examined.
 BACKGROUND, GUARD, FIRST_BIN = 10, 2, 5
 #: Probability of a line by chance in one spectrum; a line must also have this share of the noise of one reading.
-CHANCE, LEAST_SHARE = 1e-7, 0.2
+CHANCE, MIN_SHARE = 1e-7, 0.2
 #: Neighbouring pieces overlap by half, so that their number counts as this share.
 INDEPENDENT = 0.7
 MAINS_HZ = (50.0, 60.0, 100.0, 120.0)
@@ -44,7 +44,7 @@ def check_lines(series: Series) -> Iterator[Marked]:
         k = int(np.argmax(over))
         power = float(spectrum[max(k - 1, 0) : k + 2].sum()) * 4 / float(np.sum(window**2)) / readings
         size = float(np.sqrt(power))
-        if over[k] <= limit or size < LEAST_SHARE * noise:
+        if over[k] <= limit or size < MIN_SHARE * noise:
             continue
         found_hz = _peak(spectrum, hz, k)
         yield Marked(_finding(name, found_hz, size, series.step_s, len(series)), np.ones(len(series), dtype=bool))
@@ -69,12 +69,12 @@ def _limit(sets: int, pieces: float, bins: int) -> float:
 def _pieces(series: Series) -> list[list[slice]]:
     """Return pieces of one length, half overlapping, of each data set that is long enough."""
     lengths = [part.stop - part.start for part in series.parts]
-    long = [length for length in lengths if length >= LEAST_READINGS]
+    long = [length for length in lengths if length >= MIN_READINGS]
     if not long:
         return []
-    readings = min(1 << int(np.log2(np.median(long))), MOST_READINGS)
+    readings = min(1 << int(np.log2(np.median(long))), MAX_READINGS)
     if len(series.parts) == 1 and long[0] < 8 * readings:
-        readings = max(readings // 4, LEAST_READINGS)
+        readings = max(readings // 4, MIN_READINGS)
     pieces = []
     for part in series.parts:
         begins = range(part.start, part.stop - readings + 1, readings // 2)

@@ -22,7 +22,7 @@ from labctl.recording.sanity.readings.series import (
 #: A reading is compared with the median of the five around it, and its distance with the usual one of so many readings.
 USUAL_OVER = 100
 #: Readings that a data set needs for that.
-LEAST_READINGS = 20
+MIN_READINGS = 20
 #: A spike is so many usual distances off, and so many steps of its code; of a temperature so many K.
 SPIKE_NOISES, SPIKE_CODES, SPIKE_K = 8.0, 3.0, 3.0
 #: A spike is this many times as far off as 95 % of the readings beside it.
@@ -30,7 +30,7 @@ JERKS = 4.0
 #: And this many times as far off as the readings two to four places away.
 ALONE = 2.5
 #: More readings than this share of all are no spikes.
-MOST_SPIKES = 0.02
+MAX_SPIKE_SHARE = 0.02
 #: A rest is examined in blocks of this long, s, and at least so many readings, against the median of so many blocks.
 BLOCK_S, BLOCK_READINGS, LEVEL_BLOCKS = 0.5, 8, 601
 #: A unit moves where a block's median is off by so many usual distances, and by this much, deg/s, in a record at rest.
@@ -58,7 +58,7 @@ def check_spikes(series: Series) -> Iterator[Marked]:
             noise = series.noises[name] if is_output else 0.0
             size[part], rows[part] = _spikes(values[part], least, noise, steady=series.motion in ("rest", "rates"))
         n = int(rows.sum())
-        if not n or n > max(MOST_SPIKES * len(values), 1):
+        if not n or n > max(MAX_SPIKE_SHARE * len(values), 1):
             continue
         worst = int(np.argmax(np.where(rows, np.abs(size), 0.0)))
         unit = "deg/s" if is_output else "deg C"
@@ -75,7 +75,7 @@ def check_spikes(series: Series) -> Iterator[Marked]:
 
 def _spikes(values: Array, least: float, noise: float, *, steady: bool) -> tuple[Array, Rows]:
     """Return how far each reading of a data set, (n,), is from those around, and which of them are spikes."""
-    if len(values) < LEAST_READINGS:
+    if len(values) < MIN_READINGS:
         return np.zeros(len(values)), np.zeros(len(values), dtype=bool)
     off = values - medians_of_five(values)
     size = np.abs(off)

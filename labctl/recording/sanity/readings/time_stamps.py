@@ -24,9 +24,9 @@ GAP_STEPS, GAP_DEVIATIONS = 2.5, 12.0
 #: than one, while the steps beside it are whole: a reading that only came late is followed by a short step.
 NEAR_STEP, WHOLE_STEP = 0.2, 0.8
 #: Fewer single readings are missing from no mean that one could tell.
-LEAST_SINGLE = 3
+MIN_SINGLE = 3
 #: More rows out of order than this share are no accident, and are not left out.
-MOST_OUT = 0.02
+MAX_OUT_OF_ORDER_SHARE = 0.02
 
 
 def rows_in_order(t_s: Array) -> Rows:
@@ -70,7 +70,7 @@ def check_clock(series: Series) -> Iterator[Marked]:
     n = int(out.sum())
     worst = int(np.argmin(steps)) + 1
     do = "row does" if n == 1 else "rows do"
-    few = n <= MOST_OUT * len(series)
+    few = n <= MAX_OUT_OF_ORDER_SHARE * len(series)
     yield Marked(
         Finding(
             "time_back", "certain", f"t_s, {rows_in_words(out)}",
@@ -124,7 +124,7 @@ def check_gaps(series: Series) -> Iterator[Marked]:
     spread = ROBUST * float(np.median(np.abs(steps[same] - usual[same]))) if same.any() else 0.0
     wide = same & (steps > np.maximum(GAP_STEPS * usual, usual + GAP_DEVIATIONS * spread))
     single = same & _is_one_missing(steps / usual, spread / usual)
-    if single.sum() >= LEAST_SINGLE:
+    if single.sum() >= MIN_SINGLE:
         wide |= single
     if not wide.any():
         return

@@ -113,7 +113,7 @@ def test_a_channel_that_was_not_kept_silences_its_effects(channel: str, silenced
 
 
 def test_what_is_suspected_is_not_called_beyond_what_the_recording_can_say(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(visibility, "LEAST_VISIBLE", 1.1)  # as if the schedule hid everything
+    monkeypatch.setattr(visibility, "MIN_VISIBLE", 1.1)  # as if the schedule hid everything
     found = held(single_axis(1, **HELD), full=True)
     hidden = {line["effect"] for line in found.not_testable}
     assert found.verdict.named

@@ -13,12 +13,12 @@ import pytest
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting import fit
-from labctl.fitting.effects import MOST_FORMULAS, formulas, read_formula, read_formulas
+from labctl.fitting.effects import MAX_FORMULAS, formulas, read_formula, read_formulas
 from labctl.fitting.effects.formula import DEEPEST
 from labctl.services.effects import with_files
 from tests.helpers.recordings import points
 
-LINES = [f"f{n}: sin({n + 1} * table_rate_dps)" for n in range(MOST_FORMULAS)]
+LINES = [f"f{n}: sin({n + 1} * table_rate_dps)" for n in range(MAX_FORMULAS)]
 
 
 @pytest.fixture
@@ -92,18 +92,18 @@ def test_a_long_sum_is_read() -> None:
 
 
 def test_at_most_so_many_at_once(tmp_path: Path) -> None:
-    assert len(read_formulas(LINES)) == MOST_FORMULAS
-    with pytest.raises(BadInput, match=f"more than {MOST_FORMULAS} formulas"):
+    assert len(read_formulas(LINES)) == MAX_FORMULAS
+    with pytest.raises(BadInput, match=f"more than {MAX_FORMULAS} formulas"):
         read_formulas([*LINES, "g: t_s"])
-    with pytest.raises(BadInput, match=f"more than {MOST_FORMULAS} formulas"):
+    with pytest.raises(BadInput, match=f"more than {MAX_FORMULAS} formulas"):
         read_formulas(LINES * 1000)
     with pytest.raises(BadInput, match="formula 'f3' is given twice"):
         read_formulas([*LINES[:5], "f3: t_s"])
     file = tmp_path / "many.toml"
-    file.write_text("".join(f'[[effects]]\nid = "g{n}"\nformula = "t_s"\n' for n in range(MOST_FORMULAS + 1)))
-    with pytest.raises(BadInput, match=f"more than {MOST_FORMULAS} formulas"):
+    file.write_text("".join(f'[[effects]]\nid = "g{n}"\nformula = "t_s"\n' for n in range(MAX_FORMULAS + 1)))
+    with pytest.raises(BadInput, match=f"more than {MAX_FORMULAS} formulas"):
         with_files([str(file)])
-    assert len(formulas(str(file))) == MOST_FORMULAS + 1
+    assert len(formulas(str(file))) == MAX_FORMULAS + 1
 
 
 @pytest.mark.timeout(10)

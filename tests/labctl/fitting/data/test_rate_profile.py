@@ -57,7 +57,7 @@ def test_a_gap_begins_another_stretch_and_another_window() -> None:
 
 
 def test_rows_are_the_windows_off_the_ends_of_all_readings(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("labctl.recording.motions.windows.MOST_WINDOWS", 100)
+    monkeypatch.setattr("labctl.recording.motions.windows.MAX_WINDOWS", 100)
     t_s, rate = STEP_S * np.arange(1000), np.arange(1000.0)
     columns = {"t_s": t_s, "dataset": np.repeat([1, 2], [503, 497]), "table_rate_dps": rate}
     profile = rate_profile(columns, windows=True)

@@ -17,7 +17,7 @@ from tests.helpers.turned_unit import TurnedUnit
 INFO = RecordingInfo(
     serial="HAND-1", axes=("x", "y", "z"), kind="samples", motion="poses", started_at=datetime(2026, 1, 5, tzinfo=UTC)
 )
-MOST_BLOCKS = 400
+MAX_BLOCKS = 400
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Run:
 
 def run(seed: int, target: Target) -> Run:
     unit, live, states = TurnedUnit(seed), LiveCalibration(INFO, target), list[LiveState]()
-    for _ in range(MOST_BLOCKS):
+    for _ in range(MAX_BLOCKS):
         live.add(unit.block(0.5))
         states.append(live.assess())
         if states[-1].done:

@@ -161,7 +161,7 @@ def certified(store: Store, due: datetime) -> int:
 
 
 def test_the_work_does_not_grow_with_the_fleet(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(type_drift, "MOST_UNITS", 5)
+    monkeypatch.setattr(type_drift, "MAX_UNITS", 5)
     add_type(store)
     add_drifting_unit(store, "N-1", {1.0: 0.0})
     few, _ = statements_of(store)

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from labctl.answers.standards import StandardCertificateRequest, WithdrawFindingRequest
 from labctl.errors import BadInput, Conflict, NotFound
-from labctl.metrology.control_chart import LEAST_HISTORY
+from labctl.metrology.control_chart import MIN_HISTORY
 from labctl.services.standards.register import add_certificate, count_by_state, one_standard, withdraw_finding
 from labctl.services.standards.usage import affected
 from labctl.store import Store, open_store
@@ -107,13 +107,13 @@ def test_days_to_come_are_refused(store: Store) -> None:
 def test_a_history_of_checks_judges_what_stated_uncertainties_let_pass(store: Store) -> None:
     register.add(store)
     register.certificate(store, "T-1", DAY, 0.0, expanded=0.4)  # 3 u are 0.6
-    for n in range(LEAST_HISTORY):
+    for n in range(MIN_HISTORY):
         assert register.check(store, DAY + timedelta(days=n + 1), 0.01 * (-1) ** n).state == "valid"
     answer = register.check(store, DAY + timedelta(days=40), 0.2)
     assert answer.state == "check it"
     (by_history,) = [each for each in answer.checks[-1].limits if each.basis == "history"]
     assert by_history.high == pytest.approx(3 * 0.02 / 1.128)
-    assert by_history.values == LEAST_HISTORY
+    assert by_history.values == MIN_HISTORY
     assert "by its history" in answer.text[0]
     assert count_by_state(store, DAY)["check it"] == 1
     again = register.check(store, DAY + timedelta(days=41), 0.01)  # repeated, and in limits

@@ -1,8 +1,8 @@
 // A result rounded to its uncertainty (GUM 7.2.6): the uncertainty to two significant digits, the value to the same place.
 
-const MOST_DECIMALS = 12;
+const MAX_DECIMALS = 12;
 /** Results from 10^6 on and below 10^-4 are written with a power of ten. */
-const [LEAST_POWER, MOST_POWER] = [-4, 5];
+const [MIN_POWER, MAX_POWER] = [-4, 5];
 
 /**
  * Round a value to its uncertainty: {value, u, exponent}, texts that both count in units of 10^exponent.
@@ -15,10 +15,10 @@ export function roundedToUncertainty(value, uncertainty) {
   const u = known ? Number(uncertainty.toExponential(1)) : null; // two significant digits, so 0.0999 is 0.10
   const largest = Math.max(Math.abs(value), u ?? 0);
   const size = largest > 0 ? Math.floor(Math.log10(largest)) : 0;
-  const exponent = size < LEAST_POWER || size > MOST_POWER ? size : 0;
+  const exponent = size < MIN_POWER || size > MAX_POWER ? size : 0;
   if (u === null) return { value: Number((value / 10 ** exponent).toPrecision(4)).toString(), u: null, exponent };
   const place = Number(u.toExponential(1).split("e")[1]) - exponent - 1; // of the second significant digit
-  const decimals = Math.min(Math.max(-place, 0), MOST_DECIMALS);
+  const decimals = Math.min(Math.max(-place, 0), MAX_DECIMALS);
   const unit = 10 ** Math.max(place, 0);
   /** @param {number} number */
   const text = (number) => (Math.round(number / 10 ** exponent / unit) * unit).toFixed(0);

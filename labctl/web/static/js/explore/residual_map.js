@@ -15,7 +15,7 @@ import { mapCells } from "./residual_cells.js";
 
 const DIMMED_BELOW = 2;
 /** Cells that fill less than this share of their rows and columns are drawn where they are, not in a grid. */
-const LEAST_FILLED = 0.3;
+const MIN_FILLED = 0.3;
 /** Height of a panel on a narrow screen, where panels are stacked, px. */
 const PANEL_PX = 210;
 
@@ -123,7 +123,7 @@ function scatteredTraces({ cells }, position, shared) {
 function positionPanel(map, id, pick) {
   const found = mapCells(map);
   const shared = { xaxis: `x${id}`, yaxis: `y${id}` };
-  const filled = found.cells.length >= LEAST_FILLED * found.rates.length * found.warm.length;
+  const filled = found.cells.length >= MIN_FILLED * found.rates.length * found.warm.length;
   const { traces, x, y, placed } = (filled ? gridTraces : scatteredTraces)(found, map.position, shared);
   /**
    * @param {readonly PlacedCell[]} which

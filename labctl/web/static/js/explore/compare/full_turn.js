@@ -15,7 +15,7 @@ import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
 /** @import { ExploreState } from "../state.js" */
 
 /** More temperature levels than this are dots without lines. */
-const MOST_LINES = 24;
+const MAX_LINES = 24;
 
 /**
  * @param {Comparison} comparison
@@ -85,7 +85,7 @@ function turnTraces(rows, turn, name, scene, colours) {
     customdata: rows.dataset,
     hovertemplate: "data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C<br>%{z:.3g} deg per turn<extra></extra>",
   };
-  return levels.length > MOST_LINES
+  return levels.length > MAX_LINES
     ? [dots]
     : [
         ...levels.flatMap((level) =>
