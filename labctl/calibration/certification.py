@@ -69,7 +69,7 @@ def read_certification(given: Mapping[str, object]) -> Certification:
     """Read the value of `certification`. Raises LookupError, TypeError or ValueError for one that is not whole."""
     states: tuple[State, ...] = get_args(State)
     stated, due = given["state"], given["due"]
-    state = next((each for each in states if each == stated), None)
+    state: State | None = next((each for each in states if each == stated), None)
     if state is None:
         raise ValueError(f"the state is {str(stated)[:80]!r}, but must be one of {', '.join(states)}")
     return Certification(

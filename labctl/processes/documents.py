@@ -10,6 +10,7 @@ first line that says whether it is a value or an error, and the value or the err
 from __future__ import annotations
 
 from multiprocessing.connection import Connection
+from types import GenericAlias
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -46,7 +47,8 @@ class Form(Generic[ValueT]):
         """`kind` is the type; `name` says in errors what its values are, as `the answer to bench.describe`."""
         self.name = name
         # in a list of one: pydantic takes no configuration for a dataclass that stands alone
-        self._adapter: TypeAdapter[tuple[ValueT]] = TypeAdapter(tuple[kind], config=ConfigDict(val_json_bytes="base64"))
+        alone: Any = GenericAlias(tuple, (kind,))
+        self._adapter: TypeAdapter[tuple[ValueT]] = TypeAdapter(alone, config=ConfigDict(val_json_bytes="base64"))
 
     def encode(self, value: ValueT) -> bytes:
         """Return a value as one line. Raises BadDocument for one that has no form in JSON."""

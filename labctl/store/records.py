@@ -27,7 +27,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class UnitHoldings:
-    """What there is of a unit: numbers of recordings, newest first, and of versions of its calibration, rising."""
+    """Numbers of a unit's recordings, newest first, and of the versions of its calibration, rising."""
 
     recordings: list[int]
     versions: list[int]

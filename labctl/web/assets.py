@@ -1,8 +1,8 @@
 """The files of the pages as they travel: under addresses that change with their content, compressed, cached for good.
 
-`/static/<release>/js/main.js` is kept by browsers for a year and never asked for again (RFC 9111, RFC 8246); the
-release is a digest of all files, so a page of a newer labctl names other addresses, and modules that import one another
-by relative addresses follow. `/static/js/main.js` is the same file, revalidated on each request.
+`/static/<release>/js/main.js` is kept by browsers for a year and never asked for again (RFC 9111, RFC 8246). The release
+is a digest of all files: pages of the next release name other addresses, and modules that import one another by relative
+addresses follow. `/static/js/main.js` is the same file, revalidated on each request.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Assets:
     def split(self, address: str) -> tuple[str, bool]:
         """Return the name in an address below `/static/`, and whether it is of this release, so never changes.
 
-        A page that an older labctl has sent goes on to ask for its own release: it gets the files of now, revalidated.
+        An open page of an earlier release goes on to ask for its own files: it gets those of now, revalidated.
         """
         first, slash, rest = address.partition("/")
         if slash and address not in self._paths and rest in self._paths:

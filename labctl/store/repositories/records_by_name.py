@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import fields
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
 
 import sqlalchemy as sa
 
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 RecordT = TypeVar("RecordT", bound="DataclassInstance")
-RowT = TypeVar("RowT", bound=tuple[object, ...])
+ColumnTs = TypeVarTuple("ColumnTs")
 
 
-def records_of(kind: type[RecordT], found: sa.Result[RowT]) -> list[RecordT]:
+def records_of(kind: type[RecordT], found: sa.Result[*ColumnTs]) -> list[RecordT]:
     """Return the rows of a query as records. Raises TypeError where its columns are not the record's fields."""
     _check_columns(kind, found.keys())
     make: Callable[..., RecordT] = kind

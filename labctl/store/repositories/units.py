@@ -116,7 +116,7 @@ class Units:
         return Page.of(units, lambda unit: unit.serial, request, total)
 
     def holdings(self, serials: Sequence[str]) -> dict[str, UnitHoldings]:
-        """Return what there is of each of some units: numbers of recordings, newest first, and versions, rising."""
+        """Return the numbers of recordings, newest first, and of versions, rising, of each of some units."""
         r, v = tables.recordings.c, tables.calibrations.c
         held = {serial: UnitHoldings([], []) for serial in serials}
         some_of: sa.BindParameter[Sequence[str]] = sa.bindparam("serials", expanding=True)
