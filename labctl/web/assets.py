@@ -1,8 +1,8 @@
 """The files of the pages as they travel: under addresses that change with their content, compressed, cached for good.
 
-`/static/<release>/js/main.js` is kept by browsers for a year and never asked for again (RFC 9111, RFC 8246). The release
-is a digest of all files: pages of the next release name other addresses, and modules that import one another by relative
-addresses follow. `/static/js/main.js` is the same file, revalidated on each request.
+`/static/<release>/js/main.js` is kept by browsers for a year and never asked for again (RFC 9111, RFC 8246). The
+release is a digest of all files: pages of the next release name other addresses, and modules that import one another by
+relative addresses follow. `/static/js/main.js` is the same file, revalidated on each request.
 """
 
 from __future__ import annotations
