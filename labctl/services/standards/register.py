@@ -141,7 +141,7 @@ def answer_of(standard: RegisteredStandard, on: date) -> StandardResponse:
     """Return a standard as an answer."""
     row = standard.row
     found = dict(_states(standard, on))
-    state: StandardState = min(found, key=WORST_FIRST.index, default="valid")
+    state: StandardState = min(found, key=WORST_FIRST.index) if found else "valid"
     withdrawn = {each.finding: each for each in standard.findings if each.act == "withdraw"}
     return StandardResponse(
         label=row.label, serial=row.serial, quantity=row.quantity, unit=row.unit, description=row.description,
