@@ -187,8 +187,9 @@ def test_what_is_no_call_is_refused_and_the_process_goes_on(tmp_path: Path, name
 def test_a_pickle_is_never_opened(tmp_path: Path, protocol: int) -> None:
     made = tmp_path / "made"
     content = pickle.dumps(Opens(made), protocol)
-    for name, sent in (("h", content), ("a", HEAD + content)):  # the head, the arguments; short, as names of sockets are
-        refused(tmp_path / name, framed(sent), "is not as expected: Invalid JSON")
+    for name, sent in (("h", content), ("a", HEAD + content)):  # head, arguments; the name of a socket is short
+        (tmp_path / name).mkdir()
+        refused(tmp_path / name / "c", framed(sent), "is not as expected: Invalid JSON")
     assert not made.exists()
     pickle.loads(content)
     assert made.is_dir()  # what was sent does what it is meant to
