@@ -47,8 +47,8 @@ def earlier_version(
     `changes` are those of a scale factor and of a misalignment. Raises BadInput without a unit, NotFound.
     """
     from labctl.errors import BadInput
-    from labctl.services.commands.open import open_readonly
     from labctl.services.pose_triads import Earlier as Found
+    from labctl.services.reading import open_readonly
     from labctl.services.sensor_versions import one_accelerometer
 
     if number is None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
+from inspect import isawaitable
 from pathlib import Path
+from typing import Any
 
 import plotly
-from fastapi import FastAPI, HTTPException, Request, Response
+from fastapi import FastAPI, Request, Response
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from labctl.web.assets import IMMUTABLE, REVALIDATED, Asset, Assets, accepted_codings
@@ -54,6 +59,17 @@ def install(app: FastAPI) -> None:
     for path in ("/", *PAGES, *(f"{page}/{{rest:path}}" for page in PAGES)):
         app.add_api_route(path, index, methods=["GET", "HEAD"], include_in_schema=False)
     app.add_api_route(f"{STATIC}{{address:path}}", static, methods=["GET", "HEAD"], include_in_schema=False)
+    of_programs = app.exception_handlers[HTTPException]
+
+    async def unknown(request: Request, error: Exception) -> Response:
+        """Return the document of the pages to a person who asks for what is no page; it says so."""
+        if not _is_of_a_browser(request):
+            return await _answer_of(of_programs, request, error)
+        answer = index(request)
+        answer.status_code = 404 if answer.status_code == 200 else answer.status_code
+        return answer
+
+    app.add_exception_handler(404, unknown)
     app.add_middleware(_SecurityHeaders)
 
 
@@ -61,6 +77,18 @@ def install(app: FastAPI) -> None:
 def _assets() -> Assets:
     """Return the files, compressed once per process."""
     return Assets(FOLDER, {"plotly.js": PLOTLY})
+
+
+def _is_of_a_browser(request: Request) -> bool:
+    """Return whether a person's browser asks for a page, and not a program, a file or the API."""
+    reads = request.method in {"GET", "HEAD"} and "text/html" in request.headers.get("accept", "")
+    return reads and not request.url.path.startswith(("/api", STATIC))
+
+
+async def _answer_of(handler: Callable[..., Any], request: Request, error: Exception) -> Response:
+    answer = handler(request, error)
+    response: Response = await answer if isawaitable(answer) else answer
+    return response
 
 
 def _response(request: Request, asset: Asset, cache_control: str) -> Response:
@@ -79,6 +107,10 @@ def is_page(path: str) -> bool:
     return path == "/" or path.startswith(STATIC) or any(path == page or path.startswith(f"{page}/") for page in PAGES)
 
 
+def _is_document(message: Message) -> bool:
+    return Headers(raw=message["headers"]).get("content-type", "").startswith("text/html")
+
+
 class _SecurityHeaders:
     """ASGI middleware that adds `HEADERS` to every page and static file; responses of the API pass unchanged."""
 
@@ -86,12 +118,12 @@ class _SecurityHeaders:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http" or not is_page(scope["path"]):
+        if scope["type"] != "http" or scope["path"].startswith("/api"):
             await self._app(scope, receive, send)
             return
 
         async def send_with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
+            if message["type"] == "http.response.start" and (is_page(scope["path"]) or _is_document(message)):
                 message["headers"] = [*message["headers"], *HEADERS.items()]
             await send(message)
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator, model_validator
+import tomli_w
+from pydantic import BaseModel, Field, JsonValue, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from instruments.toml_documents import listed, parse_toml, read_toml_text, shown
@@ -138,6 +140,22 @@ def parse_recipe(text: str, *, source: str = "recipe") -> Recipe:
         raise RecipeError(f"{source}: not TOML: {error}; correct it") from error
     except ValidationError as error:
         raise RecipeError(f"{source}: {_complaints(error)}") from error
+
+
+def recipe_document(recipe: Recipe) -> dict[str, JsonValue]:
+    """Return a recipe as a recipe file says it; keys that have their default are left out."""
+    document = recipe.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    if recipe.turns is not None:
+        document = {key: value for key, value in document.items() if value != []}  # it has no rates
+    return {"format": "labctl-recipe/1", "name": recipe.name, **document}
+
+
+def recipe_text(recipe: Mapping[str, object]) -> str:
+    """Return a stored recipe as a recipe file; nothing for one of a release of labctl whose recipes had other keys."""
+    try:
+        return tomli_w.dumps(recipe_document(Recipe.model_validate(dict(recipe))))
+    except ValidationError:
+        return ""
 
 
 def _complaints(error: ValidationError) -> str:

@@ -40,6 +40,7 @@ const routes = ["/", "/campaigns/new", "/campaigns/:id", "/units/:serial"].map((
 test("the first route that fits is taken, with its decoded parameters", () => {
   assert.deepEqual(matchRoute(routes, "/")?.params, {});
   assert.deepEqual(matchRoute(routes, "/campaigns/new")?.params, {});
+  assert.deepEqual(matchRoute(routes, "/campaigns/%E0%A4%A")?.params, { id: "%E0%A4%A" }); // no text: as it stands
   assert.deepEqual(matchRoute(routes, "/campaigns/12")?.params, { id: "12" });
   assert.deepEqual(matchRoute(routes, "/units/A%2F1/")?.params, { serial: "A/1" });
   assert.equal(matchRoute(routes, "/campaigns"), null);

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from labctl.answers.accelerometer import AccelerometerResponse
-from labctl.answers.magnetometer import MagnetometerResponse
-from labctl.answers.sensors import AccelerometerVersion, MagnetometerVersion, SensorVersionResponse
 from labctl.cli.output import console, format_number, table
-from labctl.services.sensor_coefficients import coefficients_of
+
+if TYPE_CHECKING:
+    from labctl.answers.accelerometer import AccelerometerResponse
+    from labctl.answers.magnetometer import MagnetometerResponse
+    from labctl.answers.sensors import AccelerometerVersion, MagnetometerVersion, SensorVersionResponse
 
 #: Of the expanded uncertainty.
 COVERAGE = 2
@@ -16,6 +18,9 @@ COVERAGE = 2
 
 def print_sensor(answer: AccelerometerResponse | MagnetometerResponse) -> None:
     """Print the parameters with their uncertainty, the verdict and what it stands on."""
+    from labctl.answers.accelerometer import AccelerometerResponse
+    from labctl.services.sensor_coefficients import coefficients_of
+
     name = "accelerometer" if isinstance(answer, AccelerometerResponse) else "magnetometer"
     rows = table(name, "coefficient", "unit", "value", "u", "U, k = 2", numbers=2)
     for each in coefficients_of(answer):
@@ -53,6 +58,8 @@ def print_versions(answers: Sequence[SensorVersionResponse]) -> None:
 
 def _print_extent(answer: AccelerometerResponse | MagnetometerResponse) -> None:
     """Print how many data the result stands on."""
+    from labctl.answers.accelerometer import AccelerometerResponse
+
     if isinstance(answer, AccelerometerResponse):
         density = max(answer.noise_density_m_s2.values())
         said = (

@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import tomli_w
-from pydantic import ValidationError
-
-from labctl.answers.json_object import JsonObject
 from labctl.answers.plans import CampaignPlanResponse, RunColumns, StepState
-from labctl.services.planning.loading import (
-    recipe_document,
-)
 from labctl.services.planning.timeline import timeline_columns
 from labctl.store import StepRow, Store
 from procedures.planning.turn_steps import DATA_SETS_OF_TURN
-from procedures.recipe.recipe import Recipe
+from procedures.recipe.recipe import recipe_text
 
 
 def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
@@ -37,14 +30,6 @@ def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
         expected_s=row.expected_s,
         timeline=timeline,
     )  # fmt: skip
-
-
-def recipe_text(recipe: JsonObject) -> str:
-    """Return a recipe as text; nothing where it is of a release of labctl whose recipes had other keys."""
-    try:
-        return tomli_w.dumps(recipe_document(Recipe.model_validate(dict(recipe))))
-    except ValidationError:
-        return ""
 
 
 def _state(word: str) -> StepState:

@@ -3,52 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from pathlib import Path
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from instruments.clock import SystemClock
 from labctl.answers.campaigns import CampaignResponse
 from labctl.config import default_database
-from labctl.errors import StoreError
 from labctl.services.campaigns.resumability import with_resume
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.command import Command, CommandExecutor, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
 from labctl.services.drafts.answers import with_drafts
+from labctl.services.reading import open_readonly
 from labctl.store import Store, holder_of, is_url, open_store
 
 if TYPE_CHECKING:
     from labctl.services.commands.foreground_control import OpenTerminal
     from labctl.services.commands.remote import HttpExecutor
-
-
-@contextmanager
-def open_readonly(database: str | None) -> Iterator[Store]:
-    """Open the store for reading, also while another process writes."""
-    with open_store(database or default_database(), write=False) as store:
-        yield store
-
-
-@contextmanager
-def open_existing(database: str | None) -> Iterator[Store | None]:
-    """Open the store for reading where there is one; None: no database was made yet, and none is made."""
-    location = database or default_database()
-    if not is_url(location) and not Path(location).is_file():
-        yield None
-        return
-    with open_readonly(location) as store:
-        yield store
-
-
-@contextmanager
-def open_readable(database: str | None) -> Iterator[Store | None]:
-    """Open the store for reading, for a command that does without one; None: there is none, or it cannot be read."""
-    with ExitStack() as opened:
-        store = None
-        with suppress(StoreError):
-            store = opened.enter_context(open_existing(database))
-        yield store
 
 
 def service_url(database: str | None, campaign: int | None = None) -> str | None:

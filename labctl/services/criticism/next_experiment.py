@@ -19,12 +19,12 @@ from labctl.fitting.criticism import (
     separation_power,
 )
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.services.planning.loading import bench_for, limits_of, load_bench, recipe_document
+from labctl.services.planning.loading import bench_for, limits_of, load_bench
 from labctl.services.simulation.visibility import planned_schedule
 from labctl.store import Store
 from procedures.contracts.errors import ProcedureError
 from procedures.planning.plan import make_plan
-from procedures.recipe.recipe import Recipe
+from procedures.recipe.recipe import Recipe, recipe_document
 
 #: At most this many rivals are separated from the leader, and this many experiments are shown.
 PAIRS, SHOWN = 6, 4

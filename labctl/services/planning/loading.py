@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pydantic import JsonValue, ValidationError
+from pydantic import ValidationError
 
 from instruments.bench import checked_settings
 from instruments.bench_config import BenchFile, read_bench, shipped_benches
@@ -53,14 +53,6 @@ def own_text(source: str) -> str:
     if "\n" in source or source in shipped_recipes():
         return source
     return read_toml_text(Path(source))
-
-
-def recipe_document(recipe: Recipe) -> dict[str, JsonValue]:
-    """Return a recipe as a recipe file says it; keys that have their default are left out."""
-    document = recipe.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-    if recipe.turns is not None:
-        document = {key: value for key, value in document.items() if value != []}  # it has no rates
-    return {"format": "labctl-recipe/1", "name": recipe.name, **document}
 
 
 def load_bench(source: str) -> BenchFile:

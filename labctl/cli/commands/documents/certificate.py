@@ -91,9 +91,10 @@ def issue(
     from labctl.acting_user import actor
     from labctl.answers.certificates import CertificateRequest
     from labctl.services.certificates.served import certificate_file, format_of
-    from labctl.services.commands.open import execute, open_readonly
+    from labctl.services.commands.open import execute
     from labctl.services.commands.registry import ISSUE_CERTIFICATE
     from labctl.services.commands.requests import ToVersion
+    from labctl.services.reading import open_readonly
 
     with one_clear_line():
         chosen = format_of(out.suffix)

@@ -10,6 +10,8 @@ import { changedQuery, matchRoute, routeOf } from "./routes.js";
 const routes = [];
 let pageAbort = new AbortController();
 let navigated = false; // focus moves to the page from the second page on
+let shown = ""; // path and query of the page that is shown
+const SCROLLED_MS = 150;
 
 /**
  * Register the module of a pattern like `/units/:serial`. A module exports `page(context)`, which returns an element.
@@ -18,13 +20,30 @@ let navigated = false; // focus moves to the page from the second page on
  */
 export const route = (pattern, load) => routes.push(routeOf(pattern, load));
 
+const address = () => location.pathname + location.search;
+
 /**
- * Navigate to an address as if its link had been clicked.
+ * Navigate to an address as if its link had been clicked: the new page begins at its top, or at the part of its anchor.
  * @param {string} path
  */
-export function navigate(path) {
+export async function navigate(path) {
+  keepPlace();
   history.pushState(null, "", path);
-  return show();
+  await show();
+  if (location.hash) scrollToAnchor(location.hash);
+  else window.scrollTo(0, 0);
+}
+
+/** Write down how far this entry of the history is scrolled. */
+const keepPlace = () => history.replaceState({ scrolled: window.scrollY }, "");
+
+/** Return to an entry of the history: its page, unless that is shown already, and where one was on it. */
+async function goBack() {
+  const place = history.state?.scrolled;
+  if (address() !== shown) await show();
+  if (place !== undefined) window.scrollTo(0, place);
+  else if (location.hash) scrollToAnchor(location.hash);
+  else window.scrollTo(0, 0);
 }
 
 /**
@@ -33,7 +52,8 @@ export function navigate(path) {
  */
 export function updateQuery(choice) {
   const text = changedQuery(location.search, choice);
-  history.replaceState(null, "", text ? `?${text}` : location.pathname);
+  history.replaceState(history.state, "", (text ? `?${text}` : location.pathname) + location.hash);
+  shown = address();
 }
 
 /** @returns {Query} */
@@ -46,6 +66,7 @@ export async function show() {
   const { signal } = pageAbort;
   const main = document.querySelector("main");
   if (!main) return;
+  shown = address();
   const found = matchRoute(routes, location.pathname);
   window.dispatchEvent(new CustomEvent("labctl:moved"));
   main.setAttribute("aria-busy", "true");
@@ -114,11 +135,24 @@ export function start() {
     )
       return;
     event.preventDefault();
-    if (url.hash && url.pathname === location.pathname && url.search === location.search)
+    if (url.hash && url.pathname + url.search === address()) {
+      keepPlace();
+      if (url.hash !== location.hash) history.pushState(null, "", url.hash);
       return scrollToAnchor(url.hash);
-    navigate(url.pathname + url.search + url.hash).then(() => url.hash && scrollToAnchor(url.hash));
-    window.scrollTo(0, 0);
+    }
+    navigate(url.pathname + url.search + url.hash);
   });
-  window.addEventListener("popstate", show);
-  return show();
+  history.scrollRestoration = "manual"; // the browser restores it before the page is there
+  window.addEventListener("popstate", goBack);
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let scrolling;
+  window.addEventListener(
+    "scroll",
+    () => {
+      clearTimeout(scrolling);
+      scrolling = setTimeout(keepPlace, SCROLLED_MS);
+    },
+    { passive: true },
+  );
+  return goBack();
 }

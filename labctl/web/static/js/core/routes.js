@@ -15,12 +15,24 @@ const partsOf = (path) => path.split("/").filter(Boolean);
 export const routeOf = (pattern, load) => ({ parts: partsOf(pattern), load });
 
 /**
+ * A part of an address as it was before it was encoded; as it stands where that is not possible (`%E0%A4%A`).
+ * @param {string} part
+ */
+function decoded(part) {
+  try {
+    return decodeURIComponent(part);
+  } catch {
+    return part;
+  }
+}
+
+/**
  * The first route whose pattern fits a path, with the decoded values of its parameters; null where none does.
  * @param {readonly Route[]} routes
  * @param {string} path
  */
 export function matchRoute(routes, path) {
-  const parts = partsOf(path).map(decodeURIComponent);
+  const parts = partsOf(path).map(decoded);
   for (const { parts: pattern, load } of routes) {
     if (pattern.length !== parts.length) continue;
     if (!pattern.every((part, k) => part.startsWith(":") || part === parts[k])) continue;
