@@ -9,11 +9,11 @@ from labctl.answers.units import ExportFormatResponse, RecalibrationResponse, Un
 from labctl.exports import export_formats
 from labctl.services.calibrations.due import campaign_of
 from labctl.services.drafts.answers import newest_draft
+from labctl.services.planning.recipe_text import recipe_text
 from labctl.services.standards.usage import Notices
 from labctl.store import CertificationRow, Store, Unit
 from labctl.store.paging import Page, PageRequest
 from labctl.store.records import UnitHoldings
-from procedures.recipe.recipe import recipe_text
 
 #: Every unit, in one part.
 ANY_UNIT: PageRequest[str] = PageRequest()

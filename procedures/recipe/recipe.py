@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-import tomli_w
 from pydantic import BaseModel, Field, JsonValue, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
@@ -148,14 +146,6 @@ def recipe_document(recipe: Recipe) -> dict[str, JsonValue]:
     if recipe.turns is not None:
         document = {key: value for key, value in document.items() if value != []}  # it has no rates
     return {"format": "labctl-recipe/1", "name": recipe.name, **document}
-
-
-def recipe_text(recipe: Mapping[str, object]) -> str:
-    """Return a stored recipe as a recipe file; nothing for one of a release of labctl whose recipes had other keys."""
-    try:
-        return tomli_w.dumps(recipe_document(Recipe.model_validate(dict(recipe))))
-    except ValidationError:
-        return ""
 
 
 def _complaints(error: ValidationError) -> str:

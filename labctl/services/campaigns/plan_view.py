@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from labctl.answers.plans import CampaignPlanResponse, RunColumns, StepState
+from labctl.services.planning.recipe_text import recipe_text
 from labctl.services.planning.timeline import timeline_columns
 from labctl.store import StepRow, Store
 from procedures.planning.turn_steps import DATA_SETS_OF_TURN
-from procedures.recipe.recipe import recipe_text
 
 
 def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
