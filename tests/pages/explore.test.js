@@ -46,9 +46,9 @@ const map = {
 };
 
 test("data sets of the same rate and temperature share a cell", () => {
-  const { rates, warm, cells } = mapCells(map);
+  const { rates, temperatures, cells } = mapCells(map);
   assert.deepEqual(
-    [rates, warm],
+    [rates, temperatures],
     [
       [-10, 10],
       [20, 40],

@@ -38,6 +38,20 @@ test("lines, dots in space and maps are rows of x, y and z", () => {
   assert.deepEqual(traceRows([map]), [head, ["", "p", "r", 5], ["", "q", "r", 6]]);
 });
 
+test("rows stand under the titles of the axes, and helper traces are none of them", () => {
+  const layout = { xaxis: { title: { text: "rate, deg/s" } }, yaxis: { title: { text: "error<br>deg/s" } } };
+  const traces = [
+    { type: "scatter", name: "a", x: [1], y: [2] },
+    { type: "scatter", name: "cells", x: [1], y: [2], hoverinfo: "skip" },
+  ];
+  assert.deepEqual(traceRows(traces, layout), [
+    ["trace", "rate, deg/s", "error deg/s", "z"],
+    ["a", 1, 2, ""],
+  ]);
+  const different = { ...layout, xaxis2: { title: { text: "time, s" } } };
+  assert.deepEqual(traceRows([], different), [["trace", "x", "error deg/s", "z"]]);
+});
+
 test("a scale gives its own colours at its stops, and is clipped at its ends", () => {
   assert.equal(colourAt(TEMPERATURE_SCALE, 0), "rgb(45,95,190)");
   assert.equal(colourAt(TEMPERATURE_SCALE, 1), "rgb(191,26,32)");

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,59 @@ def test_a_pick_shows_everywhere_and_in_the_address(visit: Callable[..., Page], 
     fails.get_by_role("button", name="Clear selection").click()
     expect(fails).to_contain_text("No data set is selected")
     assert "pick=" not in page.url
+
+
+def test_the_map_is_saved_with_each_data_set_and_with_what_it_is_of(
+    visit: Callable[..., Page], service: Service, explored: str
+) -> None:
+    serial = explored.partition("=")[2]
+    page = visit(explored)
+    fails = page.get_by_role("region", name="Where the model fails")
+    fails.scroll_into_view_if_needed()
+    fails.locator(".plot .main-svg").first.wait_for()
+    with page.expect_download() as download:
+        fails.get_by_role("button", name="as CSV").first.click()
+    first, *lines = download.value.path().read_text().splitlines()
+    criticism = service.get(f"/api/units/{serial}/calibrations/1/criticism")
+    calibration = service.get(f"/api/units/{serial}/calibrations/1")
+    assert first.startswith("# ")
+    assert f"unit {serial}, version 1 ({calibration['hash'][:12]}), recording 1; saved 20" in first
+    assert download.value.suggested_filename.startswith(f"unit-{serial.lower()}-version-1-recording-1-")
+    rows = list(csv.DictReader(lines))
+    saved = {
+        (row["axis"], row["position"], int(row["data set"])): (
+            float(row["table rate, deg/s"]), float(row["temperature, deg C"]),
+            float(row["residual, deg/s"]), float(row["residual / noise floor"]),
+        )
+        for row in rows
+    }  # fmt: skip
+    stated = {
+        (of["axis"], of["position"], number): figures
+        for of in criticism["maps"]
+        for number, *figures in zip(
+            of["dataset"], of["table_rate_dps"], of["temperature_c"], of["residual_dps"], of["over_floor"], strict=True
+        )
+    }
+    assert len(rows) == len(saved) == len(stated) == 121
+    assert saved == {key: tuple(figures) for key, figures in stated.items()}
+
+
+@pytest.mark.parametrize("kind", ["PNG", "SVG"])
+def test_a_saved_picture_says_what_it_is_of(visit: Callable[..., Page], explored: str, kind: str) -> None:
+    serial = explored.partition("=")[2]
+    page = visit(explored)
+    fails = page.get_by_role("region", name="Where the model fails")
+    fails.scroll_into_view_if_needed()
+    fails.locator(".plot .main-svg").first.wait_for()
+    with page.expect_download() as download:
+        fails.get_by_role("button", name=f"as {kind}").first.click()
+    content = download.value.path().read_bytes()
+    if kind == "PNG":
+        assert content.startswith(b"\x89PNG")
+        assert len(content) > 10_000
+    else:
+        assert f"unit {serial}, version 1 (" in content.decode()
+    assert page.get_by_text(f"unit {serial}, version 1 (").count() == 0, "the figure of the page stays as it was"
 
 
 @pytest.mark.parametrize("view", ["Error over rate", "Error over temperature", "Surface", "At rest", "Per full turn"])

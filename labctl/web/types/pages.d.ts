@@ -114,6 +114,7 @@ export interface Picture {
 /** The element that Plotly has drawn into. */
 export interface Plot extends HTMLElement {
   data?: PlotTrace[];
+  layout?: PlotLayout;
   on: (name: string, act: (event: PlotEvent) => unknown) => void;
 }
 
@@ -135,7 +136,7 @@ export interface Figure extends HTMLElement {
 
 export interface Plotly {
   react: (plot: HTMLElement, data: PlotTrace[], layout: PlotLayout, config: object) => Promise<unknown>;
-  toImage: (plot: HTMLElement, options: object) => Promise<string>;
+  toImage: (plot: HTMLElement | Picture, options: object) => Promise<string>;
 }
 
 /** The state of the page of a recording: which channel, window and data set are shown. */

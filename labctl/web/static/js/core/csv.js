@@ -1,6 +1,6 @@
 // CSV files of figures.
 
-/** @import { CsvRows, PlotTrace } from "../../../types/pages.js" */
+/** @import { CsvRows, PlotLayout, PlotTrace } from "../../../types/pages.js" */
 
 /**
  * A name as that of a file: "Error over rate" -> "error-over-rate".
@@ -23,13 +23,16 @@ const cellText = (cell) =>
 export const csvText = (rows) => rows.map((row) => row.map(cellText).join(",")).join("\n") + "\n";
 
 /**
- * The numbers of Plotly traces as rows.
+ * The numbers of Plotly traces as rows, under the titles of the axes, which carry their units. Traces that only help
+ * to pick or to shade (`hoverinfo` "skip") are none of the figure's numbers.
  * @param {readonly PlotTrace[]} traces
+ * @param {PlotLayout} [layout]
  */
-export function traceRows(traces) {
+export function traceRows(traces, layout = {}) {
   /** @type {unknown[][]} */
-  const rows = [["trace", "x", "y", "z"]];
-  for (const { name = "", x, y, z } of traces) {
+  const rows = [["trace", axisTitle(layout, "x"), axisTitle(layout, "y"), axisTitle(layout, "z")]];
+  for (const { name = "", x, y, z, hoverinfo } of traces) {
+    if (hoverinfo === "skip") continue;
     const depth = z && Array.from(z);
     if (depth && !isList(depth[0])) {
       depth.forEach((value, k) => rows.push([name, x?.[k], y?.[k], value])); // dots or a line in space
@@ -40,6 +43,17 @@ export function traceRows(traces) {
     } else Array.from(x ?? y ?? []).forEach((value, k) => rows.push([name, x ? value : k, y?.[k], ""]));
   }
   return rows;
+}
+
+/**
+ * The title that all axes of a letter share; the letter where they have none, or different ones.
+ * @param {PlotLayout} layout
+ * @param {"x" | "y" | "z"} letter
+ */
+function axisTitle(layout, letter) {
+  const axes = Object.entries({ ...layout, ...layout.scene }).filter(([name]) => name.startsWith(`${letter}axis`));
+  const titles = new Set(axes.map(([, axis]) => axis?.title?.text).filter(Boolean));
+  return titles.size === 1 ? String([...titles][0]).replaceAll(/<[^>]*>/g, " ") : letter;
 }
 
 /**

@@ -29,6 +29,9 @@ export function loadPlotly() {
   return script;
 }
 
+/** Height of the line below a saved figure. */
+const LINE_PX = 24;
+
 /** @param {string} name */
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 /** @param {string} axis */
@@ -80,6 +83,29 @@ function themedLayout(layout) {
 }
 
 /**
+ * A drawn figure with a line of text below it.
+ * @param {Plot} plot
+ * @param {string} text
+ */
+function withLine({ data = [], layout = {} }, text) {
+  const { margin = {}, annotations = [] } = layout;
+  const below = (margin.b ?? 0) + LINE_PX;
+  const line = {
+    text,
+    showarrow: false,
+    xref: "paper",
+    yref: "paper",
+    x: 0,
+    y: 0,
+    xanchor: "left",
+    yanchor: "bottom",
+    yshift: -below,
+    font: { size: 10 },
+  };
+  return { data, layout: { ...layout, margin: { ...margin, b: below }, annotations: [...annotations, line] } };
+}
+
+/**
  * @typedef {object} FigureOptions
  * @property {string} [height]
  * @property {() => CsvRows} [csv]
@@ -121,25 +147,33 @@ export function figure(name, caption, draw, { height = "20rem", csv } = {}) {
         { class: "toolbar" },
         tool("PNG", () => picture("png"), "PNG"),
         tool("SVG", () => picture("svg"), "SVG"),
-        tool("CSV", () => saveBlob(new Blob([csvText(rows())], { type: "text/csv" }), `${fileName(name)}.csv`), "CSV"),
+        tool("CSV", () => saveBlob(new Blob([table()], { type: "text/csv" }), `${fileTitle()}.csv`), "CSV"),
       ),
     ),
     { plot, update, redraw: () => plot.data && update() },
   );
 
+  /** What the page shows figures of, as it says in `data-source`: "unit A1, version 2 (0f3a...), recording 7". */
+  const source = () => element.closest("[data-source]")?.getAttribute("data-source") ?? "";
+  /** What a saved figure says of itself, so that it can be traced to what it shows. */
+  const provenance = () =>
+    [name, source(), `saved ${new Date().toISOString().slice(0, 19)}Z`].filter(Boolean).join("; ");
+  const fileTitle = () => fileName(`${source().replace(/\([^)]*\)/g, "")} ${name}`);
+  const table = () => `# ${provenance()}\n${csvText(rows())}`;
+
   /** @param {"png" | "svg"} format */
   async function picture(format) {
     const Plotly = await loadPlotly();
-    const link = await Plotly.toImage(plot, {
+    const link = await Plotly.toImage(withLine(plot, provenance()), {
       format,
       width: Math.max(plot.clientWidth, 800),
       height: Math.max(plot.clientHeight, 450),
       scale: format === "png" ? 2 : 1,
     });
-    saveBlob(await (await fetch(link)).blob(), `${fileName(name)}.${format}`);
+    saveBlob(await (await fetch(link)).blob(), `${fileTitle()}.${format}`);
   }
 
-  const rows = () => csv?.() ?? traceRows(plot.data ?? []);
+  const rows = () => csv?.() ?? traceRows(plot.data ?? [], plot.layout);
   let waiting = false;
   async function update() {
     if (waiting) return;

@@ -50,15 +50,15 @@ const sorted = (values) => [...new Set(values)].sort((a, b) => a - b);
  * @param {Pick<ResidualMap, "dataset" | "rate_level_dps" | "temperature_level_c" | "over_floor">} map
  */
 export function mapCells(map) {
-  /** @type {Map<string, { rate: number, warm: number, sum: number, sets: number[] }>} */
+  /** @type {Map<string, { rate: number, temperature: number, sum: number, sets: number[] }>} */
   const found = new Map();
   map.dataset.forEach((set, k) => {
-    const [rate, warm] = [map.rate_level_dps[k], map.temperature_level_c[k]];
-    const cell = found.get(`${rate} ${warm}`) ?? { rate, warm, sum: 0, sets: [] };
-    found.set(`${rate} ${warm}`, cell);
+    const [rate, temperature] = [map.rate_level_dps[k], map.temperature_level_c[k]];
+    const cell = found.get(`${rate} ${temperature}`) ?? { rate, temperature, sum: 0, sets: [] };
+    found.set(`${rate} ${temperature}`, cell);
     cell.sum += map.over_floor[k];
     cell.sets.push(set);
   });
   const cells = [...found.values()].map((cell) => ({ ...cell, mean: cell.sum / cell.sets.length }));
-  return { rates: sorted(map.rate_level_dps), warm: sorted(map.temperature_level_c), cells };
+  return { rates: sorted(map.rate_level_dps), temperatures: sorted(map.temperature_level_c), cells };
 }

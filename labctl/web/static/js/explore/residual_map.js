@@ -26,7 +26,7 @@ const isDim = (cell) => Math.abs(cell.mean) * Math.sqrt(cell.sets.length) < DIMM
  * @param {string} position
  */
 const cellText = (cell, position) =>
-  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.warm)} deg C, ${position} up<br>${number(cell.mean, 2)} floors<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
+  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.temperature)} deg C, ${position} up<br>${number(cell.mean, 2)} floors<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
 
 /**
  * Cells as a grid, with a faded layer over those within the noise.
@@ -34,13 +34,13 @@ const cellText = (cell, position) =>
  * @param {string} position
  * @param {object} shared
  */
-function gridTraces({ rates, warm, cells }, position, shared) {
-  const labels = [distinctLabels(rates), distinctLabels(warm)];
+function gridTraces({ rates, temperatures, cells }, position, shared) {
+  const labels = [distinctLabels(rates), distinctLabels(temperatures)];
   /** @returns {unknown[][]} */
-  const grid = () => warm.map(() => rates.map(() => null));
+  const grid = () => temperatures.map(() => rates.map(() => null));
   const [z, dim, sets, texts] = [grid(), grid(), grid(), grid()];
   const placed = cells.map((cell) => {
-    const [row, column] = [warm.indexOf(cell.warm), rates.indexOf(cell.rate)];
+    const [row, column] = [temperatures.indexOf(cell.temperature), rates.indexOf(cell.rate)];
     z[row][column] = cell.mean;
     sets[row][column] = cell.sets;
     texts[row][column] = cellText(cell, position);
@@ -95,7 +95,7 @@ function scatteredTraces({ cells }, position, shared) {
         name: `${position} up`,
         showlegend: false,
         x: cells.map((cell) => cell.rate),
-        y: cells.map((cell) => cell.warm),
+        y: cells.map((cell) => cell.temperature),
         customdata: cells.map((cell) => cell.sets),
         text: cells.map((cell) => cellText(cell, position)),
         hovertemplate: "%{text}<extra></extra>",
@@ -110,7 +110,7 @@ function scatteredTraces({ cells }, position, shared) {
     ],
     x: {},
     y: {},
-    placed: cells.map((cell) => ({ ...cell, x: cell.rate, y: cell.warm })),
+    placed: cells.map((cell) => ({ ...cell, x: cell.rate, y: cell.temperature })),
   };
 }
 
@@ -123,7 +123,7 @@ function scatteredTraces({ cells }, position, shared) {
 function positionPanel(map, id, pick) {
   const found = mapCells(map);
   const shared = { xaxis: `x${id}`, yaxis: `y${id}` };
-  const filled = found.cells.length >= MIN_FILLED * found.rates.length * found.warm.length;
+  const filled = found.cells.length >= MIN_FILLED * found.rates.length * found.temperatures.length;
   const { traces, x, y, placed } = (filled ? gridTraces : scatteredTraces)(found, map.position, shared);
   /**
    * @param {readonly PlacedCell[]} which
@@ -206,8 +206,36 @@ export function residualMap(name, caption, give, { pickable = true, height = "22
     });
     return { data, layout };
   };
-  return figure(name, caption, draw, { height });
+  return figure(name, caption, draw, { height, csv: () => mapRows(give().maps) });
 }
+
+/**
+ * Every data set of the maps as a row: where it was measured, and what the model leaves of it.
+ * @param {readonly ResidualMap[]} maps
+ * @returns {unknown[][]}
+ */
+export const mapRows = (maps) => [
+  [
+    "axis",
+    "position",
+    "data set",
+    "table rate, deg/s",
+    "temperature, deg C",
+    "residual, deg/s",
+    "residual / noise floor",
+  ],
+  ...maps.flatMap((map) =>
+    map.dataset.map((set, k) => [
+      map.axis,
+      map.position,
+      set,
+      map.table_rate_dps[k],
+      map.temperature_c[k],
+      map.residual_dps[k],
+      map.over_floor[k],
+    ]),
+  ),
+];
 
 /**
  * The data sets under a Plotly click or selection on a map.

@@ -39,7 +39,7 @@ export async function page({ signal }) {
   const unit = (each) => h("a", { href: `/units/${encodeURIComponent(each.serial)}` }, each.serial);
   const element = h(
     "div",
-    { class: "page bench" },
+    { class: "page bench", "data-source": now ? `bench ${bench.name}, campaign ${now.id}` : `bench ${bench.name}` },
     pageHeader(
       "Bench",
       h(

@@ -101,7 +101,7 @@ export async function page({ params, query, signal }) {
     : endedActions(now, plan, here);
   return h(
     "div",
-    { class: "page" },
+    { class: "page", "data-source": `campaign ${now.id}, ${now.recipe} on ${now.bench}` },
     pageHeader(
       `Campaign ${now.id}`,
       h("span", {}, h("strong", {}, now.recipe), ` on bench ${now.bench}`),

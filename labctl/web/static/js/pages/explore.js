@@ -49,7 +49,7 @@ export async function page({ query: asked, signal }) {
   const motion = own.find((row) => row.id === chosen.recording)?.motion ?? "rates";
   const element = h(
     "div",
-    { class: "page explore" },
+    { class: "page explore", "data-source": sourceOf(serial, calibration, chosen) },
     pageHeader(
       "Explore",
       "Compare the model with the measurements.",
@@ -63,6 +63,21 @@ export async function page({ query: asked, signal }) {
   else element.append(versionView({ unit, calibration, versions, chosen, motion, query: asked, signal }));
   return element;
 }
+
+/**
+ * What the figures of the page are of.
+ * @param {string} serial
+ * @param {Version | undefined} calibration
+ * @param {Chosen} chosen
+ */
+const sourceOf = (serial, calibration, chosen) =>
+  [
+    `unit ${serial}`,
+    calibration ? `version ${calibration.version} (${calibration.hash.slice(0, 12)})` : null,
+    recordingsText(chosen),
+  ]
+    .filter(Boolean)
+    .join(", ");
 
 /**
  * The recordings of the address; else those that the version was fitted to together, else the usual one.

@@ -55,7 +55,12 @@ export async function page({ params, query, signal }) {
       if (state.dataset !== null) readings.scrollIntoView({ block: "nearest", behavior: "smooth" });
     },
   };
-  const element = h("div", { class: "page" }, recordingHeader(about), conditionsCard(about, sets));
+  const element = h(
+    "div",
+    { class: "page", "data-source": `unit ${about.serial}, recording ${about.id}` },
+    recordingHeader(about),
+    conditionsCard(about, sets),
+  );
   if (about.kind === "coefficients") {
     element.append(
       notice(

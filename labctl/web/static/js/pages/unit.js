@@ -54,7 +54,7 @@ export async function page({ params, signal }) {
   const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
   return h(
     "div",
-    { class: "page" },
+    { class: "page", "data-source": `unit ${unit.serial}` },
     pageHeader(
       unit.serial,
       [unit.model, unit.technology?.toUpperCase()].filter(Boolean).join(" · "),
