@@ -86,6 +86,10 @@ class Client:
         self._socket = socket.create_connection((address.host, address.port), timeout=REQUEST_S)
         self._socket.sendall(f"GET {address.path} HTTP/1.1\r\nHost: {address.host}\r\n\r\n".encode())
 
+    def followed(self) -> None:
+        """Wait for the head of the answer: from then on the server knows of this client."""
+        assert self._socket.recv(12) == b"HTTP/1.1 200"
+
     def leave(self) -> None:
         self._socket.close()
 
@@ -110,6 +114,7 @@ def test_one_of_two_clients_that_leaves_does_not_cancel_the_others_answer(
     held = HeldCriticism(monkeypatch)
     one, other = Client(served), Client(f"{served}/events")
     assert held.begun.wait(WAIT_S)
+    other.followed()
     one.leave()
     assert not held.ended.wait(2.0)
     other.leave()
