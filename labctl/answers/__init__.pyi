@@ -355,6 +355,7 @@ from labctl.answers.sensors import (
     MagnetometerVersion as MagnetometerVersion,
     MeasuredData as MeasuredData,
     MeasuredFile as MeasuredFile,
+    SensorCoefficientResponse as SensorCoefficientResponse,
     SensorFormatResponse as SensorFormatResponse,
     SensorName as SensorName,
     SensorVersionResponse as SensorVersionResponse,

@@ -308,7 +308,7 @@ class RemoteBench:
                 self._listeners.notify()
 
     def _note(self, *, silent: bool) -> None:
-        if silent and self.stops:  # it has ended in order, and this process ends too
+        if silent and (self.stops or self._over.is_set()):  # it has ended in order, and this process ends too
             return
         if silent and not self._silent:
             log.error("bench_process.silent", silent_s=round(self.heard_s, 1))

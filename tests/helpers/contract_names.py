@@ -17,13 +17,12 @@ def command_names() -> dict[str, set[str]]:
 
 
 def _commands(command: Any, words: list[str]) -> Iterator[tuple[str, set[str]]]:
-    children = getattr(command, "commands", None)
-    if children is None:
+    if not hasattr(command, "list_commands"):
         options = [each for each in command.params if each.param_type_name == "option"]
         yield " ".join(words), {name for option in options for name in (*option.opts, *option.secondary_opts)}
         return
-    for name, child in children.items():
-        yield from _commands(child, [*words, name])
+    for name in command.list_commands(None):  # those that a group makes from declarations among them
+        yield from _commands(command.get_command(None, name), [*words, name])
 
 
 def route_names(application: FastAPI) -> dict[str, dict[str, set[str]]]:

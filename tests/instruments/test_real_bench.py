@@ -71,7 +71,16 @@ def test_only_the_drivers_that_a_bench_names_are_imported() -> None:
         *(f"instruments.drivers.chambers.{name}" for name in ("setpoint_chamber", "watlow", "watlow_f4")),
         *(
             f"instruments.drivers.{name}"
-            for name in ("driver", "kvh", "probe", "probes", "registry", "resolution", "unit_handlers")
+            for name in (
+                "driver",
+                "kvh",
+                "probe",
+                "probes",
+                "registry",
+                "resolution",
+                "streamed_readings",
+                "unit_handlers",
+            )
         ),
     ]
 

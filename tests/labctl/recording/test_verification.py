@@ -172,10 +172,10 @@ def test_a_fault_of_the_verification_part_refuses_no_fit_but_the_certification(
         serial = wrong.info.serial
         made = fit_unit(store, serial, FitRequest(effects=EFFECTS), AT)
         assert made.warnings == []
-        objections = [each for each in assess(store, serial, made.version).objections if each.what == "data"]
+        objections = [each for each in assess(store, serial, made.version).objections if each["what"] == "data"]
     assert objections
-    assert "recording 1: verification part, axis x" in objections[0].text
-    assert objections[0].do.endswith("and measure the verification part again")
+    assert "recording 1: verification part, axis x" in objections[0]["text"]
+    assert objections[0]["do"].endswith("and measure the verification part again")
 
 
 def test_a_fault_of_what_is_fitted_refuses_the_fit(recording: Recording, tmp_path: Path) -> None:

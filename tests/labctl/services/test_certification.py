@@ -160,7 +160,7 @@ def test_which_verdicts_speak_against_a_version(
         known = assess(store, FOG, 1)
     assert (known.verdict, known.override_needed) == (verdict, refused)
     if refused:
-        assert "(RMS error 0.05 deg/s, noise floor 0.01 deg/s): So it is" in known.objections[0].text
+        assert "(RMS error 0.05 deg/s, noise floor 0.01 deg/s): So it is" in known.objections[0]["text"]
 
 
 def test_a_version_whose_fit_was_worse_than_none_is_refused(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -172,6 +172,6 @@ def test_a_version_whose_fit_was_worse_than_none_is_refused(lab: Lab, monkeypatc
         spoilt_row = replace(row, answer={**row.answer, "error": worse})
         monkeypatch.setattr(store.calibrations, "get", lambda *_: spoilt_row)
         (objection,) = assess(store, FOG, 1).objections
-    assert objection.what == "worse"
-    assert "residual of the model on the data of the fit is 109.4 deg/s RMS" in objection.text
-    assert "104.9 deg/s" in objection.text
+    assert objection["what"] == "worse"
+    assert "residual of the model on the data of the fit is 109.4 deg/s RMS" in objection["text"]
+    assert "104.9 deg/s" in objection["text"]

@@ -294,7 +294,7 @@ def test_the_address_of_a_service_is_written_into_the_leases_of_its_process_only
 
 
 def test_each_act_on_a_lease_can_be_done_by_the_process_that_holds_the_database() -> None:
-    assert {f"Leases.{name}" for name in ("claim", "renew", "note_address", "release")} <= TRANSACTIONS
+    assert {f"Leases.{name}" for name in ("claim", "renew", "note_address", "release")} <= TRANSACTIONS.keys()
 
 
 def test_only_the_owner_renews_and_releases_a_lease(shared: Store) -> None:
