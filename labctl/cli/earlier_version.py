@@ -48,7 +48,7 @@ def earlier_version(
     """
     from labctl.errors import BadInput
     from labctl.services.pose_triads import Earlier as Found
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.sensor_versions import one_accelerometer
 
     if number is None:

@@ -28,7 +28,7 @@ def list_(
     """List who did what, when and why."""
     from labctl.answers.admin import AuditResponse
     from labctl.services.admin.audit import list_audit
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     answers: list[AuditResponse] = []
     with one_clear_line(), open_readonly(database) as store:
@@ -61,7 +61,7 @@ def verify(
 ) -> None:
     """Verify the audit trail: find the first row that was changed or moved, or that follows a missing one."""
     from labctl.services.admin.audit import verify_audit
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         answer = verify_audit(store, anchor)

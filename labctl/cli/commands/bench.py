@@ -36,7 +36,7 @@ def check(
     from labctl.cli.printing.benches import print_check
     from labctl.services.benches.check import check_bench
     from labctl.services.planning.loading import load_bench
-    from labctl.services.reading import open_existing
+    from labctl.services.read_access import open_existing
     from labctl.services.standards.agreement import compared
 
     with one_clear_line():
@@ -152,7 +152,7 @@ def wiggle(
 def status(as_json: Json = False, database: Database = None) -> None:
     """List the benches that were not confirmed safe when their last campaign ended or its process was lost."""
     from labctl.services.campaigns.bench_status import bench_statuses
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         benches = bench_statuses(store)

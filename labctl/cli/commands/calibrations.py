@@ -155,7 +155,7 @@ def certifications(serial: Serial, as_json: Json = False, database: Database = N
     objections."""
     from labctl.services.calibrations.certification import list_certifications
     from labctl.services.calibrations.release import list_waiting
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         rows, waiting = list_certifications(store, serial), list_waiting(store, serial)
@@ -183,7 +183,7 @@ def calibration(
 ) -> None:
     """Print a calibration as a file to load elsewhere; what its format does not carry is said on standard error."""
     from labctl.services.calibrations.served import calibration_file
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         file = calibration_file(store, serial, version, format_, option or [])

@@ -123,7 +123,7 @@ def plan(
     """Show the steps of a campaign and how long it takes, by earlier campaigns on the bench if any. Nothing moves."""
     from instruments.clock import SystemClock
     from labctl.services.planning.plan_answer import describe_plan
-    from labctl.services.reading import open_readable
+    from labctl.services.read_access import open_readable
     from labctl.services.schedule.planned_start import planned_start
     from labctl.services.simulation.visibility import visibility as look
 
@@ -193,7 +193,7 @@ def start(
 def list_(search: Search = "", limit: Limit = None, as_json: Json = False, database: Database = None) -> None:
     """List the campaigns, newest first."""
     from labctl.services.campaigns.status import page_of_campaigns
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.store.paging import PageRequest
 
     with one_clear_line(), open_readonly(database) as store:

@@ -48,7 +48,7 @@ def verify(
 ) -> None:
     """Apply a version to a recording without refitting: its errors, and whether they are as small as expected."""
     from labctl.services.criticism.verification.of_version import verify_unit
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         answer = verify_unit(store, serial, version, recording, other_unit=other_unit)
@@ -85,7 +85,7 @@ def criticise(
 ) -> None:
     """Compare a version with recordings: the residual, where it is large, and which effects may be missing."""
     from labctl.services.criticism.criticise import criticise_unit, write_next
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         competing = written(formula)
@@ -166,7 +166,7 @@ def ladder(
     """Show the errors of the versions on one recording, each after the version it was changed from, and the noise
     floor."""
     from labctl.services.criticism.ladder import ladder as ladder_of
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         answer = ladder_of(store, serial, recording)

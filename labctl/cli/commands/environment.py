@@ -79,7 +79,7 @@ def show(
     from datetime import UTC, datetime, time
 
     from instruments.clock import SystemClock
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.room_environment import environment
 
     with one_clear_line(), open_readonly(database) as store:

@@ -37,7 +37,7 @@ def inspect(
 ) -> None:
     """Inspect a file or a recording before a fit: frozen, clipped or lost readings, spikes, lines, mixed units."""
     from labctl.errors import BadInput
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.recordings.examination import inspection_of_file, inspection_of_recording
 
     path = Path(source)

@@ -48,7 +48,7 @@ def create(
 def list_(as_json: Json = False, database: Database = None) -> None:
     """List every key that was made, by name; the keys themselves are not stored."""
     from labctl.services.admin.api_keys import list_keys
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         answers = list_keys(store)

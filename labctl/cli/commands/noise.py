@@ -111,7 +111,7 @@ def allan(
 ) -> None:
     """Allan deviation of a record at rest, with N, B and K of IEEE Std 952; no fit, table or thermometer needed."""
     from labctl.errors import BadInput
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.recordings.allan_source import allan_of_file, allan_of_recordings
 
     path = Path(source)
@@ -166,7 +166,7 @@ def orientation(
     from labctl.answers.orientation import OrientationOptions
     from labctl.errors import BadInput
     from labctl.services.calibrations.orientation import orientation_of_file, orientation_of_unit
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line():
         options = OrientationOptions(

@@ -125,7 +125,7 @@ def export_recording(
 ) -> None:
     """Write a recording in the interchange format: every reading, unchanged."""
     from labctl.answers.recordings import ExportedRecording
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.recordings.transfer import export_recording as export
 
     with one_clear_line(), open_readonly(database) as store:

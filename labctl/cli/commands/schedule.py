@@ -27,7 +27,7 @@ def list_(
 ) -> None:
     """List the scheduled starts, the next first. A start that was missed is listed until it is cancelled."""
     from labctl.services.commands.open import service_url
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.schedule.queue import list_starts
 
     with one_clear_line(), open_readonly(database) as store:
@@ -54,7 +54,7 @@ def list_(
 @app.command("show")
 def show(start: StartId, as_json: Json = False, database: Database = None) -> None:
     """Show when an entry begins next, and the outcome of each past start."""
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.schedule.queue import start_status
 
     with one_clear_line(), open_readonly(database) as store:

@@ -17,7 +17,7 @@ app = typer.Typer(no_args_is_help=True, help="Versions of a unit's accelerometer
 @app.command("list")
 def list_(serial: Serial, as_json: Json = False, database: Database = None) -> None:
     """List the versions of both sensors: verdict, who and when, data."""
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.sensor_versions import list_versions
 
     with one_clear_line(), open_readonly(database) as store:
@@ -40,7 +40,7 @@ def show(
     database: Database = None,
 ) -> None:
     """Show a version again, with the files that it was fitted to; with --export, write it as the fit did."""
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.sensor_exports import check_export, write_export
     from labctl.services.sensor_versions import one_version
 

@@ -121,7 +121,7 @@ def _found(source: str, database: str | None) -> tuple[str, str]:
     from labctl.services.benches.confirmation import describe_bench
     from labctl.services.campaigns.recovery import describe_recovery
     from labctl.services.planning.loading import load_bench
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     name = load_bench(source).name
     with open_readonly(database) as store:

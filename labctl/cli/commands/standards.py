@@ -31,7 +31,7 @@ Temperature = Annotated[
 def list_(on: On = None, as_json: Json = False, database: Database = None) -> None:
     """List the standards: state, due date, newest certificate, drift."""
     from instruments.clock import SystemClock
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.standards.register import list_standards
 
     with one_clear_line(), open_readonly(database) as store:
@@ -75,7 +75,7 @@ def add(
 def show(label: Label, on: On = None, as_json: Json = False, database: Database = None) -> None:
     """Show a standard: certificates, predicted value, control chart of its checks, findings."""
     from instruments.clock import SystemClock
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.standards.register import one_standard
 
     with one_clear_line(), open_readonly(database) as store:
@@ -198,7 +198,7 @@ def bad(
     from labctl.services.commands.open import execute
     from labctl.services.commands.requests import ToStandard
     from labctl.services.commands.standards import MARK_STANDARD_BAD
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.standards.usage import affected as affected_by
 
     with one_clear_line():
@@ -242,7 +242,7 @@ def affected(
     database: Database = None,
 ) -> None:
     """List the calibrations that a standard was used for; without days: those of its findings, else all."""
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.standards.usage import affected as affected_by
 
     with one_clear_line(), open_readonly(database) as store:
@@ -272,7 +272,7 @@ def check_gyro(
     from labctl.services.commands.open import execute
     from labctl.services.commands.requests import ToUnit
     from labctl.services.commands.standards import SET_CHECK_GYRO
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line():
         if mark is None:
@@ -300,7 +300,7 @@ def compare(
     """Compare two laboratories or benches: En number and zeta score; exit status 1 where one |En| is above 1."""
     from labctl.services.interlaboratory import compare as compared
     from labctl.services.interlaboratory import pair_of
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         answer = compared(store, pair_of(first), pair_of(second), temperature_c)

@@ -28,7 +28,7 @@ def units(
     """List the units, the version in force of each, and when it is due; with --due-within the earliest date first."""
     from instruments.clock import SystemClock
     from labctl.services.calibrations.due import span
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.units import page_of_units, units_due
     from labctl.store.paging import PageRequest
 
@@ -78,7 +78,7 @@ def trend(
 ) -> None:
     """Show a unit over the years: as found, as left, drift per year, and when its bias leaves a limit."""
     from labctl.services.criticism.trend import trend_unit
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         answer = trend_unit(store, serial, version, limit_dps)

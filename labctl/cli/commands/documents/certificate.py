@@ -94,7 +94,7 @@ def issue(
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import ISSUE_CERTIFICATE
     from labctl.services.commands.requests import ToVersion
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line():
         chosen = format_of(out.suffix)

@@ -32,7 +32,7 @@ def certificates(serial: Serial, as_json: Json = False, database: Database = Non
     """List the certificates of a unit, newest first, with the state of each: valid, amended, superseded, withdrawn."""
     from labctl.cli.printing.certificates import list_line
     from labctl.services.certificates.states import list_certificates
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         rows = list_certificates(store, serial)
@@ -75,7 +75,7 @@ def verify(
     withdrawn. For an amended or superseded certificate the status is 0; the state is printed.
     """
     from labctl.services.certificates.verification import verify_file
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         answer = verify_file(store, file, ca, signer or ())

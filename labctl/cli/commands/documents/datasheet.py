@@ -23,7 +23,7 @@ def datasheet(
 ) -> None:
     """Show the data sheet of a unit from its recordings; exit 1 if a specified value is not kept."""
     from labctl.services.datasheet.sheet import datasheet as datasheet_of
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line():
         with open_readonly(database) as store:

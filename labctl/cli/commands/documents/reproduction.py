@@ -42,7 +42,7 @@ def reproduce(
 ) -> None:
     """Make the tables and figures of a paper again: one page, with the printed numbers beside and why they differ."""
     from labctl.errors import BadInput
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
     from labctl.services.reproduction.reproduce import reproduce_own, reproduce_unit
 
     with one_clear_line(), stage_line():

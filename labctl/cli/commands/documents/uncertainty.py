@@ -46,7 +46,7 @@ def uncertainty(
     """Print the uncertainty budget of a corrected rate and of the coefficients, line by line (GUM)."""
     from labctl.services.calibrations.contributions import write_figure
     from labctl.services.calibrations.uncertainty import uncertainty_of_unit
-    from labctl.services.reading import open_readonly
+    from labctl.services.read_access import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
         answer = uncertainty_of_unit(
