@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -79,6 +80,19 @@ def test_an_empty_house_leads_to_a_first_calibration_in_one_press(visit: Callabl
     page.wait_for_url("**/explore?unit=OSU-FOG-2024**")
     expect(page.get_by_role("region", name="Verdict")).to_contain_text("Cause ambiguous")
     assert service.get("/api/units/OSU-FOG-2024/ladder")["steps"][0]["model"] == "bias_scale"
+
+
+def test_the_picture_of_the_start_page_is_true(visit: Callable[..., Page], service: Service) -> None:
+    """The figures that it shows are those of the example, fitted and improved."""
+    page = visit("/")
+    label = page.get_by_role("img", name="Error after the fit").get_attribute("aria-label") or ""
+    shown = [float(text) for text in re.findall(r": ([0-9.]+) deg/s", label)]
+    made = service.post("/api/recordings/example", {"name": "osu-fog"})
+    unit = f"/api/units/{made['serial']}/calibrations"
+    before = service.post(unit, {"recording": made["recording"], "model": "bias_scale"})
+    after = service.post(f"{unit}/{before['version']}/improve", {"add": ["sine_response"]})
+    computed = [before["error"]["rms_dps"], after["error"]["rms_dps"], after["error"]["noise_floor_dps"]]
+    assert shown == [float(f"{value:.3g}") for value in computed]
 
 
 def test_pages_that_do_not_exist_and_units_that_do_not(visit: Callable[..., Page], faults: Faults) -> None:

@@ -6,6 +6,7 @@ import { button, card, pageHeader } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
 import { isRunning } from "../campaigns/states.js";
+import { realGyroPicture } from "../start/real_gyro.js";
 import { DUE_WITHIN, dueNotice } from "../unit/due.js";
 
 /** @import { Bench, Campaign, Unit } from "../../../types/api.js" */
@@ -29,7 +30,21 @@ export async function page({ signal }) {
   return h(
     "div",
     { class: "page" },
-    pageHeader("Begin", "Nothing has been measured yet. Three ways to a first calibration:"),
+    pageHeader(
+      "Begin",
+      "labctl calibrates gyroscopes: it drives a rate table and a thermal chamber, fits an error model and serves the calibration. It compares the model with the measurements, shows which physical effect is missing, and the error falls when that effect is added.",
+    ),
+    card(
+      "On a real gyro",
+      realGyroPicture(),
+      h(
+        "p",
+        {},
+        "695 dwells on a heated rate table. The error after a usual fit is fifteen times the noise; find out why.",
+      ),
+      h("div", { class: "row" }, button("Open the real gyro", openExample, { kind: "primary" })),
+    ),
+    h("h2", {}, "Other ways to begin"),
     h(
       "div",
       { class: "columns" },
@@ -40,16 +55,7 @@ export async function page({ signal }) {
           {},
           "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect the model lacks.",
         ),
-        button("Simulate a recording", openSimulated, { kind: "primary" }),
-      ),
-      card(
-        "Open a real gyro",
-        h(
-          "p",
-          {},
-          "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. The error after the fit is fifteen times the noise; find out why.",
-        ),
-        button("Open the real gyro", openExample),
+        button("Simulate a recording", openSimulated),
       ),
       card(
         "Import your own data",
