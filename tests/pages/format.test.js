@@ -94,3 +94,13 @@ test("a time axis is in hours, minutes or seconds", () => {
   assert.equal(timeUnit(7199, 7200).name, "min");
   assert.deepEqual(timeUnit(599, 7200), { name: "s", seconds: 1 });
 });
+
+test("evidence is said as odds", () => {
+  holds(format.oddsText, [
+    [[0], "1 to 1"],
+    [[Math.log(20)], "20 to 1"],
+    [[-Math.log(20)], "1 to 20"],
+    [[7.16], "1300 to 1"],
+    [[22600], "10⁹⁸¹⁵ to 1"],
+  ]);
+});

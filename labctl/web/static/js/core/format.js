@@ -43,6 +43,16 @@ function power(value, digits) {
 const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? sign).join("");
 
 /**
+ * The odds for an effect as people say them; `nats` is the natural logarithm of the Bayes factor.
+ * @param {number} nats
+ */
+export function oddsText(nats) {
+  const decades = Math.abs(nats) / Math.LN10;
+  const odds = decades < 6 ? String(Number((10 ** decades).toPrecision(2))) : `10${superscript(Math.round(decades))}`;
+  return nats >= 0 ? `${odds} to 1` : `1 to ${odds}`;
+}
+
+/**
  * A number without trailing zeros, for settings: -100, 12.5, 0.0042.
  * @param {Numeric} value
  * @param {number} [digits]

@@ -130,7 +130,7 @@ function residualScatter(state, channel) {
         showlegend: false,
         selected: { marker: { opacity: 1, size: 8 } },
         unselected: { marker: { opacity: 0.15 } },
-        text: rows.dataset.map((_, k) => `${setText(rows, k)}: ${number(rows.score[k], 2)} floors`),
+        text: rows.dataset.map((_, k) => `${setText(rows, k)}: ${number(rows.score[k], 2)} times the noise floor`),
         hovertemplate: "%{text}<br>%{x:.5g}: %{y:.3g} deg/s<extra></extra>",
       },
     ];

@@ -26,7 +26,7 @@ const isDim = (cell) => Math.abs(cell.mean) * Math.sqrt(cell.sets.length) < DIMM
  * @param {string} position
  */
 const cellText = (cell, position) =>
-  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.temperature)} deg C, ${position} up<br>${number(cell.mean, 2)} floors<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
+  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.temperature)} deg C, ${position} up<br>${number(cell.mean, 2)} times the noise floor<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
 
 /**
  * Cells as a grid, with a faded layer over those within the noise.
@@ -176,7 +176,7 @@ export function residualMap(name, caption, give, { pickable = true, height = "22
         colorscale: DIVERGING,
         cmin: -limit,
         cmax: limit,
-        colorbar: { title: { text: "floors" }, thickness: 12, outlinewidth: 0 },
+        colorbar: { title: { text: "residual /<br>noise floor" }, thickness: 12, outlinewidth: 0 },
       },
     };
     const below = several && window.innerWidth < 760;

@@ -1,7 +1,7 @@
 // The verdict in words, and the suspected effects with their evidence.
 
 import { setChildren, h } from "../core/elements.js";
-import { capitalised, withUncertainty, number, percent, idText } from "../core/format.js";
+import { capitalised, withUncertainty, number, oddsText, percent, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
@@ -58,14 +58,23 @@ export function verdictCard(state) {
         : ["Drift", number(noise.drift_dps), "deg/s"],
       criticism.lack_of_fit.statistic === null
         ? null
-        : ["Lack of fit", number(criticism.lack_of_fit.statistic), null, chanceText(criticism.lack_of_fit.p_value)],
+        : [
+            "Residual variance over that of the noise",
+            number(criticism.lack_of_fit.statistic),
+            null,
+            chanceText(criticism.lack_of_fit.p_value),
+          ],
     ]),
   );
 }
 
 /** @param {number | null | undefined} p */
 const chanceText = (p) =>
-  p === null || p === undefined ? null : p < 1e-6 ? "chance below 10⁻⁶" : `chance ${number(p, 2)}`;
+  p === null || p === undefined
+    ? null
+    : p < 1e-6
+      ? "noise alone does not leave this"
+      : `noise alone leaves this in ${number(100 * p, 2)} % of cases`;
 
 /**
  * @param {ExploreState} state
@@ -110,7 +119,7 @@ export function suspectList(state, { onadd, explain }) {
               "div",
               { class: "row tight" },
               h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, idText(s.effect)),
-              named.has(s.effect) ? chip("named", "warn") : null,
+              named.has(s.effect) ? chip("likely missing", "warn") : null,
               s.physical !== false ? null : chip("not physical for this type of gyro"),
             ),
             h("div", { class: "muted small" }, s.explanation),
@@ -125,7 +134,7 @@ export function suspectList(state, { onadd, explain }) {
           evidenceItem(
             "Explains",
             h("span", { class: "number" }, percent(s.share_removed)),
-            h("span", { class: "muted small" }, "of the excess"),
+            h("span", { class: "muted small" }, "of the error above the noise"),
           ),
           evidenceItem(
             "Error with it, deg/s",
@@ -174,10 +183,10 @@ function evidenceMeter(nats) {
   return h(
     "div",
     { class: "evidence" },
-    h("span", { class: "number" }, `${nats < 1000 ? nats.toFixed(1) : Math.round(nats)} nats`),
+    h("span", { class: "number" }, oddsText(nats), h("span", { class: "muted small" }, " odds for it")),
     h(
       "div",
-      { class: "meter", role: "img", "aria-label": `evidence ${nats.toFixed(1)} nats, on a logarithmic scale` },
+      { class: "meter", role: "img", "aria-label": `odds for it ${oddsText(nats)}, on a logarithmic scale` },
       h("i", { style: `width: ${100 * share}%` }),
     ),
   );
@@ -205,7 +214,7 @@ function coefficientText(suspect, axis) {
         { class: "muted small" },
         suspect.coefficients_from === "comparison"
           ? "estimated; no fit with this effect was made"
-          : "as a version with this effect would have",
+          : "of a fit with this effect",
       ),
     );
 }
