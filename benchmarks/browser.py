@@ -55,6 +55,17 @@ def opened(control: str, url: str, settled_s: float = 4.0) -> Iterator[Page]:
         page.close()
 
 
+#: Bytes as they travelled, headers included; 0 for what came out of the cache.
+MOVED = """() => ["navigation", "resource"].flatMap((kind) => performance.getEntriesByType(kind))
+  .reduce((sum, entry) => sum + entry.transferSize, 0)"""
+
+
+def moved_kb(page: Page) -> float:
+    """Return what the current view of a page has moved over the network, kB."""
+    moved: float = page.evaluate(MOVED)
+    return moved / 1000
+
+
 def marked_s(page: Page, mark: str) -> float:
     """Return when a page first marked something in its time line, s since it was asked for."""
     times: list[float] = page.evaluate("mark => performance.getEntriesByName(mark).map(entry => entry.startTime)", mark)
