@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 import httpx
 from httpx_sse import ServerSentEvent, connect_sse
@@ -121,12 +121,15 @@ class Client:
         """Close the connection."""
         self._connection.close()
 
-    def units(self, *, due_within: str | None = None) -> list[UnitResponse]:
-        """Return every unit that was measured or imported, by serial number.
+    def units(
+        self, *, due_within: str | None = None, search: str = "", limit: int | None = None
+    ) -> list[UnitResponse]:
+        """Return every unit that was measured or imported, by serial number; at most `limit`.
 
-        With `due_within`, such as "30d", those that are due within that span or overdue, the earliest date first.
+        With `due_within`, such as "30d", those that are due within that span or overdue, the earliest date first; with
+        `search` those whose serial number, model or technology holds it.
         """
-        query = "" if due_within is None else f"?due_within={quote(due_within, safe='')}"
+        query = _query(due_within=due_within, search=search, limit=limit)
         return self._connection.get_list(f"/api/units{query}", UnitResponse)
 
     def unit(self, serial: str) -> UnitResponse:
@@ -189,9 +192,15 @@ class Client:
             raise _withdrawn(f"calibration of {serial} version {answer.version}", notice)
         return answer
 
-    def recordings(self) -> list[RecordingResponse]:
-        """Return every recording, newest first."""
-        return self._connection.get_list("/api/recordings", RecordingResponse)
+    def recordings(
+        self, *, unit: str | None = None, search: str = "", limit: int | None = None
+    ) -> list[RecordingResponse]:
+        """Return every recording, newest first, or those of one `unit`; at most `limit`.
+
+        With `search` those whose serial number or notes hold it.
+        """
+        query = _query(unit=unit, search=search, limit=limit)
+        return self._connection.get_list(f"/api/recordings{query}", RecordingResponse)
 
     def import_recording(self, folder: Path | str) -> ImportResponse:
         """Send the recording in `folder` (interchange format) and return its number and the warnings about it.
@@ -218,9 +227,12 @@ class Client:
         kind = ScheduledResponse if response.status_code == httpx.codes.ACCEPTED else CampaignResponse
         return kind.model_validate(json_of(response))
 
-    def campaigns(self) -> list[CampaignResponse]:
-        """Return every campaign, newest first."""
-        return self._connection.get_list("/api/campaigns", CampaignResponse)
+    def campaigns(self, *, search: str = "", limit: int | None = None) -> list[CampaignResponse]:
+        """Return every campaign, newest first; at most `limit`.
+
+        With `search` those whose recipe, bench, state or units' serial numbers hold it.
+        """
+        return self._connection.get_list(f"/api/campaigns{_query(search=search, limit=limit)}", CampaignResponse)
 
     def campaign(self, campaign: int) -> CampaignResponse:
         """Return state, step, progress and temperatures of one campaign."""
@@ -303,6 +315,12 @@ def _warning(field: str) -> str:
 def _withdrawn(what: str, notice: Withdrawn, content: bytes | None = None) -> CalibrationWithdrawn:
     text = f"{what} must not be used: {notice.text}; fetch the version in force, or have the unit calibrated again"
     return CalibrationWithdrawn(text, notice, content)
+
+
+def _query(**values: str | int | None) -> str:
+    """Return a query string; values that are None or empty are left out."""
+    given = {name: value for name, value in values.items() if value not in (None, "")}
+    return f"?{urlencode(given)}" if given else ""
 
 
 def _part(serial: str) -> str:

@@ -77,6 +77,13 @@ def test_a_campaign_is_started_watched_and_found(client: Client) -> None:
     assert any("campaign done" in event.message for event in events)
     assert client.campaign(begun.id).state == "done"
     assert begun.id in [each.id for each in client.campaigns()]
+    assert begun.id in [each.id for each in client.campaigns(search="SHORT", limit=1)]
+    assert client.campaigns(search="no & such=recipe") == []
+    (serial, recording), *_ = client.campaign(begun.id).recordings.items()
+    assert [each.id for each in client.recordings(unit=serial, search=serial[:3], limit=1)] == [recording]
+    assert client.recordings(unit=serial[:3]) == []
+    assert [each.serial for each in client.units(search=serial[1:])] == [serial]
+    assert client.units(search="%") == []
     later = [each for each in client.watch(begun.id, after=events[-2].id) if isinstance(each, EventResponse)]
     assert later == events[-1:]
 

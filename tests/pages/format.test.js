@@ -104,3 +104,11 @@ test("evidence is said as odds", () => {
     [[22600], "10⁹⁸¹⁵ to 1"],
   ]);
 });
+
+test("a mean that is rounded to zero has no sign", () => {
+  holds(format.mean, [
+    [[-0.00004, 1], "0.00"],
+    [[-0.00004, 0.0001], "-0.000040"],
+    [[-0.06, 1], "-0.06"],
+  ]);
+});
