@@ -1,7 +1,7 @@
 // Gauges: chamber and gyro temperature against the set point, and table rate, each on a scale.
 
 import { setChildren, h, svg } from "../core/elements.js";
-import { isNumber, plainNumber } from "../core/format.js";
+import { fixed, isNumber, plainNumber } from "../core/format.js";
 import { channelName, channelUnit } from "../recordings/channels.js";
 
 /** @import { Campaign, Timeline } from "../../../types/api.js" */
@@ -49,7 +49,7 @@ function gauge(title, unit, low, high, digits) {
    * @param {string} [text]
    */
   const set = (value, target, text) => {
-    figure.textContent = isNumber(value) ? value.toFixed(digits) : "–";
+    figure.textContent = isNumber(value) ? fixed(value, digits) : "–";
     const to = isNumber(value) ? share(value) : zero;
     bar.setAttribute("x", String(Math.min(zero, to)));
     bar.setAttribute("width", String(Math.max(Math.abs(to - zero), isNumber(value) ? 2 : 0)));

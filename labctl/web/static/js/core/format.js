@@ -70,10 +70,11 @@ export const count = (value) => (isNumber(value) ? value.toLocaleString("en-GB")
 export const percent = (share) => (isNumber(share) ? `${Math.round(100 * share)} %` : "–");
 
 /**
- * A rounded number; one that became zero has no sign: "-0.0000" is "0.0000".
- * @param {string} text
+ * A number with so many decimals; one that is rounded to zero has no sign: "-0.0000" is "0.0000".
+ * @param {number} value
+ * @param {number} decimals
  */
-const withoutNegativeZero = (text) => (/^-[0.]+$/.test(text) ? text.slice(1) : text);
+export const fixed = (value, decimals) => value.toFixed(decimals).replace(/^-(?=[0.]+$)/, "");
 
 /**
  * A mean to one place beyond its spread, so that a column of means lines up; to five digits where there is no spread.
@@ -82,7 +83,7 @@ const withoutNegativeZero = (text) => (/^-[0.]+$/.test(text) ? text.slice(1) : t
  */
 export function mean(value, spread) {
   if (!isNumber(value) || !isNumber(spread) || spread <= 0) return number(value, 5);
-  return withoutNegativeZero(value.toFixed(Math.min(Math.max(2 - Math.floor(Math.log10(spread)), 0), 8)));
+  return fixed(value, Math.min(Math.max(2 - Math.floor(Math.log10(spread)), 0), 8));
 }
 
 /**
