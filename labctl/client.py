@@ -121,9 +121,7 @@ class Client:
         """Close the connection."""
         self._connection.close()
 
-    def units(
-        self, *, due_within: str | None = None, search: str = "", limit: int | None = None
-    ) -> list[UnitResponse]:
+    def units(self, *, due_within: str | None = None, search: str = "", limit: int | None = None) -> list[UnitResponse]:
         """Return every unit that was measured or imported, by serial number; at most `limit`.
 
         With `due_within`, such as "30d", those that are due within that span or overdue, the earliest date first; with

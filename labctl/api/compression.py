@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from starlette.datastructures import Headers
-from starlette.middleware.gzip import GZipResponder
+from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipResponder
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 #: A shorter answer fits into a network packet as it is.
 MIN_COMPRESSED_BYTES = 1400
+EVENTS = "text/event-stream"
+#: Events of a computation: some stages, then a large answer. Those that go on for hours pass as they are.
+ENDING_STREAMS = ("/criticism/events",)
 #: Half the time of the highest level, for a twentieth more bytes.
 LEVEL = 5
 
@@ -15,7 +18,7 @@ LEVEL = 5
 class CompressionMiddleware:
     """Compresses by gzip what has no ETag: a strong ETag is of exactly the bytes that are sent (RFC 9110, 8.8.1).
 
-    Server-sent events, pictures and archives pass as they are; what is large is compressed in a thread.
+    Server-sent events that go on, pictures and archives pass as they are; what is large is compressed in a thread.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -24,7 +27,10 @@ class CompressionMiddleware:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
         if scope["type"] == "http" and "gzip" in Headers(scope=scope).get("accept-encoding", ""):
-            await _Responder(self._app, MIN_COMPRESSED_BYTES, LEVEL)(scope, receive, send)
+            ends = scope["path"].endswith(ENDING_STREAMS)
+            passing = tuple(kind for kind in DEFAULT_EXCLUDED_CONTENT_TYPES if not (ends and kind == EVENTS))
+            responder = _Responder(self._app, MIN_COMPRESSED_BYTES, LEVEL, exclude_content_types=passing)
+            await responder(scope, receive, send)
         else:
             await self._app(scope, receive, send)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import zlib
 
 import httpx
 import pytest
@@ -17,6 +18,10 @@ ROWS = [{"serial": f"A{number}", "rate_dps": number / 7} for number in range(500
 BODY = json.dumps(ROWS).encode()
 
 
+def events() -> StreamingResponse:
+    return StreamingResponse(iter(["data: 1\n\n"] * 500), media_type="text/event-stream")
+
+
 @pytest.fixture
 def client() -> TestClient:
     app = FastAPI()
@@ -26,7 +31,8 @@ def client() -> TestClient:
     app.add_api_route(
         "/file", lambda: Response(BODY, media_type="application/json", headers={"ETag": '"1"'}), methods=["GET"]
     )
-    app.add_api_route("/events", lambda: StreamingResponse(iter(["data: 1\n\n"] * 500), media_type="text/event-stream"))
+    app.add_api_route("/events", events)
+    app.add_api_route("/criticism/events", events)
     return TestClient(app)
 
 
@@ -49,6 +55,16 @@ def test_what_gains_nothing_or_is_a_file_passes_as_it_is(client: TestClient, pat
     headers, raw = sent(client, path, accepted)
     assert "content-encoding" not in headers
     assert json.loads(raw) == ROWS[: len(json.loads(raw))]
+
+
+def test_events_that_end_with_an_answer_are_compressed_and_sent_one_by_one(client: TestClient) -> None:
+    with client.stream("GET", "/criticism/events", headers={"accept-encoding": "gzip"}) as answer:
+        assert answer.headers["content-encoding"] == "gzip"
+        raw = list(answer.iter_raw())
+    unpack = zlib.decompressobj(16 + zlib.MAX_WBITS)
+    events = [unpack.decompress(part) for part in raw]
+    assert b"".join(events) == b"data: 1\n\n" * 500
+    assert events[0].startswith(b"data: 1\n\n"), "the first event is there before the last is made"
 
 
 def test_events_are_sent_one_by_one(client: TestClient) -> None:
