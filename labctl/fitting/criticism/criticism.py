@@ -316,7 +316,7 @@ def _without_weak_names(found: Criticism, suspects: Sequence[Suspect], forward: 
     if named and weak and above and (found.lack_of_fit[1] or 0.0) >= BY_CHANCE:
         further = tuple(group for group in groups if not set(group) <= shapes)
         return Verdict("adequate", further=further)
-    return replace(verdict, groups=groups, form="missing" if all(len(group) == 1 for group in groups) else verdict.form)
+    return replace(verdict, groups=groups)  # what was ambiguous stays so: fewer names are no more certain
 
 
 def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict:

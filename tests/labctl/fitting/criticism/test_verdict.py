@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from labctl.fitting.criticism import Criticism, Verdict, criticise
+from labctl.fitting.criticism.criticism import _without_weak_names
 from labctl.fitting.criticism.model_comparison import compare_models
 from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.criticism.search.held_out import held_out_rises
@@ -114,6 +115,15 @@ def test_the_search_ends_where_the_data_say_nothing_more() -> None:
     weak = [suspect for suspect in ended.suspects if suspect.candidate.id in further]
     assert weak
     assert all(suspect.share_removed < 0.1 for suspect in weak)
+
+
+def test_one_name_that_explains_only_a_part_stays_ambiguous() -> None:
+    """An effect that takes off little of the excess is the only one of its group, and still not certain."""
+    found = held(read_recording(EXAMPLES / "osu-fog"), "bias_scale", full=True)
+    assert found.base is not None
+    alone = replace(found, verdict=Verdict("ambiguous", (("sine_response",),)))
+    verdict = _without_weak_names(alone, found.suspects, found.base.fitted.model)
+    assert (verdict.form, verdict.groups) == ("ambiguous", (("sine_response",),))
 
 
 @pytest.mark.parametrize("effect", ["dead_band=z10", "scale_factor_asymmetry=z10"])
