@@ -305,12 +305,15 @@ def _without_weak_names(found: Criticism, suspects: Sequence[Suspect], forward: 
     verdict = found.verdict
     if verdict.form not in {"missing", "ambiguous"}:
         return verdict
+    listed = {each.candidate.id for each in suspects}  # a shape that fits worse is not
     shapes = {each.candidate.id for each in suspects if is_only_shape(each, forward)}
+    shapes |= set(verdict.named) & set(forward.effect_ids) - listed
     groups = tuple(
         group for names in verdict.groups if (group := tuple(name for name in names if name not in shapes) or names)
     )
     named = [each for each in suspects if each.candidate.id in verdict.named]
     weak = all(each.candidate.log_bf < FAR and each.share_removed < MIN_CAUSE for each in named)
+    weak = weak and set(verdict.named) <= listed | shapes
     error = found.base.error if found.base is not None else None
     above = error is not None and (error.rms_dps or 0.0) > (error.noise_floor_dps or np.inf)
     if named and weak and above and (found.lack_of_fit[1] or 0.0) >= BY_CHANCE:
