@@ -60,14 +60,23 @@ class Assets:
         own = {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*")) if path.is_file()}
         self._paths = own | others
         self._kept: dict[tuple[str, str], tuple[str, Asset]] = {}
+        self._digests: dict[str, tuple[str, str]] = {}
         self._lock = threading.Lock()
         self._release = self.release()
 
     def release(self) -> str:
         """Return the part of addresses that stands for the content of all files of now: 12 hexadecimal digits."""
-        states = "\n".join(f"{name} {_state(path)}" for name, path in sorted(self._paths.items()))
-        self._release = sha256(states.encode()).hexdigest()[:12]
+        digests = "\n".join(f"{name} {self._digest(name)}" for name in sorted(self._paths))
+        self._release = sha256(digests.encode()).hexdigest()[:12]
         return self._release
+
+    def _digest(self, name: str) -> str:
+        """Return the digest of a file; size and time alone do not tell, as installers may give all files one time."""
+        state = _state(self._paths[name])
+        known = self._digests.get(name)
+        if known is None or known[0] != state:
+            known = self._digests[name] = (state, sha256(self._paths[name].read_bytes()).hexdigest())
+        return known[1]
 
     def split(self, address: str) -> tuple[str, bool]:
         """Return the name in an address below `/static/`, and whether it is of this release, so never changes.

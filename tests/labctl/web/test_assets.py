@@ -131,5 +131,14 @@ def test_a_changed_file_changes_the_release_and_is_read_again(tmp_path: Path) ->
     assert (first.body, second.body) == (b"let a = 1;", b"let a = 2;")
 
 
+def test_files_of_one_size_and_time_differ_by_their_content(tmp_path: Path) -> None:
+    releases = set()
+    for content in ("let a = 1;", "let a = 2;"):
+        (tmp_path / "main.js").write_text(content)
+        os.utime(tmp_path / "main.js", ns=(1, 1))  # as an installer may leave all files
+        releases.add(Assets(tmp_path, {}).release())
+    assert len(releases) == 2
+
+
 def test_codings_that_a_client_refuses_are_not_accepted() -> None:
     assert accepted_codings("gzip;q=0, zstd ; q=0.0 , br;q=0.3") == {"br"}
