@@ -53,7 +53,7 @@ class LineReference:
         said = ""
         if self._model.identity:
             said = self._lines.ask(self._model.identity, r".*\S.*", "say what it is")[0]
-            refuse_other_serial(self.name, said, self.settings.serial, is_told=True)
+            refuse_other_serial(self.name, said, self.settings.serial, holds_serial=True)
         self.read()
         certificate = f"; certificate {self.settings.certificate}" if self.settings.certificate else ""
         return f"{said or self._model.title}{certificate}"

@@ -27,7 +27,7 @@ class LibraryChamber(SetpointChamber):
         Raises WrongInstrument for another serial number, InstrumentError.
         """
         said = self._instrument.identity()
-        refuse_other_serial(self.name, said, self._names.serial, is_told=bool(self._names.identity))
+        refuse_other_serial(self.name, said, self._names.serial, holds_serial=bool(self._names.identity))
         self._read_air()
         return f"{self._names.instrument} of {self._names.library} {said}".strip()
 

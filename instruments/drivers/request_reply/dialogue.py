@@ -53,7 +53,7 @@ class Dialogue:
                 f"{self.link.url} answered {said[:SHOWN]!r} to {self.request(ask.send)!r}, which does not fit the "
                 f"pattern {ask.pattern!r} of its description; check the address, or correct [identity]",
             )
-        refuse_other_serial(self.link.device, said, serial, is_told=True)
+        refuse_other_serial(self.link.device, said, serial, holds_serial=True)
         return found["text"].strip()
 
     def text(self, ask: Ask, what: str) -> str:

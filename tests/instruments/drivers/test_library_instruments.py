@@ -190,7 +190,7 @@ def test_another_serial_number_in_the_usual_identity_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "wanted", "is_told", "is_right"),
+    ("said", "wanted", "holds_serial", "is_right"),
     [
         ("FLUKE,1529,B77,1.0", "B77", False, True),
         ("FLUKE,1529,B779,1.0", "B77", False, False),  # the whole number, not a part of it
@@ -202,12 +202,12 @@ def test_another_serial_number_in_the_usual_identity_is_refused() -> None:
         ("FLUKE,1529,B78,1.0", "", True, True),
     ],
 )
-def test_serial_numbers_are_compared_in_one_way(said: str, wanted: str, *, is_told: bool, is_right: bool) -> None:
+def test_serial_numbers_are_compared_in_one_way(said: str, wanted: str, *, holds_serial: bool, is_right: bool) -> None:
     if is_right:
-        refuse_other_serial("reference", said, wanted, is_told=is_told)
+        refuse_other_serial("reference", said, wanted, holds_serial=holds_serial)
         return
     with pytest.raises(WrongInstrument, match=f"gives serial number '{wanted}'"):
-        refuse_other_serial("reference", said, wanted, is_told=is_told)
+        refuse_other_serial("reference", said, wanted, holds_serial=holds_serial)
 
 
 def test_no_identity_is_asked_where_the_bench_file_says_so() -> None:
