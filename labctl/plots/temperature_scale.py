@@ -11,11 +11,11 @@ from plotly.colors import sample_colorscale
 
 #: Share of the temperature range, colour.
 TEMPERATURE_SCALE = [
-    [0.0, "#2d5fbe"],
-    [0.25, "#50aabe"],
-    [0.5, "#beaa5a"],
-    [0.75, "#d27a3a"],
-    [1.0, "#bf1a20"],
+    [0.0, "#2f60be"],
+    [0.25, "#59aab8"],
+    [0.5, "#c3af65"],
+    [0.75, "#cf702d"],
+    [1.0, "#b31222"],
 ]
 
 

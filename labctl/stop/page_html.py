@@ -33,7 +33,7 @@ button:focus-visible,input:focus-visible{outline:4px solid #1f5fa8;outline-offse
 .bad h1{font-size:clamp(2.75rem,11vw,6.5rem)}
 .bad button{background:#fff;color:#b00020;border-color:#fff}
 .bad input{background:#fff;color:#17212b}
-.good h1{color:#1a7a4c}
+.good h1{color:#007a52}
 @media (prefers-color-scheme:dark){.good h1{color:#58c48d}}
 """
 

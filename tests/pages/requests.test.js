@@ -35,7 +35,7 @@ test("an event stream is cut at empty lines, whatever ends a line", () => {
 });
 
 const load = async () => ({ page: () => /** @type {any} */ (null) });
-const routes = ["/", "/campaigns/new", "/campaigns/:id", "/units/:serial"].map((path) => routeOf(path, load));
+const routes = ["/", "/campaigns/new", "/campaigns/:id", "/units/:serial"].map((path) => routeOf(path, "A page", load));
 
 test("the first route that fits is taken, with its decoded parameters", () => {
   assert.deepEqual(matchRoute(routes, "/")?.params, {});

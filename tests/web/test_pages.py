@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 pytestmark = pytest.mark.timeout(400)
-SERIOUS = {"serious", "critical"}
+#: As long as a serial number can be, without a place to break it.
+LONG_SERIAL = ("GYRO-" + "0123456789ABCDEF" * 4)[:64]
 
 
 @pytest.fixture
@@ -28,6 +29,9 @@ def furnished(service: Service) -> Service:
     service.post(f"{unit}/1/improve", {"add": ["scale_factor_odd"]})
     service.post(f"{unit}/1/certify", {"by": "A. Person", "due_days": 365, **OVERRIDE})
     service.post("/api/recordings/example", {"name": "osu-fog"})
+    long = service.post("/api/recordings/simulated", {"serial": LONG_SERIAL, "recipe": "short"})
+    fit = {"recording": long["recording"], "effects": ["bias", "scale_factor"]}
+    service.post(f"/api/units/{LONG_SERIAL}/calibrations", fit)
     return service
 
 
@@ -39,9 +43,16 @@ PAGES = {
     "/campaigns/new?recipe=short": "Plan a campaign",
     "/units": "Units",
     "/units/FOG-0001?beside=1": "FOG-0001",
+    f"/units/{LONG_SERIAL}": LONG_SERIAL,
     "/explore?unit=FOG-0001": "Explore",
+    f"/explore?unit={LONG_SERIAL}": "Explore",
     "/recordings": "Recordings",
     "/recordings/1": "Recording 1",
+    "/recordings/3": "Recording 3",
+    "/noise?recordings=1": "Noise",
+    "/live": "Live",
+    "/certificates": "Certificate",
+    "/nosuch": "No such page",
     "/effects": "Effects",
     "/effects/scale_factor_asymmetry": "Scale factor asymmetry",
 }
@@ -66,7 +77,6 @@ def test_every_page_opens_in_every_dress(furnished: Service, visit: Callable[...
             wrong += [
                 f"{path} ({size['width']} px): {each['id']}: {each['help']}: {each['nodes'][0]['html'][:160]}"
                 for each in found["violations"]
-                if each["impact"] in SERIOUS
             ]
     assert not wrong, "\n".join(wrong)
 

@@ -131,6 +131,8 @@ export interface Figure extends HTMLElement {
   plot: Plot;
   update: () => Promise<void>;
   redraw: () => unknown;
+  /** Draw now, so wide in px; null: as wide as the page lets it be. */
+  drawAt: (width: number | null) => void;
   ondrawn?: (plot: Plot) => void;
 }
 

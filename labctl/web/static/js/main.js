@@ -3,6 +3,7 @@
 import { loadPlotly } from "./core/figure.js";
 import { route, start } from "./core/router.js";
 import { buildLayout } from "./core/layout.js";
+import { preparePrinting } from "./core/print.js";
 import { stopAgain } from "./bench/actions.js";
 
 /** @import { Route } from "./core/routes.js" */
@@ -19,48 +20,57 @@ const withPlots = (load) => () => {
   return load();
 };
 
-route("/", () => import("./pages/start.js"));
-route("/start", () => import("./pages/start.js"));
-route("/bench", () => import("./pages/bench.js"));
+route("/", "labctl", () => import("./pages/start.js"));
+route("/start", "labctl", () => import("./pages/start.js"));
+route("/bench", "Bench", () => import("./pages/bench.js"));
 route(
   "/live",
+  "Live calibration",
   withPlots(() => import("./pages/live.js")),
 );
-route("/campaigns", () => import("./pages/campaigns.js"));
+route("/campaigns", "Campaigns", () => import("./pages/campaigns.js"));
 route(
   "/campaigns/new",
+  "Plan a campaign",
   withPlots(() => import("./pages/campaign_new.js")),
 );
 route(
   "/campaigns/:id",
+  "Campaign",
   withPlots(() => import("./pages/campaign.js")),
 );
-route("/units", () => import("./pages/units.js"));
+route("/units", "Units", () => import("./pages/units.js"));
 route(
   "/units/:serial",
+  "Unit",
   withPlots(() => import("./pages/unit.js")),
 );
 route(
   "/explore",
+  "Explore",
   withPlots(() => import("./pages/explore.js")),
 );
-route("/recordings", () => import("./pages/recordings.js"));
+route("/recordings", "Recordings", () => import("./pages/recordings.js"));
 route(
   "/recordings/:id",
+  "Recording",
   withPlots(() => import("./pages/recording.js")),
 );
 route(
   "/noise",
+  "Noise",
   withPlots(() => import("./pages/noise.js")),
 );
-route("/certificates", () => import("./pages/certificate.js"));
-route("/effects", () => import("./pages/effects.js"));
+route("/certificates", "Certificate", () => import("./pages/certificate.js"));
+route("/effects", "Effects", () => import("./pages/effects.js"));
 route(
   "/effects/:id",
+  "Effect",
   withPlots(() => import("./pages/effects.js")),
 );
 
 buildLayout();
+preparePrinting();
 stopAgain();
 await start();
 // The first page is shown; the next one may need Plotly.

@@ -2,6 +2,7 @@
 
 import { eventStream, get } from "../core/http/api.js";
 import { isAbort, Problem } from "../core/http/errors.js";
+import { untilVisible, whileVisible } from "../core/visible.js";
 import { hasEnded } from "../campaigns/states.js";
 
 /** @import { Campaign, CampaignEvent } from "../../../types/api.js" */
@@ -37,18 +38,21 @@ export async function followCampaign(campaign, handlers, signal) {
   };
   let [connection, asked] = [new AbortController(), Date.now()];
   const watch = setInterval(() => {
-    if (Date.now() - heard <= SILENCE_LIMIT_MS || connection.signal.aborted) return;
+    if (document.hidden || Date.now() - heard <= SILENCE_LIMIT_MS || connection.signal.aborted) return;
     report(true, "the service does not answer");
     if (Date.now() - asked > SILENCE_LIMIT_MS) connection.abort(); // a connection of a suspended computer never ends by itself
   }, CHECK_MS);
   signal.addEventListener("abort", () => clearInterval(watch));
   while (!signal.aborted) {
+    await untilVisible(signal);
+    const seen = whileVisible(signal);
     [connection, asked] = [new AbortController(), Date.now()];
+    if (tries === 0) heard = asked; // what was missed while the tab was hidden is no silence of the service
     try {
       for await (const message of eventStream("/api/campaigns/{campaign}/events", {
         path: { campaign },
         after,
-        signal: AbortSignal.any([signal, connection.signal]),
+        signal: AbortSignal.any([seen, connection.signal]),
       })) {
         [heard, tries] = [Date.now(), 0];
         report(false);
@@ -63,6 +67,7 @@ export async function followCampaign(campaign, handlers, signal) {
       if (hasEnded(status)) break;
     } catch (error) {
       if (signal.aborted) break;
+      if (seen.aborted) continue;
       report(
         true,
         error instanceof Problem

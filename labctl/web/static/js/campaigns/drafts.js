@@ -60,7 +60,7 @@ function figures(draft) {
   ].map(([name, found, why]) => ({ name, found, why }));
   return table(
     [
-      { title: "", cell: (row) => row.name },
+      { title: "Calibration", cell: (row) => row.name },
       { title: "Version", cell: (row) => (row.found ? `${row.found.version}` : row.why) },
       { title: "RMS, deg/s", number: true, cell: (row) => number(row.found?.rms_dps) },
       { title: "Largest, deg/s", number: true, cell: (row) => number(row.found?.max_dps) },
@@ -79,7 +79,7 @@ function limits(draft) {
       { title: "Found, deg/s", number: true, cell: (row) => number(row.value_dps) },
       { title: "At most, deg/s", number: true, cell: (row) => number(row.at_most_dps) },
       {
-        title: "",
+        title: "Result",
         cell: (row) => (row.passed === null ? row.why : row.passed ? chip("passed", "good") : chip("failed", "bad")),
       },
     ],
@@ -104,7 +104,7 @@ function changes(draft) {
         { title: "Change", number: true, cell: (row) => number(row.change) },
         { title: "u", number: true, cell: (row) => number(row.u) },
         { title: "Unit", cell: (row) => row.unit },
-        { title: "", cell: (row) => (row.significant ? chip("significant", "warn") : "") },
+        { title: "Significance", cell: (row) => (row.significant ? chip("significant", "warn") : "") },
       ],
       draft.report?.drift?.coefficients ?? [],
       { label: `Changes of ${draft.serial}`, dense: true },

@@ -8,11 +8,11 @@
  * @type {Scale}
  */
 export const TEMPERATURE_SCALE = [
-  [0, "#2d5fbe"],
-  [0.25, "#50aabe"],
-  [0.5, "#beaa5a"],
-  [0.75, "#d27a3a"],
-  [1, "#bf1a20"],
+  [0, "#2f60be"],
+  [0.25, "#59aab8"],
+  [0.5, "#c3af65"],
+  [0.75, "#cf702d"],
+  [1, "#b31222"],
 ];
 /**
  * Rate: violet is negative, grey is rest, green is positive. Neither is cold or hot.

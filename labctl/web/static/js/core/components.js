@@ -104,7 +104,8 @@ export const emptyState = (...children) => h("div", { class: "empty stack" }, ..
 export const busyIndicator = (text) => h("p", { class: "busy muted", role: "status" }, text);
 
 /**
- * A table: columns are {title, number?, prose?, cell(row)}. On a phone its rows become cards, unless they are `dense`.
+ * A table: columns are {title, number?, prose?, cell(row)}, each with a title: a screen reader says it with every cell.
+ * On a phone its rows become cards, unless they are `dense`.
  * @template Row
  * @param {readonly (Column<Row> | null)[]} columns
  * @param {readonly Row[]} rows
@@ -114,7 +115,7 @@ export function table(columns, rows, { label, selected, onrow, first, dense } = 
   const shown = columns.filter((column) => column !== null);
   return h(
     "div",
-    { class: "table-scroll", tabindex: "0", role: "region", "aria-label": label },
+    { class: "table-scroll", tabindex: "0", role: "group", "aria-label": label },
     h(
       "table",
       { class: dense ? "data" : "data cards", style: first ? `--first-column: ${first}` : null },

@@ -87,3 +87,14 @@ export function whenNearViewport(element, act) {
     { rootMargin: "300px" },
   ).observe(element);
 }
+
+/** Whether the person has asked for as little motion as possible. */
+export const wantsLessMotion = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+/**
+ * Scroll to an element: smoothly, or at once where less motion is wanted.
+ * @param {Element} element
+ * @param {ScrollLogicalPosition} [block]
+ */
+export const scrollTo = (element, block = "start") =>
+  element.scrollIntoView({ behavior: wantsLessMotion() ? "auto" : "smooth", block });

@@ -113,8 +113,8 @@ function withLine({ data = [], layout = {} }, text) {
 /**
  * Create a figure. `draw()` gives {data, layout}; it is called again when the theme changes.
  * `csv()` gives [[heading, ...], [value, ...], ...]; without it the traces' own x, y, z are saved.
- * Return an element with `.update()` (draw), `.redraw()` (draw again, if it was drawn), `.plot` (Plotly's element) and
- * `.ondrawn(plot)`, a callback for the first drawing.
+ * Return an element with `.update()` (draw), `.redraw()` (draw again, if it was drawn), `.drawAt(width)` (draw now, for
+ * paper), `.plot` (Plotly's element) and `.ondrawn(plot)`, a callback for the first drawing.
  * @param {string} name
  * @param {string | null} caption
  * @param {() => Picture} draw
@@ -150,7 +150,7 @@ export function figure(name, caption, draw, { height = "20rem", csv } = {}) {
         tool("CSV", () => saveBlob(new Blob([table()], { type: "text/csv" }), `${fileTitle()}.csv`), "CSV"),
       ),
     ),
-    { plot, update, redraw: () => plot.data && update() },
+    { plot, update, redraw: () => plot.data && update(), drawAt },
   );
 
   /** What the page shows figures of, as it says in `data-source`: "unit A1, version 2 (0f3a...), recording 7". */
@@ -181,18 +181,43 @@ export function figure(name, caption, draw, { height = "20rem", csv } = {}) {
     const Plotly = await loadPlotly();
     await new Promise(requestAnimationFrame);
     waiting = false;
+    await drawWith(Plotly, null);
+    performance.mark("labctl:picture");
+  }
+
+  /**
+   * @param {Plotly} Plotly
+   * @param {number | null} width px; null: as wide as the page lets it be
+   */
+  async function drawWith(Plotly, width) {
     const { data, layout = {} } = draw();
     const first = !plot.data;
-    await Plotly.react(plot, data, themedLayout(layout), config(data));
-    performance.mark("labctl:picture");
+    const sized = width === null ? { autosize: true } : { autosize: false, width };
+    await Plotly.react(plot, data, { ...themedLayout(layout), ...sized }, config(data));
     if (first) {
       drawnFigures.add(element);
       element.ondrawn?.(plot);
     }
   }
+
+  /**
+   * Draw at once where Plotly is loaded: a page that is about to be printed does not wait.
+   * @param {number | null} width
+   */
+  function drawAt(width) {
+    if (window.Plotly) drawWith(window.Plotly, width);
+  }
   whenNearViewport(element, update); // draw on demand: a page with ten figures opens as fast as one with two
   return element;
 }
+
+/**
+ * The figures of a part of the page, drawn or not.
+ * @param {ParentNode} place
+ * @returns {Figure[]}
+ */
+export const figuresOf = (place) =>
+  [...place.querySelectorAll("figure.figure")].map((element) => /** @type {Figure} */ (element));
 
 window.addEventListener("labctl:theme", () => {
   for (const element of drawnFigures) element.isConnected ? element.update() : drawnFigures.delete(element);

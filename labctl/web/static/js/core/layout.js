@@ -4,6 +4,7 @@ import { accessKey, setAccessKey } from "./http/api.js";
 import { setChildren, h, svg } from "./elements.js";
 import { dialog } from "./dialog.js";
 import { freshnessLine } from "./freshness/line.js";
+import { printPage } from "./print.js";
 import { show } from "./router.js";
 import { staticUrl } from "./static_url.js";
 
@@ -38,13 +39,14 @@ export function buildLayout() {
   const themes = [];
   /** @type {HTMLElement[]} */
   const keys = [];
-  /** Buttons for theme and access key: in the sidebar, and below the page on a narrow screen. */
+  /** Buttons for theme, access key and printing: in the sidebar, and below the page on a narrow screen. */
   const controls = () => {
     const theme = h("button", { type: "button", class: "button quiet tiny", onclick: swap });
     const key = h("button", { type: "button", class: "button quiet tiny", onclick: () => askKey() });
     themes.push(theme);
     keys.push(key);
-    return [theme, key];
+    const print = h("button", { type: "button", class: "button quiet tiny", onclick: printPage }, "Print or PDF");
+    return [theme, key, print];
   };
   const name = () => {
     for (const each of themes)
@@ -105,10 +107,10 @@ export function buildLayout() {
   document.body.append(
     h("a", { class: "skip-link", href: "#main" }, "To the page"),
     h(
-      "div",
-      { class: "sidebar" },
+      "nav",
+      { class: "sidebar", "aria-label": "Pages" },
       h("a", { class: "brand", href: "/" }, h("img", { src: staticUrl("mark.svg"), alt: "" }), "labctl"),
-      h("nav", { "aria-label": "Pages" }, links),
+      h("div", { class: "sidebar-links" }, links),
       h("div", { class: "sidebar-footer" }, controls()),
     ),
     h(

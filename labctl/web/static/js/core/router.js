@@ -1,6 +1,7 @@
 // Client-side router: the address determines what the page shows.
 
 import { Unreachable, isAbort } from "./http/errors.js";
+import { framed } from "./page_frame.js";
 import { changedQuery, matchRoute, routeOf } from "./routes.js";
 
 /** @import { Query } from "../../../types/pages.js" */
@@ -16,9 +17,10 @@ const SCROLLED_MS = 150;
 /**
  * Register the module of a pattern like `/units/:serial`. A module exports `page(context)`, which returns an element.
  * @param {string} pattern
+ * @param {string} name of the page, while it is not there yet
  * @param {Route["load"]} load
  */
-export const route = (pattern, load) => routes.push(routeOf(pattern, load));
+export const route = (pattern, name, load) => routes.push(routeOf(pattern, name, load));
 
 const address = () => location.pathname + location.search;
 
@@ -70,9 +72,12 @@ export async function show() {
   const found = matchRoute(routes, location.pathname);
   window.dispatchEvent(new CustomEvent("labctl:moved"));
   main.setAttribute("aria-busy", "true");
+  const endFrame = framed(main, found?.name ?? "labctl");
+  signal.addEventListener("abort", endFrame);
   try {
     const module = await (found ? found.load() : import("../pages/not_found.js"));
     const element = await module.page({ params: found?.params ?? {}, query: query(), signal });
+    endFrame();
     if (signal.aborted) return;
     main.replaceChildren(element);
     performance.mark("labctl:page"); // for the browser's own profiler, and benchmarks
@@ -82,6 +87,7 @@ export async function show() {
       main.focus({ preventScroll: true });
     navigated = true;
   } catch (error) {
+    endFrame();
     if (signal.aborted || isAbort(error)) return;
     await showError(main, error, signal);
   } finally {

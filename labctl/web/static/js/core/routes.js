@@ -1,7 +1,7 @@
 // Routes: which module shows an address.
 
 /** @import { PageModule } from "../../../types/pages.js" */
-/** @typedef {{ parts: string[], load: () => Promise<PageModule> }} Route */
+/** @typedef {{ parts: string[], name: string, load: () => Promise<PageModule> }} Route */
 
 /** @param {string} path */
 const partsOf = (path) => path.split("/").filter(Boolean);
@@ -9,10 +9,11 @@ const partsOf = (path) => path.split("/").filter(Boolean);
 /**
  * A route of a pattern like `/units/:serial`.
  * @param {string} pattern
+ * @param {string} name of the page, while it is not there yet
  * @param {Route["load"]} load
  * @returns {Route}
  */
-export const routeOf = (pattern, load) => ({ parts: partsOf(pattern), load });
+export const routeOf = (pattern, name, load) => ({ parts: partsOf(pattern), name, load });
 
 /**
  * A part of an address as it was before it was encoded; as it stands where that is not possible (`%E0%A4%A`).
@@ -33,7 +34,7 @@ function decoded(part) {
  */
 export function matchRoute(routes, path) {
   const parts = partsOf(path).map(decoded);
-  for (const { parts: pattern, load } of routes) {
+  for (const { parts: pattern, name, load } of routes) {
     if (pattern.length !== parts.length) continue;
     if (!pattern.every((part, k) => part.startsWith(":") || part === parts[k])) continue;
     /** @type {Record<string, string>} */
@@ -41,7 +42,7 @@ export function matchRoute(routes, path) {
     pattern.forEach((part, k) => {
       if (part.startsWith(":")) params[part.slice(1)] = parts[k];
     });
-    return { load, params };
+    return { load, name, params };
   }
   return null;
 }

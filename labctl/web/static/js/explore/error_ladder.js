@@ -129,7 +129,6 @@ export function errorLadder(state, signal) {
      */
     const one = (k, name) =>
       residualMap(name, null, () => ({ maps: pair()[k], limit: colourLimit(...pair()) }), {
-        pickable: false,
         height: "16rem",
       });
     const both = [one(0, `Version ${parent}`), one(1, `Version ${state.version}`)];

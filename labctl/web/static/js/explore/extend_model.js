@@ -1,7 +1,7 @@
 // Extend the model: preview a changed model, then save it as the next version.
 
 import { post } from "../core/http/api.js";
-import { setChildren, h } from "../core/elements.js";
+import { scrollTo, setChildren, h } from "../core/elements.js";
 import { capitalised, number, idText } from "../core/format.js";
 import { button, fitWarnings, cardWithHeader, notice, table, toast } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
@@ -132,7 +132,7 @@ export function extendModel(state, effects) {
           { title: `Version ${state.version}`, number: true, cell: ([key]) => number(found.before[key]) },
           { title: "Changed", number: true, cell: ([key]) => h("strong", {}, number(found.error[key])) },
           {
-            title: "",
+            title: "Change",
             cell: ([key]) =>
               key === "rms_dps" || key === "heldout_rms_dps"
                 ? relativeChange(found.before[key], found.error[key])
@@ -198,7 +198,7 @@ export function extendModel(state, effects) {
     put: async (effect) => {
       change.add.add(effect);
       show();
-      element.scrollIntoView({ behavior: "smooth", block: "start" });
+      scrollTo(element);
       await preview();
     },
   };

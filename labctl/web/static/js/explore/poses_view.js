@@ -77,7 +77,7 @@ function verifiedAxes(found) {
       { title: "Expected, deg/s", number: true, cell: (row) => number(row.expected_dps) },
       { title: "Limit, deg/s", number: true, cell: (row) => number(row.limit_dps) },
       { title: "Mean, deg/s", number: true, cell: (row) => number(row.bias_dps) },
-      { title: "", cell: (row) => (row.ok === false ? chip("off", "bad") : null) },
+      { title: "Limit kept", cell: (row) => (row.ok === false ? chip("off", "bad") : null) },
     ],
     Object.entries(found.axes).map(([axis, each]) => ({ axis, ...each })),
     { label: "Error of each axis", dense: true },

@@ -2,7 +2,8 @@
 
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { number } from "../core/format.js";
+import { isNumber, number } from "../core/format.js";
+import { reachByKeyboard } from "../core/keyboard_points.js";
 import { cardWithHeader, table } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
@@ -13,6 +14,7 @@ import { residualMap, selectedRows, datasetsUnder } from "./residual_map.js";
 import { channelName, channelTitle, scaled, setText, shownText } from "./dataset_rows.js";
 
 /** @import { Figure, PlotEvent, PlotTrace } from "../../../types/pages.js" */
+/** @import { Place } from "../core/keyboard_points.js" */
 /** @import { ExploreState } from "./state.js" */
 
 /** What there is of these is drawn at first: time where it is known, else the order of the data sets. */
@@ -32,6 +34,7 @@ export function residualDiagnostics(state) {
           limit: colourLimit(mapsOf(state.criticism, state.axis)),
           pick: state.pick,
         }),
+        { onselect: (sets, beside) => state.select(beside ? [...state.pick, ...sets] : sets) },
       );
   if (picture) bindSelection(picture, datasetsUnder, state);
 
@@ -111,6 +114,8 @@ function bindSelection(element, setsOf, state) {
  * @param {() => string} channel
  */
 function residualScatter(state, channel) {
+  /** @type {(Place & { index: number }) | null} */
+  let cursor = null;
   const draw = () => {
     const rows = selectedRows(state);
     const x = scaled(channel(), rows.channels[channel()]);
@@ -147,6 +152,7 @@ function residualScatter(state, channel) {
       });
     }
     data.push(...marks.legend);
+    if (cursor) data.push(cursorTrace(x[cursor.index], rows.residual[cursor.index]));
     const shown = shownText(state.criticism);
     const annotations = shown
       ? [
@@ -177,9 +183,57 @@ function residualScatter(state, channel) {
   };
   const element = figure("Residual against a channel", null, draw, { height: "16rem" });
   bindSelection(element, (event) => (event.points ?? []).map((point) => point.customdata), state);
+  reachByKeyboard(element, {
+    places: () => pointPlaces(state, channel()),
+    onmove: (place) => {
+      cursor = place;
+      element.redraw();
+    },
+    onselect: (sets, beside) => state.select(beside ? [...state.pick, ...sets] : sets),
+  });
   state.onchange(() => element.redraw());
   return element;
 }
+
+/**
+ * The data sets of a figure over a channel for the keyboard, from left to right.
+ * @param {ExploreState} state
+ * @param {string} channel
+ * @returns {(Place & { index: number })[]}
+ */
+function pointPlaces(state, channel) {
+  const rows = selectedRows(state);
+  const x = scaled(channel, rows.channels[channel]);
+  const order = rows.dataset
+    .map((_, k) => k)
+    .filter((k) => isNumber(x[k]) && isNumber(rows.residual[k]))
+    .sort((a, b) => Number(x[a]) - Number(x[b]));
+  return order.map((k, column) => ({
+    panel: 0,
+    column,
+    row: 0,
+    index: k,
+    sets: [rows.dataset[k]],
+    text: `${setText(rows, k)}: ${channelTitle(channel)} ${number(x[k], 5)}, residual ${number(rows.residual[k])} deg/s, ${number(rows.score[k], 2)} times the noise floor`,
+  }));
+}
+
+/**
+ * The mark of the point that the keyboard is at.
+ * @param {number | null} x
+ * @param {number | null} y
+ * @returns {PlotTrace}
+ */
+const cursorTrace = (x, y) => ({
+  type: "scatter",
+  mode: "markers",
+  name: "keyboard",
+  x: [x],
+  y: [y],
+  hoverinfo: "skip",
+  showlegend: false,
+  marker: { size: 14, symbol: "circle-open", color: colour("accent"), line: { width: 3 } },
+});
 
 /** @param {ExploreState} state */
 function pickedDatasets(state) {

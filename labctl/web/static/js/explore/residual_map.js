@@ -4,10 +4,12 @@ import { DIVERGING } from "../core/colour_scales.js";
 import { colour, figure } from "../core/figure.js";
 import { number, plainNumber } from "../core/format.js";
 import { datasetRows, distinctLabels } from "./dataset_rows.js";
+import { reachByKeyboard } from "../core/keyboard_points.js";
 import { mapCells } from "./residual_cells.js";
 
 /** @import { ResidualMap } from "../../../types/api.js" */
 /** @import { PlotEvent, PlotLayout } from "../../../types/pages.js" */
+/** @import { Place } from "../core/keyboard_points.js" */
 /** @import { Cell } from "./residual_cells.js" */
 /** @import { ExploreState } from "./state.js" */
 /** @typedef {ReturnType<typeof mapCells>} Cells */
@@ -119,8 +121,9 @@ function scatteredTraces({ cells }, position, shared) {
  * @param {ResidualMap} map
  * @param {string} id
  * @param {ReadonlySet<number>} pick
+ * @param {Place | null} cursor the cell that the keyboard is at, of this panel
  */
-function positionPanel(map, id, pick) {
+function positionPanel(map, id, pick, cursor) {
   const found = mapCells(map);
   const shared = { xaxis: `x${id}`, yaxis: `y${id}` };
   const filled = found.cells.length >= MIN_FILLED * found.rates.length * found.temperatures.length;
@@ -145,11 +148,13 @@ function positionPanel(map, id, pick) {
     unselected: { marker: { opacity: marker.opacity ?? 1 } },
   });
   const picked = placed.filter((cell) => cell.sets.some((set) => pick.has(set)));
+  const under = placed.filter((cell) => cursor?.sets[0] === cell.sets[0]);
   return {
     data: [
       ...traces,
       mark(placed, { size: 18, opacity: 0.01, symbol: "square" }, "cells"),
       mark(picked, { size: 13, symbol: "square-open", color: colour("text"), line: { width: 2.5 } }, "picked"),
+      mark(under, { size: 20, symbol: "square-open", color: colour("accent"), line: { width: 4 } }, "keyboard"),
     ],
     x: { ...x, showgrid: false, title: { text: "table rate, deg/s" } },
     y: { ...y, showgrid: false, title: id === "" ? { text: "deg C" } : undefined },
@@ -158,20 +163,45 @@ function positionPanel(map, id, pick) {
 }
 
 /**
- * The map of an axis, a panel for each position. `give()` returns {maps, limit, pick}.
+ * The cells of all panels for the keyboard, from the coldest row of the first panel on.
+ * @param {readonly ResidualMap[]} maps
+ * @returns {Place[]}
+ */
+export function cellPlaces(maps) {
+  return maps.flatMap((map, panel) => {
+    const { rates, temperatures, cells } = mapCells(map);
+    return cells
+      .map((cell) => ({
+        panel,
+        column: rates.indexOf(cell.rate),
+        row: temperatures.indexOf(cell.temperature),
+        sets: cell.sets,
+        text: cellText(cell, map.position).replaceAll("<br>", ", "),
+      }))
+      .sort((a, b) => a.row - b.row || a.column - b.column);
+  });
+}
+
+/**
+ * The map of an axis, a panel for each position. `give()` returns {maps, limit, pick}; `onselect` gets the data sets
+ * that the keyboard selects, and makes the cells reachable by it.
  * @param {string} name
  * @param {string | null} caption
  * @param {() => { maps: ResidualMap[], limit: number, pick?: ReadonlySet<number> }} give
- * @param {{ pickable?: boolean, height?: string }} [options]
+ * @param {object} [options]
+ * @param {string} [options.height]
+ * @param {(sets: readonly number[], beside: boolean) => unknown} [options.onselect] absent: no cell can be selected
  */
-export function residualMap(name, caption, give, { pickable = true, height = "22rem" } = {}) {
+export function residualMap(name, caption, give, { onselect, height = "22rem" } = {}) {
+  /** @type {Place | null} */
+  let cursor = null;
   const draw = () => {
     const { maps, limit, pick = new Set() } = give();
     const several = maps.length > 1;
     /** @type {PlotLayout} */
     const layout = {
       margin: { l: 52, r: 8, t: 28, b: 46 },
-      dragmode: pickable ? "select" : false,
+      dragmode: onselect ? "select" : false,
       coloraxis: {
         colorscale: DIVERGING,
         cmin: -limit,
@@ -188,7 +218,7 @@ export function residualMap(name, caption, give, { pickable = true, height = "22
     layout.annotations = [];
     const data = maps.flatMap((map, k) => {
       const id = k ? String(k + 1) : "";
-      const { data: traces, x, y, text } = positionPanel(map, id, pick);
+      const { data: traces, x, y, text } = positionPanel(map, id, pick, cursor?.panel === k ? cursor : null);
       layout[`xaxis${id}`] = below && k < maps.length - 1 ? { ...x, title: undefined } : x; // one title for all panels
       layout[`yaxis${id}`] = y;
       layout.annotations.push({
@@ -206,7 +236,15 @@ export function residualMap(name, caption, give, { pickable = true, height = "22
     });
     return { data, layout };
   };
-  return figure(name, caption, draw, { height, csv: () => mapRows(give().maps) });
+  const element = figure(name, caption, draw, { height, csv: () => mapRows(give().maps) });
+  if (onselect) {
+    const onmove = (/** @type {Place | null} */ place) => {
+      cursor = place;
+      element.redraw();
+    };
+    reachByKeyboard(element, { places: () => cellPlaces(give().maps), onmove, onselect });
+  }
+  return element;
 }
 
 /**

@@ -2,6 +2,7 @@
 
 import { eventStream } from "../core/http/api.js";
 import { isAbort, Problem } from "../core/http/errors.js";
+import { untilVisible, whileVisible } from "../core/visible.js";
 
 /** @import { LiveState } from "../../../types/api.js" */
 
@@ -18,8 +19,10 @@ export const goesOn = (state) => state.stage === "running" || state.stage === "s
 export async function followLive(show, trouble, signal) {
   let tries = 0;
   while (!signal.aborted) {
+    await untilVisible(signal);
+    const seen = whileVisible(signal);
     try {
-      for await (const { event, data } of eventStream("/api/live/events", { signal })) {
+      for await (const { event, data } of eventStream("/api/live/events", { signal: seen })) {
         tries = 0;
         trouble("");
         if (event !== "state") continue;
@@ -29,6 +32,7 @@ export async function followLive(show, trouble, signal) {
       }
     } catch (error) {
       if (signal.aborted) return;
+      if (seen.aborted) continue; // the tab was hidden
       trouble(error instanceof Problem ? error.message : isAbort(error) ? "" : "the connection broke");
       if (error instanceof Problem && error.status < 500) return;
     }

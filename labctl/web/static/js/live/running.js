@@ -31,7 +31,7 @@ export const coefficientTable = (coefficients) =>
       { title: "Limit", number: true, cell: (row) => (row.limit === null ? "none" : plainNumber(row.limit)) },
       { title: "Unit", cell: (row) => unitText(row.unit) },
       {
-        title: "",
+        title: "Goal",
         cell: (row) =>
           row.limit === null ? "" : row.expanded <= row.limit ? chip("reached", "good") : chip("not yet", "warn"),
       },

@@ -1,7 +1,7 @@
 // The page of one recording: conditions, trace, data sets, readings, noise, and the file to download.
 
 import { download, get } from "../core/http/api.js";
-import { h } from "../core/elements.js";
+import { h, scrollTo } from "../core/elements.js";
 import { count, day, number, plainNumber } from "../core/format.js";
 import { button, card, factList, pageHeader, notice } from "../core/components.js";
 import { updateQuery } from "../core/router.js";
@@ -52,7 +52,7 @@ export async function page({ params, query, signal }) {
       state.dataset = dataset === state.dataset ? null : dataset;
       updateQuery({ dataset: state.dataset });
       for (const part of parts) part.redraw();
-      if (state.dataset !== null) readings.scrollIntoView({ block: "nearest", behavior: "smooth" });
+      if (state.dataset !== null) scrollTo(readings, "nearest");
     },
   };
   const element = h(
@@ -95,7 +95,7 @@ function shownTrace(state, signal) {
     const [from, until] = [state.sets.t_from_s[k] ?? 0, state.sets.t_until_s[k] ?? 0];
     const beside = 0.5 * (until - from);
     found.show({ from: from - beside, until: until + beside });
-    found.scrollIntoView({ block: "start", behavior: "smooth" });
+    scrollTo(found);
   };
   return found;
 }

@@ -148,7 +148,7 @@ function versions(unit, rows, issued, explore) {
         { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
         { title: "Left-out temperatures, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
         {
-          title: "",
+          title: "Action",
           cell: (row) =>
             h(
               "div",

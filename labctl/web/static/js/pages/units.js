@@ -53,7 +53,7 @@ const unitTable = (units) =>
         cell: (unit) => (unit.overdue ? chip(`overdue since ${day(unit.due)}`, "bad") : unit.due ? day(unit.due) : "–"),
       },
       {
-        title: "",
+        title: "Action",
         cell: (unit) =>
           h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"),
       },

@@ -46,7 +46,7 @@ export function certificateTable(issued) {
       { title: "Why", prose: true, cell: (row) => row.state_reason || "–" },
       { title: "Valid instead", cell: (row) => row.valid_instead ?? "–" },
       {
-        title: "",
+        title: "Action",
         cell: (row) =>
           row.state === "withdrawn" ? null : button("Withdraw", () => askWithdrawal(row.number), { kind: "tiny" }),
       },

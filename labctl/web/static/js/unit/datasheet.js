@@ -39,7 +39,7 @@ function sheet(answer) {
           title: "Specified",
           cell: (row) => (row.specified === null ? "" : `${row.specified_as} ${number(row.specified)}`),
         },
-        { title: "", cell: decision },
+        { title: "Decision", cell: decision },
         { title: "From", cell: source },
       ],
       answer.characteristics,

@@ -52,7 +52,7 @@ function heldOutByLeg({ error }) {
               : `${number(row.rms_dps / error.noise_floor_dps, 2)} times`,
         },
         { title: "Data sets", number: true, cell: (row) => `${row.datasets}` },
-        error.heldout_by_leg.some((row) => row.why) ? { title: "", prose: true, cell: (row) => row.why } : null,
+        error.heldout_by_leg.some((row) => row.why) ? { title: "Note", prose: true, cell: (row) => row.why } : null,
       ],
       error.heldout_by_leg,
       { label: "Held out by leg" },

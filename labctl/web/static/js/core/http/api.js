@@ -4,6 +4,7 @@
 import { address } from "./address.js";
 import { Problem, Unreachable, isAbort } from "./errors.js";
 import { parseMessage, splitMessages } from "./event_message.js";
+import { tracked } from "./pending.js";
 
 /** @import { AnswerOf, Options, PathOf, PostOptions, Streams } from "../../../../types/api.js" */
 /** @import { EventMessage } from "./event_message.js" */
@@ -30,7 +31,7 @@ function headers(more = {}) {
 async function request(path, options) {
   let response;
   try {
-    response = await fetch(path, options);
+    response = await tracked(`${options.method ?? "GET"} ${path}`, fetch(path, options));
   } catch (error) {
     if (isAbort(error)) throw error;
     throw new Unreachable();

@@ -1,0 +1,53 @@
+"""A page on paper: every figure whole, also those that were not scrolled to, and what it is of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.helpers.browser import Service, settled
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = pytest.mark.timeout(400)
+#: Of A4 upright within margins of 10 mm, CSS px.
+PAPER_PX = 718
+#: For each figure on paper: whether it is drawn, and how far its drawing reaches beyond the paper.
+FIGURES = """() => [...document.querySelectorAll("figure.figure")].map((each) => {
+  const svg = each.querySelector(".main-svg");
+  return {
+    name: each.querySelector(".plot").getAttribute("aria-label").split(".")[0],
+    drawn: Boolean(svg), width: svg?.getBoundingClientRect().width ?? 0,
+    right: svg ? svg.getBoundingClientRect().right - document.documentElement.clientWidth : 0,
+    dark: each.querySelector(".plot").layout?.font?.color,
+  };
+})"""
+
+
+def test_every_figure_is_printed_whole_and_in_light_colours(service: Service, visit: Callable[..., Page]) -> None:
+    made = service.post("/api/recordings/simulated", {"serial": "FOG-0001", "recipe": "short"})
+    fit = {"recording": made["recording"], "effects": ["bias", "scale_factor"]}
+    service.post("/api/units/FOG-0001/calibrations", fit)
+    page = visit("/explore?unit=FOG-0001", dark=True)
+    settled(page)
+    page.get_by_role("region", name="Error of the versions").wait_for()
+    page.wait_for_function("() => window.Plotly")
+    page.evaluate("() => { window.dispatchEvent(new Event('beforeprint')); }")
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": PAPER_PX, "height": 1000})
+    figures = page.evaluate(FIGURES)
+    assert len(figures) >= 5
+    assert [each["name"] for each in figures if not each["drawn"]] == []
+    assert [each["name"] for each in figures if each["right"] > 0 or each["width"] < PAPER_PX / 2] == []
+    muted = "#51606e"  # the text of the light theme
+    assert {each["dark"] for each in figures} == {muted}
+    line = page.locator(".print-line")
+    assert "unit FOG-0001, version 1" in line.inner_text()
+    assert page.url in line.inner_text()
+    page.emulate_media(media="screen")
+    page.evaluate("() => { window.dispatchEvent(new Event('afterprint')); }")
+    assert page.locator(".print-line").count() == 0
+    assert page.evaluate("() => document.documentElement.dataset.theme") == "dark"

@@ -1,0 +1,46 @@
+"""Several tabs of one browser: those that are hidden keep no connection, so that a stop never waits for one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.helpers.browser import Service, settled
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = pytest.mark.timeout(300)
+#: More than the connections that a browser keeps to one service over HTTP/1.1.
+TABS = 8
+HIDDEN = """hidden => {
+  Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+  document.dispatchEvent(new Event("visibilitychange"));
+}"""
+
+
+def test_a_stop_in_the_ninth_tab_of_a_running_campaign_is_carried_out(
+    service: Service, visit: Callable[..., Page]
+) -> None:
+    from playwright.sync_api import expect
+
+    service.post("/api/campaigns", {"recipe": "table1-x-table2"})
+    first = visit("/bench")
+    settled(first)
+    tabs = [first]
+    for _ in range(TABS):
+        tabs[-1].evaluate(HIDDEN, True)  # the browser hides a tab when the next one is opened
+        tabs.append(first.context.new_page())
+        tabs[-1].goto(f"{service.url}/bench")
+        settled(tabs[-1])
+    last = tabs[-1]
+    last.get_by_role("button", name="Abort").first.click()
+    confirm = last.get_by_role("dialog").get_by_role("button", name="Abort")
+    if confirm.count():
+        confirm.first.click()
+    service.until("/api/campaigns/1", lambda answer: answer["ended"])
+    last.evaluate(HIDDEN, True)
+    first.evaluate(HIDDEN, False)
+    expect(first.locator("main")).to_contain_text("No campaign is running")
