@@ -1,6 +1,7 @@
 // Numbers, sizes, durations and results as text.
 
 import assert from "node:assert/strict";
+import { readdirSync, readFileSync } from "node:fs";
 import { test } from "node:test";
 
 import * as format from "../../labctl/web/static/js/core/format.js";
@@ -111,4 +112,14 @@ test("a mean that is rounded to zero has no sign", () => {
     [[-0.00004, 0.0001], "-0.000040"],
     [[-0.06, 1], "-0.06"],
   ]);
+});
+
+test("only a result with its expanded uncertainty has the sign ±", () => {
+  const folder = "labctl/web/static/js";
+  const signed = readdirSync(folder, { recursive: true, encoding: "utf8" })
+    .filter((name) => name.endsWith(".js") && /[`"'][^`"']*±/.test(readFileSync(`${folder}/${name}`, "utf8")))
+    .sort();
+  // the text itself; the heading of a column of such texts; where a line may break in one
+  assert.deepEqual(signed, ["core/format.js", "explore/suspects.js", "unit/sensors.js"]);
+  assert.equal(format.scatterText(0.01234), "s = 0.012");
 });

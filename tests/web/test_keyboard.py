@@ -76,7 +76,7 @@ def test_the_points_over_a_channel_are_reached_from_left_to_right(explored: Page
     drawn = json.loads(plot.evaluate("plot => JSON.stringify([...plot.data[0].x])"))
     plot.focus()
     explored.keyboard.press("ArrowRight")
-    line = failing.locator("figure", has=plot).locator(".keyboard-line")
+    line = plot.locator("xpath=..").locator(".keyboard-line")
     expect(line).to_contain_text(f"{min(drawn):.5g}"[:6])
     explored.keyboard.press("End")
     expect(line).to_contain_text(f"{max(drawn):.5g}"[:6])

@@ -26,7 +26,7 @@ def test_a_stop_in_the_ninth_tab_of_a_running_campaign_is_carried_out(
 ) -> None:
     from playwright.sync_api import expect
 
-    service.post("/api/campaigns", {"recipe": "table1-x-table2"})
+    service.post("/api/campaigns", {"recipe": "ojeda2000-121"})
     first = visit("/bench")
     settled(first)
     tabs = [first]

@@ -137,6 +137,7 @@ export interface Figure extends HTMLElement {
 }
 
 export interface Plotly {
+  restyle: (plot: HTMLElement, changed: object, traces: number[]) => Promise<unknown>;
   react: (plot: HTMLElement, data: PlotTrace[], layout: PlotLayout, config: object) => Promise<unknown>;
   toImage: (plot: HTMLElement | Picture, options: object) => Promise<string>;
 }

@@ -2,7 +2,7 @@
 
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
-import { mean, number } from "../core/format.js";
+import { mean, scatterText } from "../core/format.js";
 import { factList, cardWithHeader } from "../core/components.js";
 
 /** @import { Campaign, Output } from "../../../types/api.js" */
@@ -104,7 +104,7 @@ export function liveOutput(campaign) {
           seriesName(output, several),
           mean(output.mean, output.n > 1 ? output.std : null),
           output.unit,
-          output.n > 1 ? `± ${number(output.std, 2)} over ${output.n} readings` : "one reading",
+          output.n > 1 ? `${scatterText(output.std)} over ${output.n} readings` : "one reading",
         ]),
       ),
     );

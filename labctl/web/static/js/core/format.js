@@ -87,6 +87,12 @@ export function mean(value, spread) {
 }
 
 /**
+ * How far readings scatter: their standard deviation s, never with the sign ±, which is that of U with k = 2.
+ * @param {Numeric} std
+ */
+export const scatterText = (std) => `s = ${number(std, 2)}`;
+
+/**
  * Seconds as 45 h 10 min, 3 min 20 s, 12 s.
  * @param {Numeric} seconds
  */

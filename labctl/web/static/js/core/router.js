@@ -3,6 +3,7 @@
 import { Unreachable, isAbort } from "./http/errors.js";
 import { framed } from "./page_frame.js";
 import { changedQuery, matchRoute, routeOf } from "./routes.js";
+import { setPageName } from "./tab_mark.js";
 
 /** @import { Query } from "../../../types/pages.js" */
 /** @import { Route } from "./routes.js" */
@@ -82,7 +83,7 @@ export async function show() {
     main.replaceChildren(element);
     performance.mark("labctl:page"); // for the browser's own profiler, and benchmarks
     const heading = element.querySelector("h1");
-    document.title = heading ? `${heading.textContent} · labctl` : "labctl";
+    setPageName(heading ? `${heading.textContent} · labctl` : "labctl");
     if (navigated && (document.activeElement === document.body || main.contains(document.activeElement)))
       main.focus({ preventScroll: true });
     navigated = true;

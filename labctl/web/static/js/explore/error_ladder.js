@@ -1,11 +1,13 @@
 // The error of each version down to the noise floor, and the residual maps of this version and its parent.
 
 import { get } from "../core/http/api.js";
-import { h } from "../core/elements.js";
+import { setChildren, h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { capitalised, isNumber, number, idText } from "../core/format.js";
-import { cardWithHeader, loadInto, modelName, table } from "../core/components.js";
+import { button, cardWithHeader, loadInto, modelName, table } from "../core/components.js";
 import { asked, recordingsText } from "./chosen_recordings.js";
+import { axisNames } from "./dataset_rows.js";
+import { finishLine, stepOf } from "./finish_line.js";
 import { heldOutName } from "./first_models.js";
 import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap } from "./residual_map.js";
@@ -110,10 +112,38 @@ export function errorLadder(state, signal) {
   loadInto(place, "RMS error by version", async () => {
     const ladder = await get("/api/units/{serial}/ladder", { path: { serial }, signal });
     const here = ladder.steps.find((step) => step.version === state.version);
-    const parts = [ladderFigure(ladder, state.motion), versionTable(ladder, state)];
+    const parts = [ladderFigure(ladder, state.motion), versionTable(ladder, state), replay(ladder)];
     if (here?.parent && hasMap(state)) parts.push(await faded(here.parent));
     return h("div", { class: "stack" }, parts);
   });
+
+  /**
+   * The versions that led to this one, each criticised on the same data, one after the other.
+   * @param {Ladder} ladder
+   */
+  function replay(ladder) {
+    const line = versionsTo(ladder, state.version);
+    if (line.length < 2 || !axisNames(state.criticism).length) return null;
+    const show = h("div", {});
+    const play = button(`Replay versions ${line.join(", ")}`, async () => {
+      const criticisms = await Promise.all(
+        line.map((version) =>
+          version === state.version
+            ? state.criticism
+            : get("/api/units/{serial}/calibrations/{version}/criticism", {
+                path: { serial, version },
+                query: asked(state),
+                signal,
+              }),
+        ),
+      );
+      const steps = criticisms.map((each, k) => stepOf(state, each, line[k]));
+      const played = finishLine(state, steps, `Versions ${line.join(", ")}`);
+      setChildren(show, played.element);
+      await played.play();
+    });
+    return h("div", { class: "stack" }, h("div", { class: "row" }, play), show);
+  }
 
   /** @param {number} parent */
   async function faded(parent) {
@@ -148,6 +178,20 @@ export function errorLadder(state, signal) {
   }
 
   return cardWithHeader("Error of the versions", null, place);
+}
+
+/**
+ * The versions from the first one that led to `version`, up to it.
+ * @param {Ladder} ladder
+ * @param {number} version
+ */
+export function versionsTo(ladder, version) {
+  const parents = new Map(ladder.steps.map((step) => [step.version, step.parent]));
+  /** @type {number[]} */
+  const line = [];
+  for (let at = /** @type {number | null | undefined} */ (version); at && parents.has(at); at = parents.get(at))
+    line.unshift(at);
+  return line;
 }
 
 /**

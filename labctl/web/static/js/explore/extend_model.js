@@ -9,6 +9,7 @@ import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
 import { postFit } from "./accept_warnings.js";
 import { asked, inAddress } from "./chosen_recordings.js";
+import { finishLine, keepFor, stepOf, stepOfPreview } from "./finish_line.js";
 import { heldOutName } from "./first_models.js";
 import { plausibility, relativeChange, residualFigure } from "./preview_result.js";
 
@@ -117,9 +118,11 @@ export function extendModel(state, effects) {
     stale();
   };
 
+  /** @type {Preview} */
+  let previewed;
   async function preview() {
-    const found = await post("/api/units/{serial}/calibrations/{version}/preview", { path, body: body() });
-    setChildren(result, shown(found));
+    previewed = await post("/api/units/{serial}/calibrations/{version}/preview", { path, body: body() });
+    setChildren(result, shown(previewed));
   }
 
   /** @param {Preview} found */
@@ -172,9 +175,13 @@ export function extendModel(state, effects) {
     );
     if (!made) return;
     toast("good", `Version ${made.version} of ${state.serial} was made.`);
+    const steps = [stepOf(state), stepOfPreview(state, previewed, made.version)];
+    const finish = finishLine(state, steps, `Version ${state.version} to version ${made.version}`);
+    keepFor(state.serial, made.version, finish);
     await navigate(
-      `/explore?${changedQuery("", { unit: state.serial, version: made.version, ...inAddress(state), axis: state.axis })}#watch`,
+      `/explore?${changedQuery("", { unit: state.serial, version: made.version, ...inAddress(state), axis: state.axis })}#finish`,
     );
+    await finish.play();
   }
 
   show();

@@ -75,7 +75,7 @@ export function residualFigure(state, found, floor) {
       layout: {
         title: shownText(state.criticism) ? { text: shownText(state.criticism), font: { size: 11 } } : undefined,
         xaxis: { title: { text: channelTitle(channel) } },
-        yaxis: { title: { text: "residual, deg/s" } },
+        yaxis: { title: { text: "residual of<br>the fitted model, deg/s" } },
         shapes: floor ? [line(2 * floor), line(-2 * floor)] : [],
       },
     };

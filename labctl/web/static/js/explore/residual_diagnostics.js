@@ -175,9 +175,9 @@ function residualScatter(state, channel) {
         annotations,
         dragmode: "select",
         xaxis: { title: { text: channelTitle(channel()) } },
-        yaxis: { title: { text: "residual, deg/s" } },
+        yaxis: { title: { text: "residual of<br>the fitted model, deg/s" } },
         showlegend: Boolean(state.overlay) || marks.legend.length > 0,
-        margin: { l: 62, r: 8, t: state.overlay || marks.legend.length ? 34 : shown ? 20 : 8, b: 44 },
+        margin: { l: 76, r: 8, t: state.overlay || marks.legend.length ? 34 : shown ? 20 : 8, b: 44 },
       },
     };
   };

@@ -3,15 +3,17 @@
 import { get, getFollowed, post } from "../core/http/api.js";
 import { isAbort } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
-import { busyIndicator, errorPage } from "../core/components.js";
+import { busyIndicator, errorPage, notice } from "../core/components.js";
 import { option, toggleGroup } from "../core/fields.js";
 import { navigate } from "../core/router.js";
 import { jointCard } from "../joint/card.js";
+import { showTour } from "../tour/tour.js";
 import { asked as askedFor } from "./chosen_recordings.js";
 import { errorComparison } from "./compare/error_comparison.js";
 import { axisNames, inDatasetOrder } from "./dataset_rows.js";
 import { errorLadder } from "./error_ladder.js";
 import { extendModel } from "./extend_model.js";
+import { takeKept } from "./finish_line.js";
 import { residualDiagnostics } from "./residual_diagnostics.js";
 import { selectedRows } from "./residual_map.js";
 import { ExploreState } from "./state.js";
@@ -43,11 +45,13 @@ const SECTIONS = [
 
 /** @param {Given} given */
 export function versionView(given) {
-  const { unit, calibration, chosen, signal } = given;
+  const { unit, calibration, chosen, query, signal } = given;
   const stage = h("p", { class: "muted", "aria-live": "polite" });
+  const finish = takeKept(unit.serial, calibration.version);
   const place = h(
     "div",
     { class: "page" },
+    finish?.element ?? null,
     h(
       "div",
       { class: "card" },
@@ -67,8 +71,10 @@ export function versionView(given) {
   ]);
   asking
     .then(([criticism, catalogue]) => {
-      setChildren(place, sections(given, criticism, catalogue.effects));
-      if (location.hash) document.getElementById(location.hash.slice(1))?.scrollIntoView();
+      setChildren(place, finish?.element ?? null, sections(given, criticism, catalogue.effects));
+      finish?.settle(nextSteps(given, criticism));
+      if (query.tour) showTour(place, signal);
+      else if (location.hash) document.getElementById(location.hash.slice(1))?.scrollIntoView();
     })
     .catch(
       (error) =>
@@ -117,6 +123,37 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
     part.id = SECTIONS[k][0];
   });
   return [verdictCard(state), joint, pageNavigation(state, axes), ...parts];
+}
+
+/**
+ * What the new version has come to, and what can be done next.
+ * @param {Given} given
+ * @param {Criticism} criticism
+ */
+function nextSteps({ unit, calibration }, criticism) {
+  const isEnd = criticism.verdict === "adequate";
+  const plan = criticism.experiments.find((each) => each.toml)?.toml;
+  const unitPage = `/units/${encodeURIComponent(unit.serial)}?version=${calibration.version}`;
+  return [
+    notice(
+      isEnd ? "good" : "warn",
+      h("p", {}, h("strong", {}, criticism.text[0])),
+      isEnd ? h("p", {}, "These data say nothing more: no effect of the catalogue has evidence in them.") : null,
+    ),
+    h(
+      "div",
+      { class: "row" },
+      h("a", { class: `button ${isEnd ? "primary" : ""}`, href: unitPage }, "Certify"),
+      h(
+        "a",
+        {
+          class: `button ${isEnd ? "" : "primary"}`,
+          href: plan ? `/campaigns/new?toml=${encodeURIComponent(plan)}` : "/campaigns/new",
+        },
+        "Next experiment",
+      ),
+    ),
+  ];
 }
 
 /**

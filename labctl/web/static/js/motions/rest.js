@@ -31,7 +31,10 @@ export function restFigures(found, axis) {
   /** @returns {Picture} */
   const residual = () => ({
     data: legs(rows, along.x, rows.residual_dps, axis, true),
-    layout: { xaxis: { title: { text: along.title } }, yaxis: { title: { text: "residual, deg/s" } } },
+    layout: {
+      xaxis: { title: { text: along.title } },
+      yaxis: { title: { text: "residual of<br>the corrected rate, deg/s" } },
+    },
   });
   const both =
     new Set(rows.leg).size > 1

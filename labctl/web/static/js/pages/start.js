@@ -5,6 +5,7 @@ import { h } from "../core/elements.js";
 import { button, card, pageHeader } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
+import { changedQuery } from "../core/routes.js";
 import { isRunning } from "../campaigns/states.js";
 import { realGyroPicture } from "../start/real_gyro.js";
 import { DUE_WITHIN, dueNotice } from "../unit/due.js";
@@ -42,7 +43,12 @@ export async function page({ signal }) {
         {},
         "695 dwells on a heated rate table. The error after a usual fit is fifteen times the noise; find out why.",
       ),
-      h("div", { class: "row" }, button("Open the real gyro", openExample, { kind: "primary" })),
+      h(
+        "div",
+        { class: "row" },
+        button("Open the real gyro", () => openExample(), { kind: "primary" }),
+        button("Show me around", () => openExample("1")),
+      ),
     ),
     h("h2", {}, "Other ways to begin"),
     h(
@@ -81,19 +87,22 @@ async function openSimulated() {
   await openExplore(made.serial, made.recording, "ojeda2000");
 }
 
-async function openExample() {
+/** @param {string | null} [tour] the step of the tour that is shown */
+async function openExample(tour = null) {
   const made = await post("/api/recordings/example", { body: { name: "osu-fog" } });
-  await openExplore(made.serial, made.recording, "bias_scale");
+  await openExplore(made.serial, made.recording, "bias_scale", tour);
 }
 
 /**
  * @param {string} serial
  * @param {number} recording
  * @param {string} model
+ * @param {string | null} [tour]
  */
-async function openExplore(serial, recording, model) {
+async function openExplore(serial, recording, model, tour = null) {
   const fitted = await post("/api/units/{serial}/calibrations", { path: { serial }, body: { recording, model } });
-  await navigate(`/explore?unit=${encodeURIComponent(serial)}&version=${fitted.version}&recording=${recording}`);
+  const shown = { unit: serial, version: fitted.version, recording, tour };
+  await navigate(`/explore?${changedQuery("", shown)}`);
 }
 
 /**
@@ -160,7 +169,8 @@ function overview(units, due, campaigns, benches) {
           { class: "row" },
           h("a", { class: "button", href: "/recordings" }, "Import a recording"),
           button("Simulate a hidden effect", openSimulated),
-          button("Open the real gyro", openExample),
+          button("Open the real gyro", () => openExample()),
+          button("Tour", () => openExample("1")),
         ),
       ),
     ),

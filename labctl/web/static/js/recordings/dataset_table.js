@@ -1,7 +1,7 @@
 // The data sets of a recording as a table with pages and a selection.
 
 import { setChildren, h } from "../core/elements.js";
-import { count, duration, mean, number, plainNumber } from "../core/format.js";
+import { count, duration, mean, number, plainNumber, scatterText } from "../core/format.js";
 import { chip, cardWithHeader, table } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
@@ -159,7 +159,11 @@ function pageTable(state, rows) {
           mean(sets.channels[name].mean[k], sets.channels[name].std[k]),
           sets.channels[name].std[k] === null
             ? null
-            : h("span", { class: "muted small secondary" }, ` ± ${number(sets.channels[name].std[k], 2)}`),
+            : h(
+                "span",
+                { class: "muted small secondary", title: "standard deviation of one reading" },
+                ` ${scatterText(sets.channels[name].std[k])}`,
+              ),
         ],
       })),
       { title: "Readings", number: true, cell: (k) => count(sets.n[k]) },

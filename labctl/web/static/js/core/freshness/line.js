@@ -3,6 +3,7 @@
 
 import { h, setChildren } from "../elements.js";
 import { reportStop } from "../stop/overlay.js";
+import { setAlarm } from "../tab_mark.js";
 import { freshnessWords, stalenessOf } from "./state.js";
 
 /** @import { Heartbeat } from "../../../../types/api.js" */
@@ -22,7 +23,7 @@ const now = () => performance.now();
  * @type {{ at: number, on: Date, bench_s: number | null } | null}
  */
 let answered = null;
-let [asking, askedAt, paused, trouble] = [false, -ASK_MS, false, ""];
+let [asking, askedAt, paused, trouble, notStopped] = [false, -ASK_MS, false, "", false];
 /** @type {Staleness | null} */
 let state = null;
 /** @type {{ text: HTMLElement, announcement: HTMLElement } | null} */
@@ -36,6 +37,7 @@ async function ask() {
     /** @type {Heartbeat} */
     const answer = await response.json();
     answered = { at: now(), on: new Date(), bench_s: answer.heard_s ?? null };
+    notStopped = Boolean(answer.not_stopped);
     reportStop(answer.not_stopped);
     window.dispatchEvent(new CustomEvent("labctl:heard"));
   } catch {
@@ -74,6 +76,7 @@ function draw() {
   const { stale, text } = freshnessWords(found, heard);
   if (line.text.textContent !== (stale ? STALE : "") + text)
     setChildren(line.text, stale ? h("strong", {}, STALE) : null, text);
+  setAlarm(notStopped ? "NOT STOPPED" : stale ? "Stale" : "");
   if (found === state) return;
   const before = state;
   state = found;

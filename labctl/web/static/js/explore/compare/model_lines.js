@@ -93,7 +93,7 @@ export function overRate(comparison, state) {
       layout: {
         coloraxis: colours.axis,
         xaxis: { title: { text: "rate about the axis, deg/s" } },
-        yaxis: { title: { text: "error, deg/s" } },
+        yaxis: { title: { text: "error of the output, deg/s" } },
       },
     };
   };
@@ -131,7 +131,7 @@ export function overTemperature(comparison, state) {
       layout: {
         coloraxis: colours.axis,
         xaxis: { title: { text: "gyro temperature, deg C" } },
-        yaxis: { title: { text: "error, deg/s" } },
+        yaxis: { title: { text: "error of the output, deg/s" } },
       },
     };
   };
@@ -171,7 +171,7 @@ export function allPanels(comparison) {
       layout[`xaxis${id}`] = {
         title: panel >= panels.length - columns ? { text: "rate about the axis, deg/s" } : undefined,
       };
-      layout[`yaxis${id}`] = { title: panel % columns ? undefined : { text: "error, deg/s" }, nticks: 5 };
+      layout[`yaxis${id}`] = { title: panel % columns ? undefined : { text: "error of the output, deg/s" }, nticks: 5 };
       layout.annotations.push({
         text: `output ${axis}, turning about ${position}`,
         showarrow: false,
