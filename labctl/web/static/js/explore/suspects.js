@@ -1,11 +1,12 @@
 // The verdict in words, and the suspected effects with their evidence.
 
-import { setChildren, h } from "../core/elements.js";
+import { scrollTo, setChildren, h } from "../core/elements.js";
 import { capitalised, withUncertainty, number, oddsText, percent, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { heldOutName } from "./first_models.js";
+import { whatIf } from "./what_if.js";
 
 /** @import { Criticism, Suspect } from "../../../types/api.js" */
 /** @import { Child } from "../../../types/pages.js" */
@@ -104,6 +105,19 @@ export function suspectList(state, { onadd, explain }) {
       { kind: "tiny" },
     );
   const speaking = criticism.suspects.filter((s) => s.log_bayes_factor > 0);
+  const open = h("div", {});
+  /** @param {Suspect} suspect */
+  const openWhatIf = (suspect) =>
+    button(
+      "What if",
+      async () => {
+        const others = speaking.filter((each) => each !== suspect);
+        const explained = await explain(suspect.effect);
+        setChildren(open, whatIf({ state, suspect, others, explained, explain }));
+        scrollTo(open, "nearest");
+      },
+      { kind: "tiny" },
+    );
   const list = h("ol", { class: "suspects", "aria-label": "Suspects" });
   const fillList = () =>
     setChildren(
@@ -128,6 +142,7 @@ export function suspectList(state, { onadd, explain }) {
               { class: "row tight" },
               button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "primary" : ""}` }),
               draw(s),
+              openWhatIf(s),
             ),
           ),
           evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
@@ -151,6 +166,7 @@ export function suspectList(state, { onadd, explain }) {
   fillList();
   state.onchange((what) => {
     fillList();
+    if (what === "axis") setChildren(open); // its figures are of the axis that was shown
     if (what === "overlay" && !state.overlay)
       setChildren(drawnNow, "Select a suspected effect to draw the part of the residual that it would explain.");
   });
@@ -158,7 +174,7 @@ export function suspectList(state, { onadd, explain }) {
     "Which effects are missing",
     null,
     speaking.length
-      ? [drawnNow, list]
+      ? [drawnNow, list, open]
       : h(
           "p",
           { class: "muted" },

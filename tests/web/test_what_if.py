@@ -1,0 +1,74 @@
+"""The size of a suspect as a slider: what it would leave is what the service computes for that size."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from tests.helpers.browser import Service, figure, settled
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Locator, Page
+
+pytestmark = pytest.mark.timeout(400)
+RMS = re.compile(r"([0-9.]+) deg/s RMS left on axis z, over 695 data sets")
+
+
+@pytest.fixture
+def opened(service: Service, visit: Callable[..., Page]) -> tuple[Page, Locator]:
+    made = service.post("/api/recordings/example", {"name": "osu-fog"})
+    fit = {"recording": made["recording"], "model": "bias_scale"}
+    service.post(f"/api/units/{made['serial']}/calibrations", fit)
+    page = visit(f"/explore?unit={made['serial']}")
+    settled(page)
+    learn = page.get_by_role("region", name="Which effects are missing")
+    learn.get_by_role("listitem").filter(has_text="sine response").get_by_role("button", name="What if").click()
+    panel = page.get_by_role("region", name="What if: sine response")
+    panel.wait_for()
+    return page, panel
+
+
+def rms_shown(panel: Locator) -> float:
+    found = RMS.search(panel.locator("output").inner_text())
+    assert found
+    return float(found.group(1))
+
+
+def test_the_slider_moves_between_the_fits_without_and_with_the_effect(
+    opened: tuple[Page, Locator], service: Service
+) -> None:
+    from playwright.sync_api import expect
+
+    page, panel = opened
+    unit = "/api/units/OSU-FOG-2024/calibrations/1"
+    before = service.get(f"{unit}/criticism")
+    after = service.post(f"{unit}/preview", {"add": ["sine_response"]})
+    assert rms_shown(panel) == float(f"{after['error']['rms_dps']:.3g}")
+    slider = panel.get_by_role("slider")
+    slider.fill("0")
+    expect(panel.locator("output")).to_contain_text("0 % of the fitted size")
+    assert rms_shown(panel) == float(f"{before['error']['rms_dps']:.3g}")
+    slider.fill("0.5")
+    expect(panel.locator("output")).to_contain_text("50 % of the fitted size")
+    drawn = np.array(figure(page, "What would be left.")["data"][0]["y"])
+    middle = (np.array(before["views"]["sets"]["residual_dps"]["z"]) + np.array(after["residuals"]["residual_dps"])) / 2
+    assert np.abs(drawn - middle).max() < 1e-5
+    assert rms_shown(panel) == float(f"{np.sqrt(np.mean(middle**2)):.3g}")
+
+
+def test_a_second_effect_lies_over_it_and_their_parting_rates_become_a_plan(opened: tuple[Page, Locator]) -> None:
+    from playwright.sync_api import expect
+
+    page, panel = opened
+    panel.get_by_label("Lay another effect over it").select_option("saturation")
+    note = panel.locator(".notice")
+    expect(note).to_contain_text("sine response and saturation part at table rate, deg/s")
+    names = [trace.get("name") for trace in figure(page, "What the effect would explain")["data"]]
+    assert "saturation" in names
+    note.get_by_role("link", name="Plan these rates").click()
+    expect(page.get_by_role("heading", level=1, name="Plan a campaign")).to_be_visible()
+    expect(page.get_by_role("region", name="Steps")).to_contain_text("data sets")
