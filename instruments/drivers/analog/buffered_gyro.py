@@ -56,13 +56,13 @@ class ScanBuffer(Protocol):
 
 @dataclass(frozen=True)
 class BufferTiming:
-    """How fast scans come into the buffer, and what may be wrong where none comes.
+    """How fast scans come into the buffer, and what to check where none comes.
 
     A voltage is valid below the share `valid_share` of the range.
     """
 
     transfer_s: float  #: a scan is in the buffer within this time
-    silence_cause: str
+    check: str
     valid_share: float = 1.0
 
 
@@ -154,4 +154,4 @@ class BufferedGyro:
         self._readings.drop()
 
     def _silent(self) -> NoReply:
-        return NoReply(self.name, f"no scan from {self._address} for {SILENCE_S:g} s; {self._timing.silence_cause}")
+        return NoReply(self.name, f"no scan from {self._address} for {SILENCE_S:g} s; check {self._timing.check}")

@@ -40,12 +40,13 @@ BLOCK_BYTES, BLOCK_S = 512, 0.02
 MIN_SAMPLE_BYTES = 2
 #: The calibration of a device moves the ends of a range: a voltage this near to them, as a share, may be cut off.
 VALID_SHARE = 0.99
-REMEDIES: dict[int, str] = {
-    UlError.USB_DEV_NO_PERMISSION: "install the maker's udev rules (rules/50-uldaq.rules of libuldaq)",
-    UlError.USB_INTERFACE_CLAIMED: "end the other program that uses the device",
-    UlError.OVERRUN: "lower sample_rate_hz or scan fewer inputs, and measure again",
+#: What to check after an error number; after any other, CHECK.
+CHECKS: dict[int, str] = {
+    UlError.USB_DEV_NO_PERMISSION: "that the maker's udev rules are installed (rules/50-uldaq.rules of libuldaq)",
+    UlError.USB_INTERFACE_CLAIMED: "that no other program uses the device",
+    UlError.OVERRUN: "whether a lower sample_rate_hz or fewer inputs will do",
 }
-REMEDY = "check device, cable and power"
+CHECK = "device, cable and power"
 
 
 class MccScans:
@@ -161,7 +162,9 @@ class MccScans:
         if isinstance(error, InstrumentError):
             return error
         if isinstance(error, TimeoutError):
-            return NoReply(self.name, f"cannot {purpose} of {self._settings.address}: no answer ({error}); {REMEDY}")
+            return NoReply(
+                self.name, f"cannot {purpose} of {self._settings.address}: no answer ({error}); check {CHECK}"
+            )
         if isinstance(error, NotInstalled | NotFound):
             return LinkError(self.name, str(error))
         if isinstance(error, Unsuitable):
@@ -169,7 +172,7 @@ class MccScans:
         number = int(getattr(error, "error_code", UlError.NO_ERROR))
         text = f"error {number}: {getattr(error, 'error_message', '')}" if number else one_line(error)
         return LinkError(
-            self.name, f"cannot {purpose} of {self._settings.address} ({text}); {REMEDIES.get(number, REMEDY)}"
+            self.name, f"cannot {purpose} of {self._settings.address} ({text}); check {CHECKS.get(number, CHECK)}"
         )
 
 
@@ -185,7 +188,7 @@ class MccGyro(BufferedGyro):
         self._scans = MccScans(settings, device)
         samples_per_s = self._scans.scan.inputs * settings.scans_per_s
         transfer_s = max(BLOCK_S, BLOCK_BYTES / (MIN_SAMPLE_BYTES * samples_per_s))
-        timing = BufferTiming(transfer_s, "check cable and power", VALID_SHARE)
+        timing = BufferTiming(transfer_s, "cable and power", VALID_SHARE)
         super().__init__(settings, settings.address, self._scans, clock, timing)
 
 

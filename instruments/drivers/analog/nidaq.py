@@ -197,7 +197,8 @@ def _rpc_status(error: Exception) -> int | None:
     return None if code is None else int(code.value[0])
 
 
-SILENCE_CAUSE = "check its sample clock"
+#: What to check where no scan comes.
+SILENT_CHECK = "its sample clock"
 #: A scan is in the buffer of the computer within this time, s.
 TRANSFER_S = 0.02
 
@@ -240,7 +241,7 @@ class NidaqGyro(BufferedGyro):
 
     def __init__(self, settings: NidaqSettings, ports: Ports, clock: Clock) -> None:
         self._task = NidaqmxTask(settings, ports)
-        timing = BufferTiming(TRANSFER_S, SILENCE_CAUSE)
+        timing = BufferTiming(TRANSFER_S, SILENT_CHECK)
         super().__init__(settings, settings.address, _TaskScans(self._task), clock, timing)
 
 

@@ -215,7 +215,9 @@ def test_devices_by_name_and_by_host(daq: Callable[..., Any]) -> None:
 def test_a_device_that_may_not_be_used(daq: Callable[..., Any], library: Any) -> None:
     gyro, _ = daq()
     library.stand_in_connect_error(PERMISSION)
-    with pytest.raises(LinkError, match=r"\(error 4: Insufficient permission .*\); install the maker's udev rules"):
+    with pytest.raises(
+        LinkError, match=r"\(error 4: Insufficient permission .*\); check that the maker's udev rules are"
+    ):
         gyro.start()
 
 
