@@ -66,6 +66,7 @@ class SimulatedMcc(RpcDevice):
             return Reply(None, RpcStatus.INVALID_ARGUMENT, str(error))
 
     def _connect(self, _message: bytes, _t_s: float) -> bytes:
+        self.scan = None  # the library stops a device before it uses it
         return calls.reply(UlError.NO_ERROR, self.product.encode("utf-8"))
 
     def _info(self, message: bytes, _t_s: float) -> bytes:

@@ -140,7 +140,7 @@ def test_scans_that_were_overwritten_are_lost_by_their_number(daq: Callable[...,
     [
         (
             OVERRUN,
-            r"cannot read the scans of the USB device \(error 18: FIFO overrun, .*\); lower sample_rate_hz or scan",
+            r"cannot read the scans of the USB device \(error 18: FIFO overrun, .*\); check whether a lower",
         ),
         (
             DEAD,
