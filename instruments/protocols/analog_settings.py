@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from instruments.bench_config import GyroSettings, Strict, is_simulated_address
 from instruments.protocols.nidaqmx.service import SERVER_PORT
+from instruments.protocols.uldaq.library import DISCOVERY_PORT
 
 #: Rates of the inputs, scans per second.
 DEFAULT_SCANS_PER_S = 1000.0
@@ -107,3 +108,27 @@ class NidaqSettings(AnalogSettings):
             return self.device
         server = self.host if is_simulated_address(self.host) else f"{self.host}:{self.tcp_port}"
         return f"{self.device} at {server}"
+
+
+class MccSettings(AnalogSettings):
+    """A device of Measurement Computing: at the USB of this computer, or with `host` one with Ethernet."""
+
+    device: str = ""  #: unique ID (serial number) or product name of a USB device; empty: the only one that is found
+    tcp_port: int = Field(default=DISCOVERY_PORT, ge=1, le=65535)  #: at which an Ethernet device is found
+
+    @model_validator(mode="after")
+    def _is_somewhere(self) -> MccSettings:
+        if self.port is not None:
+            raise ValueError("key port is not used; give the unique ID of a USB device as device, or host")
+        if self.host is not None and self.device:
+            raise ValueError("keys host and device are both given; keep host for an Ethernet device, device for USB")
+        if self.host is not None and "/" in self.host and not is_simulated_address(self.host):
+            raise ValueError(
+                f"host = {self.host!r} is not a network address; give the name or the IP address of the device alone"
+            )
+        return self
+
+    @property
+    def address(self) -> str:
+        """Device, as an error names it."""
+        return self.host or self.device or "the USB device"

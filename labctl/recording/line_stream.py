@@ -15,6 +15,7 @@ from labctl.recording.checks import POSSIBLE
 from labctl.recording.column_map.conversion import LARGEST_RATE_DPS
 from labctl.recording.column_map.names import name_says
 from labctl.recording.column_map.units import QUANTITIES, find_unit, names_of, unit_of_target
+from labctl.recording.columns import DEVICE_S
 
 #: The columns that a stream may have beside time.
 _GYROS = tuple(f"gyro_{axis}" for axis in "xyz")
@@ -134,7 +135,8 @@ _SEPARATORS = (",", ";", "\t")
 class DecodedLines:
     """n readings of some bytes."""
 
-    columns: dict[str, NDArray[np.generic]]  #: of a recording, (n,) each, with t_s from the first line on
+    #: Of a recording, (n,) each: t_s from the first line on, and device_s as the lines state it where they do.
+    columns: dict[str, NDArray[np.generic]]
     damaged: int  #: lines that are no reading
     example: str  #: what is wrong with the first of them; "" without one
 
@@ -192,8 +194,8 @@ class LineDecoder:
             return None
         layout = self._layout
         assert layout is not None
-        t_s = self._time(layout, values)
-        row = [t_s]
+        t_s, stamp_s = self._time(layout, values)
+        row = [t_s, stamp_s]
         for field in layout.fields:
             value = field.factor * values.get(field.name, math.nan) + field.zero
             low, high = field.limits
@@ -243,9 +245,10 @@ class LineDecoder:
             )
         return layout
 
-    def _time(self, layout: LineLayout, values: Mapping[str, float]) -> float:
+    def _time(self, layout: LineLayout, values: Mapping[str, float]) -> tuple[float, float]:
+        """Return the time since the first line, s, and the time as the line states it, s; raises BadInput."""
         if not layout.time:
-            return self._count / (self._rate_hz or 1.0)
+            return self._count / (self._rate_hz or 1.0), math.nan
         stamps = {name: values.get(name, math.nan) for name in layout.time}
         if not all(map(math.isfinite, stamps.values())):
             raise _Damaged("the time is missing")
@@ -254,7 +257,7 @@ class LineDecoder:
         t_s = sum((value - self._first[name]) * layout.time[name] for name, value in stamps.items())
         if t_s > self._last_s:
             self._backwards = 0
-            return t_s
+            return t_s, sum(value * layout.time[name] for name, value in stamps.items())
         self._backwards += 1
         if self._backwards >= BACKWARDS:
             raise BadInput(
@@ -266,11 +269,12 @@ class LineDecoder:
     def _columns(self, rows: list[list[float]]) -> dict[str, NDArray[np.generic]]:
         if self._layout is None:
             return {}
-        targets = ["t_s", *(field.target for field in self._layout.fields)]
+        targets = ["t_s", DEVICE_S, *(field.target for field in self._layout.fields)]
         table = np.array(rows, dtype=np.float64).reshape(len(rows), len(targets))
         return {
             target: table[:, k].astype(np.int64 if target == "valid" else np.float64)
             for k, target in enumerate(targets)
+            if target != DEVICE_S or self._layout.time
         }
 
 

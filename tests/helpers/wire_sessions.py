@@ -52,7 +52,7 @@ def bench_of(driver: str) -> BenchFile:
         shipped = [read_bench(name) for name in shipped_benches()]
         able = [each for each in shipped if each.is_simulated and each.table is not None and each.chamber is not None]
         bench = next(each for each in able if driver in [gyro.driver for gyro in each.gyros])
-    if driver == "nidaq":
+    if driver in ("nidaq", "mcc-daq"):
         record = bench.model_dump(exclude_none=True)
         (gyro,) = record["gyros"]
         gyro["sample_rate_hz"], gyro["options"]["average"] = 50, 1

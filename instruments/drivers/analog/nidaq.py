@@ -16,21 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.clock import Clock
-from instruments.drivers.analog.analog_readings import (
-    AnalogReadings,
-    Scans,
-    analog_channels,
-    analog_identity,
-    limits_of,
-)
+from instruments.drivers.analog.buffered_gyro import BufferedGyro, BufferTiming
 from instruments.drivers.driver import GyroDriver, Trial
-from instruments.errors import LinkError, NoReply, WrongInstrument, one_line
-from instruments.interfaces.gyro import Channel, GyroIdentity, Readings
+from instruments.errors import LinkError, NoReply, one_line
 from instruments.protocols.analog_settings import NidaqSettings
 from instruments.protocols.nidaqmx.rpc_status import RpcStatus
 from instruments.protocols.nidaqmx.service import INSTALL, INSTALL_GRPC
 from instruments.transport.factory import Ports
 from instruments.transport.rpc import RpcChannel
+from instruments.transport.scan_means import Counts
 
 PACKAGE = "nidaqmx"
 #: What nidaqmx itself imports with its first task, without a server and with one.
@@ -78,12 +72,13 @@ class NidaqmxTask:
         except Exception as error:
             raise self._failed("start the scans", error) from error
 
-    def product(self) -> str:
-        """Return the model of the device; empty where it does not tell."""
+    def product_of_device(self) -> str:
+        """Return the model of the device, where it is known, and the name that the driver software gives it."""
         try:
-            return str(self._task.devices[0].product_type)
+            product = str(self._task.devices[0].product_type)
         except Exception:  # noqa: BLE001  a name is no reason to fail
-            return ""
+            product = ""
+        return f"{product or 'NI-DAQ'} {self._settings.device}"
 
     def read(self) -> NDArray[np.float64]:
         """Return all scans that the buffer holds, in volts (inputs, n). Raises LinkError."""
@@ -202,105 +197,52 @@ def _rpc_status(error: Exception) -> int | None:
     return None if code is None else int(code.value[0])
 
 
-#: A raw value is the sum of voltages in whole steps of this, V: finer than any converter of the kind.
-STEP_V = 1e-7
-SILENCE_S = 2.0
-LOOK_EVERY_S = 0.1
-RATE_TOLERANCE = 0.01
+#: What to check where no scan comes.
+SILENT_CHECK = "its sample clock"
 #: A scan is in the buffer of the computer within this time, s.
 TRANSFER_S = 0.02
 
 
-class NidaqGyro:
-    """Driver of analog gyros on one device. Every error of nidaqmx becomes a LinkError in one line."""
+class _TaskScans:
+    """The scans of a task, numbered from its start."""
 
-    def __init__(self, settings: NidaqSettings, ports: Ports, clock: Clock) -> None:
-        self.name, self.settings = settings.name, settings
-        self.axes: tuple[str, ...] = settings.axes
-        self.limits = limits_of(settings)
-        self.sample_rate_hz = settings.scans_per_s / settings.options.average
-        self._clock, self._inputs = clock, settings.options.all_inputs
-        self._readings = AnalogReadings(settings, settings.address)
-        self._task = NidaqmxTask(settings, ports)
+    def __init__(self, task: NidaqmxTask) -> None:
+        self._task = task
         self._taken = 0  #: scans that were read
-        self._last_s = 0.0
 
     @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Get the voltages, in whole steps of 0.1 microvolt."""
-        return analog_channels(self.settings, [(STEP_V, 0.0)] * len(self._inputs))
+    def is_open(self) -> bool:
+        """Whether the inputs are scanned."""
+        return self._task.is_open
 
-    def identify(self) -> GyroIdentity:
-        """Get the unit's identity by the bench file, after one reading came; raises LinkError, NoReply."""
-        was_open = self._task.is_open
-        self.start()
-        reported = {"inputs": f"{self._task.product() or 'NI-DAQ'} {self.settings.device}"}
-        self.read_latest()
-        if not was_open:
-            self.stop()
-        return analog_identity(self.settings, f"analog gyro on {reported['inputs']}", reported)
-
-    def start(self) -> None:
-        """Start the scans; those that run go on. Raises LinkError, WrongInstrument for another rate."""
-        if self._task.is_open:
-            self._discard()
-            return
-        scan_rate_hz, requested_hz = self._task.open(), self.settings.scans_per_s
-        if abs(scan_rate_hz / requested_hz - 1.0) > RATE_TOLERANCE:
-            self.stop()
-            raise WrongInstrument(
-                self.name,
-                f"scans {scan_rate_hz:g} times per second, but the bench file states {requested_hz:g}; set "
-                f"sample_rate_hz = {scan_rate_hz:g}",
-            )
+    def open(self) -> float:
+        """Begin to scan; returns the scans per second that the device makes. Raises LinkError."""
         self._taken = 0
-        self._last_s = self._clock.now_s()
-        self._readings.start(self._last_s)
+        return self._task.open()
 
-    def read(self, duration_s: float) -> Readings:
-        """Get every reading of the next `duration_s` seconds. Raises NoReply after SILENCE_S without one, LinkError."""
-        self._clock.sleep(duration_s)
-        readings = self._available()
-        now_s = self._clock.now_s()
-        if len(readings):
-            self._last_s = now_s
-        elif now_s - self._last_s > SILENCE_S:
-            raise self._silent()
-        return readings
+    def product(self) -> str:
+        """Return the model and name of the device."""
+        return self._task.product_of_device()
 
-    def read_latest(self) -> Readings:
-        """Get one fresh reading and drop everything older; raises NoReply after SILENCE_S, LinkError."""
-        self._discard()
-        began_s = self._clock.now_s()
-        while self._clock.now_s() < began_s + max(SILENCE_S, 3 / self.sample_rate_hz):
-            self._clock.sleep(min(LOOK_EVERY_S, 0.5 / self.sample_rate_hz))
-            if len(readings := self._available()):
-                self._last_s = self._clock.now_s()
-                return readings.newest()
-        raise self._silent()
-
-    def stop(self) -> None:
-        """Stop the scans; safe to call twice, and where nidaqmx fails."""
-        self._task.close()
-
-    def _available(self) -> Readings:
-        """Return the readings of all scans that the buffer holds."""
-        asked_s = self._clock.now_s()
+    def take(self) -> tuple[Counts, NDArray[np.float64]]:
+        """Return the scans that the buffer holds: numbers (n,) and volts (n, inputs). Raises LinkError."""
         volts = self._task.read().T
         numbers = self._taken + np.arange(len(volts), dtype=np.int64)
         self._taken += len(volts)
-        now_s = self._clock.now_s()
-        good = np.all(np.abs(volts) < self.settings.options.range_v, axis=1)
-        codes = np.rint(volts / STEP_V).astype(np.int64)
-        scans = Scans(numbers, codes, good, np.full(len(volts), now_s))
-        return self._readings.add(scans, (now_s, now_s, now_s - asked_s + TRANSFER_S))
+        return numbers, volts
 
-    def _discard(self) -> None:
-        self._available()
-        self._readings.drop()
+    def close(self) -> None:
+        """End the scans; safe to call twice. Raises LinkError."""
+        self._task.close()
 
-    def _silent(self) -> NoReply:
-        return NoReply(self.name, f"no scan from {self.settings.address} for {SILENCE_S:g} s; check its sample clock")
+
+class NidaqGyro(BufferedGyro):
+    """Driver of analog gyros on one device. Every error of nidaqmx becomes a LinkError in one line."""
+
+    def __init__(self, settings: NidaqSettings, ports: Ports, clock: Clock) -> None:
+        self._task = NidaqmxTask(settings, ports)
+        timing = BufferTiming(TRANSFER_S, SILENT_CHECK)
+        super().__init__(settings, settings.address, _TaskScans(self._task), clock, timing)
 
 
 DRIVER = GyroDriver(

@@ -66,6 +66,8 @@ class ColumnField(StreamField):
     """A decimal number of a line."""
 
     column: int = Field(ge=0)  #: counted from 0; what `begins` says is column 0
+    #: Text before the number in its column, which tells it from others; a line with another one is damaged.
+    prefix: str = Field(default="", max_length=8)
 
 
 class BytesField(StreamField):

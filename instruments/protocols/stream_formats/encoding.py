@@ -36,7 +36,8 @@ def line_of(layout: LineLayout, numbers: Mapping[str, int]) -> bytes:
     for field in layout.fields:
         step = step_of(field)
         places = max(0, len(f"{step:.15f}".rstrip("0").partition(".")[2]))
-        words[field.column] = f"{numbers.get(field.name, 0) * step:+.{places}f}"
+        number = f"{numbers.get(field.name, 0) * step:+.{places}f}"
+        words[field.column] = field.prefix + number.removeprefix("+") if field.prefix else number
     body = layout.separator.join(words)
     if layout.checksum is not None:
         used = algorithm(layout.checksum.algorithm)

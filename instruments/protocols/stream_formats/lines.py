@@ -28,7 +28,6 @@ class LineDecoder:
         assert format_.line is not None
         self._format, self._layout = format_, format_.line
         self._steps = [step_of(field) for field in self._layout.fields]
-        self._columns = [field.column for field in self._layout.fields]
         self._unfinished, self._in_line = b"", False
 
     def drop(self) -> None:
@@ -43,7 +42,7 @@ class LineDecoder:
             self._in_line = True
         parsed_lines = [self._numbers(piece) if piece else _Not.OTHER_MESSAGE for piece in pieces]
         rows = [parsed_line for parsed_line in parsed_lines if isinstance(parsed_line, list)]
-        numbers = np.asarray(rows, dtype=np.float64).reshape(-1, len(self._columns)).T
+        numbers = np.asarray(rows, dtype=np.float64).reshape(-1, len(self._layout.fields)).T
         good = np.ones(len(rows), dtype=bool)
         values = {}
         for field, column, step in zip(self._layout.fields, numbers, self._steps, strict=True):
@@ -65,7 +64,7 @@ class LineDecoder:
         if self._layout.columns is not None and len(words) != self._layout.columns:
             return _Not.DAMAGED
         try:
-            numbers = [float(words[column]) for column in self._columns]
+            numbers = [_number(words[field.column], field.prefix) for field in self._layout.fields]
         except (ValueError, IndexError):
             return _Not.DAMAGED
         unequal = any(
@@ -73,6 +72,15 @@ class LineDecoder:
             for field, number in zip(self._layout.fields, numbers, strict=True)
         )
         return _Not.OTHER_MESSAGE if unequal else numbers
+
+
+def _number(word: str, prefix: str) -> float:
+    """Return the number behind a prefix; raises ValueError for another word."""
+    if not prefix:
+        return float(word)
+    if not (stripped := word.strip()).startswith(prefix):
+        raise ValueError(f"{word!r} does not begin with {prefix!r}")
+    return float(stripped[len(prefix) :])
 
 
 def body_of(line: bytes, layout: LineLayout) -> str | None:

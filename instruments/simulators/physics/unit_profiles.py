@@ -222,12 +222,14 @@ DEFAULT_PROFILES = {
     "gyrostar": "gyrostar",
     "labjack-t": "gyrostar",
     "nidaq": "gyrostar",
+    "mcc-daq": "gyrostar",
     "stream-format": "mems-triaxial",
     "can": "mems-triaxial",
 }
 #: Sampling rate of a unit, Hz, where the bench file gives none: the rate of the wire.
 USUAL_RATE_HZ = {
-    "stim300": 125.0, "kvh-dsp3000": 100.0, "kvh-rd2100": 10.0, "gyrostar": 10.0, "labjack-t": 1000.0, "nidaq": 1000.0
+    "stim300": 125.0, "kvh-dsp3000": 100.0, "kvh-rd2100": 10.0, "gyrostar": 10.0, "labjack-t": 1000.0, "nidaq": 1000.0,
+    "mcc-daq": 1000.0,
 }  # fmt: skip
 
 

@@ -11,7 +11,8 @@ from instruments.clock import Clock
 from labctl.errors import BadInput
 from labctl.fitting.live import PoseRequest
 from labctl.recording import RecordingInfo
-from labctl.recording.line_stream import LineDecoder
+from labctl.recording.columns import ARRIVAL_S
+from labctl.recording.line_stream import DecodedLines, LineDecoder
 from labctl.services.live.line_feed import LineFeed
 from labctl.services.live.source import Block, StreamEnded
 
@@ -39,6 +40,7 @@ class LineSource:
         self.name, self.serial = feed.name, info.serial
         self._last_s, self._begun = 0.0, False
         self._newest_s, self._spacing_s = np.empty(0), 0.0
+        self._zero_s: float | None = None  #: clock time of the time 0 of the lines
 
     def start(self) -> RecordingInfo:
         """Open the feed; raises BadInput."""
@@ -67,8 +69,17 @@ class LineSource:
             self._last_s, self._begun = now_s, True
         elif now_s - self._last_s > (SILENCE_S if self._begun else FIRST_WITHIN_S):
             raise StreamEnded(self._silence(now_s - self._last_s, decoded.example))
-        columns = decoded.columns if len(decoded) else {}
+        columns = {**decoded.columns, ARRIVAL_S: self._arrivals(decoded, now_s)} if len(decoded) else {}
         return Block(columns, self._lost(columns), decoded.damaged, decoded.example)
+
+    def _arrivals(self, decoded: DecodedLines, now_s: float) -> NDArray[np.float64]:
+        """Return when the lines had arrived, (n,) s from the time 0 of the lines on: all when they were read.
+
+        The first lines are taken to be as late as the newest of them: how long that was under way is not known.
+        """
+        if self._zero_s is None:
+            self._zero_s = now_s - float(np.asarray(decoded.columns["t_s"], dtype=np.float64)[-1])
+        return np.full(len(decoded), now_s - self._zero_s)
 
     def _lost(self, columns: Mapping[str, NDArray[np.generic]]) -> int:
         """Return how many readings of a feed that may lose some are missing, by the times that the lines carry."""

@@ -18,7 +18,7 @@ from instruments.protocols.arrick_c4_settings import StepperSettings
 from instruments.simulation import open_simulation
 from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo
-from labctl.recording.columns import RATE_TIME_U, VERIFICATION
+from labctl.recording.columns import ARRIVAL_S, DEVICE_S, RATE_TIME_U, VERIFICATION
 from labctl.services.benches.standards import standards_of
 from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, Step
 from procedures.planning.chamber_time import counted_move_s
@@ -155,6 +155,8 @@ class _Walk:
         part: dict[str, NDArray[np.generic]] = {
             "dataset": np.full(n, dataset, dtype=np.int64),
             "t_s": times,
+            DEVICE_S: self._device_s(times),
+            ARRIVAL_S: times,  # there is no wire here: a reading arrives when it is made
             "position": np.full(n, step.position),
             "run": np.full(n, step.run, dtype=np.int64),
             "mounting": np.full(n, step.mounting, dtype=np.int64),
@@ -175,6 +177,11 @@ class _Walk:
             part[VERIFICATION] = np.full(n, int(step.verification), dtype=np.int64)
         part |= {f"gyro_{axis}": sample.rate_dps[:, i] for i, axis in enumerate(self._settings.axes)}
         self._parts.append(part)
+
+    def _device_s(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the times (n,) s of evenly spaced readings by the unit's count of them since it was switched on."""
+        since_s = float(times[0]) - (self._power_on_s or 0.0) if len(times) else 0.0
+        return (np.ceil(since_s / self._period - 1e-6) + np.arange(len(times))) * self._period
 
     def recording(self) -> Recording:
         """Return everything that was acquired."""

@@ -40,6 +40,24 @@ def vectornav(_n: int, t_s: float) -> bytes:
     return body + struct.pack(">H", crc_hqx(body[1:], 0))
 
 
+def vectornav_line(_n: int, t_s: float) -> bytes:
+    """Return a $VNIMU with SyncInTime, whole microseconds since the last pulse by the unit's clock."""
+    since_s = OFF * (t_s - FIRST_PULSE_S - np.floor(t_s - FIRST_PULSE_S))
+    values = f"{'+00.1000,' * 3}+00.000,+00.000,-09.800,+00.000000,+00.000000,+00.500000,+24.5,+101.3"
+    body = f"VNIMU,{values},T{1e6 * since_s:.0f}"
+    check = 0
+    for byte in body.encode():
+        check ^= byte
+    return f"${body}*{check:02X}\r\n".encode()
+
+
+def vectornav_count(_n: int, t_s: float) -> bytes:
+    """Return TimeStartup, SyncInCnt, acceleration, rates, temperature."""
+    pulses = int(np.floor(t_s - FIRST_PULSE_S)) + 1
+    body = struct.pack("<BBHHQI7f", 0xFA, 5, 0x2001, 0x1C, round(1e9 * OFF * t_s), pulses, 0, 0, -9.8, 0, 0, 0.5, 24.5)
+    return body + struct.pack(">H", crc_hqx(body[1:], 0))
+
+
 def xsens(n: int, t_s: float) -> bytes:
     """Return an MTData2 message; SampleTimeFine begins again at 0 in the second second."""
     ticks = round(1e4 * OFF * t_s) + (1 << 32) - 15_000
@@ -125,6 +143,24 @@ def test_time_is_by_the_pulses_where_a_unit_says_how_long_ago_the_last_one_came(
     off_s -= np.round(off_s[0])  # the zero is the last pulse before the first reading
     assert np.abs(off_s).max() < 81e-6  # within a second the unit's crystal counts; over 3 s nothing adds up
     assert np.diff(found.device_s) == pytest.approx(0.005, abs=90e-6)
+
+
+def test_time_is_by_the_pulses_where_a_line_says_how_long_ago_the_last_one_came(unit: Unit) -> None:
+    found = read(unit, "vectornav-vnimu-sync", 40.0, vectornav_line)
+    assert found.device_s is not None
+    off_s = found.device_s - (taken_s(40.0)[-len(found) :] - FIRST_PULSE_S)
+    off_s -= np.round(off_s[0])
+    assert np.abs(off_s).max() < 82e-6
+
+
+def test_time_is_by_the_pulses_that_a_vectornav_counts(unit: Unit) -> None:
+    """A pulse came between two readings, 5 ms apart."""
+    found = read(unit, "vectornav-binary-count", 200.0, vectornav_count)
+    assert found.device_s is not None
+    true_s = taken_s(200.0)[-len(found) :]
+    off_s = (found.device_s - true_s)[true_s > FIRST_PULSE_S + 1.0]
+    assert np.ptp(off_s) < 0.0052
+    assert abs(off_s.mean()) < 0.003
 
 
 def test_a_counter_of_ten_kilohertz_in_32_bits_is_a_time_of_the_unit(unit: Unit) -> None:

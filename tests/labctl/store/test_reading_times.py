@@ -18,6 +18,7 @@ from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.transfer import export_recording, import_folder
+from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from labctl.store import Store, check, open_store, sample_codec
 from labctl.store.repositories.sample_blocks import join_blocks
 
@@ -108,3 +109,18 @@ def test_a_recording_of_which_a_part_has_them_is_read_without(path: Path, tmp_pa
         samples = store.recordings.samples(1, times=True)
     assert not READING_TIMES & samples.columns.keys()
     assert len(samples) == 2 * len(found[0]["t_s"])
+
+
+def test_a_simulated_recording_has_both_times() -> None:
+    """Without a wire a reading arrives when it is made; the unit counts its readings from switch-on to switch-off."""
+    made = make_recording(SimulateRequest(recipe="short", sample_rate_hz=5.0)).recording
+    columns = {name: np.asarray(made.columns[name]) for name in ("dataset", "t_s", DEVICE_S, ARRIVAL_S, "power_s")}
+    assert (columns[ARRIVAL_S] == columns["t_s"]).all()
+    late_s = columns[DEVICE_S] - columns["power_s"]
+    assert (late_s > -1e-6).all()  # the next whole count after the first reading of a data set
+    assert (late_s < 0.2).all()
+    counts = columns[DEVICE_S] / 0.2
+    assert counts == pytest.approx(np.rint(counts))
+    for number in np.unique(columns["dataset"]):
+        of_one = columns["dataset"] == number
+        assert np.diff(columns[DEVICE_S][of_one]) == pytest.approx(0.2)

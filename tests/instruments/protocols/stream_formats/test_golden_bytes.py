@@ -141,6 +141,38 @@ def test_vectornav_lines_of_real_units() -> None:
     assert found.damaged == 1
 
 
+def test_vectornav_time_behind_a_message() -> None:
+    """UM001, page 69: $VNYPR with a time appended; the letter tells it from the status, which has an S."""
+    record = read_format("vectornav-vnimu-sync").model_dump()
+    names = ["gyro_x", "gyro_y", "gyro_z"]
+    fields = [{"name": name, "column": 1 + k, "unit": "deg/s", "resolution": 0.001} for k, name in enumerate(names)]
+    fields.append({**record["line"]["fields"][-1], "column": 4})
+    record["line"] |= {"begins": "$VNYPR,", "columns": 5, "fields": fields}
+    lines = LineDecoder(StreamFormat.model_validate(record))
+    found = lines.feed(
+        b"\r\n$VNYPR,+010.071,+000.278,-002.026,T1162704*2F\r\n$VNYPR,+010.071,+000.278,-002.026,S0000*1F\r\n"
+    )
+    assert found.values["time_sync_in"].tolist() == [1162704]
+    assert found.values["gyro_x"].tolist() == [10071]
+    assert found.damaged == 1
+
+
+def test_vectornav_synchronised_messages_have_the_fields_of_the_manual() -> None:
+    """UM001: VNIMU (register 54) has 11 values, then the appended one; bits 0, 2, 13 of group 1 are times, pulses."""
+    plain, timed = read_format("vectornav-vnimu").line, read_format("vectornav-vnimu-sync").line
+    assert plain is not None
+    assert timed is not None
+    assert timed.fields[:-1] == plain.fields
+    assert (timed.columns, timed.fields[-1].column, timed.fields[-1].prefix) == (1 + 11 + 1, 12, "T")
+    for name, group_1, size in (("sync", 1 << 0 | 1 << 2, 8 + 8), ("count", 1 << 0 | 1 << 13, 8 + 4)):
+        frame = read_format(f"vectornav-binary-{name}").frame
+        assert frame is not None
+        sync = bytes.fromhex(frame.sync)
+        assert sync[:2] == bytes([0xFA, 1 << 0 | 1 << 2])
+        assert int.from_bytes(sync[2:4], "little") == group_1
+        assert frame.length == len(sync) + size + 12 + 12 + 4 + 2
+
+
 # VN-100 manual UM001, pages 39 and 40: binary output packets and the numbers in them. The CRC printed for the second
 # fits none of the CRCs of its bytes, nor with the mask that its fields ought to have; its numbers are what is compared.
 YAW_PITCH_ROLL = "FA01080093502E42833EF13F48B504BB9288"

@@ -29,6 +29,13 @@ def test_csv_with_a_header() -> None:
     assert columns["accel_y_g"] == [0.0, 0.5]
 
 
+def test_the_time_that_the_lines_state_is_kept() -> None:
+    columns, _, _ = fed("time (ms)," + HEADER.partition(",")[2], "10250,1,2,3,0,0,1", "10750,4,5,6,0,0.5,1")
+    assert columns["device_s"] == pytest.approx([10.25, 10.75], abs=1e-12)
+    without, _, _ = fed(HEADER.partition(",")[2], "1,2,3,0,0,1", rate_hz=100.0)
+    assert "device_s" not in without
+
+
 def test_bytes_may_be_split_anywhere() -> None:
     data = f"{HEADER}\n10,1,2,3,0,0,1\n10.5,4,5,6,0,0.5,1\n".encode()
     decoder, times = LineDecoder(), list[float]()
