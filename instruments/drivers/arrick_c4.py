@@ -191,7 +191,9 @@ class ArrickC4:
         took_s = self._timed_home()
         if self._homing is not None:
             home_check = self._homing.check(took_s, self.settings)
-            if home_check.missed_steps >= -(home_check.limit_steps + COVERAGE * home_check.u_steps):
+            is_early = home_check.missed_steps < -(home_check.limit_steps + COVERAGE * home_check.u_steps)
+            is_blind = home_check.u_steps > max(home_check.limit_steps, self._homing.least_u_steps(self.settings))
+            if home_check.is_missing or not (is_early or is_blind):
                 return home_check
             self._homing = None  # it was learned while replies were late
         return self._learn_homing(took_s, wait)

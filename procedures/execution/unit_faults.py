@@ -1,4 +1,4 @@
-"""Which unit's readings failed in a data set, and whether it is this computer's fault: it did not run labctl meanwhile."""
+"""Which unit's readings failed in a data set, and whether stalls of this computer explain it."""
 
 from __future__ import annotations
 

@@ -324,11 +324,11 @@ class BenchMonitor:
         """Read the chamber; returns whether it answered. Without one the units are all of the environment."""
         if (chamber := self._bench.air_chamber) is None:
             return True
-        name, stalled_s = chamber.name, self.stalls.total_s()
+        name, before = chamber.name, (self._recorder.t_s(), self.stalls.total_s())
         try:
             self._chamber = chamber.read()
         except LinkError as error:
-            self._note_silence(name, error, stalled_s)
+            self._note_silence(name, error, before)
             return False
         self.links.heard(name)
         self.links.change(name, "well")
@@ -336,22 +336,27 @@ class BenchMonitor:
 
     def _poll_units(self) -> None:
         for name, gyro in self._bench.gyros.items():
-            stalled_s = self.stalls.total_s()
+            before = self._recorder.t_s(), self.stalls.total_s()
             try:
                 if self.links.is_broken(name):
                     gyro.start()  # a port that broke is opened again
                 readings = gyro.read_latest()
             except LinkError as error:
-                self._note_silence(name, error, stalled_s)
+                self._note_silence(name, error, before)
                 continue
             self.add_readings(name, gyro, readings)
             self.links.change(name, "well")
 
-    def _note_silence(self, device: str, error: InstrumentError, stalled_before_s: float = math.inf) -> None:
-        """Note that a device did not answer, or that this computer was not there to hear it."""
+    def _note_silence(self, device: str, error: InstrumentError, before: tuple[float, float] | None = None) -> None:
+        """Note that a device did not answer, or that this computer was not there to hear it for most of the time.
+
+        `before` is the campaign time at which the device was asked, and the total of the stalls then.
+        """
         self._gyro_c.pop(device, None)
         why = str(error)
-        if (stalled_s := self.stalls.total_s() - stalled_before_s) > 0:
+        asked_s, stalled_before_s = before or (math.inf, math.inf)
+        stalled_s = self.stalls.total_s() - stalled_before_s
+        if stalled_s > 0 and self.stalls.speed * stalled_s > 0.5 * (self._recorder.t_s() - asked_s):
             why = f"{device}: no answer in time, but {not_run(stalled_s)} meanwhile"
         self.links.change(device, "degraded", f"{why}; labctl asks again at the next check")
 

@@ -12,7 +12,7 @@ from instruments.errors import NoReply
 from instruments.interfaces.gyro import Readings
 from procedures.contracts.campaign_state import CampaignState
 from procedures.execution.acquire import STALLED_ATTEMPTS
-from procedures.monitoring.host_stalls import PERIOD_S, HostStalls
+from procedures.monitoring.host_stalls import PERIOD_S, SHORT_PERIOD_S, HostStalls, Lateness
 from tests.helpers.engine_rig import Rig
 
 SPEED = 30.0
@@ -206,3 +206,35 @@ def test_a_stall_explains_as_many_lost_readings_as_the_unit_sends_meanwhile(lost
     assert rig.run().state is CampaignState.DONE
     (message,) = repeated(rig)
     assert message.startswith(f"data set 1 is taken again: {said}")
+
+
+def test_a_lateness_of_milliseconds_is_measured_while_something_is_timed() -> None:
+    lateness = Lateness(wall := VirtualClock())
+    for late_s in (0.0, 0.06, 0.004):
+        lateness.look()
+        wall.sleep(SHORT_PERIOD_S + late_s)
+    lateness.look()
+    assert lateness.largest_s == pytest.approx(0.06)
+
+
+def test_no_lateness_is_measured_where_the_clock_stands_still_meanwhile() -> None:
+    with HostStalls(VirtualClock()).lateness() as lateness:
+        pass
+    assert lateness.largest_s == 0.0
+
+
+@pytest.mark.parametrize(("stalled_s", "said"), [(0.5, "no answer in time, but this computer did not"), (0.15, "gone")])
+def test_a_chamber_that_does_not_answer_is_excused_by_a_stall_of_most_of_the_time(stalled_s: float, said: str) -> None:
+    rig, silent = Busy(), [True]
+
+    def late() -> None:
+        if silent:
+            silent.clear()
+            rig.stall(stalled_s)  # times 30 of the bench, less 3 s
+            rig.slept(6.0)
+            raise NoReply("chamber", "gone")
+
+    rig.when_step("soak", lambda: rig.chamber.faults.update(read=late))
+    assert rig.run().state is CampaignState.DONE
+    (event,) = [each for each in rig.journal.events if each.kind == "link.degraded"]
+    assert said in event.message
