@@ -39,7 +39,7 @@ class Stalls:
 
 def context_of(late_s: float, events: list[str], *checks: HomeCheck) -> ExecutionContext:
     table = create_autospec(ArrickC4, instance=True)
-    table.name, table.check_home.side_effect = "table", checks
+    table.name, table.step_clock, table.check_home.side_effect = "table", None, checks
     recorder = SimpleNamespace(
         event=lambda event: events.append(f"{event.kind}: {event.message}"),
         journal=SimpleNamespace(dataset_closed=lambda number, *_: events.append(f"partial {number}")),
