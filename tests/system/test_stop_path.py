@@ -210,7 +210,7 @@ def test_a_signal_to_a_supervisor_that_stands_still_is_carried_out_by_the_others
 
 
 def named_by(log: Path, bench_pid: int) -> str:
-    """Return which process said what a stop could not confirm, by the log of the service: the bench process, or another.
+    """Return which process said what a stop could not confirm, by the log of the service.
 
     The supervisor ends a bench process that it did not hear for its limit; the guardian one that did not stop the bench
     in time for whoever asked. Both then stop the bench themselves, and the log says which of them did.
