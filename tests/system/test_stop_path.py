@@ -213,7 +213,7 @@ def named_by(log: Path, bench_pid: int) -> str:
     """Return which process said what a stop could not confirm, by the log of the service.
 
     The supervisor ends a bench process that it did not hear for its limit; the guardian one that did not stop the bench
-    in time for whoever asked. Both then stop the bench themselves, and the log says which of them did.
+    in time for the process that asked. Both then stop the bench themselves, and the log says which of them did.
     """
     lines = logged(log)
     silent = [line for line in lines if line["event"] == "child.silent"]

@@ -43,7 +43,7 @@ class SetpointChamber(ABC):
         self._has_controlled = False
         self._given_c: float | None = None  #: the set point that the controller took last from this driver
         self._found_hindrance, self._ask_again_s = "", 0.0
-        self._request_s = math.inf  #: shortest time in which the controller told so far whether a set point has effect
+        self._request_s = math.inf  #: shortest time so far of asking whether a set point has an effect
 
     #: Whether `_switch_on` can switch control on; False where only a person can.
     switches_on = True
