@@ -192,6 +192,8 @@ class ArrickC4:
         if self._homing is not None:
             home_check = self._homing.check(took_s, self.settings)
             if home_check.missed_steps >= -(home_check.limit_steps + COVERAGE * home_check.u_steps):
+                if home_check.u_steps > max(home_check.limit_steps, self._homing.least_u_steps(self.settings)):
+                    self._learn_better(self._homing, wait)
                 return home_check
             self._homing = None  # it was learned while replies were late
         return self._learn_homing(took_s, wait)
@@ -210,6 +212,12 @@ class ArrickC4:
             if self._homing.u_steps <= self.settings.home_limit_steps:
                 break
         return None if self._homing is None else self._homing.check(took_s, self.settings)
+
+    def _learn_better(self, homing: checks.Homing, wait: Wait) -> None:
+        """Learn a homing that scatters once more, for the next check; the more certain of the two is kept."""
+        other = self._learned(wait)
+        if isinstance(other, checks.Homing) and other.u_steps < homing.u_steps:
+            self._homing = other
 
     def _learned(self, wait: Wait) -> checks.Homing | HomeCheck | None:
         """Return the homing from home and from places away from it, or the check of the turns where steps were missed.

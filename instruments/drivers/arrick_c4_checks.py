@@ -83,6 +83,10 @@ class Homing:
         """Standard uncertainty of a number of steps: of a duration less that from home."""
         return math.sqrt(2.0) * self.u_s / self.step_s
 
+    def least_u_steps(self, settings: ArrickC4Settings) -> float:
+        """Return the standard uncertainty of a number of steps by the latency of replies alone."""
+        return math.sqrt(2.0) * reply_u_s(settings) / self.step_s
+
     def check(self, took_s: float, settings: ArrickC4Settings) -> HomeCheck:
         """Return how many steps away from home a homing began; fewer than none where it ended sooner than from home."""
         return self._check((took_s - self.from_home_s) / self.step_s, settings)

@@ -165,7 +165,8 @@ class Supervisor:
         bench = self._bench
         if bench is None or bench.wait(0.0):
             return ""
-        self._kill_bench(bench)
+        log.error("guardian.ends_child", child="bench", child_pid=bench.pid, silent_s=round(bench.heard_s, 1))
+        bench.signal(signal.SIGKILL)
         return "" if bench.wait(ENDS_WITHIN_S) else f"the bench process {bench.pid} does not end"
 
     def _end_guarding(self) -> None:
@@ -269,7 +270,7 @@ class Supervisor:
                 web.end_soon()
             if self._may_take_longer(bench, ending):
                 continue
-            self._kill_bench(bench)
+            self._kill_bench(bench, bench.heard_s)
         bench.close()
         shutil.rmtree(self._folder, ignore_errors=True)
         if bench.left is not None:
@@ -306,8 +307,8 @@ class Supervisor:
         writing.join(LATCH_S)  # a disk that stands still does not delay the end
 
     @staticmethod
-    def _kill_bench(bench: BenchLine) -> None:
-        log.error("child.silent", child="bench", child_pid=bench.pid, silent_s=round(bench.heard_s, 1))
+    def _kill_bench(bench: BenchLine, silent_s: float) -> None:
+        log.error("child.silent", child="bench", child_pid=bench.pid, silent_s=round(silent_s, 1))
         bench.signal(signal.SIGKILL)
 
     # -- watching
@@ -338,8 +339,8 @@ class Supervisor:
     def _look_after_bench(self) -> None:
         bench = self._bench
         assert bench is not None
-        if bench.heard_s > SILENT_S:
-            self._kill_bench(bench)
+        if (silent_s := bench.heard_s) > SILENT_S:
+            self._kill_bench(bench, silent_s)
         if not bench.wait(0.0) or self._waker.ending:
             return
         log.error("child.ended", child="bench", child_pid=bench.pid)

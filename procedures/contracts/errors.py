@@ -61,6 +61,10 @@ class BadData(StepFailed):
         self.gyro = gyro
 
 
+class NoReadings(BadData):
+    """No reading of a unit arrived in a data set."""
+
+
 class GuardTripped(StepFailed):
     """A limit that is watched was passed; `kind` names the guard and `action` what the recipe wants done."""
 

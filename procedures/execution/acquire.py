@@ -12,7 +12,7 @@ from procedures.contracts.errors import BadData, GuardTripped, StepFailed
 from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
 from procedures.execution import late_readings
-from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
+from procedures.execution.context import ExecutionContext, raise_violation
 from procedures.execution.course import take_course
 from procedures.execution.gate_readings import (
     count_missing,
@@ -23,6 +23,7 @@ from procedures.execution.gate_readings import (
     read_round,
 )
 from procedures.execution.table_checks import follow_clock
+from procedures.execution.unit_faults import is_by_stalls, unit_at_fault
 from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.event_recorder import warning
@@ -51,11 +52,12 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             learn_periods(context)
             return _take(context, step) if step.course is None else take_course(context, step)
         except (LinkError, BadData, GuardTripped) as error:
-            unit = _unit_at_fault(context, error)
+            unit = unit_at_fault(context, error)
             if unit is None:
                 raise
             why = str(error)
-            if (stalled_s := context.monitor.stalls.total_s() - stalled_s) > 0:
+            stalled_s = context.monitor.stalls.total_s() - stalled_s
+            if is_by_stalls(context, unit, error, stalled_s):
                 why = f"{not_run(stalled_s)} while it was taken, and readings of {unit} are missing"
                 stalled += 1
                 attempt -= stalled <= STALLED_ATTEMPTS  # no fault of the unit
@@ -83,14 +85,6 @@ def reopen(context: ExecutionContext) -> None:
             context.drop(name, str(error))
 
 
-def _unit_at_fault(context: ExecutionContext, error: LinkError | BadData | GuardTripped) -> str | None:
-    """Return the unit whose readings failed; None when it is something else, or a limit that suspends."""
-    if isinstance(error, GuardTripped) and (error.kind not in UNIT_FAULTS or error.action != "fail"):
-        return None
-    unit = error.gyro if isinstance(error, BadData) else error.device
-    return unit if unit in context.bench.gyros else None
-
-
 def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     ramp_s = abs(step.rate_dps) / context.bench.table.limits.max_acceleration_dps2
     if context.monitor.is_due(within_s=ramp_s):
@@ -105,13 +99,12 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     }
     context.response.begin((step.mounting, step.run))
     with context.monitor.taking_readings(spin, counts):
-        context.poll()
+        context.poll(units_until_s=gate[0] - LEAD_S)  # a chamber that is late to answer costs no reading of the gate
         _wait_for_gate(context, watch, gate[0])
         number = context.recorder.journal.dataset_opened(_header(context, step, spin, gate))
         try:
             _read_gate(context, watch, encoder, number, gate, counts)
-            if context.monitor.is_due(within_s=ramp_s + LEAD_S):
-                context.poll(read_latest=False)
+            context.poll(read_latest=False)  # a chamber that others changed in the gate ends the data set
             read_late(context, number, gate, counts, late_readings.STEADY_S)
             context.bench.table.settle(spin)  # a run that does not end as computed was not the run it was taken for
             read_late(context, number, gate, counts, late_readings.WAIT_S)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -51,9 +52,13 @@ class ExecutionContext:
     _prompts: int = field(default=0, repr=False)
     _set: dict[str, dict[str, str]] = field(default_factory=dict, repr=False)  #: unit -> how it was set so far
 
-    def poll(self, *, read_latest: bool = True) -> None:
-        """Poll the bench once. Raises GuardTripped for a limit that does more than warn, and InstrumentError."""
-        violations = self.monitor.poll(POLL_S, read_latest=read_latest)
+    def poll(self, *, read_latest: bool = True, units_until_s: float = math.inf) -> None:
+        """Poll the bench once; the units are read where they are before clock time `units_until_s`.
+
+        Raises GuardTripped for a limit that does more than warn, and InstrumentError.
+        """
+        until_s = float(self.recorder.time.of(units_until_s)) if read_latest else -math.inf
+        violations = self.monitor.poll(POLL_S, units_until_s=until_s)
         raise_violation(violations if self.monitor.is_taking_readings else self.without_dropouts(violations))
 
     def without_dropouts(self, violations: list[GuardViolation]) -> list[GuardViolation]:

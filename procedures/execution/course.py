@@ -57,6 +57,7 @@ def _follow(
         try:
             run = _read(context, table, run, log, number, gate, counts)
             table.end_course(run)
+            context.poll(read_latest=False)  # a chamber that others changed in the gate ends the data set
             read_late(context, number, gate, counts, late_readings.WAIT_S)
             demand_readings(counts)
             count_missing(context, number, gate, counts)

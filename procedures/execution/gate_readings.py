@@ -7,7 +7,7 @@ from dataclasses import replace
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro, Readings
 from instruments.interfaces.self_checks import KeepingBack, StreamingGyro
-from procedures.contracts.errors import BadData
+from procedures.contracts.errors import NoReadings
 from procedures.execution import late_readings
 from procedures.execution.context import ExecutionContext, raise_violation
 from procedures.execution.waiting import checkpoint
@@ -44,9 +44,9 @@ def _is_period_unknown(gyro: Gyro) -> bool:
 def read_late(
     context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts], wait_s: float
 ) -> None:
-    """Wait for readings of the gate that are still on their way, until `wait_s` after its end."""
+    """Wait for readings of the gate that are still on their way, until `wait_s` after its end; read once at least."""
     gyros, every_s = context.bench.gyros, late_readings.EVERY_S / len(context.bench.gyros)
-    while context.clock.now_s() < gate[1] + wait_s and any(
+    while any(
         late_readings.is_late(gyro)
         or late_readings.pending(gyro, gate, counts[name])
         or missing_of(gyro, gate, counts[name])
@@ -54,6 +54,8 @@ def read_late(
     ):
         read_round(context, number, gate, counts, every_s)
         checkpoint(context)
+        if context.clock.now_s() >= gate[1] + wait_s:
+            return
 
 
 def missing_of(gyro: Gyro, gate: tuple[float, float], count: ReadingCounts) -> int:
@@ -143,6 +145,6 @@ def cut(readings: Readings, gate: tuple[float, float], time: CampaignTime) -> Re
 def demand_readings(counts: dict[str, ReadingCounts]) -> None:
     for name, count in counts.items():
         if count.valid + count.invalid == 0:
-            raise BadData(
+            raise NoReadings(
                 name, f"none of about {count.expected:.0f} expected readings arrived; check cable, power and baud rate"
             )

@@ -19,6 +19,8 @@ from procedures.planning.clock_runs import FIRST_RUNS, run_lengths_s
 
 #: So many runs are added where those that were planned disagree, and a run is repeated where this computer stalled.
 MAX_ADDED, STALLED_ATTEMPTS = 8, 5
+#: A lateness of this computer that a check for missed steps counts, s of real time.
+MIN_LATE_S = 0.01
 QUIETEN = "end other work on this computer, and set the latency of the table's USB adapter to 1 ms"
 
 
@@ -176,17 +178,15 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
     table = context.bench.table
     if not isinstance(table, OpenLoopTable):
         return {}
-    stalls = context.monitor.stalls
-    stalled_s = stalls.total_s()
-    check = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
-    stalled_s = stalls.total_s() - stalled_s
-    if check is not None and check.learning and stalled_s:
-        context.recorder.event(warning("home_unchecked", f"home is checked again: {not_run(stalled_s)} meanwhile"))
-        check = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
+    check, late_s = _timed_check(context, table)
+    if check is not None and check.learning and late_s:
+        context.recorder.event(warning("home_unchecked", f"home is checked again: {_late_text(late_s)}"))
+        check, late_s = _timed_check(context, table)
     since, context.unchecked = context.unchecked, []
     if check is None:
         return {}
-    if check.is_missing and stalls.speed * stalled_s / check.step_s < check.missed_steps - check.limit_steps:
+    late_steps = context.monitor.stalls.speed * late_s / check.step_s
+    if check.is_missing and late_steps < check.missed_steps - check.limit_steps:
         reason = _missing_text(table.name, check, step.temperature_c)
         for number in since:
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
@@ -202,13 +202,30 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
             f"{table.name}: home seems {check.missed_steps:g} steps from where it was left, limit "
             f"{check.limit_steps:g} steps, but a late reply explains it (u = {check.u_steps:.1f} steps"
         )
-        text += f", {not_run(stalled_s)} meanwhile)" if stalled_s else ")"
+        text += f", {_late_text(late_s)})" if late_s else ")"
         context.recorder.event(warning("home_doubtful", f"{text}; {QUIETEN}", table.name))
     return {
         "missed_steps": check.missed_steps,
         "u_steps": check.u_steps,
         "limit_steps": check.limit_steps,
     }
+
+
+def _timed_check(context: ExecutionContext, table: OpenLoopTable) -> tuple[HomeCheck | None, float]:
+    """Return the check for missed steps, and by how much this computer may have timed its replies late, real s.
+
+    0 for less than `MIN_LATE_S`: the uncertainty of a reply contains that.
+    """
+    stalls = context.monitor.stalls
+    stalled_s = stalls.total_s()
+    with stalls.lateness() as lateness:
+        check = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
+    late_s = max(stalls.total_s() - stalled_s, lateness.largest_s)
+    return check, late_s if late_s >= MIN_LATE_S else 0.0
+
+
+def _late_text(late_s: float) -> str:
+    return f"this computer ran labctl late by up to {late_s:.2f} s meanwhile"
 
 
 def _missing_text(name: str, home_check: HomeCheck, temperature_c: float) -> str:

@@ -172,8 +172,13 @@ def _invalid(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
         yield from _fraction(name, count.invalid, count.base, guards.rules.max_invalid_fraction, "marked bad")
 
 
+def is_too_many(count: float, base: float, limit: float) -> bool:
+    """Return whether `count` of `base` readings are more than the share `limit`; a single one is never a trend."""
+    return count > 1 + limit * base
+
+
 def _fraction(name: str, count: int, base: float, limit: float, quantity: str) -> Iterator[Excess]:
-    if count > 1 + limit * base:  # a single bad reading is never a trend
+    if is_too_many(count, base, limit):
         yield Excess(name, 100 * count / base, 100 * limit, "%", f"readings {quantity}")
 
 

@@ -14,6 +14,8 @@ from instruments.clock import Clock, SystemClock, attending, stands_in_stalls
 from procedures.contracts.journal import Event
 
 PERIOD_S = 0.1
+#: The time is read so often while something is timed to milliseconds, s of real time.
+SHORT_PERIOD_S = 0.005
 #: A shorter delay is the usual one of a scheduler, s of real time.
 MIN_S = 0.1
 #: A stall is said from this length on, s of real time, and at most so often.
@@ -58,6 +60,21 @@ class HostStalls:
         finally:
             self._looked_s = None
             ended.set()
+
+    @contextmanager
+    def lateness(self) -> Iterator[Lateness]:
+        """Measure how late this computer runs while the block runs; 0 where the clock stands still in stalls."""
+        found, ended = Lateness(self._wall), threading.Event()
+        if not self.speed:
+            yield found
+            return
+        thread = threading.Thread(target=found.watch, args=(ended,), name="lateness", daemon=True)
+        thread.start()
+        try:
+            yield found
+        finally:
+            ended.set()
+            thread.join()
 
     def total_s(self) -> float:
         """Return how long the process was not run so far, s of real time."""
@@ -104,6 +121,32 @@ class HostStalls:
             self._total_s += late_s
             self._unsaid_s += late_s
             self._longest_s = max(self._longest_s, late_s)
+
+
+class Lateness:
+    """How late this computer runs a thread, down to milliseconds: what is timed meanwhile may be timed as late.
+
+    `wall` is the real time of this computer.
+    """
+
+    def __init__(self, wall: Clock) -> None:
+        self._wall = wall
+        self._looked_s: float | None = None
+        self.largest_s = 0.0  #: s of real time
+
+    def look(self) -> None:
+        """Take in the time since it was read last, which was to be `SHORT_PERIOD_S`."""
+        now_s = self._wall.now_s()
+        if self._looked_s is not None:
+            self.largest_s = max(self.largest_s, now_s - self._looked_s - SHORT_PERIOD_S)
+        self._looked_s = now_s
+
+    def watch(self, ended: threading.Event) -> None:
+        """Read the time every `SHORT_PERIOD_S` until the end."""
+        self.look()
+        while not ended.wait(SHORT_PERIOD_S):
+            self.look()
+        self.look()
 
 
 def not_run(stalled_s: float) -> str:

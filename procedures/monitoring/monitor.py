@@ -60,6 +60,11 @@ class LinkStates:
             for device, (heard_s, before_s) in self._heard_s.items()
         }
 
+    def is_silent_by_stalls(self, device: str, t_s: float) -> bool:
+        """Return whether this computer's stalls are the greater part of a device's silence at campaign time `t_s`."""
+        silent_s = self.silent_s(t_s).get(device)
+        return silent_s is not None and silent_s < 0.5 * (t_s - self._heard_s[device][0])
+
     def change(self, device: str, state: LinkState, why: str = "") -> None:
         """Take in how a device can be reached. What is lost is not merely degraded again."""
         before = self._broken.get(device, "well")
@@ -147,6 +152,7 @@ class BenchMonitor:
         self._gyro_c: dict[str, float] = {}
         self._spin: Spin | None = None
         self._counts: Mapping[str, ReadingCounts] = {}
+        self.ended_counts: Mapping[str, ReadingCounts] = {}  #: of the data set that ended last
         self._taking_readings = self._attended = False
         self._next_poll_s = 0.0
         self.run = 0  #: powered session; 0 while the units are off
@@ -241,6 +247,7 @@ class BenchMonitor:
         try:
             yield
         finally:
+            self.ended_counts = self._counts
             self._taking_readings, self._spin, self._counts = False, None, {}
             self._tripped = {each for each in self._tripped if each[0] not in WHILE_READING}  # disarmed, not released
             self._recorder.tracker.update(rate_dps=0.0)
@@ -256,12 +263,15 @@ class BenchMonitor:
         """Return whether the chamber is to be polled again within `within_s`."""
         return self._recorder.t_s() + within_s >= self._next_poll_s
 
-    def poll(self, every_s: float, *, read_latest: bool = True) -> list[GuardViolation]:
-        """Poll the chamber and, unless their streams are being read, the units; returns the limits that are passed."""
+    def poll(self, every_s: float, *, units_until_s: float = math.inf) -> list[GuardViolation]:
+        """Poll the chamber and, before campaign time `units_until_s`, the units; returns the limits that are passed.
+
+        A unit that is polled drops all readings but the newest.
+        """
         self._next_poll_s = self._recorder.t_s() + every_s
         air_heard = self._poll_chamber()
         self.references.poll(self._note_silence)
-        if read_latest and self.run:
+        if self.run and self._recorder.t_s() < units_until_s:
             self._poll_units()
         t_s = self._recorder.t_s()
         chamber_c, setpoint_c = self.air_c, self.air_setpoint_c
@@ -314,11 +324,11 @@ class BenchMonitor:
         """Read the chamber; returns whether it answered. Without one the units are all of the environment."""
         if (chamber := self._bench.air_chamber) is None:
             return True
-        name, stalled_s = chamber.name, self.stalls.total_s()
+        name, before = chamber.name, (self._recorder.t_s(), self.stalls.total_s())
         try:
             self._chamber = chamber.read()
         except LinkError as error:
-            self._note_silence(name, error, stalled_s)
+            self._note_silence(name, error, before)
             return False
         self.links.heard(name)
         self.links.change(name, "well")
@@ -326,22 +336,27 @@ class BenchMonitor:
 
     def _poll_units(self) -> None:
         for name, gyro in self._bench.gyros.items():
-            stalled_s = self.stalls.total_s()
+            before = self._recorder.t_s(), self.stalls.total_s()
             try:
                 if self.links.is_broken(name):
                     gyro.start()  # a port that broke is opened again
                 readings = gyro.read_latest()
             except LinkError as error:
-                self._note_silence(name, error, stalled_s)
+                self._note_silence(name, error, before)
                 continue
             self.add_readings(name, gyro, readings)
             self.links.change(name, "well")
 
-    def _note_silence(self, device: str, error: InstrumentError, stalled_before_s: float = math.inf) -> None:
-        """Note that a device did not answer, or that this computer was not there to hear it."""
+    def _note_silence(self, device: str, error: InstrumentError, before: tuple[float, float] | None = None) -> None:
+        """Note that a device did not answer, or that this computer was not there to hear it for most of the time.
+
+        `before` is the campaign time at which the device was asked, and the total of the stalls then.
+        """
         self._gyro_c.pop(device, None)
         why = str(error)
-        if (stalled_s := self.stalls.total_s() - stalled_before_s) > 0:
+        asked_s, stalled_before_s = before or (math.inf, math.inf)
+        stalled_s = self.stalls.total_s() - stalled_before_s
+        if stalled_s > 0 and self.stalls.speed * stalled_s > 0.5 * (self._recorder.t_s() - asked_s):
             why = f"{device}: no answer in time, but {not_run(stalled_s)} meanwhile"
         self.links.change(device, "degraded", f"{why}; labctl asks again at the next check")
 

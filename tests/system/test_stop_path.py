@@ -17,6 +17,7 @@ from typing import Any
 import httpx
 import pytest
 
+from labctl.processes.supervisor import SILENT_S
 from labctl.processes.supervisor_watch import is_stopped
 from labctl.store import open_store
 from tests.helpers.processes import WAIT_S, ServiceProcess, running
@@ -208,28 +209,51 @@ def test_a_signal_to_a_supervisor_that_stands_still_is_carried_out_by_the_others
         assert starts_of(simulator, quiet) == []
 
 
-def test_instruments_that_do_not_answer_a_stop_are_named_until_they_do(
-    service: ServiceProcess, simulator: Simulator
-) -> None:
-    campaign = turning(service, simulator)
-    simulator.process.send_signal(signal.SIGSTOP)
-    try:
-        asked = service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "a hand in the bench"})
-        assert asked.status_code == 503
-        assert "NOT STOPPED" in asked.text
-        assert "Use the stop switch" in asked.text
-        while "table" not in (bench := service.http.get("/api/benches").json()[0])["unconfirmed"]:
-            before_next_request()
-        assert service.http.get("/health").json()["status"] == "look at the bench"
-        # on a busy computer the supervisor may have replaced a bench process that was late to answer: the stop is then
-        # over, and the bench marked
-        if not service.bench_was_replaced:
-            assert bench["stop"]["phase"] in {"asked", "stopping"}
-        while not service.bench_was_replaced and not status(service.url, campaign)["step_text"].startswith(
-            "stopping: table"
-        ):
-            before_next_request()  # the bench is marked before the step's text is
-    finally:
-        simulator.process.send_signal(signal.SIGCONT)
-    assert "a hand in the bench" in ended(service.url, campaign)["reason"]
-    wait_until(simulator, lambda lines: not lines[-1]["table_turns"])
+def named_by(log: Path, bench_pid: int) -> str:
+    """Return which process said what a stop could not confirm, by the log of the service.
+
+    The supervisor ends a bench process that it did not hear for its limit; the guardian one that did not stop the bench
+    in time for the process that asked. Both then stop the bench themselves, and the log says which of them did.
+    """
+    lines = logged(log)
+    silent = [line for line in lines if line["event"] == "child.silent"]
+    ended = [line for line in lines if line["event"] == "guardian.ends_child"]
+    assert {line["child_pid"] for line in silent + ended} <= {bench_pid}, silent + ended
+    assert all(line["silent_s"] >= SILENT_S for line in silent), silent
+    return "supervisor" if silent else "guardian" if ended else "bench process"
+
+
+def logged(log: Path) -> list[dict[str, Any]]:
+    """Return the lines of the log of a service."""
+    return [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines() if line.startswith("{")]
+
+
+def test_instruments_that_do_not_answer_a_stop_are_named_until_they_do(simulator: Simulator, tmp_path: Path) -> None:
+    log = tmp_path / "service.log"
+    with running(tmp_path / "lab.sqlite", "--bench", str(simulator.bench), log=log) as service:
+        campaign = turning(service, simulator)
+        simulator.process.send_signal(signal.SIGSTOP)
+        try:
+            asked = service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "a hand in the bench"})
+            assert asked.status_code == 503
+            assert "NOT STOPPED" in asked.text
+            assert "Use the stop switch" in asked.text
+            while "table" not in (bench := service.http.get("/api/benches").json()[0])["unconfirmed"]:
+                before_next_request()
+            assert service.http.get("/health").json()["status"] == "look at the bench"
+            if (process := named_by(log, service.bench_pid)) == "bench process":
+                assert bench["stop"]["phase"] in {"asked", "stopping"}
+            while process == "bench process" and not status(service.url, campaign)["step_text"].startswith(
+                "stopping: table"
+            ):
+                before_next_request()  # the bench is marked before the step's text is
+                process = named_by(log, service.bench_pid)
+            replaced = service.bench_was_replaced  # before the log is read, which says so first
+            assert replaced <= (named_by(log, service.bench_pid) != "bench process")
+            while process != "bench process" and not any(line["event"] == "guardian.stopped" for line in logged(log)):
+                before_next_request()
+            assert not any(line["stands"] for line in logged(log) if line["event"] == "guardian.stopped")
+        finally:
+            simulator.process.send_signal(signal.SIGCONT)
+        assert "a hand in the bench" in ended(service.url, campaign)["reason"]
+        wait_until(simulator, lambda lines: not lines[-1]["table_turns"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from typing import Protocol
 
@@ -42,6 +43,7 @@ class SetpointChamber(ABC):
         self._has_controlled = False
         self._given_c: float | None = None  #: the set point that the controller took last from this driver
         self._found_hindrance, self._ask_again_s = "", 0.0
+        self._request_s = math.inf  #: shortest time so far of asking whether a set point has an effect
 
     #: Whether `_switch_on` can switch control on; False where only a person can.
     switches_on = True
@@ -178,7 +180,9 @@ class SetpointChamber(ABC):
             return ()
         if (asked_s := self._clock.now_s()) >= self._ask_again_s:
             self._found_hindrance = self._hindrance()
-            self._ask_again_s = asked_s + SLOW_SHARE * (self._clock.now_s() - asked_s)
+            # the shortest: a computer that is busy makes one request slow, and no chamber
+            self._request_s = min(self._request_s, self._clock.now_s() - asked_s)
+            self._ask_again_s = asked_s + SLOW_SHARE * self._request_s
         # a program has a state of its own: a controller that runs one is not in its manual mode, and yet not off
         stopped = "" if self._found_hindrance or not self._has_controlled else self._stopped()
         hindrances = [self._found_hindrance, stopped]

@@ -258,6 +258,11 @@ def test_homings_that_scatter_each_time_end_with_an_uncertainty_that_says_so(sta
     assert found.u_steps > 10 * found.limit_steps
     assert not found.is_missing
     assert len(homings) == 16
+    again = table.check_home(waiting(s))  # by the same homing, which is then learned once more, for the next check
+    assert (again.u_steps, len(homings)) == (found.u_steps, 22)
+    certain = table.check_home(waiting(s))
+    assert certain.u_steps < certain.limit_steps
+    assert len(homings) == 23
 
 
 def test_after_an_abort_the_place_is_not_known(stand: Make) -> None:

@@ -86,6 +86,23 @@ def test_a_data_set_of_readings_in_time_does_not_wait() -> None:
     assert {each for each in rig.journal.kinds() if "lost" in each} == set()
 
 
+def test_a_chamber_that_is_late_to_answer_before_a_gate_costs_no_reading_of_it() -> None:
+    rig, late = Rig(), [True]
+
+    def answer_late() -> None:
+        if late and rig.engine._context.monitor.is_taking_readings:
+            late.clear()
+            rig.clock.sleep(18.0)  # beyond the end of the gate
+            raise NoReply("chamber", "no answer in 18 s")
+
+    rig.chamber.faults["read"] = answer_late
+    assert rig.run().state is CampaignState.DONE
+    assert not late
+    assert "link.degraded" in rig.journal.kinds()
+    assert came(rig, 1) >= 98
+    assert "data_set_repeated" not in rig.journal.kinds()
+
+
 def test_what_never_comes_is_lost_is_said_and_the_data_set_is_taken_again() -> None:
     rig = with_unit(Deaf)
     assert rig.run().state is CampaignState.DONE

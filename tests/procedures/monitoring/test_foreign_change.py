@@ -51,6 +51,27 @@ def test_it_is_an_event_within_one_poll_and_what_was_under_it_is_done_again(rig:
     assert ("partial" in [state for _, state, _ in rig.journal.closed]) == (kind == "readings")
 
 
+def test_a_change_just_before_a_data_set_ends_is_seen_before_it_counts_as_complete(rig: Any) -> None:
+    when: list[float] = []
+
+    def act() -> None:
+        context, headers = rig.engine._context, rig.journal.headers
+        if not when and headers and context.recorder.t_s() > headers[-1].gate_until_s - 2.0:
+            when.append(rig.clock.now_s())
+            rig.chamber.at_the_panel(rig.chamber.given_c + 7.0)
+
+    def put_back(_what: str, _detail: Any) -> None:
+        if when and rig.clock.now_s() > when[0] + 100.0:
+            rig.chamber.at_the_panel(rig.chamber.given_c)
+
+    rig.imu.faults["read"] = act
+    rig.journal.hooks.append(put_back)
+    assert rig.run(rig.recipe(acquire={"duration_s": 5.0})).state == CampaignState.DONE
+    assert [header.step.dataset for header in rig.journal.headers] == [1, 1, 2, 3, 4]
+    assert [state for _, state, _ in rig.journal.closed] == ["partial", *["complete"] * 4]
+    assert "changed by others" in rig.journal.closed[0][2]
+
+
 def test_nobody_who_puts_it_back_ends_the_campaign_in_time(rig: Any) -> None:
     changed_in(rig, "soak")
     outcome = rig.run(rig.recipe(guards={"suspend_timeout_s": 600.0}))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from instruments.clock import PacedClock, ScaledClock, VirtualClock
 from instruments.errors import NoReply
+from instruments.interfaces.gyro import Readings
 from procedures.contracts.campaign_state import CampaignState
 from procedures.execution.acquire import STALLED_ATTEMPTS
-from procedures.monitoring.host_stalls import PERIOD_S, HostStalls
+from procedures.monitoring.host_stalls import PERIOD_S, SHORT_PERIOD_S, HostStalls, Lateness
 from tests.helpers.engine_rig import Rig
 
 SPEED = 30.0
@@ -166,3 +168,73 @@ def test_a_data_set_that_a_stall_spoilt_is_taken_again_and_no_cable_is_blamed() 
     assert repeated[0].startswith("data set 1 is taken again: this computer did not run labctl for 1.")
     assert not any("cable" in each.message for each in rig.journal.events)
     assert rig.engine.progress.repeated == STALLED_ATTEMPTS
+
+
+def repeated(rig: Busy) -> list[str]:
+    return [each.message for each in rig.journal.events if each.kind == "data_set_repeated"]
+
+
+def test_a_unit_that_is_silent_beyond_a_short_stall_is_named_for_it() -> None:
+    rig = Busy()
+
+    def silent() -> None:
+        if rig.engine._context.monitor.is_taking_readings:
+            rig.stall(0.2)  # 6 s of the bench, in which no reading was asked for
+            rig.slept(8.0)
+            raise NoReply("imu", "no intact datagram for 14.0 s: no bytes arrived; check power and cable")
+
+    rig.imu.faults["read"] = silent
+    assert rig.run().state is CampaignState.FAILED
+    said = "data set 1 is taken again: imu: no intact datagram for 14.0 s: no bytes arrived; check power and cable"
+    assert set(repeated(rig)) == {said}
+
+
+@pytest.mark.parametrize(("lost", "said"), [(20, "this computer did not run labctl"), (60, "imu: readings lost")])
+def test_a_stall_explains_as_many_lost_readings_as_the_unit_sends_meanwhile(lost: int, said: str) -> None:
+    rig = Busy()
+    read, losing = rig.imu.read, [True]
+
+    def lossy(duration_s: float) -> Readings:
+        readings = read(duration_s)
+        if len(readings) and rig.journal.blocks and losing:
+            losing.clear()
+            rig.stall(0.2)  # counted as 0.1 s, 3 s of the bench: 30 of 100 readings
+            return replace(readings, lost=lost)
+        return readings
+
+    rig.imu.read = lossy
+    assert rig.run().state is CampaignState.DONE
+    (message,) = repeated(rig)
+    assert message.startswith(f"data set 1 is taken again: {said}")
+
+
+def test_a_lateness_of_milliseconds_is_measured_while_something_is_timed() -> None:
+    lateness = Lateness(wall := VirtualClock())
+    for late_s in (0.0, 0.06, 0.004):
+        lateness.look()
+        wall.sleep(SHORT_PERIOD_S + late_s)
+    lateness.look()
+    assert lateness.largest_s == pytest.approx(0.06)
+
+
+def test_no_lateness_is_measured_where_the_clock_stands_still_meanwhile() -> None:
+    with HostStalls(VirtualClock()).lateness() as lateness:
+        pass
+    assert lateness.largest_s == 0.0
+
+
+@pytest.mark.parametrize(("stalled_s", "said"), [(0.5, "no answer in time, but this computer did not"), (0.15, "gone")])
+def test_a_chamber_that_does_not_answer_is_excused_by_a_stall_of_most_of_the_time(stalled_s: float, said: str) -> None:
+    rig, silent = Busy(), [True]
+
+    def late() -> None:
+        if silent:
+            silent.clear()
+            rig.stall(stalled_s)  # times 30 of the bench, less 3 s
+            rig.slept(6.0)
+            raise NoReply("chamber", "gone")
+
+    rig.when_step("soak", lambda: rig.chamber.faults.update(read=late))
+    assert rig.run().state is CampaignState.DONE
+    (event,) = [each for each in rig.journal.events if each.kind == "link.degraded"]
+    assert said in event.message
