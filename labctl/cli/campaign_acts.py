@@ -61,8 +61,8 @@ class CampaignGroup(TyperGroup):
 
     def get_command(self, ctx: Context, cmd_name: str) -> Command | None:
         """Return a command by its name; None: there is none."""
-        own = super().get_command(ctx, cmd_name)
-        return own or next((command_of(act, line) for act, line in _declared() if act.name == cmd_name), None)
+        written = super().get_command(ctx, cmd_name)
+        return written or next((command_of(act, line) for act, line in _declared() if act.name == cmd_name), None)
 
 
 def _declared() -> list[tuple[CampaignAct[Any], CampaignCommand]]:

@@ -28,8 +28,8 @@ def scale_deviation_pct(of: float = NOMINAL_MV) -> tuple[float, float]:
 def offset_slope(low_c: float, high_c: float) -> float:
     """Return the least-squares slope of the printed offsets between two temperatures, deg/s per K."""
     temperature_c = np.asarray(TEMPERATURES_C)
-    here = (temperature_c >= low_c) & (temperature_c <= high_c)
-    slope, _ = np.polyfit(temperature_c[here], np.asarray(OFFSET_V)[here], 1)
+    in_range = (temperature_c >= low_c) & (temperature_c <= high_c)
+    slope, _ = np.polyfit(temperature_c[in_range], np.asarray(OFFSET_V)[in_range], 1)
     return float(slope) / (NOMINAL_MV / 1000.0)
 
 

@@ -41,7 +41,7 @@ class CoefficientForm:
 
 def _matrix(info: RecordingInfo, _: Collection[str]) -> list[str]:
     """K[output][input] in output units per deg/s, and B in output units."""
-    gains = [f"k_{out}{turned}" for out in info.axes for turned in info.axes]
+    gains = [f"k_{out}{axis}" for out in info.axes for axis in info.axes]
     return [*gains, *(f"b_{out}" for out in info.axes), "temperature_c"]
 
 

@@ -53,9 +53,9 @@ def pieces(columns: Columns, motion: Motion = "rates") -> NDArray[np.int64]:
     if len(dataset) and "t_s" in columns and (warm is not None or motion == "rest"):
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         starts = dataset_starts(dataset)
-        turned = np.asarray(columns["turn_deg"]) != 0 if "turn_deg" in columns else np.zeros(len(dataset), dtype=bool)
+        is_turn = np.asarray(columns["turn_deg"]) != 0 if "turn_deg" in columns else np.zeros(len(dataset), dtype=bool)
         for begin, end in zip(starts, np.append(starts[1:], len(dataset)), strict=True):
-            if turned[begin]:  # a part of a turn is no known angle
+            if is_turn[begin]:  # a part of a turn is no known angle
                 continue
             since_s, here = t_s[begin:end] - t_s[begin], None if warm is None else warm[begin:end]
             if motion == "rest":

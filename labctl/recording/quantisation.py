@@ -86,9 +86,9 @@ def quantisation_variance(step: float, white: float, std: float) -> float:
     """
     if step <= 0:
         return 0.0
-    own = step**2 / 12.0  # the steps themselves make readings spread
-    noise_var = max(white**2 - own, 0.0)
-    wave_var = max(std**2 - max(white**2, own), 0.0)
+    of_steps = step**2 / 12.0  # the steps themselves make readings spread
+    noise_var = max(white**2 - of_steps, 0.0)
+    wave_var = max(std**2 - max(white**2, of_steps), 0.0)
     angle = 2.0 * np.pi * _K / step
     gaussian = np.exp(-(angle**2) * noise_var)
     bessel = 1.0 / np.sqrt(1.0 + (np.pi * angle) ** 2 * 2.0 * wave_var)

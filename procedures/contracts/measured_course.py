@@ -53,8 +53,8 @@ class MeasuredCourse:
     def angle_deg(self, t_s: Array) -> Array:
         """Return the angle at times (n,), campaign time, as measured; unwrapped."""
         since_s = t_s - self.began_s
-        own = regressors(self.course, since_s) @ np.array(self.coefficients)
-        return np.asarray(self.course.angle_deg(since_s) + own)
+        correction_deg = regressors(self.course, since_s) @ np.array(self.coefficients)
+        return np.asarray(self.course.angle_deg(since_s) + correction_deg)
 
     def rates_dps(self, t_s: Array, period_s: float) -> tuple[Array, Array]:
         """Return the measured and the commanded mean rates, (n,) each, over the periods that end at times (n,) s."""

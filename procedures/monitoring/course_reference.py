@@ -53,8 +53,8 @@ class CourseLog:
         self._lost = 0
         self.readings.append(reading)
         times = np.array([self.readings[0].t_s, reading.t_s]) - run.began_s
-        turned = float(np.diff(run.course.angle_deg(times))[0])
-        off_deg = abs(reading.angle_deg - self.readings[0].angle_deg - turned)
+        expected_deg = float(np.diff(run.course.angle_deg(times))[0])
+        off_deg = abs(reading.angle_deg - self.readings[0].angle_deg - expected_deg)
         limit_deg = STOPPED_DEG + STOPPED_SHARE * run.course.largest_dps * abs(float(times[1] - times[0]))
         if off_deg > limit_deg:
             raise TableStopped(

@@ -114,10 +114,10 @@ class Task:
 
     def read(self, count: int, t_s: float) -> tuple[Status | None, NDArray[np.float64]]:
         """Return the next scans as volts (channels, n), with a status where there are fewer; raises DaqFailure."""
-        there = self.available(t_s)
-        if self.started_s is None or there > self.buffer:
-            raise DaqFailure(Status.OVERRUN if there else Status.NOT_YET_AVAILABLE)
-        samples = there if count == ALL_AVAILABLE else min(count, there)
+        available = self.available(t_s)
+        if self.started_s is None or available > self.buffer:
+            raise DaqFailure(Status.OVERRUN if available else Status.NOT_YET_AVAILABLE)
+        samples = available if count == ALL_AVAILABLE else min(count, available)
         index = self.taken + 1 + np.arange(samples)
         self.taken += samples
         volts = self.inputs.sample(self.numbers, self.range_v, self.started_s + index / self._true_hz)

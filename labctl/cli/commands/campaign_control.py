@@ -30,7 +30,7 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
     from labctl.cli.progress_bar import CampaignProgress
     from labctl.services.commands.open import current_status
 
-    clock, asked_prompt, fault, turned = SystemClock(), "", "", ""
+    clock, asked_prompt, fault, turn_shown = SystemClock(), "", "", ""
     with one_clear_line(), CampaignProgress(quiet=as_json) as progress:
         while True:
             answer = current_status(database, campaign)
@@ -38,8 +38,8 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
             if not as_json and answer.prompt is not None and answer.prompt.id != asked_prompt:
                 asked_prompt = answer.prompt.id
                 console.print(f"question {asked_prompt}: {answer.prompt.text}", style="yellow")
-            if not as_json and (text := turn_text(answer)) and text != turned:
-                turned = text
+            if not as_json and (text := turn_text(answer)) and text != turn_shown:
+                turn_shown = text
                 console.print(text)
             if not as_json and answer.last_error and answer.last_error != fault:
                 fault = answer.last_error

@@ -44,8 +44,10 @@ class Response:
 
     def slope(self, name: str, rad_s: Array) -> NDArray[np.complex128]:
         """Return the derivative of the gain along `DELAY` or `TIME_CONSTANT`, 1/s."""
-        own = -1j * rad_s
-        return np.asarray(own * self.gain(rad_s) / (1.0 if name == DELAY else 1 + 1j * rad_s * self.time_constant_s))
+        derivative = -1j * rad_s
+        return np.asarray(
+            derivative * self.gain(rad_s) / (1.0 if name == DELAY else 1 + 1j * rad_s * self.time_constant_s)
+        )
 
     def value(self, name: str) -> float:
         """Return a coefficient of the response by its name, s."""

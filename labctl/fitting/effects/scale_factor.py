@@ -165,8 +165,8 @@ class SineResponse(Effect):
         def slope(k_squared: Array) -> Array:
             return cube * sine_ratio_slope(k_squared * rate**2)
 
-        there = np.full(len(rate), at)
-        shape = error_dps(there) / at if abs(at) > MIN_K_SQUARED else slope(there)
+        amplitudes = np.full(len(rate), at)
+        shape = error_dps(amplitudes) / at if abs(at) > MIN_K_SQUARED else slope(amplitudes)
         return [Column("k_squared", "(rad/(rad/s))^2", shape, law=Law(error_dps, slope), start=at)]
 
     def shaped_by(self, term: Term, coefficients: Mapping[str, float]) -> Term:

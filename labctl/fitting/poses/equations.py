@@ -42,9 +42,9 @@ def equations_of(moves: Moves, accelerometer: Accelerometer, bias: Bias, errors:
     """Return the equations of m moves at gyro errors E (3, 3)."""
     rotations = integrate(rate_without_bias(moves, bias), moves.step_s, moves.share, errors)
     up = accelerometer.up[moves.before]
-    there = accelerometer.up[moves.before + 1]
-    across = tangents(there)
-    residual = np.einsum("mca,ma->mc", across, seen_at_end(up, rotations.matrix) - there)
+    up_after = accelerometer.up[moves.before + 1]
+    across = tangents(up_after)
+    residual = np.einsum("mca,ma->mc", across, seen_at_end(up, rotations.matrix) - up_after)
     by_turn = across @ change_of_direction(up, rotations.matrix)
     return Equations(residual.reshape(-1), (by_turn @ rotations.by_error).reshape(-1, 9), across, by_turn, rotations)
 

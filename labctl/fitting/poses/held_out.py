@@ -47,10 +47,10 @@ def held_out_moves(equations: Equations, covariance: NDArray[np.float64], used: 
     residual_inverse = inverse - weighted @ gain
     error, spread = np.zeros((len(used), 2)), np.zeros((len(used), 2, 2))
     for place, move in enumerate(np.flatnonzero(used)):
-        here = slice(2 * place, 2 * place + 2)
-        own = np.linalg.solve(residual_inverse[here, here], residual_inverse[here])
-        without = -jacobian[here] @ (gain - normal @ weighted[here].T @ own)
-        without[:, here] += np.eye(2)
+        pair = slice(2 * place, 2 * place + 2)
+        move_inverse = np.linalg.solve(residual_inverse[pair, pair], residual_inverse[pair])
+        without = -jacobian[pair] @ (gain - normal @ weighted[pair].T @ move_inverse)
+        without[:, pair] += np.eye(2)
         error[move], spread[move] = without @ residual, without @ move_covariance @ without.T
     for move in np.flatnonzero(~used):
         both = np.array([2 * move, 2 * move + 1])

@@ -204,11 +204,11 @@ def _between_stops(
 
 
 def _axis(source: _Source, asked: str | None) -> str:
-    there = [axis for axis in get_args(Axis) if f"gyro_{axis}" in source.columns]
-    if asked is None and len(there) == 1:
-        return there[0]
-    if asked is None or asked not in there:
-        text = ", ".join(there) or "none"
+    axes = [axis for axis in get_args(Axis) if f"gyro_{axis}" in source.columns]
+    if asked is None and len(axes) == 1:
+        return axes[0]
+    if asked is None or asked not in axes:
+        text = ", ".join(axes) or "none"
         raise BadInput(
             f"{source.what}: axis {asked or 'not named'}; name an axis that the data have a column for ({text})"
         )

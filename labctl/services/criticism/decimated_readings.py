@@ -68,8 +68,8 @@ def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decim
     wanted = [row for row in rows if is_decimated(row)]
 
     def read() -> dict[int, ReadRecording]:
-        with open_store(store.location, write=False) as own:
-            return {row.id: read_recording_of(own, row) for row in wanted}
+        with open_store(store.location, write=False) as second_store:
+            return {row.id: read_recording_of(second_store, row) for row in wanted}
 
     with closing(Forked(read)) as forked:
         found: dict[int, ReadRecording] = {}

@@ -159,9 +159,9 @@ class Measurements:
         columns = self.readings.columns
         if RECORDING not in columns:
             return longest
-        own = np.asarray(columns[OWN_DATASET])[np.asarray(columns[RECORDING]) == recording]
+        own_numbers = np.asarray(columns[OWN_DATASET])[np.asarray(columns[RECORDING]) == recording]
         joined = np.asarray(columns["dataset"])[np.asarray(columns[RECORDING]) == recording]
-        first, last = (int(joined[own == n][0]) for n in (longest.first_dataset, longest.last_dataset))
+        first, last = (int(joined[own_numbers == n][0]) for n in (longest.first_dataset, longest.last_dataset))
         return replace(longest, first_dataset=first, last_dataset=last)
 
     def question(self) -> dict[str, object]:

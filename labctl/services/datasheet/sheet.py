@@ -221,9 +221,9 @@ def _lines(
     if line.id in OF_THREE_AXES and len(axes) < 3:
         return []
     limit = None if line.key is None else specified.get(line.key)
-    here = [each for (name, _, _), each in sorted(characteristics.items()) if name == line.id]
-    if here:
-        return [decided(line, each, limit) for each in here]
+    of_line = [each for (name, _, _), each in sorted(characteristics.items()) if name == line.id]
+    if of_line:
+        return [decided(line, each, limit) for each in of_line]
     return [
         Characteristic(
             id=line.id, title=line.title, axis="", value=None, u=None, unit=line.unit, conditions=None,

@@ -111,8 +111,8 @@ def _readings(store: Store, recording: int, channel: str, rows: list[DataSetRow]
 def _as_it_is(t_s: NDArray[np.generic], values: NDArray[np.generic]) -> Envelope:
     """Return an envelope whose bins are single readings."""
     numbers = np.asarray(values, dtype=np.float64)
-    there = np.isfinite(numbers)
-    numbers, times = numbers[there], np.asarray(t_s, dtype=np.float64)[there]
+    is_finite = np.isfinite(numbers)
+    numbers, times = numbers[is_finite], np.asarray(t_s, dtype=np.float64)[is_finite]
     return Envelope(times, numbers, numbers, numbers, np.ones(len(numbers)))
 
 
