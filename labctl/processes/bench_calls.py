@@ -1,4 +1,4 @@
-"""What other processes may ask of the bench process."""
+"""Calls of other processes that the bench process answers."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from labctl.store import Store
 
 log = get_logger()
 
-#: A watcher gets a sign of life this often, s,
+#: Longest interval between two messages to a watcher, s.
 BEAT_S = 1.0
-#: and of changes at most this often, s.
+#: Shortest interval between two messages to a watcher, s.
 MIN_BEAT_S = 0.1
-#: Calls that are under way when the process ends have so long to be answered, s.
+#: Time to answer the pending calls when the process ends, s.
 UNDER_WAY_S = 2.0
 
 
@@ -40,7 +40,7 @@ class BenchCalls:
     def __init__(
         self, store: Store, local: LocalBench, supervision: Supervision, address: HeldAddress, clock: Clock
     ) -> None:
-        """`clock` has the date of the service."""
+        """`clock` gives the date of the service, which may be simulated."""
         self._store, self._local, self._supervision, self._address = store, local, supervision, address
         self._under_way = UnderWay()
         self._watchers: set[Connection] = set()
@@ -100,7 +100,7 @@ class BenchCalls:
         raise KeyError(call.name)
 
     def _watch(self, connection: Connection) -> None:
-        """Tell a watcher what happens, until it goes; this thread is the watcher's."""
+        """Send the state to a watcher at every change until it disconnects, in the thread of its connection."""
         changed, never, form = threading.Event(), threading.Event(), form_of("watch").result
         remove = self._local.listen(changed.set)
         self._watchers.add(connection)

@@ -1,4 +1,4 @@
-"""Keeps a web process at the service's address, and answers stops there while there is none that answers."""
+"""Restarts the web process of a service, and answers stops at its address while no web process answers."""
 
 from __future__ import annotations
 
@@ -23,21 +23,20 @@ from labctl.stop.wire import Stopping
 log = get_logger()
 
 LOOK_S = 0.25
-#: A web process that gave no sign of life for so long: the supervisor answers stops at its address, s.
+#: Time without a message of the web process after which the supervisor answers stops at its address, s.
 PAGE_AFTER_S = 2.0
-#: And for so long: it is ended, and another one started, s.
+#: Time without a message after which the web process is replaced, s.
 SILENT_S = 6.0
-#: On a busy computer it may be silent so much longer, for as long as it gets no processor: another one would get none
-#: either, s.
+#: Extra time on a busy computer while the web process gets no processor time: a new one would get none either, s.
 EXCUSED_S = 60.0
-#: A look that was itself so late cannot tell whether the web process was silent, s.
+#: Delay of a check above which its result is not used: the supervisor itself did not run, s.
 LATE_S = 1.0
-#: The web process cuts its requests and ends within this, s.
+#: Time within which the web process ends, with its requests, s.
 ENDS_WITHIN_S = 4.0
 
 
 class WebKeeper:
-    """One web process after the other."""
+    """The web process of a service, which is replaced when it ends or does not answer."""
 
     def __init__(
         self,
@@ -119,7 +118,7 @@ class WebKeeper:
                 value_of(SAID_BY_CHILD, receive(self._process.line))
             except (EOFError, OSError):
                 return
-            except LabctlError as error:  # what it says cannot be read: as if it said nothing
+            except LabctlError as error:  # an unreadable message counts as none
                 log.warning("child.unread", child="web", child_pid=self.pid, error=str(error))
                 return
             self._count_from_now()

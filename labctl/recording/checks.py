@@ -1,4 +1,4 @@
-"""What a recording must keep to, and the defaults of what it leaves out."""
+"""Requirements on the content of a recording, and the defaults of its optional columns."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from labctl.recording.positions import EXPECTED, Position
 from labctl.recording.recording import Column
 from labctl.texts import control_character
 
-#: Values outside of these ranges are in another unit, or mistakes.
+#: Possible ranges: a value outside is in another unit, or wrong.
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
 #: Largest size of a value: the square of a larger one, as a spread needs it, may overflow.
 LARGEST = 1e100
@@ -241,7 +241,7 @@ def _refuse_unknown_up(path: Path, info: RecordingInfo, columns: dict[str, Colum
 
 
 def _positions(path: Path, position: Column) -> Column:
-    """Return positions as they are written here: `x@0` is x."""
+    """Return positions in their normal form: `x@0` becomes x."""
     words, of = np.unique(position, return_inverse=True)
     unknown = []
     for word in words:

@@ -17,17 +17,17 @@ from procedures.monitoring.campaign_time import CampaignTime
 
 Array = NDArray[np.float64]
 
-#: Replies in a row that may be lost.
+#: Largest number of consecutive lost replies.
 MAX_LOST = 2
-#: For each coefficient that is fitted so many angles are read at least.
+#: Least number of angles for each fitted coefficient.
 ANGLES_EACH = 3
-#: A table that is this far from where it was commanded has stopped, degrees and share of the angle turned either way.
+#: Limit of the difference from the commanded angle, deg, plus a share of the angle turned; above it the table stopped.
 STOPPED_DEG, STOPPED_SHARE = 5.0, 0.05
-#: Angles that scatter about what is fitted by more than their uncertainty times this follow no course.
+#: Largest ratio of the scatter of the angles about the fit to their uncertainty.
 MAX_EXCESS = 5.0
-#: A measured rate that differs from the commanded one by more than this share of the largest is said.
+#: A difference between measured and commanded rate above this share of the largest rate is reported.
 NEWS_SHARE = 0.02
-#: The smallest singular value that counts, as a share of the largest: a ramp tells a delay from no offset.
+#: Smallest singular value that is used, as a share of the largest: a ramp does not separate a delay from an offset.
 RCOND = 1e-9
 #: Points of a course at which the uncertainty of its rate is computed, and the time over which a rate is taken, s.
 POINTS, RATE_OVER_S = 400, 0.01
@@ -118,7 +118,7 @@ def _fitted(design: Array, values: Array, u: Array) -> tuple[Array, Array, float
 
 
 def _rates(run: CourseRun) -> tuple[Array, Array]:
-    """Return how the rate follows the coefficients, (n, k) deg/s each, and its slope, (n,) deg/s^2, over a course."""
+    """Return the derivatives of the rate by the coefficients, (n, k) deg/s, and its slope, (n,) deg/s^2."""
     at = np.linspace(RATE_OVER_S, run.course.duration_s, POINTS)
     change = (regressors(run.course, at) - regressors(run.course, at - RATE_OVER_S)) / RATE_OVER_S
     slope = (run.course.rate_dps(at) - run.course.rate_dps(at - RATE_OVER_S)) / RATE_OVER_S

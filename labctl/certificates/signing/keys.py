@@ -73,7 +73,7 @@ class SigningKey:
 
 
 def signatory_of(certificate: x509.Certificate) -> Signatory:
-    """Return who a certificate is of."""
+    """Return the subject of a certificate as a signatory."""
 
     return Signatory(
         subject=certificate.subject.rfc4514_string(),
@@ -83,7 +83,7 @@ def signatory_of(certificate: x509.Certificate) -> Signatory:
 
 
 def digest_of(public: PublicKey) -> Digest:
-    """Return the hash that fits a key: SHA-384 on P-384, else SHA-256."""
+    """Return the hash for a key: SHA-384 for P-384, else SHA-256."""
     return "sha384" if getattr(getattr(public, "curve", None), "name", "") == "secp384r1" else "sha256"
 
 

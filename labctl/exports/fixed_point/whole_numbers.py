@@ -84,7 +84,7 @@ class FixedPoint:
 
     @property
     def steepest(self) -> float:
-        """How much the error of an axis can change for each deg/s that all outputs change by: a bound."""
+        """Upper bound of the change of an error per change of all outputs, deg/s per deg/s."""
         powers = np.arange(self.tables.shape[2])[None, None, :, None]
         return float((np.abs(self.tables) * powers).max(axis=-1).sum(axis=(1, 2)).max() / 2.0 ** (Q31 + self.shift))
 
@@ -135,7 +135,7 @@ def fixed_point(part: StaticPart, nodes: int, format_name: str) -> FixedPoint:
 
 
 def _of_several_axes(part: StaticPart) -> float:
-    """Return how far the error is from the sum of those that the output of each axis alone causes, deg/s."""
+    """Return the largest difference of the error from the sum of the errors by each output alone, deg/s."""
     raw, temperature_c = all_turning(part)
     apart = raw - part.rate(raw, temperature_c)
     still = -part.rate(np.zeros_like(raw), temperature_c)

@@ -1,4 +1,4 @@
-"""Two equations of each move: gravity's direction at its end, carried there by the gyro, minus that of the rest."""
+"""Two equations of each move: the direction of gravity at its end by the gyro, minus that of the rest."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from labctl.fitting.poses.triad import tangents
 
 @dataclass(frozen=True)
 class Equations:
-    """Residuals of m moves and their derivatives; two components each, square to gravity, rad.
+    """Residuals of m moves and their derivatives; two components each, perpendicular to gravity, rad.
 
-    A turn about the vertical leaves gravity where it is: of the three angles of a move two are seen.
+    A rotation about the vertical does not change the direction of gravity: two of three angles are observable.
     """
 
     residual: Array  #: (2m,)

@@ -32,10 +32,10 @@ class HeldOut:
 
 
 def held_out_moves(equations: Equations, covariance: NDArray[np.float64], used: NDArray[np.bool_]) -> HeldOut:
-    """Return what each of m moves is off from what coefficients fitted to the used ones, mask (m,), without it say.
+    """Return the prediction error of each of m moves by coefficients fitted to the other used moves, mask (m,).
 
-    `covariance` (2m, 2m) is that of the residuals. The fit without a used move is that to all with two unknowns more,
-    which absorb the whole of its residual, so none has to be made again.
+    `covariance` (2m, 2m) is that of the residuals. The fit without a used move equals the fit to all
+    moves with two further unknowns, which absorb its residual, so that no fit is repeated.
     """
     rows = np.repeat(used, 2)
     jacobian, residual = equations.jacobian[rows], equations.residual[rows]

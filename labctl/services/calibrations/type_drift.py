@@ -54,8 +54,8 @@ def drift_of_type(
 ) -> TypeDrift | str:
     """Return the drift of the type of a unit on a grid, or why it is not known; the unit itself is left out.
 
-    The type is the model of the unit, letter by letter. Simulated units are a type of their own. `version` is that of the
-    grid, `calibration` its content.
+    The type is the model of the unit, letter by letter. Simulated units are a type of their own. The grid is that of
+    `version`, whose content is `calibration`.
     """
     model = store.units.get(version.serial).model
     if not model.strip():

@@ -1,4 +1,4 @@
-"""A stop that was asked of a bench, as the one who asked follows it: of a campaign that runs, or of a bench at rest."""
+"""The progress of a stop that was requested: of a campaign that runs, or of a bench without one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 from labctl.services.campaigns.campaign_job import CampaignJob
 from procedures.contracts.control import Control
 
-#: How often the end of a campaign's thread is looked for while its table is not known to stand, s.
+#: Interval at which the end of a campaign is checked until its table is confirmed to be at rest, s.
 LOOK_S = 0.2
 
 
@@ -51,14 +51,14 @@ class CampaignStop:
 
     @property
     def text(self) -> str:
-        """How far the stop is, or what keeps it."""
+        """State of the stop, or what delays it."""
         if self._control.hindrance:
             return f"campaign {self.campaign}: {self._control.hindrance}"
         return f"campaign {self.campaign}: {'the table is at rest' if self.stands else 'the table is being stopped'}"
 
 
 class IdleStop:
-    """A stop while no campaign runs: the instruments are made safe, once what has the bench now has let it go."""
+    """A stop while no campaign runs: the instruments are made safe as soon as the bench is released."""
 
     campaign: int | None = None
 

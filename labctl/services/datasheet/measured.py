@@ -1,4 +1,4 @@
-"""Figures of a data sheet from the data sets of one recording; the outputs as they are, nothing corrected."""
+"""Figures of a data sheet from the data sets of one recording, of the uncorrected outputs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from labctl.recording.positions import Position, axis_in
 
 #: Figures at one temperature are at the level nearest to this, deg C.
 USUAL_C = 25.0
-#: Different rates of the table that a line takes.
+#: Least number of different table rates for a straight line.
 MIN_RATES = 2
 PAIRS = ("xy", "xz", "yz")
 
@@ -43,7 +43,7 @@ class Figure:
     id: str
     axis: str
     estimate: Estimate
-    rows: NDArray[np.bool_]  #: the data sets behind it, (m,)
+    rows: NDArray[np.bool_]  #: the data sets that it is computed from, (m,)
     along: str = ""
 
 
@@ -75,7 +75,7 @@ class _Columns:
     def line_about(self, axis: str, about: str, rows: NDArray[np.bool_]) -> StraightLine | None:
         """Return the line of an output over the true rate about an axis; None unless the table ran different rates.
 
-        The Earth's rate differs from position to position: it is no rate that a line could be drawn over.
+        A line over the Earth's rate alone, which differs from position to position, is not fitted.
         """
         if different_rates(self.table_dps[rows]) < MIN_RATES:
             return None
@@ -96,7 +96,7 @@ def figures_of(data: FitData) -> list[Figure]:
 
 
 def _spread(rows: NDArray[np.bool_], among: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return a mask of the data sets of another mask as one of all, (m,)."""
+    """Return a mask over the data sets of another mask as a mask over all data sets, (m,)."""
     is_spread = np.zeros(len(among), dtype=bool)
     is_spread[among] = rows
     return is_spread
@@ -115,7 +115,7 @@ def _columns(data: FitData) -> _Columns:
 
 
 def _of_rates(seen: _Columns, axis: str) -> Iterator[Figure]:
-    """Yield what the rates about an axis say of it: at the usual temperature, over temperature, and from run to run."""
+    """Yield the figures by rates about an axis: at the usual temperature, over temperature, and from run to run."""
     about_axis = seen.turning_about(axis)
     at_usual_level = about_axis & (seen.level == seen.usual)
     line = seen.line(axis, at_usual_level)
@@ -173,7 +173,7 @@ def _from_run_to_run(seen: _Columns, axis: str, about_axis: NDArray[np.bool_], s
 
 
 def _at_rest(seen: _Columns, axis: str) -> Iterator[Figure]:
-    """Yield what is known at rest alone: bias and its repeatability where no rate was run, and the g-sensitivity."""
+    """Yield the figures at rest: bias and its repeatability where no rate was run, and the g-sensitivity."""
     still = seen.table_dps == 0
     error = seen.data.outputs[axis] - seen.data.true_rate_dps(axis)
     if not np.any(seen.table_dps):
@@ -221,7 +221,7 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
             u[i, j] = math.hypot(line.scale_factor.u or 0.0, 0.0 if i == j else leaning)
     try:
         alignment = alignment_of(k, u if has_u else None)
-    except ValueError:  # an axis has its sign reversed: no rotation takes it there
+    except ValueError:  # the sign of an axis is reversed, which no rotation does
         return
     for axis, estimate in zip(AXES, alignment.misalignment_deg, strict=True):
         yield Figure("misalignment", axis, estimate, used)

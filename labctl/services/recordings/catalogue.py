@@ -32,7 +32,7 @@ def page_of_recordings(
 
 
 def _of_simulated_time(store: Store, rows: Sequence[RecordingRow]) -> set[int | None]:
-    """Return those campaigns of the recordings whose times are of a simulated clock."""
+    """Return the campaigns of these recordings that ran on a simulated clock."""
     campaigns = sorted({row.campaign for row in rows if row.campaign is not None})
     return {number for number, bench in store.campaigns.benches(campaigns).items() if has_simulated_time(bench)}
 
@@ -83,7 +83,7 @@ def _of_rows(numbers: list[int], means: list[MeanRow]) -> dict[str, ChannelColum
     return {name: ChannelColumns(mean=mean, std=std) for name, (mean, std) in by_column.items()}
 
 
-#: Columns of a table of points that say which data set it is, or how its mean was made.
+#: Columns of a table of points that identify a data set, or describe its mean.
 NO_CHANNEL = frozenset(
     {
         "dataset", "t_s", "position", "run", "mounting", "table_rate_dps", "computed_rate_dps", "encoder_rate_u_dps",
@@ -93,7 +93,7 @@ NO_CHANNEL = frozenset(
 
 
 def _of_table(numbers: list[int], points: Recording) -> dict[str, ChannelColumns]:
-    """Return the figures of points that were imported as such; they stand in the table itself."""
+    """Return the figures of points that were imported as points, from their own columns."""
     order = np.argsort(np.asarray(points.columns["dataset"]), kind="stable")
     nothing: list[float | None] = [None] * len(numbers)
     by_name: dict[str, ChannelColumns] = {}
