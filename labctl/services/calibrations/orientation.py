@@ -18,7 +18,7 @@ from labctl.error_per_turn import static_bias
 from labctl.errors import BadInput, BadRecording, NotCertified, NotEnoughData
 from labctl.fitting.numeric.arrays import Array
 from labctl.orientation import Orientation
-from labctl.recording import OutputUnit, RecordingInfo
+from labctl.recording import OutputUnit
 from labctl.recording.recording import Columns
 from labctl.services.calibrations.served import calibration_file
 from labctl.services.recordings.loading import newest_row
@@ -58,7 +58,7 @@ def orientation_of_recording(
             f"recording {recording} holds {row.kind}, but an angle is integrated from single "
             "readings; name a recording of readings"
         )
-    info = RecordingInfo.model_validate(row.info)
+    info = row.recording_info
     parts = [columns for _, columns in store.recordings.iter_datasets(recording)]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}
     return _follow(

@@ -132,7 +132,7 @@ def _mark_resumed(store: Store, row: CampaignRow, standing: ResumePoint, how: Re
 
 def _other_drivers(row: CampaignRow, bench_file: BenchFile) -> str:
     """Return which instruments have another driver, or another release of it, than when the campaign began."""
-    was = BenchFile.model_validate({**row.bench, "simulation": None}).drivers
+    was = row.bench_file.drivers
     changed = [
         f"; driver of {device}: {now.driver} of {now.distribution} {now.version} instead of "
         f"{then.driver} of {then.distribution} {then.version}"

@@ -9,7 +9,6 @@ from typing import Literal
 
 from pydantic import TypeAdapter
 
-from instruments.bench_config import BenchFile
 from labctl.answers.campaign_parts import DriverResponse, OutputResponse, PromptResponse, TurnResponse
 from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.services.benches.bench_clock import has_simulated_time
@@ -169,8 +168,7 @@ def describe_interrupted(answer: CampaignResponse) -> str:
 
 def outlives_its_process(row: CampaignRow) -> bool:
     """Return whether a campaign's bench is still there, as it was, when the process that drove it is gone."""
-    # the simulation may be that of another version of labctl, whose settings are not known any more
-    return not BenchFile.model_validate({**row.bench, "simulation": None}).is_simulated
+    return not row.bench_file.is_simulated
 
 
 def mark_abandoned(answer: CampaignResponse, *, attended: bool) -> CampaignResponse:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labctl.recording import Columns, Recording, RecordingInfo
+from labctl.recording import Columns, Recording
 from labctl.recording.decimation import decimate
 from labctl.recording.points import longest_undivided_s, to_points
 from labctl.services.forked import Forked
@@ -49,7 +49,7 @@ def read_recording_of(store: Store, row: RecordingRow) -> ReadRecording:
     """Return what a criticism takes of the readings of a recording, each of which is read once."""
     from labctl.services.recordings.allan import StillReadings  # noqa: PLC0415  slow to import
 
-    info = RecordingInfo.model_validate(row.info)
+    info = row.recording_info
     longest_s, still = longest_undivided_s(info.motion), StillReadings(store, row)
     parts, pieces = list[Columns](), {}
     for number, columns in store.recordings.iter_datasets(row.id):

@@ -18,7 +18,7 @@ from labctl.fitting.data.static_record import StaticRecord
 from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.columns import OWN_DATASET, RECORDING
-from labctl.recording.info import GIVE_DATE, RecordingInfo, measured_at
+from labctl.recording.info import GIVE_DATE, measured_at
 from labctl.recording.output_steps import per_reading, quantisation_of
 from labctl.services.criticism.decimated_readings import (
     Decimated,
@@ -194,7 +194,7 @@ def undated_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
 
 def other_settings_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
     """Yield that the unit was set otherwise in one of several recordings than in the first one that says how."""
-    configurations = [(row.id, RecordingInfo.model_validate(row.info).configuration) for row in rows]
+    configurations = [(row.id, row.recording_info.configuration) for row in rows]
     first, *others = [configuration for configuration in configurations if configuration[1]] or [(0, {})]
     for number, settings in others:
         if differs := changed(first[1], settings):

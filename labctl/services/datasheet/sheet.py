@@ -15,7 +15,6 @@ from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.progress import report_stage
-from labctl.recording import RecordingInfo
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.datasheet.measured import Figure, figures_of
 from labctl.services.recordings.allan import MAX_RECORDINGS, noise_of_recordings
@@ -117,7 +116,7 @@ def datasheet(store: Store, serial: str) -> DatasheetResponse:
 
 
 def _of_recording(store: Store, row: RecordingRow) -> Iterator[Characteristic]:
-    info = RecordingInfo.model_validate(row.info)
+    info = row.recording_info
     if row.kind == "coefficients" or info.motion not in {"rates", "rest"}:
         return
     try:
@@ -197,7 +196,7 @@ def _bandwidth(store: Store, serial: str) -> Iterator[Characteristic]:
 def _response(
     unit: Unit, rows: Sequence[RecordingRow], characteristics: Mapping[Key, Characteristic]
 ) -> DatasheetResponse:
-    infos = [RecordingInfo.model_validate(row.info) for row in rows]
+    infos = [row.recording_info for row in rows]
     specified: dict[str, float] = {}
     for info in reversed(infos):  # the newest recording says it last
         specified |= info.datasheet

@@ -15,7 +15,7 @@ from labctl.answers.recordings import (
     RecordingWithPoints,
     SamplesResponse,
 )
-from labctl.recording import Recording, RecordingInfo
+from labctl.recording import Recording
 from labctl.recording.columns import RATE_TIME_U
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.store import MeanRow, RecordingRow, Store
@@ -41,7 +41,7 @@ def _line(row: RecordingRow, simulated_time: bool) -> RecordingResponse:
     return RecordingResponse(
         id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
         readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
-        motion=RecordingInfo.model_validate(row.info).motion, simulated_time=simulated_time,
+        motion=row.recording_info.motion, simulated_time=simulated_time,
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ def trace(
     Raises NotFound, and BadInput for a channel that is not there, a window that is none, or means without times.
     """
     head = store.recordings.get(recording)
-    info = RecordingInfo.model_validate(head.info)
+    info = head.recording_info
     rows = [row for row in store.recordings.data_sets(recording) if row.state == "complete" and row.n]
     if head.kind == "samples":
         courses = courses_of(store.recordings.dataset(recording, rows[0].number)) if rows else []
