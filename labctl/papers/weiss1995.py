@@ -14,7 +14,7 @@ OFFSET_V = (2.428, 2.452, 2.477, 2.501, 2.525, 2.549)
 #: Data sheet: scale factor, mV per deg/s; at rest, V; full rate, deg/s; change of the offset, share of full rate per K.
 NOMINAL_MV, REST_V, FULL_DPS, OFFSET_SHARE_PER_K = 22.0, 2.5, 90.0, 0.001
 #: Interval at which the offset is determined again, and warm-up time of the unit, s.
-STOP_EVERY_S, WARM_UP_S = 120.0, 600.0
+OFFSET_EVERY_S, WARM_UP_S = 120.0, 600.0
 #: Ranges of temperature in which the offset changes steeply and slowly, deg C.
 STEEP_C, FLAT_C = (16.0, 23.0), (23.0, 45.0)
 

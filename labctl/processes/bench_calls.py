@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from multiprocessing.connection import Connection
-from typing import Any, cast
+from typing import Any
 
 from instruments.clock import Clock
 from labctl.acting_user import acting
@@ -78,7 +78,8 @@ class BenchCalls:
             log.warning("calls.under_way", count=left, waited_s=UNDER_WAY_S)
 
     def _supervise(self, call: Call, connection: Connection) -> Answer | None:
-        wanted = cast(BenchSettings, call.arguments["wanted"])
+        wanted = call.arguments["wanted"]
+        assert isinstance(wanted, BenchSettings)  # by the form of the call
         found = answer_with(lambda: self._supervision.take_charge(wanted, connection))
         return None if found.raised is None else found
 
@@ -89,7 +90,8 @@ class BenchCalls:
         if area == "control":
             return BENCH_ACTS[name].execute(self._context, call.arguments["asked"])
         if call.name == "bench.live":
-            campaign = cast(int, call.arguments["campaign"])
+            campaign = call.arguments["campaign"]
+            assert isinstance(campaign, int)  # by the form of the call
             return self._local.runs(campaign), self._local.status(campaign)
         if call.name == "bench.describe":
             return self._local.describe()

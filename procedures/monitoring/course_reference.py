@@ -20,13 +20,13 @@ Array = NDArray[np.float64]
 #: Largest number of consecutive lost replies.
 MAX_LOST = 2
 #: Least number of angles for each fitted coefficient.
-ANGLES_EACH = 3
+MIN_ANGLES_EACH = 3
 #: Limit of the difference from the commanded angle, deg, plus a share of the angle turned; above it the table stopped.
 STOPPED_DEG, STOPPED_SHARE = 5.0, 0.05
 #: Largest ratio of the scatter of the angles about the fit to their uncertainty.
 MAX_EXCESS = 5.0
 #: A difference between measured and commanded rate above this share of the largest rate is reported.
-NEWS_SHARE = 0.02
+REPORTED_SHARE = 0.02
 #: Smallest singular value that is used, as a share of the largest: a ramp does not separate a delay from an offset.
 RCOND = 1e-9
 #: Points of a course at which the uncertainty of its rate is computed, and the time over which a rate is taken, s.
@@ -68,7 +68,7 @@ class CourseLog:
         Raises StepFailed for too few angles, and for angles that do not follow the course.
         """
         t_s = np.array([reading.t_s for reading in self.readings])
-        needed = ANGLES_EACH * regressors(run.course, np.zeros(1)).shape[1]
+        needed = MIN_ANGLES_EACH * regressors(run.course, np.zeros(1)).shape[1]
         if len(t_s) < needed:
             raise StepFailed(
                 f"{self._name}: its encoder was read {len(t_s)} times during a {run.course.text}, but {needed} angles "
@@ -150,7 +150,7 @@ def course_event(table: RateTable, angles: TableAngles, course: MeasuredCourse, 
     """Return a warning where the measured rate differs from the commanded one by more than a share of the largest."""
     at = course.began_s + np.linspace(RATE_OVER_S, duration_s, POINTS)
     measured, commanded = course.rates_dps(at, RATE_OVER_S)
-    off_dps, limit_dps = float(np.abs(measured - commanded).max()), NEWS_SHARE * course.course.largest_dps
+    off_dps, limit_dps = float(np.abs(measured - commanded).max()), REPORTED_SHARE * course.course.largest_dps
     if off_dps <= limit_dps:
         return None
     used = "the encoder is the reference" if angles.is_reference else "the commanded rate is the reference"

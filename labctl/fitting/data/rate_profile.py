@@ -18,7 +18,7 @@ from labctl.recording import Columns, dataset_starts
 from labctl.recording.motions.windows import kept_windows, stretch_starts, window_labels
 
 #: Length of the memory of a response: in time constants, and in sample intervals of the readings.
-FORGOTTEN_TAUS, FORGOTTEN_STEPS = 30.0, 256
+MEMORY_TAUS, MEMORY_STEPS = 30.0, 256
 #: Extrapolation beyond the ends of a stretch: decay of the slope, and span from which the slope is taken, in samples.
 BEND_STEPS, SLOPE_STEPS = 64, 8
 #: Largest deviation from an even spacing, as a share of it; above it readings are resampled to one, and back.
@@ -60,7 +60,7 @@ class Response:
     @property
     def memory_s(self) -> float:
         """Duration after which the impulse response is negligible, s."""
-        return 2 * abs(self.delay_s) + FORGOTTEN_TAUS * abs(self.time_constant_s)
+        return 2 * abs(self.delay_s) + MEMORY_TAUS * abs(self.time_constant_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +140,7 @@ def _filtered(t_s: Array, rate_dps: Array, factor: Factor, memory_s: float) -> A
     even = t_s[0] + step_s * np.arange(n)
     is_even = bool(np.max(np.abs(t_s - even)) < EVEN_SHARE * step_s)
     values = rate_dps if is_even else CubicSpline(t_s, rate_dps)(even)
-    spare = FORGOTTEN_STEPS + int(np.ceil(memory_s / step_s))
+    spare = MEMORY_STEPS + int(np.ceil(memory_s / step_s))
     total = int(next_fast_len(n + 3 * spare, real=True))
     back = total - n - 2 * spare  # smooth transition from the last rate to the first: the spectrum is periodic
     bend = 0.5 - 0.5 * np.cos(np.pi * (np.arange(back) + 0.5) / back)

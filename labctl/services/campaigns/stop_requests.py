@@ -9,7 +9,7 @@ from labctl.services.campaigns.campaign_job import CampaignJob
 from procedures.contracts.control import Control
 
 #: Interval at which the end of a campaign is checked until its table is confirmed to be at rest, s.
-LOOK_S = 0.2
+POLL_S = 0.2
 
 
 class CampaignStop:
@@ -37,8 +37,8 @@ class CampaignStop:
     def is_over(self, within_s: float) -> bool:
         """Wait until the table stands, or the engine has ended without that; returns whether either came."""
         waited_s = 0.0
-        while not self._control.is_at_rest(min(LOOK_S, within_s)):
-            waited_s += LOOK_S
+        while not self._control.is_at_rest(min(POLL_S, within_s)):
+            waited_s += POLL_S
             ended = self._has_ended()
             if ended or waited_s >= within_s:
                 return ended
@@ -106,7 +106,7 @@ class IdleStop:
         return self._trouble or "no campaign runs, and the table is at rest"
 
 
-class NotHere:
+class StopElsewhere:
     """A stop of a campaign that does not run here, or of a service that drives no bench."""
 
     campaign: int | None = None

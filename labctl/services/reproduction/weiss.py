@@ -33,7 +33,7 @@ AT_REST = (
     "labctl simulate gyrostar-at-rest --bench gyrostar-sim --out rest; labctl import rest; labctl orientation "
     "GYROSTAR-0001 --version 0 --warm-up-s 600 --stop-every-s 120."
 )
-OPTIONS = OrientationOptions(warm_up_s=paper.WARM_UP_S, stop_every_s=paper.STOP_EVERY_S)
+OPTIONS = OrientationOptions(warm_up_s=paper.WARM_UP_S, stop_every_s=paper.OFFSET_EVERY_S)
 RECORD_TABLE = "rates of both signs at the report's temperatures: labctl campaign start gyrostar"
 RECORD_REST = "22 min at rest from power-on: labctl campaign start gyrostar-at-rest"
 UNIT = "ENV-05S, simulated"

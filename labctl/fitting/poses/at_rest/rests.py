@@ -19,11 +19,11 @@ from labctl.fitting.poses.readings import PoseReadings
 #: Length of the windows, s, and the least number of readings of one.
 WINDOW_S, MIN_IN_WINDOW = 0.5, 8
 #: Limit of the standard deviation of each channel in a window at rest, as a multiple of its static noise.
-FACTOR = 3.0
+REST_FACTOR = 3.0
 #: Largest static noise; a recording above it has no rest.
-NOISIEST_G, NOISIEST_DPS = 0.05, 3.0
+MAX_NOISE_G, MAX_NOISE_DPS = 0.05, 3.0
 #: Quantile of the standard deviations that is the first estimate of the static noise, and largest number of iterations.
-QUIETEST, ROUNDS = 0.1, 6
+QUIET_QUANTILE, MAX_ITERATIONS = 0.1, 6
 #: Least degrees of freedom of the noise of a mean over half seconds; with fewer, readings are taken as independent.
 MIN_BLOCKS = 20
 #: Margin that is cut off both ends of a quiet stretch, as a share of a window: the turn begins there.
@@ -78,7 +78,7 @@ def find_rests(readings: PoseReadings) -> Rests:
     spread = _spread(channels, size)
     noise = _static_noise(spread, _steps(channels))
     _require_quiet(readings.info.serial, noise)
-    quiet = np.all(spread < FACTOR * noise, axis=1) & ~_broken(readings.breaks, size)
+    quiet = np.all(spread < REST_FACTOR * noise, axis=1) & ~_broken(readings.breaks, size)
     inside = _union(quiet, size, len(readings))
     begin, end = _stretches(inside & ~readings.breaks, inside)
     margin = round(MARGIN * size)
@@ -135,10 +135,10 @@ def density_in_rests(channels: NDArray[np.float64], rests: Rests, spacing_s: flo
 def _require_quiet(serial: str, noise: Array) -> None:
     """Raise NotEnoughData where the static noise is larger than that of any sensor at rest."""
     accel, gyro = float(noise[:3].max()), float(noise[3:].max())
-    if accel > NOISIEST_G or gyro > NOISIEST_DPS:
+    if accel > MAX_NOISE_G or gyro > MAX_NOISE_DPS:
         raise NotEnoughData(
             f"{serial}: the unit is never at rest in this recording: its quietest half seconds scatter by "
-            f"{accel:.2g} g and {gyro:.2g} deg/s (limit for rest: {NOISIEST_G:g} g and {NOISIEST_DPS:g} deg/s); "
+            f"{accel:.2g} g and {gyro:.2g} deg/s (limit for rest: {MAX_NOISE_G:g} g and {MAX_NOISE_DPS:g} deg/s); "
             "lay the unit down "
             "between turns for 2 s or more, in many poses"
         )
@@ -162,9 +162,9 @@ def _steps(channels: NDArray[np.float64]) -> Array:
 
 def _static_noise(spread: NDArray[np.float64], rounding: Array) -> Array:
     """Return the static noise of each channel, (channels,): its median standard deviation in windows at rest."""
-    noise = np.maximum(np.quantile(spread, QUIETEST, axis=0), rounding)
-    for _ in range(ROUNDS):
-        quiet = np.all(spread < FACTOR * noise, axis=1)
+    noise = np.maximum(np.quantile(spread, QUIET_QUANTILE, axis=0), rounding)
+    for _ in range(MAX_ITERATIONS):
+        quiet = np.all(spread < REST_FACTOR * noise, axis=1)
         if not quiet.any():
             break
         noise = np.maximum(np.median(spread[quiet], axis=0), rounding)

@@ -36,7 +36,7 @@ LEVEL_SHARE = 1e-3
 #: than so many noises may change theirs by drift.
 AT_ONCE, AT_ONCE_SHARE, LEVEL_NOISES = 3, 0.35, 3.0
 #: Largest difference of the logarithms of the factor and of the ratio of the noise after a row to that before it.
-LASTS = 0.4
+MAX_LOG_DIFFERENCE = 0.4
 
 
 @dataclass(frozen=True)
@@ -100,14 +100,16 @@ def _by_factors(values: Array, row: int, factors: Sequence[float]) -> Iterator[C
             above_noise = min(abs(level) for level in levels) > LEVEL_NOISES * max(noises)
             agrees = above_noise and _is_at_once(values, row, levels[1] - levels[0])
         else:
-            agrees = abs(ratio) >= NOISE_CHANGES * u_noise and _lasts(values, row, factor)
+            agrees = abs(ratio) >= NOISE_CHANGES * u_noise and _persists(values, row, factor)
         if agrees:
             yield Change(row, factor, size)
 
 
-def _lasts(values: Array, row: int, factor: float) -> bool:
+def _persists(values: Array, row: int, factor: float) -> bool:
     """Whether the noise of all readings after a row, of (n,), over that of all before it is a factor."""
-    return bool(abs(np.log(spread_of(values[row + GUARD :]) / spread_of(values[: row - GUARD]) / factor)) < LASTS)
+    return bool(
+        abs(np.log(spread_of(values[row + GUARD :]) / spread_of(values[: row - GUARD]) / factor)) < MAX_LOG_DIFFERENCE
+    )
 
 
 def beside(values: Array, row: int) -> tuple[Array, Array]:
