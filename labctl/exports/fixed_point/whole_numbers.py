@@ -22,7 +22,7 @@ Whole = NDArray[np.int64]
 Q31, Q16, POSITION_BITS, RECIPROCAL_BITS = 31, 16, 24, 32
 MAX_Q31 = 2**31 - 1
 #: Highest order of the polynomials. The lowest order within TARGET_DEVIATION of the calibration is taken; the highest
-#: has to be within MAX_DEVIATION, both as shares of the full scale; this also limits what several axes cause only together.
+#: has to be within MAX_DEVIATION, as does what several axes cause only together. Both are shares of the full scale.
 MAX_ORDER, TARGET_DEVIATION, MAX_DEVIATION = 11, 2.0**-30, 2.0**-18
 #: Coefficients of an axis may add up to this share of the full scale: no sum and no product leaves its 64 bits.
 MAX_FILL = 0.99
