@@ -165,7 +165,7 @@ def test_the_reference_of_the_command_line_has_a_declared_act() -> None:
     written = get_docs_for_click(obj=get_command(app), ctx=Context(get_command(app)), name="labctl")
     entry = written.partition("### `labctl campaign hold`")[2].partition("### ")[0]
     assert "* `--reason TEXT`: Reason for this action; it is recorded.  [default: held from the command line]" in entry
-    assert written.index("`labctl campaign hold`") < written.index("### `labctl campaign draft`")
+    assert written.index("`labctl campaign hold`") < written.index("### `labctl campaign abort`")
 
 
 def test_every_act_has_a_command_that_is_made_or_written() -> None:

@@ -35,4 +35,4 @@ class CampaignCommand:
     default_campaign: DefaultCampaign = "none"  #: none: the number has to be given
     request: Callable[[Values], Values] = dict  #: the fields of the request, and of its address, from the options
     runs_here: bool = False  #: without a service the campaign runs in the terminal until it ends; exit 1 if it failed
-    before: str = "draft"  #: the command before which it stands in the help
+    before: str = "abort"  #: the command before which it stands in the help

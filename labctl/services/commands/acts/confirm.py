@@ -78,6 +78,7 @@ CONFIRM = CampaignAct(
         options=(QUESTION, CAMPAIGN, DECLINE, AGAIN, "by"),
         default_campaign="newest",
         request=_request,
+        before="draft",
     ),
 )
 CONFIRM_PROMPT = CONFIRM.command

@@ -35,7 +35,6 @@ PAUSE = CampaignAct(
     command_line=CampaignCommand(
         help="Pause a running campaign after the present data set; the bench is still monitored.",
         defaults={"reason": "paused from the command line"},
-        before="abort",
     ),
     in_service=_in_service,
     in_foreground=_in_foreground,

@@ -56,6 +56,5 @@ RESUME = CampaignAct(
         options=(CAMPAIGN, "bench", POWER, "speed", "wire_log", "by"),
         default_campaign="resumable",
         runs_here=True,
-        before="abort",
     ),
 )
