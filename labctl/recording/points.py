@@ -57,11 +57,11 @@ def pieces(columns: Columns, motion: Motion = "rates") -> NDArray[np.int64]:
         for begin, end in zip(starts, np.append(starts[1:], len(dataset)), strict=True):
             if is_turn[begin]:  # a part of a turn is no known angle
                 continue
-            since_s, here = t_s[begin:end] - t_s[begin], None if warm is None else warm[begin:end]
+            since_s, warm_rows = t_s[begin:end] - t_s[begin], None if warm is None else warm[begin:end]
             if motion == "rest":
-                piece[begin:end] = _windows(since_s, here)
-            elif here is not None:
-                piece[begin:end] = _minutes(since_s, here)
+                piece[begin:end] = _windows(since_s, warm_rows)
+            elif warm_rows is not None:
+                piece[begin:end] = _minutes(since_s, warm_rows)
     changes = (dataset[1:] != dataset[:-1]) | (piece[1:] != piece[:-1])
     return np.concatenate([[0], np.cumsum(changes)]).astype(np.int64)
 

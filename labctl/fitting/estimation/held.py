@@ -283,7 +283,7 @@ def _require_reference(channels: Channels, model: ErrorModel, axis: str, fixed: 
         return
     shifted_model = replace(model, reference=Reference(model.reference.temperature_c + STEP_K))
     pairs = zip(model.columns(channels, axis), shifted_model.columns(channels, axis), strict=True)
-    centred = [effect for (effect, here), (_, there) in pairs if not np.array_equal(here.values, there.values)]
+    centred = [effect for (effect, column), (_, shifted) in pairs if not np.array_equal(column.values, shifted.values)]
     if centred:
         raise BadInput(
             f"{fixed.name}: effect {centred[0]} is centred on a reference temperature, on which the other coefficients "

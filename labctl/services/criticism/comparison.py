@@ -50,24 +50,24 @@ def lines_over(
     level = rate_levels(rate)
     rates = np.unique(level_centres(rate, level))
     over_rate, over_temperature = [], []
-    for there in np.unique(position).tolist():
+    for up_axis in np.unique(position).tolist():
         for axis in (axis for axis in data.info.axes if axis in fitted.axes):
             warm = channels.temperature_c(axis)
             temperatures = np.unique(level_centres(warm, temperature_rows(warm, position, level)))
 
-            def error(across: Array, down: Array, *, by_rate: bool, axis: str = axis, there: str = there) -> Any:
+            def error(across: Array, down: Array, *, by_rate: bool, axis: str = axis, up_axis: str = up_axis) -> Any:
                 grid = np.meshgrid(across, down)
                 r, t = grid if by_rate else grid[::-1]
-                return _rounded(_on_grid(fitted, axis, there, r, t, held, up_dps))
+                return _rounded(_on_grid(fitted, axis, up_axis, r, t, held, up_dps))
 
             lines, at = _picked(temperatures), _along(rates)
             over_rate.append(ModelLines(
-                axis=axis, position=there, level=lines.tolist(), levels=len(temperatures), at=at.tolist(),
+                axis=axis, position=up_axis, level=lines.tolist(), levels=len(temperatures), at=at.tolist(),
                 error_dps=error(at, lines, by_rate=True),
             ))  # fmt: skip
             lines, at = _picked(rates, keep=0.0), _along(temperatures)
             over_temperature.append(ModelLines(
-                axis=axis, position=there, level=lines.tolist(), levels=len(rates), at=at.tolist(),
+                axis=axis, position=up_axis, level=lines.tolist(), levels=len(rates), at=at.tolist(),
                 error_dps=error(at, lines, by_rate=False),
             ))  # fmt: skip
     return over_rate, over_temperature
