@@ -85,11 +85,11 @@ def whitened(
 
 
 def _expected_of_one(
-    ordered: NDArray[np.float64], before: NDArray[np.float64], share: NDArray[np.float64]
+    ordered: NDArray[np.float64], before: NDArray[np.float64], shares: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return what is expected of each row (m, k) from those before it, (1, m, k): the solution of a banded system."""
     band = np.ones((2, len(ordered)))
-    band[1, :-1] = -share[0, 1:]
+    band[1, :-1] = -shares[0, 1:]
     pull = np.zeros_like(ordered, order="F")
     pull[1:] = before[0, 1:, None] * ordered[:-1]
     expected, _ = dtbtrs(band, pull, uplo="L", diag="U", overwrite_b=True)

@@ -33,12 +33,12 @@ def move_covariance(
     by_rest[rows, :, before, :3] = tilt[0] * accelerometer.u_rest_g[before][:, None, None]
     by_rest[rows, :, after, :3] = tilt[1] * accelerometer.u_rest_g[after][:, None, None]
     u_bias = np.radians(bias.u_rest_dps)
-    by_turn = (
+    by_bias = (
         equations.by_turn @ equations.rotations.by_bias_before,
         equations.by_turn @ equations.rotations.by_bias_after,
     )
-    by_rest[rows, :, before, 3:] += by_turn[0] * u_bias[before][:, None, :]
-    by_rest[rows, :, after, 3:] += by_turn[1] * u_bias[after][:, None, :]
+    by_rest[rows, :, before, 3:] += by_bias[0] * u_bias[before][:, None, :]
+    by_rest[rows, :, after, 3:] += by_bias[1] * u_bias[after][:, None, :]
     shared = by_rest.reshape(2 * m, -1)
     common = by_accelerometer(moves, accelerometer, equations)
     total = shared @ shared.T + common @ accelerometer.covariance @ common.T
