@@ -1,20 +1,20 @@
-"""How a unit is set, as it says itself, beside what it should be: filter, compensation, range, firmware and so on."""
+"""The configuration that a unit reports, compared with the stated one: filter, compensation, range, firmware ..."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-#: What a unit says of itself that does not change its readings.
+#: Reported values that do not affect the readings.
 IDENTITY = frozenset({"serial", "adapter"})
 
 
 def configuration_of(reported: Mapping[str, str]) -> dict[str, str]:
-    """Return how a unit is set, by what it says of itself; empty where it says nothing."""
+    """Return the configuration of a unit from its reported values; empty where it reports none."""
     return {name: value for name, value in reported.items() if name not in IDENTITY}
 
 
 def not_as_stated(stated_settings: Mapping[str, str], reported: Mapping[str, str]) -> list[str]:
-    """Return where a unit is not set as it is stated to be, one phrase each; what it does not say counts."""
+    """Return the differences between stated and reported configuration, one phrase each; a missing value is one."""
     configuration = configuration_of(reported)
     return [
         f"{name} is {configuration[name]} instead of {value}"
@@ -26,7 +26,7 @@ def not_as_stated(stated_settings: Mapping[str, str], reported: Mapping[str, str
 
 
 def changed(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, tuple[str, str]]:
-    """Return name -> setting before and now, of those that were reported both times and differ."""
+    """Return name -> (previous, present) setting, of those that were reported both times and differ."""
     then, configuration_now = configuration_of(before), configuration_of(now)
     return {
         name: (then[name], configuration_now[name])

@@ -32,10 +32,10 @@ class Position:
     def of(text: str) -> Position:
         """Return the position that a text names; raises ValueError where it names none."""
         match = _FORM.fullmatch(text)
-        turned = tuple(int(group or 0) for group in match.groups()[2:]) if match else (0, 0)
-        if match is None or max(turned) >= 360:
+        angles_deg = tuple(int(group or 0) for group in match.groups()[2:]) if match else (0, 0)
+        if match is None or max(angles_deg) >= 360:
             raise ValueError(f"{text!r} is not a position (expected {EXPECTED})")
-        return Position(match[2], -1.0 if match[1] else 1.0, *turned)
+        return Position(match[2], -1.0 if match[1] else 1.0, *angles_deg)
 
     @property
     def end(self) -> str:
@@ -55,12 +55,12 @@ class Position:
     @property
     def in_words(self) -> str:
         """The position in words: which axis points up, and what is turned by how much."""
-        turned = [
+        turns_text = [
             f"the {role} turned by {angle} deg"
             for role, angle in (("unit", self.unit_deg), ("fixture", self.fixture_deg))
             if angle
         ]
-        return ", ".join([f"{self.end} up", *turned])
+        return ", ".join([f"{self.end} up", *turns_text])
 
     def __str__(self) -> str:
         if self.fixture_deg:

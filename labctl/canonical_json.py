@@ -23,8 +23,8 @@ def hash_of(document: JsonObject) -> str:
 def canonical_and_hash(document: JsonObject) -> tuple[bytes, str]:
     """Return `canonical` and `hash_of` of a document, written once for both."""
     before, after = _around_hash(document)
-    own = canonical({"hash": document["hash"]})[1:-1] if "hash" in document else b""
-    return _joined(before, own, after), hashlib.sha256(_joined(before, after)).hexdigest()
+    hash_entry = canonical({"hash": document["hash"]})[1:-1] if "hash" in document else b""
+    return _joined(before, hash_entry, after), hashlib.sha256(_joined(before, after)).hexdigest()
 
 
 def with_own_hash(document: JsonObject) -> tuple[bytes, str]:

@@ -239,7 +239,7 @@ class Client:
     def watch(self, campaign: int, *, after: int = 0) -> Iterator[EventResponse | CampaignResponse]:
         """Yield the events of a campaign whose id is above `after`, and its status when it changes, until it ends.
 
-        It also ends when the service stops; the state in the last status tells. A connection that breaks is opened
+        It also ends when the service stops, as the state in the last status shows. A connection that breaks is opened
         again after 1, 2, 4, 8 and 15 s and goes on behind the last event. Raises StoreError when the service stays
         silent.
         """
@@ -289,7 +289,7 @@ class Client:
         return self._connection.request("POST", path, json=request.model_dump(mode="json", exclude_unset=True))
 
     def _events(self, campaign: int, after: int) -> Iterator[EventResponse | CampaignResponse]:
-        """Yield what one connection to the event stream tells."""
+        """Yield the updates of one connection to the event stream."""
         path = f"/api/campaigns/{campaign}/events"
         headers = {"Last-Event-ID": str(after)} if after else {}
         with connect_sse(self._connection.http, "GET", path, headers=headers, timeout=SILENT_S) as source:

@@ -33,10 +33,10 @@ def error_per_turn(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]
 
 def turn_errors(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]) -> list[float | None]:
     """Return the error after one turn, deg, of n data sets; None below the least rate, or without an error."""
-    there = (np.abs(rate_dps) >= MIN_RATE_DPS) & np.isfinite(error_dps)
-    turned = np.full(len(rate_dps), np.nan)
-    turned[there] = error_per_turn(error_dps[there], rate_dps[there])
-    return [float(value) if ok else None for value, ok in zip(turned, there, strict=True)]
+    is_known = (np.abs(rate_dps) >= MIN_RATE_DPS) & np.isfinite(error_dps)
+    per_turn_deg = np.full(len(rate_dps), np.nan)
+    per_turn_deg[is_known] = error_per_turn(error_dps[is_known], rate_dps[is_known])
+    return [float(value) if ok else None for value, ok in zip(per_turn_deg, is_known, strict=True)]
 
 
 def bias_at_rest(
@@ -52,12 +52,14 @@ def bias_at_rest(
     """
     rest = np.abs(rate_dps) < AT_REST_DPS
     bias = np.full(len(error_dps), np.nan)
-    for there in np.unique(position):
-        here = position == there
-        from_ = rest & here if np.any(rest & here) else rest
+    for up_axis in np.unique(position):
+        in_position = position == up_axis
+        from_ = rest & in_position if np.any(rest & in_position) else rest
         if np.any(from_):
             warm, which = np.unique(temperature_c[from_], return_inverse=True)
-            bias[here] = np.interp(temperature_c[here], warm, np.bincount(which, error_dps[from_]) / np.bincount(which))
+            bias[in_position] = np.interp(
+                temperature_c[in_position], warm, np.bincount(which, error_dps[from_]) / np.bincount(which)
+            )
     return bias
 
 

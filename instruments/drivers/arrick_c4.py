@@ -160,8 +160,8 @@ class ArrickC4:
         self._counted = False
         self._abort_and_wait()
         move = active.move
-        turned = active.steady_elapsed_s(self._clock.now_s()) * move.step_hz
-        self._steps += math.copysign(turned, move.steps)
+        steps_done = active.steady_elapsed_s(self._clock.now_s()) * move.step_hz
+        self._steps += math.copysign(steps_done, move.steps)
 
     def time_run(self, rate_dps: float, steady_s: float, wait: Wait) -> TimedRun:
         """Measure how long a run at `rate_dps`, deg/s, takes that is steady for `steady_s` by the nominal clock.

@@ -23,10 +23,10 @@ def refuse_other_serial(device: str, identification: str, wanted: str, *, holds_
     `holds_serial`: the identification is known to hold it, as that of a request or an attribute that the bench file
     or a description names. Else it counts only where it has the form of an answer to `*IDN?`.
     """
-    own = serial_in(identification)
-    if not wanted or not (holds_serial or own):
+    reported = serial_in(identification)
+    if not wanted or not (holds_serial or reported):
         return
-    if own == wanted or re.search(rf"(?<![\w-]){re.escape(wanted)}(?![\w-])", identification):
+    if reported == wanted or re.search(rf"(?<![\w-]){re.escape(wanted)}(?![\w-])", identification):
         return
     raise WrongInstrument(
         device,

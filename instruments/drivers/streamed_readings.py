@@ -145,12 +145,12 @@ class StreamedReadings:
 
     def _new_device_time(self) -> DeviceClock | None:
         """Return the unit's own time: by pulses, by its time stamps, or by its counter; None without any."""
-        own, pulses = self._new_own_time(), self._law.pulses
+        device_time, pulses = self._new_own_time(), self._law.pulses
         if pulses is None:
-            return own
+            return device_time
         if pulses.tick_s:
             return PulseTime(pulses.tick_s, pulses.interval_s)
-        return None if own is None else CountedPulseTime(own, pulses.interval_s)
+        return None if device_time is None else CountedPulseTime(device_time, pulses.interval_s)
 
     def _new_own_time(self) -> DeviceTime | None:
         if (ticks := self._law.stamps) is not None:
@@ -197,10 +197,10 @@ class StreamedReadings:
 
     def _ticks(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64] | None:
         """Return what each reading says of the unit's own time, (n,), or (n, 2) with the number of pulses."""
-        own, pulses = self._law.stamps or self._law.counter, self._law.pulses
-        if own is None and pulses is None:
+        time_field, pulses = self._law.stamps or self._law.counter, self._law.pulses
+        if time_field is None and pulses is None:
             return None
-        fields = [each.field for each in (own, pulses) if each is not None]
+        fields = [each.field for each in (time_field, pulses) if each is not None]
         if pulses is not None and pulses.tick_s:
             fields = [pulses.field]
         columns = [found.values[field][kept].astype(np.int64) for field in fields]

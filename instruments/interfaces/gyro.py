@@ -58,10 +58,10 @@ class Readings:
 
     def after(self, before: Readings) -> Readings:
         """Return these readings after those that came before them, with the counts of both."""
-        own = (self.device_s, self.arrival_s), (before.device_s, before.arrival_s)
+        time_pairs = (self.device_s, self.arrival_s), (before.device_s, before.arrival_s)
         device_s, arrival_s = (
             None if late is None or early is None else np.concatenate([early, late])
-            for late, early in zip(*own, strict=True)
+            for late, early in zip(*time_pairs, strict=True)
         )
         return Readings(
             np.concatenate([before.t_s, self.t_s]),

@@ -87,8 +87,8 @@ class CountedPulseTime:
     pulse; then `interval_s` from pulse to pulse, and that of `own` between them.
     """
 
-    def __init__(self, own: DeviceTime, interval_s: float) -> None:
-        self._own, self._interval_s = own, interval_s
+    def __init__(self, device_time: DeviceTime, interval_s: float) -> None:
+        self._own, self._interval_s = device_time, interval_s
         self._newest: tuple[float, int] | None = None  #: own time and count of the newest reading
         self._edge: tuple[float, float] | None = None  #: own times between which the last pulse came
         self._edge_s = 0.0  #: its device time

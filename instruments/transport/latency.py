@@ -1,4 +1,4 @@
-"""Latency of USB adapters: FTDI chips hold received bytes back until a timer ends, 16 ms as delivered.
+"""Latency of USB adapters: FTDI chips hold received bytes until a timer expires, 16 ms by default.
 
 Linux sets that timer to 1 ms for a port in its low-latency mode, which pyserial asks for (TIOCSSERIAL).
 """
@@ -11,7 +11,7 @@ from pathlib import Path
 import serial
 
 SYS_TTY = Path("/sys/class/tty")
-#: What a port that tells nothing of itself is taken for: an FTDI adapter as delivered, s.
+#: Latency of a port that does not report its own: the default of FTDI adapters, s.
 USUAL_S = 0.016
 
 
@@ -32,6 +32,6 @@ def latency_timer_ms(name: str) -> int | None:
 
 
 def latency_s(url: str) -> float:
-    """Return by how much replies of a port may be late, s: the adapter's timer, or that of an adapter as delivered."""
+    """Return the largest delay of replies by the adapter of a port, s: its timer, or the default one."""
     found_ms = latency_timer_ms(Path(url).resolve().name)
     return USUAL_S if found_ms is None else 1e-3 * found_ms

@@ -34,8 +34,8 @@ def remedy(url: str, error: Exception) -> str:
             return f"which other process has it open: {', '.join(users)}; end that process"
         return f"which other process has it open: run `fuser -v {url}`, and end that process"
     if number == errno.ENOENT:
-        there = sorted(str(path) for path in BY_ID.glob("*")) if BY_ID.is_dir() else []
-        found_text = f"; the ports are {', '.join(there)}" if there else f"; `ls {BY_ID}` lists all ports"
+        ports = sorted(str(path) for path in BY_ID.glob("*")) if BY_ID.is_dir() else []
+        found_text = f"; the ports are {', '.join(ports)}" if ports else f"; `ls {BY_ID}` lists all ports"
         return f"the cable and the port's name{found_text}"
     return "the cable, the name of the port, and which other process uses the port"
 
@@ -54,10 +54,10 @@ def users_of(url: str) -> list[str]:
 
     The process that made a pseudo-terminal has both of its ends open: it is the device, and no other user of the port.
     """
-    real, own = os.path.realpath(url), str(os.getpid())
+    real, own_pid = os.path.realpath(url), str(os.getpid())
     users = []
     for process in PROCESSES.glob("[0-9]*"):
-        if process.name == own:
+        if process.name == own_pid:
             continue
         try:
             open_files = {os.path.realpath(link) for link in (process / "fd").iterdir()}

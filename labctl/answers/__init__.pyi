@@ -25,7 +25,6 @@ from labctl.answers.admin import (
     SignedResponse as SignedResponse,
 )
 from labctl.answers.base import (
-    FieldT as FieldT,
     LongText as LongText,
     Request as Request,
     ResponseModel as ResponseModel,
@@ -238,7 +237,6 @@ from labctl.answers.fixed_coefficients import (
 from labctl.answers.inspection import (
     CourseJson as CourseJson,
     DataWarning as DataWarning,
-    FindingJson as FindingJson,
     InspectionResponse as InspectionResponse,
     MarkJson as MarkJson,
     Part as Part,
@@ -256,9 +254,11 @@ from labctl.answers.joint import (
 from labctl.answers.json_object import JsonDocument as JsonDocument, JsonObject as JsonObject
 from labctl.answers.kept_answers import (
     ChangeFigures as ChangeFigures,
+    FitFigures as FitFigures,
     KeptAnswer as KeptAnswer,
     KeptChange as KeptChange,
     KeptFit as KeptFit,
+    KeptVersion as KeptVersion,
 )
 from labctl.answers.ladder import LadderResponse as LadderResponse, LadderRow as LadderRow
 from labctl.answers.live import (

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, TypeVar, cast
+from typing import Annotated, ClassVar
 
 from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationInfo, field_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from labctl.texts import cleaned, control_character
-
-FieldT = TypeVar("FieldT")
 
 #: Description of `by_key` and its like in responses.
 BY_KEY = "Name of the API key that acted; null: none did, the person's name is as typed."
@@ -57,10 +55,10 @@ class Request(BaseModel):
 
     @field_validator("*")
     @classmethod
-    def _without_control_characters(cls, value: FieldT, info: ValidationInfo) -> FieldT:
+    def _without_control_characters(cls, value: object, info: ValidationInfo) -> object:
         name = info.field_name or ""
         if cls.cleans_texts and isinstance(value, str):
-            return cast(FieldT, cleaned(value))
+            return cleaned(value)
         lines = any(isinstance(each, SeveralLines) for each in cls.model_fields[name].metadata)
         for text in _texts(value):
             if found := control_character(text, lines=lines):

@@ -6,30 +6,30 @@ from collections.abc import Callable
 
 from fastapi import APIRouter
 
+from labctl.answers.base import Request
 from labctl.answers.campaigns import CampaignResponse
 from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
-from labctl.services.commands.acts.campaign_act import BodyT, CampaignAct
-from labctl.services.commands.requests import ToCampaign
+from labctl.services.commands.acts.campaign_act import AskedT, CampaignAct
 from labctl.services.lab_service import LabService
 
 
-def add_act_route(router: APIRouter, act: CampaignAct[BodyT]) -> None:
+def add_act_route(router: APIRouter, act: CampaignAct[AskedT]) -> None:
     """Route an act; one that is urgent is executed in threads that no other requests fill."""
 
-    def perform(campaign: int, request: BodyT, service: LabService) -> CampaignResponse:
-        return service.execute(act.command, ToCampaign(campaign, request))
+    def perform(campaign: int, request: Request, service: LabService) -> CampaignResponse:
+        return service.execute(act.command, act.asked(campaign, request))
 
     if act.is_urgent:
 
         async def urgent(
-            campaign: int, request: BodyT, service: ServiceDep, control: ControlPoolDep
+            campaign: int, request: Request, service: ServiceDep, control: ControlPoolDep
         ) -> CampaignResponse:
             return await control.run(lambda: perform(campaign, request, service))
 
         endpoint: Callable[..., object] = urgent
     else:
 
-        def usual(campaign: int, request: BodyT, service: ServiceDep) -> CampaignResponse:
+        def usual(campaign: int, request: Request, service: ServiceDep) -> CampaignResponse:
             return perform(campaign, request, service)
 
         endpoint = usual

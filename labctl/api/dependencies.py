@@ -6,7 +6,7 @@ import asyncio
 import contextvars
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Annotated, TypeVar, cast
+from typing import Annotated, TypeVar
 
 from fastapi import APIRouter, Depends, Request, params
 from fastapi.datastructures import Default
@@ -22,7 +22,8 @@ ResultT = TypeVar("ResultT")
 
 async def get_service(request: Request) -> LabService:
     """Return the service that this application serves; without `async` each request would first go to a thread."""
-    return cast(LabService, request.app.state.service)
+    service: LabService = request.app.state.service
+    return service
 
 
 ServiceDep = Annotated[LabService, Depends(get_service)]
@@ -46,7 +47,8 @@ class ControlPool:
 
 async def get_control_pool(request: Request) -> ControlPool:
     """Return the threads that acts on campaigns are executed in."""
-    return cast(ControlPool, request.app.state.control_pool)
+    control: ControlPool = request.app.state.control_pool
+    return control
 
 
 ControlPoolDep = Annotated[ControlPool, Depends(get_control_pool)]

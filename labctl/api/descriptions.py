@@ -40,7 +40,7 @@ def typed_dictionaries() -> dict[str, dict[str, str]]:
     Each is there under its name and under the one that an OpenAPI document gives it where two classes share a name.
     """
     kinds: dict[str, type] = {}
-    own: dict[str, dict[str, str]] = {}
+    own_fields: dict[str, dict[str, str]] = {}
     for found in pkgutil.walk_packages(answers.__path__, f"{answers.__name__}."):
         module = import_module(found.name)
         classes = {
@@ -49,8 +49,8 @@ def typed_dictionaries() -> dict[str, dict[str, str]]:
         for name, kind in vars(module).items():
             if is_typeddict(kind) and kind.__module__ == module.__name__:
                 kinds[name] = kind
-                own[name] = _docstrings(classes[name]) if name in classes else _docs(kind)
-    described = {name: _with_inherited(kind, own) for name, kind in kinds.items()}
+                own_fields[name] = _docstrings(classes[name]) if name in classes else _docs(kind)
+    described = {name: _with_inherited(kind, own_fields) for name, kind in kinds.items()}
     return described | {f"{kinds[name].__module__.replace('.', '__')}__{name}": described[name] for name in described}
 
 
@@ -64,13 +64,13 @@ def _docs(kind: type) -> dict[str, str]:
     }
 
 
-def _with_inherited(kind: type, own: dict[str, dict[str, str]]) -> dict[str, str]:
+def _with_inherited(kind: type, own_fields: dict[str, dict[str, str]]) -> dict[str, str]:
     """Return the descriptions of a typed dictionary's own fields, and of those of its bases."""
     found: dict[str, str] = {}
     for base in get_original_bases(kind):
         if is_typeddict(base):
-            found |= _with_inherited(base, own)
-    return found | own.get(kind.__name__, {})
+            found |= _with_inherited(base, own_fields)
+    return found | own_fields.get(kind.__name__, {})
 
 
 def _docstrings(node: ast.ClassDef) -> dict[str, str]:

@@ -205,9 +205,9 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         """Answer with a problem document if nothing else is being answered, and close."""
         cycle = self.cycle
         answering = cycle is not None and not cycle.response_complete
-        own = self.phase is Phase.BODY and not self.pipeline
+        is_of_request = self.phase is Phase.BODY and not self.pipeline
         silent = self.phase is Phase.HEADERS and self._received == 0 and status is TIMED_OUT
-        if silent or (answering and not (own and not cycle.response_started)):
+        if silent or (answering and not (is_of_request and not cycle.response_started)):
             self.cut()
             return
         self._disconnect()

@@ -259,8 +259,8 @@ def _results(parent: ET.Element, certificate: Certificate) -> None:
     for coefficient in certificate.coefficients:
         place_text = "" if coefficient.temperature_c is None else f" at {coefficient.temperature_c:g} °C"
         alone = "" if coefficient.has_standards or coefficient.u is None else ", u of the fit alone"
-        own = coefficient.name_text if coefficient.unit == "s" else coefficient.name
-        name = f"Axis {coefficient.axis}: {own}{place_text}{alone}"
+        coefficient_name = coefficient.name_text if coefficient.unit == "s" else coefficient.name
+        name = f"Axis {coefficient.axis}: {coefficient_name}{place_text}{alone}"
         quantity(element, name, [coefficient.value], coefficient.unit, u=coefficient.u)
     _budget(parent, certificate)
     for sensor in certificate.sensors:

@@ -1,9 +1,10 @@
-"""The commands of acts on a campaign, made from what each act says of itself and from the fields of its request."""
+"""The commands of acts on a campaign, made from what each act states of its command and from its request."""
 
 from __future__ import annotations
 
 import getpass
 import inspect
+from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,30 +14,34 @@ from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Database, Json
+from labctl.cli.options import BenchName, Database, Json, SimulatedSpeed, WireLogOnly
 from labctl.cli.output import print_json
-from labctl.cli.printing.campaigns import print_campaign
+from labctl.cli.printing.campaigns import print_campaign, print_end
 
 if TYPE_CHECKING:
     from typer._click.core import Command, Context
 
-    from labctl.services.commands.acts.campaign_act import BodyT, CampaignAct
+    from labctl.answers.campaigns import CampaignResponse
+    from labctl.services.commands.acts.campaign_act import AskedT, CampaignAct
+    from labctl.services.commands.acts.campaign_command import CampaignCommand, CommandOption, DefaultCampaign
 
 Id = Annotated[int, typer.Argument(metavar="ID", help="Number of the campaign.")]
 By = Annotated[
     str | None, typer.Option("--by", metavar="NAME", help="Name of the person; default: the user who is logged in.")
 ]
 Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason for this action; it is recorded.")]
-#: Fields of requests that have an option with words of its own; that of another field has the field's description.
-_OPTIONS: dict[str, Any] = {"reason": Reason, "by": By}
-#: The commands of acts stand before this one.
-NEXT = "resume"
+#: Options that several commands have in the same words.
+_SHARED: dict[str, Any] = {
+    "reason": Reason, "by": By, "bench": BenchName, "speed": SimulatedSpeed, "wire_log": WireLogOnly,
+}  # fmt: skip
 
 
-def person(by: str | None) -> str:
+def person(by: object) -> str:
     """Return who acts: the given name, or else the user who is logged in."""
+    if isinstance(by, str) and by:
+        return by
     try:
-        return by or getpass.getuser()
+        return getpass.getuser()
     except (KeyError, OSError):
         return "a person"
 
@@ -49,44 +54,43 @@ class CampaignGroup(TyperGroup):
 
     def list_commands(self, ctx: Context) -> list[str]:
         """Return the names of all commands, in the order of the help."""
-        own = super().list_commands(ctx)
-        place = own.index(NEXT) if NEXT in own else len(own)
-        return [*own[:place], *(name for name in _made() if name not in own), *own[place:]]
+        names = super().list_commands(ctx)
+        for act, line in _declared():
+            names.insert(names.index(line.before), act.name)
+        return names
 
     def get_command(self, ctx: Context, cmd_name: str) -> Command | None:
         """Return a command by its name; None: there is none."""
-        return super().get_command(ctx, cmd_name) or _made().get(cmd_name)
+        written = super().get_command(ctx, cmd_name)
+        return written or next((command_of(act, line) for act, line in _declared() if act.name == cmd_name), None)
 
 
-def _made() -> dict[str, TyperCommand]:
-    """Return the command of each act that is not written by hand, by name."""
+def _declared() -> list[tuple[CampaignAct[Any], CampaignCommand]]:
+    """Return each act whose command is not written by hand, and what it states of the command."""
     from labctl.services.commands.acts import catalogue
 
-    return {act.name: command_of(act) for act in catalogue.CAMPAIGN_ACTS if act.command_help}
+    return [(act, act.command_line) for act in catalogue.CAMPAIGN_ACTS if act.command_line is not None]
 
 
 @cache
-def command_of(act: CampaignAct[BodyT]) -> TyperCommand:
-    """Return the command of an act: the campaign, an option for each field of the request, --json and --database."""
+def command_of(act: CampaignAct[AskedT], line: CampaignCommand) -> TyperCommand:
+    """Return the command of an act: the campaign, the options that it states, --json and --database."""
 
-    def perform(campaign: int, as_json: bool, database: str | None, **given: object) -> None:
-        from labctl.services.commands.open import execute
-        from labctl.services.commands.requests import ToCampaign
-
+    def perform(campaign: int | None, as_json: bool, database: str | None, **given: object) -> None:
         with one_clear_line():
-            if "by" in given:
-                by = given["by"]
-                given["by"] = person(by if isinstance(by, str) else None)
-            answer = execute(database, act.command, ToCampaign(campaign, act.body.model_validate(given)))
-        print_json(answer) if as_json else print_campaign(answer)
+            number = _campaign(line.default_campaign, database, campaign)
+            answer = _send(act, line, number, given, database, quiet=as_json)
+        if line.runs_here:
+            print_end(answer, as_json=as_json)
+        else:
+            print_json(answer) if as_json else print_campaign(answer)
 
     parameters = [
-        _parameter("campaign", Id),
-        *(_option(act, name, field) for name, field in act.body.model_fields.items()),
+        *_options(act, line),
         _parameter("as_json", Json, False),
         _parameter("database", Database, None),
     ]
-    perform.__name__, perform.__doc__ = act.name, act.command_help
+    perform.__name__, perform.__doc__ = act.name, line.help
     perform.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # what typer reads
     perform.__annotations__ = {each.name: each.annotation for each in parameters}
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich")
@@ -96,15 +100,77 @@ def command_of(act: CampaignAct[BodyT]) -> TyperCommand:
     return made
 
 
-def _option(act: CampaignAct[BodyT], name: str, field: FieldInfo) -> inspect.Parameter:
-    """Return the option of a field; what the act states comes before the default of the request."""
-    kind = _OPTIONS.get(name)
+def _campaign(default: DefaultCampaign, database: str | None, given: int | None) -> int | None:
+    """Return the number of the campaign that is meant. Raises NotFound."""
+    from labctl.services.commands.open import campaign_to_resume, current_status
+
+    if default == "resumable":
+        return campaign_to_resume(database, given)
+    return given if given is not None or default == "none" else current_status(database, None).id
+
+
+def _send(
+    act: CampaignAct[AskedT],
+    line: CampaignCommand,
+    campaign: int | None,
+    given: Mapping[str, object],
+    database: str | None,
+    *,
+    quiet: bool,
+) -> CampaignResponse:
+    """Have an act carried out: what the options give is a field of its request, or else of the address."""
+    from labctl.services.commands.open import execute
+
+    named = {**given, "by": person(given["by"])} if "by" in given else given
+    values = line.request(named)
+    body = act.body.model_validate({name: value for name, value in values.items() if name in act.body.model_fields})
+    address = {name: value for name, value in values.items() if name not in act.body.model_fields}
+    terminal = None
+    if line.runs_here:
+        from labctl.cli.campaign_terminal import campaign_terminal
+
+        terminal = campaign_terminal(quiet=quiet)
+    return execute(database, act.command, act.asked(campaign, body, **address), terminal)
+
+
+def _options(act: CampaignAct[AskedT], line: CampaignCommand) -> list[inspect.Parameter]:
+    """Return the parameters of a command for its campaign and its options, in the order of the help."""
+    fields = act.body.model_fields
+    options = [
+        _of_name(option, fields.get(option), line.defaults) if isinstance(option, str) else _of_words(option)
+        for option in line.options or tuple(fields)
+    ]
+    has_campaign = any(each.name == "campaign" for each in options)
+    return options if has_campaign else [_parameter("campaign", Id), *options]
+
+
+def _of_words(option: CommandOption) -> inspect.Parameter:
+    """Return the parameter of an option with words of its own."""
+    kind = (
+        typer.Argument(metavar=option.metavar, help=option.help)
+        if option.is_argument
+        else typer.Option(_flag(option.name), metavar=option.metavar, help=option.help)
+    )
+    default = inspect.Parameter.empty if option.default is ... else option.default
+    return _parameter(option.name, Annotated[option.kind, kind], default)
+
+
+def _of_name(name: str, field: FieldInfo | None, defaults: Mapping[str, object]) -> inspect.Parameter:
+    """Return the parameter of a field of the request, or of an option that several commands have.
+
+    What the act states comes before the default of the request.
+    """
+    kind = _SHARED.get(name)
     if kind is None:
-        kind = Annotated[field.annotation, typer.Option(f"--{name.replace('_', '-')}", help=field.description)]
-    default = inspect.Parameter.empty if field.is_required() else field.get_default()
-    if name == "by":
-        default = None  # the user who is logged in
-    return _parameter(name, kind, act.command_defaults.get(name, default))
+        assert field is not None, f"option {name}: neither a field of the request nor an option of several commands"
+        kind = Annotated[field.annotation, typer.Option(_flag(name), help=field.description)]
+    default = None if field is None or name == "by" else field.get_default()  # by: the user who is logged in
+    required = field is not None and field.is_required() and name != "by"
+    return _parameter(name, kind, defaults.get(name, inspect.Parameter.empty if required else default))
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def _parameter(name: str, kind: Any, default: object = inspect.Parameter.empty) -> inspect.Parameter:

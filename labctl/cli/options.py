@@ -50,6 +50,12 @@ BenchName = Annotated[
     str | None,
     typer.Option("--bench", metavar="FILE", help="Bench file, or the name of a bench that ships with labctl."),
 ]
+SimulatedSpeed = Annotated[
+    float | None,
+    typer.Option(
+        "--speed", metavar="X", help="Speed of a simulated bench: X times real time; default: as fast as possible."
+    ),
+]
 CampaignId = Annotated[
     int | None, typer.Argument(metavar="ID", help="Number of the campaign; default: the newest campaign.")
 ]

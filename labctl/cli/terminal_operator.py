@@ -35,8 +35,8 @@ class TerminalOperator:
         A bench with a unit handler asks no questions.
         """
         if isinstance(operator, HumanOperator):
-            here = copy_context()  # in the name of the user who gave the command
-            threading.Thread(target=here.run, args=(self._serve, operator, note), daemon=True).start()
+            caller_context = copy_context()  # in the name of the user who gave the command
+            threading.Thread(target=caller_context.run, args=(self._serve, operator, note), daemon=True).start()
 
     def _serve(self, operator: HumanOperator, note: Callable[[str], None]) -> None:
         asked_prompt = ""

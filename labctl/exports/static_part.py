@@ -131,14 +131,14 @@ class Differences:
     """How far a formula is from a calibration over its whole range, deg/s, (axes,) each."""
 
     at_rest: Array  #: at true rate 0
-    own: Array  #: while the axis itself turns
+    turning: Array  #: while the axis itself turns
     cross: Array  #: by the other axes' rates, all of them together
     corners: Array  #: while all axes turn at once
 
     @property
     def together(self) -> float:
         """The largest difference of any axis, with all axes turning at any of their rates."""
-        return float(np.maximum(np.maximum(self.own, self.at_rest) + self.cross, self.corners).max())
+        return float(np.maximum(np.maximum(self.turning, self.at_rest) + self.cross, self.corners).max())
 
 
 def differences(part: StaticPart, formula: Callable[[Array, Array], Array]) -> Differences:
@@ -159,10 +159,10 @@ def differences(part: StaticPart, formula: Callable[[Array, Array], Array]) -> D
         raw = base.copy()
         raw[:, turning] = np.tile(part.outputs(), len(coarse_c))
         apart[:, turning] = np.abs(formula(raw, temperature_c) - part.rate(raw, temperature_c)).max(axis=0)
-    own = np.maximum(np.diag(apart), at_rest)
+    while_turning = np.maximum(np.diag(apart), at_rest)
     raw, temperature_c = all_turning(part)
     corners = np.abs(formula(raw, temperature_c) - part.rate(raw, temperature_c)).max(axis=0)
-    return Differences(at_rest, own, apart.sum(axis=1) - np.diag(apart), corners)
+    return Differences(at_rest, while_turning, apart.sum(axis=1) - np.diag(apart), corners)
 
 
 def all_turning(part: StaticPart) -> tuple[Array, Array]:

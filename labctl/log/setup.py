@@ -196,11 +196,11 @@ def _log_to(output: int | None, process: str, level: int, locations: Iterable[st
 @contextmanager
 def _foreign_records(handler: logging.Handler, level: int) -> Iterator[None]:
     """Take in what other libraries log while the block runs: their warnings and worse, more where more is asked for."""
-    root, own = logging.getLogger(), [logging.getLogger(name) for name in ("instruments", "procedures")]
-    before = {logger: logger.level for logger in (root, *own)}
+    root, package_loggers = logging.getLogger(), [logging.getLogger(name) for name in ("instruments", "procedures")]
+    before = {logger: logger.level for logger in (root, *package_loggers)}
     root.addHandler(handler)
     root.setLevel(logging.INFO if level <= logging.DEBUG else max(level, logging.WARNING))
-    for logger in own:
+    for logger in package_loggers:
         logger.setLevel(level)
     logging.captureWarnings(capture=True)
     try:

@@ -13,14 +13,14 @@ SCALE_MV = (21.997, 22.007, 22.000, 22.069, 22.078, 21.991)  #: mV per deg/s
 OFFSET_V = (2.428, 2.452, 2.477, 2.501, 2.525, 2.549)
 #: Data sheet: scale factor, mV per deg/s; at rest, V; full rate, deg/s; change of the offset, share of full rate per K.
 NOMINAL_MV, REST_V, FULL_DPS, OFFSET_SHARE_PER_K = 22.0, 2.5, 90.0, 0.001
-#: The offset is renewed so often, s, and the unit warmed up for so long, s.
-STOP_EVERY_S, WARM_UP_S = 120.0, 600.0
-#: Temperatures, deg C, that divide the offset's table into a steep and a flat part.
+#: Interval at which the offset is determined again, and warm-up time of the unit, s.
+OFFSET_EVERY_S, WARM_UP_S = 120.0, 600.0
+#: Ranges of temperature in which the offset changes steeply and slowly, deg C.
 STEEP_C, FLAT_C = (16.0, 23.0), (23.0, 45.0)
 
 
 def scale_deviation_pct(of: float = NOMINAL_MV) -> tuple[float, float]:
-    """Return the lowest and the highest scale factor of the table less `of`, %."""
+    """Return the lowest and the highest deviation of the printed scale factors from `of`, %."""
     deviation = 100.0 * (np.asarray(SCALE_MV) / of - 1.0)
     return float(deviation.min()), float(deviation.max())
 
@@ -28,8 +28,8 @@ def scale_deviation_pct(of: float = NOMINAL_MV) -> tuple[float, float]:
 def offset_slope(low_c: float, high_c: float) -> float:
     """Return the least-squares slope of the printed offsets between two temperatures, deg/s per K."""
     temperature_c = np.asarray(TEMPERATURES_C)
-    here = (temperature_c >= low_c) & (temperature_c <= high_c)
-    slope, _ = np.polyfit(temperature_c[here], np.asarray(OFFSET_V)[here], 1)
+    in_range = (temperature_c >= low_c) & (temperature_c <= high_c)
+    slope, _ = np.polyfit(temperature_c[in_range], np.asarray(OFFSET_V)[in_range], 1)
     return float(slope) / (NOMINAL_MV / 1000.0)
 
 

@@ -50,9 +50,9 @@ def rms_of(rates_dps: tuple[float, ...]) -> float:
     return float(np.sqrt(np.mean(np.square(rates_dps))))
 
 
-def gain_pct(turned: str, output: str, against: str) -> float:
+def gain_pct(turning: str, output: str, against: str) -> float:
     """Return by how much the proposed method is below another column of Table 4, per cent, by the printed errors."""
-    before, after = (TABLE_4[turned][output][TABLE_4_COLUMNS.index(name)] for name in (against, "proposed"))
+    before, after = (TABLE_4[turning][output][TABLE_4_COLUMNS.index(name)] for name in (against, "proposed"))
     return 100.0 * (1.0 - abs(after) / abs(before))
 
 
@@ -85,13 +85,13 @@ def _printed() -> Iterator[Printed]:
     yield Printed("cross_max", "Text", "largest cross-axis error before, at 400 deg/s", "deg/s", CROSS_DPS)
     yield from _cells(3, TABLE_3, TABLE_3_COLUMNS)
     yield from _cells(4, TABLE_4, TABLE_4_COLUMNS)
-    for turned, outputs in TABLE_4.items():
+    for turning, outputs in TABLE_4.items():
         for output in outputs:
             for against in TABLE_4_COLUMNS[:2]:
                 yield Printed(
-                    f"gain_{turned}_{output}_{against}", "Table 4, reductions",
-                    f"turning about {turned}, output {output}: proposed against {against}", "%",
-                    gain_pct(turned, output, against),
+                    f"gain_{turning}_{output}_{against}", "Table 4, reductions",
+                    f"turning about {turning}, output {output}: proposed against {against}", "%",
+                    gain_pct(turning, output, against),
                 )  # fmt: skip
     for axis in AXES:
         after = TABLE_3[axis][axis][3] if axis == MEANS else TABLE_4[axis][axis][2]
@@ -110,12 +110,12 @@ def _printed() -> Iterator[Printed]:
 def _cells(
     number: int, table: Mapping[str, Mapping[str, Sequence[float]]], columns: tuple[str, ...]
 ) -> Iterator[Printed]:
-    for turned, outputs in table.items():
-        means = " (a mean)" if number == 4 and turned == MEANS else ""
+    for turning, outputs in table.items():
+        means = " (a mean)" if number == 4 and turning == MEANS else ""
         for output, values in outputs.items():
             for column, value in zip(columns, values, strict=True):
-                quantity = f"turning about {turned}, output {output}: {column}{means}"
-                yield Printed(f"table{number}_{turned}_{output}_{column}", f"Table {number}", quantity, "deg/s", value)
+                quantity = f"turning about {turning}, output {output}: {column}{means}"
+                yield Printed(f"table{number}_{turning}_{output}_{column}", f"Table {number}", quantity, "deg/s", value)
 
 
 def _of_the_tables() -> Iterator[Contradiction]:
@@ -132,7 +132,7 @@ def _of_the_tables() -> Iterator[Contradiction]:
         "Recipe table1-x-table2 has the rates as printed, yang-23-rates has +-350 deg/s too; which this page uses.",
     )
     below = [
-        f"{turned} to {output}" for turned, outputs in TABLE_3.items()
+        f"{turning} to {output}" for turning, outputs in TABLE_3.items()
         for output, (_, _, mean, rms) in outputs.items() if rms < abs(mean)
     ]  # fmt: skip
     cells = sum(len(outputs) for outputs in TABLE_3.values())

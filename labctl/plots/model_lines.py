@@ -24,23 +24,23 @@ def error_over_rate(comparison: ComparisonResponse) -> go.Figure | None:
     if not columns.dataset:
         return None
     axes, positions = _in_order(columns.axis), _in_order(columns.position)
-    panels = [(axis, there) for axis in axes for there in positions]
+    panels = [(axis, position) for axis in axes for position in positions]
     low, high = min(columns.temperature_c), max(columns.temperature_c)
     figure = grid_of([f"output {a}, turning about {p}" for a, p in panels], len(positions), horizontal_spacing=0.09)
     pairs = list(zip(columns.axis, columns.position, strict=True))
     lines = {(line.axis, line.position): line for line in comparison.over_rate}
-    for panel, (axis, there) in enumerate(panels):
-        where, line = place(panel, len(positions)), lines[axis, there]
+    for panel, (axis, position) in enumerate(panels):
+        where, line = place(panel, len(positions)), lines[axis, position]
         for level, error in zip(line.level, line.error_dps, strict=True):
             shade = {"color": temperature_colour(level, low, high), "width": 1.5}
             figure.add_trace(
                 go.Scatter(x=line.at, y=error, mode="lines", line=shade, name=f"{level:.3g} deg C"), **where
             )
-        rows = [k for k, pair in enumerate(pairs) if pair == (axis, there)]
+        rows = [k for k, pair in enumerate(pairs) if pair == (axis, position)]
         figure.add_trace(
             go.Scatter(
                 x=_of(columns.table_rate_dps, rows), y=_of(columns.measured_error_dps, rows), mode="markers",
-                name=f"{axis} about {there}", customdata=_of(columns.dataset, rows),
+                name=f"{axis} about {position}", customdata=_of(columns.dataset, rows),
                 marker=temperature_marker(_of(columns.temperature_c, rows), low, high, size=4),
                 hovertemplate="data set %{customdata}<br>%{x:.5g} deg/s: %{y:.4g} deg/s<extra></extra>",
             ),
@@ -64,18 +64,18 @@ def full_turn(comparison: ComparisonResponse) -> go.Figure | None:
     )
     low, high = min(columns.temperature_c), max(columns.temperature_c)
     for row, axis in enumerate(axes, 1):
-        own = [k for k in rows if columns.axis[k] == axis]
+        axis_rows = [k for k in rows if columns.axis[k] == axis]
         errors = {
-            "turn_before_deg": _known(_of(columns.turn_before_deg, own)),
-            "turn_after_deg": _known(_of(columns.turn_after_deg, own)),
+            "turn_before_deg": _known(_of(columns.turn_before_deg, axis_rows)),
+            "turn_after_deg": _known(_of(columns.turn_after_deg, axis_rows)),
         }
         least, most = (end(value for values in errors.values() for value in values) for end in (min, max))
         for col, (name, values) in enumerate(errors.items(), 1):
-            marker = temperature_marker(_of(columns.temperature_c, own), low, high, size=3)
+            marker = temperature_marker(_of(columns.temperature_c, axis_rows), low, high, size=3)
             figure.add_trace(
                 go.Scatter3d(
-                    x=_of(columns.own_rate_dps, own), y=_of(columns.temperature_c, own), z=values,
-                    mode="markers", name=f"{axis} {name}", customdata=_of(columns.dataset, own), marker=marker,
+                    x=_of(columns.own_rate_dps, axis_rows), y=_of(columns.temperature_c, axis_rows), z=values,
+                    mode="markers", name=f"{axis} {name}", customdata=_of(columns.dataset, axis_rows), marker=marker,
                     hovertemplate="data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C: %{z:.3g} deg",
                 ),
                 row=row, col=col,

@@ -104,8 +104,8 @@ def ladder(answer: LadderResponse) -> go.Figure | None:
         return None
     figure = grid_of([""], 1)
     names = [f"{step.version}: {step.model}" for step in steps]
-    own, unseen = [step.rms_dps for step in steps], [step.heldout_rms_dps for step in steps]
-    for errors, word, colour in ((own, "on its own data", ACCENT), (unseen, "held out", WARM)):
+    fitted, unseen = [step.rms_dps for step in steps], [step.heldout_rms_dps for step in steps]
+    for errors, word, colour in ((fitted, "on its own data", ACCENT), (unseen, "held out", WARM)):
         figure.add_trace(
             go.Scatter(
                 x=names, y=errors, mode="lines+markers", line={"color": colour, "shape": "hv"},

@@ -78,7 +78,7 @@ def _dots(
     residual = (sets.get("residual_dps") or {}).get(axis)
     if values is None or residual is None:
         return
-    rows = [k for k, there in enumerate(sets.get("position", ())) if position in {None, there}]
+    rows = [k for k, row_position in enumerate(sets.get("position", ())) if position in {None, row_position}]
     numbers = sets.get("dataset", [])
     dots(
         figure, [values[k] for k in rows], [residual[k] for k in rows], colour_of(axis),

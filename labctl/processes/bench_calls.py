@@ -1,11 +1,11 @@
-"""What other processes may ask of the bench process."""
+"""Calls of other processes that the bench process answers."""
 
 from __future__ import annotations
 
 import contextlib
 import threading
 from multiprocessing.connection import Connection
-from typing import Any, cast
+from typing import Any
 
 from instruments.clock import Clock
 from labctl.acting_user import acting
@@ -26,11 +26,11 @@ from labctl.store import Store
 
 log = get_logger()
 
-#: A watcher gets a sign of life this often, s,
+#: Longest interval between two messages to a watcher, s.
 BEAT_S = 1.0
-#: and of changes at most this often, s.
+#: Shortest interval between two messages to a watcher, s.
 MIN_BEAT_S = 0.1
-#: Calls that are under way when the process ends have so long to be answered, s.
+#: Time to answer the pending calls when the process ends, s.
 UNDER_WAY_S = 2.0
 
 
@@ -40,7 +40,7 @@ class BenchCalls:
     def __init__(
         self, store: Store, local: LocalBench, supervision: Supervision, address: HeldAddress, clock: Clock
     ) -> None:
-        """`clock` has the date of the service."""
+        """`clock` gives the date of the service, which may be simulated."""
         self._store, self._local, self._supervision, self._address = store, local, supervision, address
         self._under_way = UnderWay()
         self._watchers: set[Connection] = set()
@@ -78,7 +78,8 @@ class BenchCalls:
             log.warning("calls.under_way", count=left, waited_s=UNDER_WAY_S)
 
     def _supervise(self, call: Call, connection: Connection) -> Answer | None:
-        wanted = cast(BenchSettings, call.arguments["wanted"])
+        wanted = call.arguments["wanted"]
+        assert isinstance(wanted, BenchSettings)  # by the form of the call
         found = answer_with(lambda: self._supervision.take_charge(wanted, connection))
         return None if found.raised is None else found
 
@@ -89,7 +90,8 @@ class BenchCalls:
         if area == "control":
             return BENCH_ACTS[name].execute(self._context, call.arguments["asked"])
         if call.name == "bench.live":
-            campaign = cast(int, call.arguments["campaign"])
+            campaign = call.arguments["campaign"]
+            assert isinstance(campaign, int)  # by the form of the call
             return self._local.runs(campaign), self._local.status(campaign)
         if call.name == "bench.describe":
             return self._local.describe()
@@ -100,7 +102,7 @@ class BenchCalls:
         raise KeyError(call.name)
 
     def _watch(self, connection: Connection) -> None:
-        """Tell a watcher what happens, until it goes; this thread is the watcher's."""
+        """Send the state to a watcher at every change until it disconnects, in the thread of its connection."""
         changed, never, form = threading.Event(), threading.Event(), form_of("watch").result
         remove = self._local.listen(changed.set)
         self._watchers.add(connection)

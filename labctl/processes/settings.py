@@ -1,4 +1,4 @@
-"""What `labctl serve` was asked for, as each of its processes needs it."""
+"""Settings of `labctl serve`, as each of its processes needs them."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class ServeRequest:
 
 @dataclass(frozen=True)
 class BenchSettings:
-    """What the bench process is started with. Two with equal `drives` drive the same bench the same way."""
+    """Settings of the bench process. Two with equal `drives` drive the same bench in the same way."""
 
     location: str
     bench: str | None
@@ -104,18 +104,18 @@ class BenchSettings:
 
     @property
     def page_access(self) -> PageAccess:
-        """Who may stop at the service's address while no web process answers there."""
+        """Access to a stop at the address of the service while no web process answers there."""
         return page_access(self.asks_for_keys, self.at, self.folder)
 
 
 def page_access(asks_for_keys: bool, at: str, folder: Path) -> PageAccess:
-    """Return who may stop at a service's address while no web process answers there."""
+    """Return the access to a stop at the address of a service while no web process answers there."""
     return PageAccess(LOOPBACK_NAMES | {at.lower()}, folder / KEYS if asks_for_keys else None)
 
 
 @dataclass(frozen=True)
 class WebSettings:
-    """What the web process is started with."""
+    """Settings of the web process."""
 
     request: ServeRequest
     folder: Path  #: of the bench process's sockets

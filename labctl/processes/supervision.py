@@ -85,10 +85,10 @@ class Supervision:
                     f"the service at {self._settings.url} controls this bench process; stop that service first"
                 )
             if wanted.drives != self._settings.drives:
-                own = self._settings
+                present = self._settings
                 raise Conflict(
-                    f"a bench process whose service has ended still drives bench {own.bench} at speed "
-                    f"{own.speed:g} and uses this database; start the service with the same --bench, "
+                    f"a bench process whose service has ended still drives bench {present.bench} at speed "
+                    f"{present.speed:g} and uses this database; start the service with the same --bench, "
                     "--speed and --simulated-start, or stop that process"
                 )
             self._line = line

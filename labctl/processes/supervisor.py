@@ -37,7 +37,7 @@ from labctl.processes.supervisor_watch import is_stopped
 from labctl.processes.waker import Waker
 from labctl.processes.web_keeper import WebKeeper
 from labctl.services.benches.bench_left import BenchLeft
-from labctl.services.campaigns.stop_requests import NotHere
+from labctl.services.campaigns.stop_requests import StopElsewhere
 from labctl.services.planning.loading import load_bench, with_drivers
 from labctl.stop.client import LATCH_S, AttemptedStop, StopAttempt, end_process
 from labctl.stop.latch import StopRequest
@@ -176,7 +176,7 @@ class Supervisor:
     def _respond(self, stop: StopRequest) -> Stopping:
         """Begin a stop that came over HTTP while no web process answered."""
         if self._place is None:
-            return NotHere("this service drives no bench", stands=True)
+            return StopElsewhere("this service drives no bench", stands=True)
         return AttemptedStop(StopAttempt(self._place, stop))
 
     def _secure_orphan(self) -> None:

@@ -34,9 +34,11 @@ def unheard_end(pid: int) -> bool:
         return False
     ending, asked = sum(1 << (number - 1) for number in ENDING), 0
     for status in _statuses(pid):
-        waiting, own, blocked = (int(status.get(each, "0"), 16) & ending for each in ("ShdPnd", "SigPnd", "SigBlk"))
+        waiting, of_thread, blocked = (
+            int(status.get(each, "0"), 16) & ending for each in ("ShdPnd", "SigPnd", "SigBlk")
+        )
         in_handler = blocked if blocked != ending else 0  # a thread of a library may block them all, a handler its own
-        asked |= waiting | own | in_handler
+        asked |= waiting | of_thread | in_handler
     return bool(asked)
 
 

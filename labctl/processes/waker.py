@@ -1,4 +1,4 @@
-"""A wait that signals end at once: their handlers only write a byte into a pipe, which waits for no lock."""
+"""A wait that a signal ends at once: the handler writes a byte into a pipe and takes no lock."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Waker:
 
     def wake(self) -> None:
         """End the present wait, or the next one."""
-        with contextlib.suppress(BlockingIOError):  # so many bytes wait that one more says nothing
+        with contextlib.suppress(BlockingIOError):  # the pipe is full: the wait ends in any case
             os.write(self._writer, b"!")
 
     def wait(self, seconds: float) -> None:
-        """Wait until woken, at most so long."""
+        """Wait until woken, at most `seconds`."""
         if select.select([self._reader], [], [], seconds)[0]:
             with contextlib.suppress(BlockingIOError):
                 os.read(self._reader, 4096)

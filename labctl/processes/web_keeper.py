@@ -1,4 +1,4 @@
-"""Keeps a web process at the service's address, and answers stops there while there is none that answers."""
+"""Restarts the web process of a service, and answers stops at its address while no web process answers."""
 
 from __future__ import annotations
 
@@ -22,22 +22,21 @@ from labctl.stop.wire import Stopping
 
 log = get_logger()
 
-LOOK_S = 0.25
-#: A web process that gave no sign of life for so long: the supervisor answers stops at its address, s.
-PAGE_AFTER_S = 2.0
-#: And for so long: it is ended, and another one started, s.
+CHECK_EVERY_S = 0.25
+#: Time without a message of the web process after which the supervisor answers stops at its address, s.
+STOPS_ANSWERED_AFTER_S = 2.0
+#: Time without a message after which the web process is replaced, s.
 SILENT_S = 6.0
-#: On a busy computer it may be silent so much longer, for as long as it gets no processor: another one would get none
-#: either, s.
-EXCUSED_S = 60.0
-#: A look that was itself so late cannot tell whether the web process was silent, s.
-LATE_S = 1.0
-#: The web process cuts its requests and ends within this, s.
+#: Extra time on a busy computer while the web process gets no processor time: a new one would get none either, s.
+BUSY_EXTRA_S = 60.0
+#: Delay of a check above which its result is not used: the supervisor itself did not run, s.
+MAX_DELAY_S = 1.0
+#: Time within which the web process ends, with its requests, s.
 ENDS_WITHIN_S = 4.0
 
 
 class WebKeeper:
-    """One web process after the other."""
+    """The web process of a service, which is replaced when it ends or does not answer."""
 
     def __init__(
         self,
@@ -58,7 +57,7 @@ class WebKeeper:
 
     def _new(self) -> Child:
         made = Child("labctl.processes.web_process", pass_fds=[self._at.socket.fileno()])
-        self._heard, self._unheard = Silence(made.pid, EXCUSED_S), Elapsed()
+        self._heard, self._unheard = Silence(made.pid, BUSY_EXTRA_S), Elapsed()
         return made
 
     @property
@@ -102,24 +101,24 @@ class WebKeeper:
     def _keep(self) -> None:
         since = Elapsed()
         try:
-            while not self._over.wait(LOOK_S):
-                if since.s > LOOK_S + LATE_S:
+            while not self._over.wait(CHECK_EVERY_S):
+                if since.s > CHECK_EVERY_S + MAX_DELAY_S:
                     self._count_from_now()
                 since.restart()
-                self._hear()
-                self._look()
+                self._receive()
+                self._check_silence()
         except LabctlError as error:
             self._failure = error
             self._waker.end()
         self._closed.wait()  # the kernel kills a web process together with the thread that has started it
 
-    def _hear(self) -> None:
+    def _receive(self) -> None:
         while self._process.line.poll(0):
             try:
                 value_of(SAID_BY_CHILD, receive(self._process.line))
             except (EOFError, OSError):
                 return
-            except LabctlError as error:  # what it says cannot be read: as if it said nothing
+            except LabctlError as error:  # an unreadable message counts as none
                 log.warning("child.unread", child="web", child_pid=self.pid, error=str(error))
                 return
             self._count_from_now()
@@ -129,14 +128,14 @@ class WebKeeper:
         self._heard.restart()
         self._unheard.restart()
 
-    def _look(self) -> None:
-        if self._unheard.s > PAGE_AFTER_S or self._process.has_ended():
+    def _check_silence(self) -> None:
+        if self._unheard.s > STOPS_ANSWERED_AFTER_S or self._process.has_ended():
             settings = self._settings()
             self._address.open_page(page_access(settings.request.asks_for_keys, settings.at, settings.folder))
         if self._heard.s > SILENT_S:
             log.error("child.silent", child="web", child_pid=self.pid, silent_s=round(self._heard.s, 1))
             self._process.signal(signal.SIGKILL)
-            self._process.wait(LATE_S)
+            self._process.wait(MAX_DELAY_S)
         if self._process.has_ended() and not self._over.is_set():
             self._start_again()
 

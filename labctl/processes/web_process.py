@@ -37,10 +37,10 @@ from labctl.store.connection.database import Database
 
 log = get_logger()
 
-#: A request that has not ended so long after the end was asked for is cut, s.
+#: Time that requests have to end before they are closed, s.
 GRACE_S = 2
 BEAT_S = 1
-#: What a worker needs, loaded once for all of them.
+#: Modules of the workers, loaded once for all of them.
 WORKER_MODULES = (
     "blosc2", "pyarrow.csv", "pyarrow.parquet", "labctl.plots", "labctl.processes.remote_bench",
     "labctl.services.commands.computed", "labctl.services.commands.registry",
@@ -76,16 +76,16 @@ def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:
 
 
 def _end_with(line: Connection) -> None:
-    """End this process when its supervisor has gone: another one may want its address."""
+    """End this process when its supervisor has ended, so that its address is free for another one."""
     with contextlib.suppress(EOFError, OSError):
-        line.recv_bytes(1)  # it says nothing more
+        line.recv_bytes(1)  # the supervisor sends nothing more: the read returns when its end is closed
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _stop_for(settings: WebSettings) -> None:
-    """Stop the bench in the place of a supervisor that was asked to end and stands still.
+    """Stop the bench for a supervisor that was asked to end and does not react.
 
-    Its bench process does the same where it can; this one also ends a bench process that does not react.
+    The bench process does the same where it can; this process also ends a bench process that does not react.
     """
     bench = settings.request.bench_name
     if bench is None:
@@ -102,7 +102,7 @@ def _stop_for(settings: WebSettings) -> None:
 
 
 def _keys_of(store: Store, settings: WebSettings) -> KeyMemory:
-    """Return the keys in force, which also lie beside the bench process's sockets, for a page without a database."""
+    """Return the keys in force; a copy of their digests is kept with the sockets for use without the database."""
     memory = KeyMemory(store, lambda digests: write_keys(settings.folder / KEYS, digests))
     memory.start()
     return memory

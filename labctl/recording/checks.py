@@ -1,4 +1,4 @@
-"""What a recording must keep to, and the defaults of what it leaves out."""
+"""Requirements on the content of a recording, and the defaults of its optional columns."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from labctl.recording.positions import EXPECTED, Position
 from labctl.recording.recording import Column
 from labctl.texts import control_character
 
-#: Values outside of these ranges are in another unit, or mistakes.
+#: Possible ranges: a value outside is in another unit, or wrong.
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
 #: Largest size of a value: the square of a larger one, as a spread needs it, may overflow.
 LARGEST = 1e100
@@ -36,28 +36,28 @@ NO_REFERENCE = (
 
 def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict[str, Column]:
     """Return the columns with the format's defaults filled in; raises BadRecording on the first thing that is wrong."""
-    _texts(path, info)
-    _datasheet(path, info)
+    _require_texts(path, info)
+    _require_datasheet(path, info)
     for name in needed(info):
         if name not in columns:
             raise _missing(path, info, name)
-        _finite(path, name, columns[name], columns.get("valid"))
+        _require_finite(path, name, columns[name], columns.get("valid"))
     for name, (low, high) in POSSIBLE.items():
         if name in columns:
-            _possible(path, name, np.asarray(columns[name], dtype=np.float64), low, high)
+            _require_possible(path, name, np.asarray(columns[name], dtype=np.float64), low, high)
     for name, values in columns.items():
-        _squarable(path, name, values, columns.get("valid"))
+        _require_squarable(path, name, values, columns.get("valid"))
     refuse_large_numbers(path, columns)
     if info.kind == "coefficients":
         check_coefficients(path, info, columns)
         return columns
     refuse_too_many_data_sets(path, info, columns)
     if "t_s" in columns:
-        _time(path, np.asarray(columns["t_s"], dtype=np.float64), strict=info.kind == "samples")
-    _datasets(path, np.asarray(columns["dataset"], dtype=np.int64), points=info.kind == "points")
+        _require_rising_time(path, np.asarray(columns["t_s"], dtype=np.float64), strict=info.kind == "samples")
+    _require_datasets(path, np.asarray(columns["dataset"], dtype=np.int64), points=info.kind == "points")
     if info.kind == "samples" and info.motion == "rates":
-        _one_rate(path, columns)
-    _one_mark(path, info, columns)
+        _require_one_rate(path, columns)
+    _require_one_mark(path, info, columns)
     if info.motion == "turns":
         check_turns(path, info, columns)
     return _defaults(path, info, columns)
@@ -72,7 +72,7 @@ def _missing(path: Path, info: RecordingInfo, name: str) -> BadRecording:
     )
 
 
-def _possible(path: Path, name: str, values: NDArray[np.float64], low: float, high: float) -> None:
+def _require_possible(path: Path, name: str, values: NDArray[np.float64], low: float, high: float) -> None:
     wrong = (values < low) | (values > high)
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -82,7 +82,7 @@ def _possible(path: Path, name: str, values: NDArray[np.float64], low: float, hi
         )
 
 
-def _squarable(path: Path, name: str, values: Column, valid: Column | None) -> None:
+def _require_squarable(path: Path, name: str, values: Column, valid: Column | None) -> None:
     if not _are_floats(values) or not values.size:
         return
     if max(np.nanmax(values, initial=0.0), -np.nanmin(values, initial=0.0)) <= LARGEST:
@@ -107,16 +107,16 @@ def checked_environment(path: Path, columns: dict[str, Column]) -> dict[str, Col
     for name in ENVIRONMENT_NEEDED:
         if name not in columns:
             raise BadRecording(f"{path}: column {name!r} is missing; add it")
-        _finite(path, name, columns[name], None)
+        _require_finite(path, name, columns[name], None)
     for name, values in columns.items():
-        _squarable(path, name, values, None)
-    _time(path, np.asarray(columns["t_s"], dtype=np.float64), strict=False)
+        _require_squarable(path, name, values, None)
+    _require_rising_time(path, np.asarray(columns["t_s"], dtype=np.float64), strict=False)
     refuse_large_numbers(path, columns)
     columns.setdefault("run", np.ones(len(columns["t_s"]), dtype=np.int64))
     return columns
 
 
-def _finite(path: Path, name: str, values: Column, valid: Column | None) -> None:
+def _require_finite(path: Path, name: str, values: Column, valid: Column | None) -> None:
     if values.dtype.kind != "f":
         return
     bad = ~np.isfinite(values)
@@ -130,7 +130,7 @@ def _finite(path: Path, name: str, values: Column, valid: Column | None) -> None
         )
 
 
-def _time(path: Path, t_s: NDArray[np.float64], *, strict: bool) -> None:
+def _require_rising_time(path: Path, t_s: NDArray[np.float64], *, strict: bool) -> None:
     steps = np.diff(t_s)
     back = steps <= 0 if strict else steps < 0
     if back.any():
@@ -149,7 +149,7 @@ def _time(path: Path, t_s: NDArray[np.float64], *, strict: bool) -> None:
         )
 
 
-def _datasets(path: Path, dataset: NDArray[np.int64], *, points: bool) -> None:
+def _require_datasets(path: Path, dataset: NDArray[np.int64], *, points: bool) -> None:
     starts = np.flatnonzero(np.concatenate([[True], dataset[1:] != dataset[:-1]]))
     numbers = dataset[starts] if not points else dataset
     rows = starts if not points else np.arange(len(dataset))
@@ -162,7 +162,7 @@ def _datasets(path: Path, dataset: NDArray[np.int64], *, points: bool) -> None:
         )
 
 
-def _one_rate(path: Path, columns: dict[str, Column]) -> None:
+def _require_one_rate(path: Path, columns: dict[str, Column]) -> None:
     rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(rate), dtype=bool)
     change = rate_change(np.asarray(columns["dataset"], dtype=np.int64), rate, valid)
@@ -174,7 +174,7 @@ def _one_rate(path: Path, columns: dict[str, Column]) -> None:
         )
 
 
-def _texts(path: Path, info: RecordingInfo) -> None:
+def _require_texts(path: Path, info: RecordingInfo) -> None:
     for name, text in (
         ("model", info.model), ("active_calibration", info.active_calibration), ("notes", info.notes),
         ("thermometer", info.thermometer),
@@ -183,7 +183,7 @@ def _texts(path: Path, info: RecordingInfo) -> None:
             raise BadRecording(f"{path}: {name} has a control character ({control}); write it without")
 
 
-def _datasheet(path: Path, info: RecordingInfo) -> None:
+def _require_datasheet(path: Path, info: RecordingInfo) -> None:
     for name, value in info.datasheet.items():
         if not 0.0 <= value < LARGEST:  # also true for NaN
             raise BadRecording(
@@ -191,7 +191,7 @@ def _datasheet(path: Path, info: RecordingInfo) -> None:
             )
 
 
-def _one_mark(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> None:
+def _require_one_mark(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> None:
     """Raise BadRecording for a mark other than 0 and 1, one that changes within a data set, or any in poses."""
     if VERIFICATION not in columns:
         return
@@ -241,7 +241,7 @@ def _refuse_unknown_up(path: Path, info: RecordingInfo, columns: dict[str, Colum
 
 
 def _positions(path: Path, position: Column) -> Column:
-    """Return positions as they are written here: `x@0` is x."""
+    """Return positions in their normal form: `x@0` becomes x."""
     words, of = np.unique(position, return_inverse=True)
     unknown = []
     for word in words:

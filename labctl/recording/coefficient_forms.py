@@ -26,13 +26,13 @@ Needed = Callable[[RecordingInfo, Collection[str]], list[str]]
 
 @dataclass(frozen=True)
 class CoefficientForm:
-    """A form of table: `mark` is a column that no other form has, `needed` lists what it must have."""
+    """A form of table: `mark` is a column that no other form has, `needed` returns the required columns."""
 
     name: str
-    models: tuple[str, ...]  #: presets that it makes; the first is proposed
+    models: tuple[str, ...]  #: presets for the model; the first is proposed
     mark: re.Pattern[str]
     needed: Needed
-    also: frozenset[str] = frozenset()  #: further columns that it may have
+    also: frozenset[str] = frozenset()  #: optional columns
 
     def coefficients(self, info: RecordingInfo, columns: Collection[str]) -> list[str]:
         """Return the names of its columns of coefficients."""
@@ -41,7 +41,7 @@ class CoefficientForm:
 
 def _matrix(info: RecordingInfo, _: Collection[str]) -> list[str]:
     """K[output][input] in output units per deg/s, and B in output units."""
-    gains = [f"k_{out}{turned}" for out in info.axes for turned in info.axes]
+    gains = [f"k_{out}{axis}" for out in info.axes for axis in info.axes]
     return [*gains, *(f"b_{out}" for out in info.axes), "temperature_c"]
 
 

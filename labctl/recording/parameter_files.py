@@ -74,7 +74,11 @@ def read(path: Path, options: ParameterOptions) -> Recording:
         serial=options.serial, axes=AXES, kind="coefficients", started_at=options.started_at,
         max_rate_dps=options.max_rate_dps, notes=notes,
     )  # fmt: skip
-    gains = {f"k_{out}{turned}": np.full(len(temperatures_c), float(out == turned)) for out in AXES for turned in AXES}
+    gains = {
+        f"k_{out}{body_axis}": np.full(len(temperatures_c), float(out == body_axis))
+        for out in AXES
+        for body_axis in AXES
+    }
     biases = {f"b_{axis}": np.rad2deg(bias_rad_s[:, column]) for column, axis in enumerate(AXES)}
     columns: dict[str, Column] = {**gains, **biases, "temperature_c": temperatures_c}
     return Recording(info, columns)

@@ -53,15 +53,15 @@ def pieces(columns: Columns, motion: Motion = "rates") -> NDArray[np.int64]:
     if len(dataset) and "t_s" in columns and (warm is not None or motion == "rest"):
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         starts = dataset_starts(dataset)
-        turned = np.asarray(columns["turn_deg"]) != 0 if "turn_deg" in columns else np.zeros(len(dataset), dtype=bool)
+        is_turn = np.asarray(columns["turn_deg"]) != 0 if "turn_deg" in columns else np.zeros(len(dataset), dtype=bool)
         for begin, end in zip(starts, np.append(starts[1:], len(dataset)), strict=True):
-            if turned[begin]:  # a part of a turn is no known angle
+            if is_turn[begin]:  # a part of a turn is no known angle
                 continue
-            since_s, here = t_s[begin:end] - t_s[begin], None if warm is None else warm[begin:end]
+            since_s, warm_rows = t_s[begin:end] - t_s[begin], None if warm is None else warm[begin:end]
             if motion == "rest":
-                piece[begin:end] = _windows(since_s, here)
-            elif here is not None:
-                piece[begin:end] = _minutes(since_s, here)
+                piece[begin:end] = _windows(since_s, warm_rows)
+            elif warm_rows is not None:
+                piece[begin:end] = _minutes(since_s, warm_rows)
     changes = (dataset[1:] != dataset[:-1]) | (piece[1:] != piece[:-1])
     return np.concatenate([[0], np.cumsum(changes)]).astype(np.int64)
 

@@ -1,4 +1,4 @@
-"""Quantisation: the step of a coarse converter, and what it leaves of the mean of many readings."""
+"""Quantisation: the step of a coarse converter, and the error of the mean of many readings by it."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from labctl.recording.spread import MIN_FOR_SPECTRUM, white_std
 
-#: What coarse steps of the output leave in a mean, as a standard deviation: suffix of the output's column.
+#: Suffix of the column with the standard deviation of a mean by the quantisation of an output.
 QUANTISATION = "_quantisation_std"
-#: Readings of a data set that are searched for codes; with more different ones than this there is no coarse step.
+#: Readings of a data set that are searched for codes, largest number of codes of a coarse converter, least readings.
 CODE_READINGS, MAX_CODES, MIN_READINGS = 256, 32, 16
 #: Share of the data sets that must take few codes, and of those the share that shows two codes or more.
 COARSE_SHARE, STEP_SHARE = 0.5, 0.2
-#: Codes closer than this share of the largest are one.
+#: Codes that differ by less than this share of the largest are taken as equal.
 SAME_CODE = 1e-9
-#: Terms of the series; the next are below 1e-3 of the sum even without noise.
+#: Indices of the terms of the series; the remainder is below 1e-3 of the sum even without noise.
 _K = np.arange(1.0, 201.0)
 
 
@@ -70,7 +70,7 @@ def quantisation_std(
 
 
 def steps_columns(name: str, sets: Sequence[NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-    """Return the column of what coarse steps leave in the means of data sets of readings; none where they are fine."""
+    """Return the column of the standard deviation of the means by quantisation; none for a fine converter."""
     figures = np.array([codes_of(readings) for readings in sets], dtype=np.float64).reshape(-1, 4)
     step, deviation = quantisation_std(*figures.T)
     return {} if step is None else {f"{name}{QUANTISATION}": deviation}
@@ -86,9 +86,9 @@ def quantisation_variance(step: float, white: float, std: float) -> float:
     """
     if step <= 0:
         return 0.0
-    own = step**2 / 12.0  # the steps themselves make readings spread
-    noise_var = max(white**2 - own, 0.0)
-    wave_var = max(std**2 - max(white**2, own), 0.0)
+    of_steps = step**2 / 12.0  # the steps themselves make readings spread
+    noise_var = max(white**2 - of_steps, 0.0)
+    wave_var = max(std**2 - max(white**2, of_steps), 0.0)
     angle = 2.0 * np.pi * _K / step
     gaussian = np.exp(-(angle**2) * noise_var)
     bessel = 1.0 / np.sqrt(1.0 + (np.pi * angle) ** 2 * 2.0 * wave_var)

@@ -115,16 +115,16 @@ def _results(store: Store, serial: str, at_c: float, first: date | None) -> tupl
         if measured_at(row.info) is None:
             left_out[row.id] = f"the date of the measurement is not known; {GIVE_DATE}"
             continue
-        own = next((version for version in versions if version.recordings == (row.id,)), None)
-        if own is None:
+        version_of_row = next((version for version in versions if version.recordings == (row.id,)), None)
+        if version_of_row is None:
             left_out[row.id] = f"no version is fitted to it alone: `labctl fit {serial} --recording {row.id}`"
             continue
         try:
-            values = _values(own.hash, own.document, at_c)
+            values = _values(version_of_row.hash, version_of_row.document, at_c)
         except (BadInput, NotEnoughData) as error:
-            left_out[row.id] = f"version {own.version}: {error}"
+            left_out[row.id] = f"version {version_of_row.version}: {error}"
             continue
-        results.append(_Found(row, own.version, dict(values)))
+        results.append(_Found(row, version_of_row.version, dict(values)))
     return results, left_out
 
 

@@ -119,7 +119,9 @@ def _results(
     """Return what is compared, and why other results are not."""
     budgets = [coefficients_at(side.calibration, at_c) for side in sides]
     results, left_out = list[ComparedResult](), dict[str, str]()
-    keys = dict.fromkeys((own, name) for budget in budgets for own, named in budget.items() for name in named)
+    keys = dict.fromkeys(
+        (axis_of_budget, name) for budget in budgets for axis_of_budget, named in budget.items() for name in named
+    )
     for axis, name in keys:
         pair = [budget.get(axis, {}).get(name) for budget in budgets]
         if pair[0] is None or pair[1] is None:

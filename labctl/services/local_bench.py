@@ -15,7 +15,7 @@ from labctl.errors import Conflict, NotStopped, StoreError
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.confirmation import describe_bench, describe_safe_state
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.stop_requests import NotHere
+from labctl.services.campaigns.stop_requests import StopElsewhere
 from labctl.services.commands.service_control import NO_BENCH, ServiceControl
 from labctl.services.live.live_sessions import LiveSessions
 from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S, Scheduler
@@ -108,7 +108,7 @@ class LocalBench:
     def request_stop(self, stop: StopRequest) -> Stopping:
         """Begin a stop; returns how it goes on. Waits for no lock, no disk and no database."""
         if self.runner is None:
-            return NotHere("this service drives no bench", stands=True)
+            return StopElsewhere("this service drives no bench", stands=True)
         return self.runner.stops.request(stop)
 
     @property

@@ -29,19 +29,19 @@ class _Flight:
         Raises Cancelled where the caller does not want the result any more. The work of a thread whose caller has left
         goes on while another waits for its result.
         """
-        own = progress()
+        show_progress = progress()
         with self._guard:
-            self._wanted_by.append(own)
+            self._wanted_by.append(show_progress)
         try:
             while not self._lock.acquire(timeout=LOOK_S):
-                own(self._stage)
+                show_progress(self._stage)
             try:
                 with reporting_to(self._report):
                     yield
             finally:
                 self._lock.release()
         finally:
-            self._leave(own)
+            self._leave(show_progress)
 
     def _report(self, stage: str) -> None:
         self._stage = stage

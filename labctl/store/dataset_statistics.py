@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labctl.recording.columns import READING_TIMES, VERIFICATION
 from labctl.recording.spread import MIN_FOR_SPECTRUM, white_std
 
-#: Columns that are no measured channel, so have no mean of their own.
+#: Columns that are not measured channels: no mean is stored for them.
 NOT_CHANNELS = frozenset(
     {
         "dataset",

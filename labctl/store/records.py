@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from functools import cached_property
 from typing import Literal
 
+from instruments.bench_config import BenchFile
 from labctl.answers.certification import JudgementDetail
 from labctl.answers.json_object import JsonDocument, JsonObject
 from labctl.answers.kept_answers import KeptAnswer
 from labctl.answers.recordings import RawChannelJson
 from labctl.answers.steps import StepJson
+from labctl.recording.info import RecordingInfo
 from procedures.contracts.campaign_state import CampaignState
 
 
@@ -51,10 +54,15 @@ class RecordingRow:
     campaign: int | None
     gyro: str | None
     kind: str
-    info: JsonDocument
+    info: JsonDocument  #: as it is stored
     created_at: datetime
     datasets: int
     readings: int
+
+    @cached_property
+    def recording_info(self) -> RecordingInfo:
+        """`info`, validated."""
+        return RecordingInfo.model_validate(self.info)
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,11 @@ class CampaignRow:
     started_at: datetime | None
     ended_at: datetime | None
     recordings: Mapping[str, int]  #: serial -> recording
+
+    @cached_property
+    def bench_file(self) -> BenchFile:
+        """`bench`, validated, without its simulation: that may have settings of another version of labctl."""
+        return BenchFile.model_validate({**self.bench, "simulation": None})
 
 
 @dataclass(frozen=True)

@@ -57,8 +57,8 @@ class Assets:
     """
 
     def __init__(self, folder: Path, others: dict[str, Path]) -> None:
-        own = {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*")) if path.is_file()}
-        self._paths = own | others
+        own_paths = {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*")) if path.is_file()}
+        self._paths = own_paths | others
         self._kept: dict[tuple[str, str], tuple[str, Asset]] = {}
         self._digests: dict[str, tuple[str, str]] = {}
         self._lock = threading.Lock()

@@ -1,8 +1,8 @@
 """A course of the table's rate as its encoder measured it: the commanded course, and by how much the table differs.
 
-The angle is the commanded one plus an offset that changes slowly, of a sweep also a gain and a phase that change
-slowly, and a delay of the whole: what a servo does to a demand. Between the angles that were read it is interpolated by
-that, so it needs no reading in each period.
+The angle is the commanded one plus a slowly changing offset and a delay, for a sweep also a slowly changing gain and
+phase: the response of a servo to its demand. This model interpolates between the angles that were read, so that not
+every period needs a reading.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from instruments.interfaces.rate_course import Ramp, RateCourse, SineSweep
 
 Array = NDArray[np.float64]
 
-#: Degrees of the polynomials in time: of the offset, and of gain and phase of a sweep.
+#: Degrees of the polynomials in time, for the offset, and for gain and phase of a sweep.
 OFFSET_DEGREE, GAIN_DEGREE = 5, 6
 #: Steps by which derivatives are taken, s.
 LATE_STEP_S = 1e-3
 
 
 def regressors(course: RateCourse, since_s: Array) -> Array:
-    """Return what the angle may differ from the commanded one by, (n, k) degrees, at times (n,) since it began, s."""
+    """Return the regressors of the difference from the commanded angle, (n, k) deg, `since_s` (n,) after the start."""
     share = 2 * np.clip(since_s / course.duration_s, 0.0, 1.0) - 1
     offset = np.polynomial.chebyshev.chebvander(share, OFFSET_DEGREE)
     if isinstance(course, Ramp):
@@ -37,7 +37,7 @@ def regressors(course: RateCourse, since_s: Array) -> Array:
 
 
 def _fading(course: SineSweep, since_s: Array) -> Array:
-    """Return the change of the angle, (n,) degrees, for each second that the fade-out begins later."""
+    """Return the change of the angle by a delay of the fade-out, (n,) deg/s."""
     later = replace(course, late_s=course.late_s + LATE_STEP_S)
     return np.asarray((later.angle_deg(since_s) - course.angle_deg(since_s)) / LATE_STEP_S)
 
@@ -53,8 +53,8 @@ class MeasuredCourse:
     def angle_deg(self, t_s: Array) -> Array:
         """Return the angle at times (n,), campaign time, as measured; unwrapped."""
         since_s = t_s - self.began_s
-        own = regressors(self.course, since_s) @ np.array(self.coefficients)
-        return np.asarray(self.course.angle_deg(since_s) + own)
+        correction_deg = regressors(self.course, since_s) @ np.array(self.coefficients)
+        return np.asarray(self.course.angle_deg(since_s) + correction_deg)
 
     def rates_dps(self, t_s: Array, period_s: float) -> tuple[Array, Array]:
         """Return the measured and the commanded mean rates, (n,) each, over the periods that end at times (n,) s."""

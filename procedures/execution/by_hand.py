@@ -96,9 +96,9 @@ class TurnReadings:
 
     def units(self) -> list[UnitTurn]:
         """Return what each unit that takes part said in the whole attempt."""
-        before, turned, after = (self._courses[part] for part in (-1, 0, 1))
+        before, during, after = (self._courses[part] for part in (-1, 0, 1))
         return [
-            UnitTurn(name, before[name], turned[name], after[name], gyro.limits.max_rate_dps)
+            UnitTurn(name, before[name], during[name], after[name], gyro.limits.max_rate_dps)
             for name, gyro in self._context.bench.gyros.items()
         ]
 
@@ -177,10 +177,10 @@ def turn(context: ExecutionContext, step: Turn) -> dict[str, float]:
         for attempt in range(1, rules.attempts + 1):
             shown = TurnProgress(step.position, step.turn_deg, "rest", attempt, refused=refused)
             context.recorder.tracker.update(turn=shown)
-            turned = _attempt(context, step, rules, shown)
-            if not turned.refused:
-                return {"attempts": float(attempt), **turned.figures}
-            refused = turned.refused
+            outcome = _attempt(context, step, rules, shown)
+            if not outcome.refused:
+                return {"attempts": float(attempt), **outcome.figures}
+            refused = outcome.refused
     finally:
         context.recorder.tracker.update(turn=None)
     raise StepFailed(

@@ -17,7 +17,7 @@ from procedures.monitoring.event_recorder import warning
 def ask(context: ExecutionContext, prompt: Prompt, meanwhile: Callable[[], None] | None = None) -> Answer:
     """Ask the operator and wait for the answer, with the environment recorded.
 
-    `meanwhile` is called again and again instead of waiting; it lets about a second pass.
+    `meanwhile` is called repeatedly instead of waiting; each call takes about a second.
     Raises StepFailed when the answer is no, Unanswered when none comes in time, and what `ExecutionContext.polls` and
     `meanwhile` raise.
     """
@@ -39,7 +39,7 @@ def ask(context: ExecutionContext, prompt: Prompt, meanwhile: Callable[[], None]
 
 
 def _wait_for_answer(context: ExecutionContext, prompt: Prompt, meanwhile: Callable[[], None] | None) -> Answer:
-    """Show that the campaign waits until the answer is there."""
+    """Wait for the answer with the campaign in the state `waiting`."""
     recorder = context.recorder
     recorder.tracker.update(prompt=prompt)
     recorder.change_state(CampaignState.WAITING, prompt.text)

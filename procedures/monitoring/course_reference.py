@@ -17,17 +17,17 @@ from procedures.monitoring.campaign_time import CampaignTime
 
 Array = NDArray[np.float64]
 
-#: Replies in a row that may be lost.
+#: Largest number of consecutive lost replies.
 MAX_LOST = 2
-#: For each coefficient that is fitted so many angles are read at least.
-ANGLES_EACH = 3
-#: A table that is this far from where it was commanded has stopped, degrees and share of the angle turned either way.
+#: Least number of angles for each fitted coefficient.
+MIN_ANGLES_EACH = 3
+#: Limit of the difference from the commanded angle, deg, plus a share of the angle turned; above it the table stopped.
 STOPPED_DEG, STOPPED_SHARE = 5.0, 0.05
-#: Angles that scatter about what is fitted by more than their uncertainty times this follow no course.
+#: Largest ratio of the scatter of the angles about the fit to their uncertainty.
 MAX_EXCESS = 5.0
-#: A measured rate that differs from the commanded one by more than this share of the largest is said.
-NEWS_SHARE = 0.02
-#: The smallest singular value that counts, as a share of the largest: a ramp tells a delay from no offset.
+#: A difference between measured and commanded rate above this share of the largest rate is reported.
+REPORTED_SHARE = 0.02
+#: Smallest singular value that is used, as a share of the largest: a ramp does not separate a delay from an offset.
 RCOND = 1e-9
 #: Points of a course at which the uncertainty of its rate is computed, and the time over which a rate is taken, s.
 POINTS, RATE_OVER_S = 400, 0.01
@@ -53,8 +53,8 @@ class CourseLog:
         self._lost = 0
         self.readings.append(reading)
         times = np.array([self.readings[0].t_s, reading.t_s]) - run.began_s
-        turned = float(np.diff(run.course.angle_deg(times))[0])
-        off_deg = abs(reading.angle_deg - self.readings[0].angle_deg - turned)
+        expected_deg = float(np.diff(run.course.angle_deg(times))[0])
+        off_deg = abs(reading.angle_deg - self.readings[0].angle_deg - expected_deg)
         limit_deg = STOPPED_DEG + STOPPED_SHARE * run.course.largest_dps * abs(float(times[1] - times[0]))
         if off_deg > limit_deg:
             raise TableStopped(
@@ -68,7 +68,7 @@ class CourseLog:
         Raises StepFailed for too few angles, and for angles that do not follow the course.
         """
         t_s = np.array([reading.t_s for reading in self.readings])
-        needed = ANGLES_EACH * regressors(run.course, np.zeros(1)).shape[1]
+        needed = MIN_ANGLES_EACH * regressors(run.course, np.zeros(1)).shape[1]
         if len(t_s) < needed:
             raise StepFailed(
                 f"{self._name}: its encoder was read {len(t_s)} times during a {run.course.text}, but {needed} angles "
@@ -118,7 +118,7 @@ def _fitted(design: Array, values: Array, u: Array) -> tuple[Array, Array, float
 
 
 def _rates(run: CourseRun) -> tuple[Array, Array]:
-    """Return how the rate follows the coefficients, (n, k) deg/s each, and its slope, (n,) deg/s^2, over a course."""
+    """Return the derivatives of the rate by the coefficients, (n, k) deg/s, and its slope, (n,) deg/s^2."""
     at = np.linspace(RATE_OVER_S, run.course.duration_s, POINTS)
     change = (regressors(run.course, at) - regressors(run.course, at - RATE_OVER_S)) / RATE_OVER_S
     slope = (run.course.rate_dps(at) - run.course.rate_dps(at - RATE_OVER_S)) / RATE_OVER_S
@@ -150,7 +150,7 @@ def course_event(table: RateTable, angles: TableAngles, course: MeasuredCourse, 
     """Return a warning where the measured rate differs from the commanded one by more than a share of the largest."""
     at = course.began_s + np.linspace(RATE_OVER_S, duration_s, POINTS)
     measured, commanded = course.rates_dps(at, RATE_OVER_S)
-    off_dps, limit_dps = float(np.abs(measured - commanded).max()), NEWS_SHARE * course.course.largest_dps
+    off_dps, limit_dps = float(np.abs(measured - commanded).max()), REPORTED_SHARE * course.course.largest_dps
     if off_dps <= limit_dps:
         return None
     used = "the encoder is the reference" if angles.is_reference else "the commanded rate is the reference"

@@ -20,11 +20,11 @@ from instruments.interfaces.table import StepClock
 from procedures.contracts.journal import ClockRun
 
 S_PER_H = 3600.0
-#: Runs over a shorter time, in lengths of the longest of them, tell no drift.
+#: Least span of the runs for a drift to be fitted, in durations of the longest run.
 DRIFT_SPAN = 10.0
-#: Level of confidence of an expanded uncertainty, and that from which runs of two sessions differ by no chance.
+#: Level of confidence of an expanded uncertainty, and that at which a difference between two sessions is significant.
 CONFIDENCE, CERTAIN = 0.95, 0.999
-#: By so much the step clock of one crystal may change between two sessions of a campaign, with its temperature, ppm.
+#: Largest plausible change of a crystal's frequency between two sessions of a campaign, by its temperature, ppm.
 LARGEST_CHANGE_PPM = 200.0
 
 
@@ -37,8 +37,8 @@ class ClockFit:
     x: float
     x_per_h: float
     covariance: NDArray[np.float64]  #: (2, 2); zero for a drift that was not fitted
-    scatter_s: float  #: standard deviation of what a run leaves
-    has_drift: bool  #: whether the runs tell a drift, with its uncertainty
+    scatter_s: float  #: standard deviation of the residuals of the runs
+    has_drift: bool  #: whether a drift was fitted
     is_drift_applied: bool  #: whether it is significant; `x` is then that of the line, else that of a steady clock
     freedom: int
 
@@ -97,7 +97,7 @@ class MeasuredClock:
 
     @property
     def limit_ppm(self) -> float:
-        """Largest deviation from the nominal clock that both uncertainties explain, ppm."""
+        """Largest deviation from the nominal clock within the expanded uncertainties of both, ppm."""
         return math.hypot(self.deviation_expanded_ppm, 3.0 * self.nominal.u_ppm)
 
 
@@ -109,7 +109,7 @@ def coverage_factor(freedom: int, confidence: float = CONFIDENCE) -> float:
 
 
 def fitted(runs: Sequence[ClockRun]) -> ClockFit | None:
-    """Return the step clock by runs; None for too few of them to tell their scatter."""
+    """Return the step clock fitted to runs; None for too few runs to estimate their scatter."""
     t_s = np.array([run.t_s for run in runs])
     nominal_s = np.array([run.nominal_s for run in runs])
     late_s = np.array([run.duration_s for run in runs]) - nominal_s

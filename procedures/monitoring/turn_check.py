@@ -37,7 +37,7 @@ class UnitTurn:
 
     name: str
     before: Course
-    turned: Course
+    during: Course
     after: Course
     max_rate_dps: float
 
@@ -47,7 +47,7 @@ class UnitTurn:
 
     def angles_deg(self) -> dict[str, float]:
         """Return the integral of each axis less its bias, deg."""
-        return {axis: self.turned.angle_deg(axis, self.bias_dps(axis)) for axis in self.turned.outputs}
+        return {axis: self.during.angle_deg(axis, self.bias_dps(axis)) for axis in self.during.outputs}
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def check_turn(step: Turn, rules: TurnRules, unit: UnitTurn) -> TurnResult:
 
 
 def _lost(rules: TurnRules, unit: UnitTurn) -> str:
-    courses = {"before the turn": unit.before, "of the turn": unit.turned, "after the turn": unit.after}
+    courses = {"before the turn": unit.before, "of the turn": unit.during, "after the turn": unit.after}
     for when, course in courses.items():
         if len(course) < 2:
             return f"no readings {when} arrived; check cable and power"
@@ -117,10 +117,10 @@ def _lost(rules: TurnRules, unit: UnitTurn) -> str:
 
 
 def _at_limit(unit: UnitTurn) -> str:
-    if unit.turned.largest_dps < LIMIT_SHARE * unit.max_rate_dps:
+    if unit.during.largest_dps < LIMIT_SHARE * unit.max_rate_dps:
         return ""
     return (
-        f"the output reached {unit.turned.largest_dps:.0f} deg/s, but the unit measures only up to "
+        f"the output reached {unit.during.largest_dps:.0f} deg/s, but the unit measures only up to "
         f"{unit.max_rate_dps:g} deg/s; turn the unit more slowly"
     )
 

@@ -26,12 +26,14 @@ ADVICE = "Change the recipe, or plan with --clip to leave these points out."
 
 @dataclass(frozen=True)
 class BenchLimits:
-    """What the table, the chamber and every unit may be asked for."""
+    """Limits of the table, the chamber and every unit."""
 
-    table: TableLimits | None  #: absent for a bench without one, and so below
+    table: TableLimits | None  #: None: the bench has none; `chamber` likewise
     chamber: ChamberLimits | None
     gyros: Mapping[str, GyroLimits]
-    achievable_dps: Callable[[float], float] | None = None  #: the rate a table would really run (step quantisation)
+    achievable_dps: Callable[[float], float] | None = (
+        None  #: nearest rate that the table can run (step quantisation), deg/s
+    )
     needs_person: bool = True  #: whether a person turns the units; a unit handler takes no time that a plan counts
     #: whether the table moves in a campaign; in a simulation without bytes any table follows any course of the rate
     is_driven: bool = True
@@ -63,7 +65,7 @@ class BenchLimits:
         return math.inf if self.chamber is None else self.chamber.ramp_c_per_min
 
     def rate_complaint(self, rate_dps: float, max_error_fraction: float) -> str | None:
-        """Return why the table or a unit cannot do a rate, or None."""
+        """Return which limit of the table or a unit a rate exceeds, or None."""
         complaints = [
             f"the {limit:g} deg/s of {owner}"
             for owner, limit in [*self._table_rate(), *_unit_rates(self.gyros)]
@@ -74,7 +76,7 @@ class BenchLimits:
         return self._quantisation_complaint(rate_dps, max_error_fraction)
 
     def course_complaint(self, course: RateCourse) -> str | None:
-        """Return why the table or a unit cannot do a course of the rate, or None."""
+        """Return which limit of the table or a unit a course of the rate exceeds, or None."""
         table = self.table
         if table is None or not self.is_driven:
             return None
@@ -107,7 +109,7 @@ class BenchLimits:
         )
 
     def temperature_complaint(self, temperature_c: float) -> str | None:
-        """Return why the chamber or a unit cannot stand a temperature, or None."""
+        """Return which limit of the chamber or a unit a temperature exceeds, or None."""
         ranges = [] if self.chamber is None else [("the chamber", self.chamber.min_c, self.chamber.max_c)]
         ranges += [(f"unit {name}", unit.min_c, unit.max_c) for name, unit in self.gyros.items()]
         complaints = [

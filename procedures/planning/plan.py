@@ -168,9 +168,9 @@ def _refuse_endless(recipe: Recipe) -> None:
     """Refuse what no bench would ever finish, before it is written down step by step."""
     rates = len(recipe.rates_dps) * (recipe.repeats + 1)
     data_sets = len(recipe.positions) * (len(recipe.temperatures_c) + 1) * rates
-    if (turned := recipe.indexing) is not None:
-        mountings = len(recipe.positions) * (len(turned.unit_deg) + len(turned.fixture_deg))
-        data_sets += mountings * len(turned.temperatures_c) * len(turned.rates_dps)
+    if (indexing := recipe.indexing) is not None:
+        mountings = len(recipe.positions) * (len(indexing.unit_deg) + len(indexing.fixture_deg))
+        data_sets += mountings * len(indexing.temperatures_c) * len(indexing.rates_dps)
     if recipe.inverted is not None:
         data_sets += len(recipe.positions) * len(recipe.inverted.temperatures_c) * len(recipe.inverted.rates_dps)
     if recipe.power_cycle is not None:

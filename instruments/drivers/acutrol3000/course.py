@@ -1,8 +1,8 @@
-"""Courses of the rate on an ACUTROL 3000: a ramp is a demand in rate mode with the slope as its limit, a sweep its
-oscillator, whose size fades and whose frequency changes by themselves.
+"""Courses of the rate on an ACUTROL 3000: a ramp uses the rate mode with its acceleration limit, a sweep the oscillator
+of the controller, which changes amplitude and frequency by itself.
 
-Only the fade-out is commanded while a course runs. A course that is not commanded on, because the computer died, goes
-on as it is: the controller has no watchdog over its command interface.
+Only the fade-out is commanded while a course runs. When the computer fails, the course continues without end: the
+controller has no watchdog over its command interface.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from instruments.interfaces.table import AngleReading, CourseRun, reply_time_u_s
 from instruments.protocols.acutrol3000 import commands as acl
 from instruments.protocols.acutrol3000.settings import Acutrol3000Settings
 
-#: The interlock is asked for this often during a course, s.
+#: Interval at which the interlock is read during a course, s.
 ASK_EVERY_S = 2.0
 
 
@@ -32,7 +32,7 @@ class CourseFollower:
         self._device, self._settings, self._link, self._clock = device, settings, link, clock
         self._last: AngleReading | None = None
         self._quickest_s = math.inf
-        self._ask_s = 0.0  #: when the interlock is asked for again, clock time
+        self._ask_s = 0.0  #: time at which the interlock is read next, clock time
 
     def check(self, course: RateCourse) -> None:
         """Raise LimitError for a sweep whose frequencies the oscillator does not have."""
@@ -44,7 +44,7 @@ class CourseFollower:
             )
 
     def begin(self, course: RateCourse) -> CourseRun:
-        """Begin a course; the table has the rate from which it begins. Raises RequestRejected, LinkError and others."""
+        """Begin a course; the table runs at its initial rate already. Raises RequestRejected, LinkError and others."""
         self._last = None
         axis = self._settings.axis
         if isinstance(course, Ramp):
@@ -70,7 +70,7 @@ class CourseFollower:
         return replace(run, course=replace(course, late_s=late_s), is_whole=True)
 
     def demand_closed(self, course: RateCourse) -> None:
-        """Raise RequestRejected with the cause where the interlock is not closed: the table stops by itself then."""
+        """Raise RequestRejected with the cause where the interlock is open, with which the table stops by itself."""
         self._ask_s = self._clock.now_s() + ASK_EVERY_S
         if cause := checks.interlock_cause(self._device, self._settings.axis, self._link):
             raise RequestRejected(
@@ -78,7 +78,7 @@ class CourseFollower:
             )
 
     def angle(self, run: CourseRun) -> AngleReading:
-        """Get the angle, unwrapped from the one before by the commanded rate, and the middle of its question's time."""
+        """Read the angle, unwrapped by the commanded rate, and the middle of the time between request and reply."""
         text, sent_s, answered_s = self._link.timed(f":Read:Position? {self._settings.axis}")
         t_s = (sent_s + answered_s) / 2
         angle_deg = self._settings.direction * checks.numbers(self._device, text, 1)[0]

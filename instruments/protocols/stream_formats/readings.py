@@ -1,4 +1,4 @@
-"""What the bytes of a stream hold, as whole numbers, and how these become the channels of a recording."""
+"""The fields of a stream as whole numbers, and their conversion to the channels of a recording."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from instruments.protocols.stream_formats.document import (
 from instruments.protocols.stream_formats.units import UNITS
 
 Whole = NDArray[np.int64]
-#: A number that does not fit into this many steps is no reading.
+#: Largest number of steps of a reading; above it the reading is invalid.
 MAX_STEPS = 2.0**62
 
 
@@ -32,7 +32,7 @@ class Scale(NamedTuple):
 
 
 class StampTicks(NamedTuple):
-    """Time stamps as whole numbers: one is `tick_s` s, and they begin again at 0 after `wrap` - 1 (None: never)."""
+    """Time stamps as whole numbers in units of `tick_s` s; they wrap to 0 after `wrap` - 1 (None: never)."""
 
     field: str
     tick_s: float
@@ -40,7 +40,7 @@ class StampTicks(NamedTuple):
 
 
 class PulseTicks(NamedTuple):
-    """Where a format tells of pulses: time since the last as whole numbers of `tick_s` s, or a number (`tick_s` 0)."""
+    """Pulses in a format: time since the last pulse in units of `tick_s` s, or number of the pulse (`tick_s` 0)."""
 
     field: str
     tick_s: float
@@ -51,14 +51,14 @@ class PulseTicks(NamedTuple):
 class Decoded:
     """Messages of a stream, n readings: field name -> (n,) whole numbers; which are valid (n,); damaged messages.
 
-    `behind` (n,) is how many bytes arrived after each message.
+    `behind` (n,) is the number of bytes that followed each message.
     """
 
     values: Mapping[str, Whole]
     valid: NDArray[np.bool_]
     behind: Whole
     damaged: int = 0
-    missed: int | None = None  #: readings that did not come whole; None: one for each damaged message
+    missed: int | None = None  #: incomplete readings; None: one for each damaged message
 
     def __len__(self) -> int:
         return len(self.valid)
@@ -68,30 +68,30 @@ class Decoder(Protocol):
     """Takes the bytes of a stream as they come."""
 
     def drop(self) -> None:
-        """Drop the unfinished message: what comes next may begin anywhere in one."""
+        """Discard the incomplete message: the next bytes may begin inside a message."""
         ...
 
     def feed(self, data: bytes) -> Decoded:
-        """Return every message that is whole now."""
+        """Return the messages that these bytes complete."""
         ...
 
 
 def step_of(field: StreamField) -> float:
-    """Return what one whole number of a field is, in its unit before `scale`."""
+    """Return the resolution of a field, in its unit before `scale`."""
     if isinstance(field, BytesField):
         return (field.resolution or BINARY_STEP) if field.is_float else 1.0
     return field.resolution or DECIMAL_STEP
 
 
 def scale_of(field: StreamField, rate_hz: float) -> Scale:
-    """Return how the whole numbers of a field with a unit become values of its channel; `rate_hz` of the readings."""
+    """Return the conversion of the whole numbers of a field to its channel; `rate_hz` is that of the readings."""
     conversion = UNITS[field.unit or ""]
     per_s = rate_hz if conversion.is_per_sample else 1.0
     return Scale(conversion.unit, step_of(field) * field.scale * conversion.factor * per_s, conversion.offset)
 
 
 def stamp_ticks(format_: StreamFormat) -> StampTicks | None:
-    """Return what the whole numbers of a format's time stamps are; None for a format without time stamps."""
+    """Return the unit and the range of the time stamps of a format; None for a format without time stamps."""
     if (stamp := format_.time) is None:
         return None
     step = next(step_of(field) for field in format_.fields if field.name == stamp.field)
@@ -99,7 +99,7 @@ def stamp_ticks(format_: StreamFormat) -> StampTicks | None:
 
 
 def pulse_ticks(format_: StreamFormat) -> PulseTicks | None:
-    """Return what the whole numbers of a format tell of pulses; None for a format without."""
+    """Return the unit of the pulse field of a format; None for a format without one."""
     if (given := format_.pulses) is None:
         return None
     step = next(step_of(field) for field in format_.fields if field.name == given.field)
@@ -109,7 +109,7 @@ def pulse_ticks(format_: StreamFormat) -> PulseTicks | None:
 def whole_numbers(values: NDArray[np.float64], step: float) -> tuple[Whole, NDArray[np.bool_]]:
     """Return numbers (n,) in whole steps, and which of them are numbers that fit."""
     steps = values / step
-    good = np.abs(steps) < MAX_STEPS  # not for one that is no number
+    good = np.abs(steps) < MAX_STEPS  # False for NaN
     return np.rint(np.where(good, steps, 0.0)).astype(np.int64), good
 
 

@@ -194,9 +194,9 @@ class SimulatedAcutrol3000(TimedReplies):
             raise Refused(OUT_OF_RANGE)
         self._servo(command, acl.SYNTHESIS)
         size, frequency, phase = self.axis.oscillator
-        turned = np.radians(phase + (0.0 if self._sign > 0 else 180.0))
+        phase_rad = np.radians(phase + (0.0 if self._sign > 0 else 180.0))
         whole = self.ratio[0] * size
-        self.motion.oscillate(Sine(t_s, float(turned), 0.0, frequency, whole, frequency, *self.axis.slews))
+        self.motion.oscillate(Sine(t_s, float(phase_rad), 0.0, frequency, whole, frequency, *self.axis.slews))
         return ""
 
     def _mode_off(self, command: Command, t_s: float) -> str:

@@ -1,4 +1,4 @@
-"""NI's gRPC device server with one device, as far as its analog inputs: the service nidaqmx_grpc.NiDAQmx by its bytes.
+"""NI's gRPC device server with the analog inputs of one device: the service nidaqmx_grpc.NiDAQmx by its bytes.
 
 The messages are built and read by their published numbers, without the stubs of nidaqmx. An error of the driver
 software is a failed call with the status UNKNOWN, whose trailing metadata has the error number.
@@ -23,11 +23,11 @@ from instruments.simulators.links.rpc_device import RpcDevice
 from instruments.simulators.physics.world import SimulatedGyro
 from instruments.simulators.setup import InstrumentSetup
 
-#: The clock of the device divides this, Hz.
+#: Time base of the device, Hz: a sample rate is this over a whole number.
 TIMEBASE_HZ = 100e6
 #: Codes of the converter over its whole range.
 CODES = 65536
-#: Reply to a request for all samples: how many there are is asked before.
+#: Number of samples in a request for all that are available.
 ALL_AVAILABLE = -1
 
 
@@ -42,8 +42,8 @@ class DaqFailure(Exception):
 class Inputs:
     """The analog inputs: the gyro of the simulated world at those of the bench file, 0 V at the others.
 
-    `volts` holds the constant voltage of inputs that a test sets; `rate_hz` is what the device makes of the rate that
-    it is asked for (None: the nearest that its clock can make), and `clock_ppm` the error of its clock.
+    `volts` holds the constant voltage of inputs that a test sets; `rate_hz` is the rate that the device sets instead of
+    the requested one (None: the nearest that its clock allows), and `clock_ppm` the error of its clock.
     """
 
     def __init__(self, settings: NidaqSettings, unit: SimulatedGyro) -> None:
@@ -55,7 +55,7 @@ class Inputs:
         self._options, self._unit = settings.options, unit
 
     def coerced_hz(self, rate_hz: float) -> float:
-        """Return the rate that the device makes, in scans per second by its own clock."""
+        """Return the rate that the device sets, in scans per second by its own clock."""
         return self.rate_hz or TIMEBASE_HZ / round(TIMEBASE_HZ / rate_hz)
 
     def sample(self, numbers: list[int], range_v: float, t_s: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,17 +107,17 @@ class Task:
         self.started_s, self.taken = t_s, 0
 
     def available(self, t_s: float) -> int:
-        """Return how many scans were made by `t_s` and not read, also those that the buffer has lost."""
+        """Return the number of scans until `t_s` that were not read, with those that were lost in the buffer."""
         if self.started_s is None:
             return 0
         return int(np.floor((t_s - self.started_s) * self._true_hz + 1e-6)) - self.taken
 
     def read(self, count: int, t_s: float) -> tuple[Status | None, NDArray[np.float64]]:
         """Return the next scans as volts (channels, n), with a status where there are fewer; raises DaqFailure."""
-        there = self.available(t_s)
-        if self.started_s is None or there > self.buffer:
-            raise DaqFailure(Status.OVERRUN if there else Status.NOT_YET_AVAILABLE)
-        samples = there if count == ALL_AVAILABLE else min(count, there)
+        available = self.available(t_s)
+        if self.started_s is None or available > self.buffer:
+            raise DaqFailure(Status.OVERRUN if available else Status.NOT_YET_AVAILABLE)
+        samples = available if count == ALL_AVAILABLE else min(count, available)
         index = self.taken + 1 + np.arange(samples)
         self.taken += samples
         volts = self.inputs.sample(self.numbers, self.range_v, self.started_s + index / self._true_hz)
@@ -129,7 +129,7 @@ class Task:
 
 
 class SimulatedNidaq(RpcDevice):
-    """The server; `version`, `inputs` and `failure` may be set to those of another one.
+    """The server; `version`, `inputs` and `failure` may be set, to simulate another server.
 
     A task has the name that its client gives it and stays until it is cleared, also after its client has gone.
     """
@@ -138,7 +138,7 @@ class SimulatedNidaq(RpcDevice):
         super().__init__(setup.faults)
         self.version: tuple[int, int, int] = (26, 0, 0)  #: of the driver software
         self.inputs = Inputs(part_of(setup.gyro, NidaqSettings), setup.unit)
-        self.failure: Status | None = None  #: of every read
+        self.failure: Status | None = None  #: that every read returns
         self.tasks: dict[str, Task] = {}
         self._made = 0
         self._methods: dict[str, Callable[[Fields, float], Reply]] = {

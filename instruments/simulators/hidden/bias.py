@@ -17,7 +17,7 @@ class Bias(HiddenEffect):
 
 
 class BiasTemperature(HiddenEffect):
-    """A bias that follows temperature, bending away from a line."""
+    """A bias that is a nonlinear function of temperature."""
 
     id, unit, default = "bias_temperature", "deg/s/K", 1e-3
 

@@ -73,15 +73,15 @@ class StartTransient(HiddenEffect):
         self._at_s = 0.0
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
-        own = state.own_dps
+        own_dps = state.own_dps
         if self._followed is None:
-            self._followed, self._at_s = own[0].copy(), float(state.t_s[0])
+            self._followed, self._at_s = own_dps[0].copy(), float(state.t_s[0])
         self._catch_up(state)
         steps = np.diff(np.concatenate([[self._at_s], state.t_s]))
-        missing = np.empty_like(own)
+        missing = np.empty_like(own_dps)
         for i, step in enumerate(steps):
-            self._followed += (own[i] - self._followed) * (1.0 - np.exp(-step / self.tau_s))
-            missing[i] = own[i] - self._followed
+            self._followed += (own_dps[i] - self._followed) * (1.0 - np.exp(-step / self.tau_s))
+            missing[i] = own_dps[i] - self._followed
         self._at_s = float(state.t_s[-1])
         return -self.size * missing
 
@@ -91,6 +91,6 @@ class StartTransient(HiddenEffect):
         if gap_s <= self.STEP_S or self._followed is None:
             return
         times = np.arange(max(self._at_s, float(state.t_s[0]) - 12 * self.tau_s), float(state.t_s[0]), self.STEP_S)
-        for own in state.own_at(times):
-            self._followed += (own - self._followed) * (1.0 - np.exp(-self.STEP_S / self.tau_s))
+        for own_dps in state.own_at(times):
+            self._followed += (own_dps - self._followed) * (1.0 - np.exp(-self.STEP_S / self.tau_s))
         self._at_s = float(times[-1])

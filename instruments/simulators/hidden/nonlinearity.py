@@ -34,9 +34,9 @@ class DeadBand(HiddenEffect):
     id, unit, default = "dead_band", "deg/s", 0.05
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
-        own = state.own_dps
-        passed = np.sign(own) * np.sqrt(np.maximum(own * own - self.size**2, 0.0))
-        return passed - own
+        own_dps = state.own_dps
+        passed = np.sign(own_dps) * np.sqrt(np.maximum(own_dps * own_dps - self.size**2, 0.0))
+        return passed - own_dps
 
 
 class Quantization(HiddenEffect):

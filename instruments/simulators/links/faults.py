@@ -143,8 +143,8 @@ class FaultyWire:
 
     def connect(self) -> FaultyWire:
         """Return a further link to the instrument: one of its own where each connection has one, else this wire."""
-        own = connected(self._device)
-        return self if own is self._device else FaultyWire(own, self.faults)
+        connection = connected(self._device)
+        return self if connection is self._device else FaultyWire(connection, self.faults)
 
     @property
     def is_rpc(self) -> bool:

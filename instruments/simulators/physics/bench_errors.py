@@ -73,14 +73,14 @@ def felt(rates: Array, frame: BodyFrame, lean_rad: Lean) -> Array:
     """Return the rates (n, 3) about the axes of a unit, deg/s, against which the axis of rotation leans."""
     if lean_rad == UPRIGHT:
         return rates
-    turned = _rotated(rates, frame.up, frame.first, frame.sign * lean_rad[0])
-    return _rotated(turned, frame.up, frame.second, frame.sign * lean_rad[1])
+    leaned = _rotated(rates, frame.up, frame.first, frame.sign * lean_rad[0])
+    return _rotated(leaned, frame.up, frame.second, frame.sign * lean_rad[1])
 
 
 def _turned(lean_rad: Lean, turned_deg: int, sign: float) -> Lean:
     """Return a lean that is fixed below a unit in the frame of the unit, which is turned by an angle above it."""
-    turned = sign * math.radians(turned_deg)
-    cos, sin = math.cos(turned), math.sin(turned)
+    angle_rad = sign * math.radians(turned_deg)
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     return cos * lean_rad[0] + sin * lean_rad[1], cos * lean_rad[1] - sin * lean_rad[0]
 
 
@@ -90,10 +90,10 @@ def _lean(two: Array) -> Lean:
 
 def _rotated(rates: Array, axis: int, other: int, angle_rad: float) -> Array:
     """Return rates (n, 3) in axes that are turned by an angle in the plane of two of them."""
-    turned = rates.copy()
-    turned[:, axis] = np.cos(angle_rad) * rates[:, axis] - np.sin(angle_rad) * rates[:, other]
-    turned[:, other] = np.sin(angle_rad) * rates[:, axis] + np.cos(angle_rad) * rates[:, other]
-    return turned
+    rotated = rates.copy()
+    rotated[:, axis] = np.cos(angle_rad) * rates[:, axis] - np.sin(angle_rad) * rates[:, other]
+    rotated[:, other] = np.sin(angle_rad) * rates[:, axis] + np.cos(angle_rad) * rates[:, other]
+    return rotated
 
 
 def _summed(standards: Sequence[Standard], quantity: str, rng: np.random.Generator) -> Array:

@@ -97,15 +97,15 @@ class TableMotion:
         """
         index = self._in_force(t_s)
         move = self._moves[index]
-        rate, here = move.rate(t_s), float(move.position(np.array([t_s]))[0])
+        rate, position_steps = move.rate(t_s), float(move.position(np.array([t_s]))[0])
         if rate > 0:
             # The rest of the move is replaced by the down ramp of a move that cruises at the present rate.
             ramp_steps = rate**2 / (2 * move.acceleration_hz_s)
             begun = t_s - rate / move.acceleration_hz_s
-            from_steps = here - move.direction * ramp_steps
+            from_steps = position_steps - move.direction * ramp_steps
             last = Move(begun, from_steps, move.direction, 2 * ramp_steps, rate, move.acceleration_hz_s, t_s)
         elif self.moving(t_s):
-            last = Move(t_s, here, 1, 0.0, 1.0, 1.0)
+            last = Move(t_s, position_steps, 1, 0.0, 1.0, 1.0)
         else:
             return t_s
         self._moves = [*self._moves[: index + 1][1 - HISTORY_MOVES :], last]
@@ -113,9 +113,9 @@ class TableMotion:
 
     def home(self, t_s: float) -> float:
         """Turn back to the home switch by the shorter way at a tenth of a turn per second; returns when it is there."""
-        here = float(self._moves[-1].position(np.array([t_s]))[0])
-        away = here - self._steps_per_turn * round(here / self._steps_per_turn)
-        back = Move(t_s, here, -1 if away > 0 else 1, abs(away), 0.1 * self._steps_per_turn, 1e6)
+        position_steps = float(self._moves[-1].position(np.array([t_s]))[0])
+        away = position_steps - self._steps_per_turn * round(position_steps / self._steps_per_turn)
+        back = Move(t_s, position_steps, -1 if away > 0 else 1, abs(away), 0.1 * self._steps_per_turn, 1e6)
         settled = Move(back.end_s, 0.0, 1, 0.0, 1.0, 1.0)
         self._moves = [back, settled] if away else [settled]
         return back.end_s

@@ -87,8 +87,8 @@ class SineMotion:
             return
         more = max(parts - have, int(AHEAD_S / self._step_s))
         begin_s = np.asarray(self.sine.start_s + self._step_s * np.arange(have, have + more), dtype=np.float64)
-        turned = self._turned(begin_s, np.full(more, self._step_s))
-        self._angles = np.concatenate([self._angles, self._angles[-1] + np.cumsum(turned)])
+        increments = self._turned(begin_s, np.full(more, self._step_s))
+        self._angles = np.concatenate([self._angles, self._angles[-1] + np.cumsum(increments)])
 
     def _turned(self, begin_s: Array, length_s: Array) -> Array:
         """Return the integrals of the rate by Simpson's rule, (n,) degrees."""

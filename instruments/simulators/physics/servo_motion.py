@@ -36,8 +36,8 @@ class ServoMotion:
     def move_to(self, t_s: float, angle_deg: float, rate_dps: float, acceleration_dps2: float) -> float:
         """Turn to an angle by the shorter way and stay there; returns when it is there."""
         begin_s = self.set_rate(t_s, 0.0, acceleration_dps2)
-        here, _ = self._at(begin_s)
-        way = (angle_deg - here + 180.0) % 360.0 - 180.0
+        present_deg, _ = self._at(begin_s)
+        way = (angle_deg - present_deg + 180.0) % 360.0 - 180.0
         if way == 0:
             return begin_s
         top = math.copysign(min(rate_dps, math.sqrt(acceleration_dps2 * abs(way))), way)
@@ -45,10 +45,10 @@ class ServoMotion:
         steady_s = abs(way / top) - ramp_s
         ramp_deg = top * ramp_s / 2
         corners = [
-            (begin_s, here, 0.0),
-            (begin_s + ramp_s, here + ramp_deg, top),
-            (begin_s + ramp_s + steady_s, here + way - ramp_deg, top),
-            (begin_s + 2 * ramp_s + steady_s, here + way, 0.0),
+            (begin_s, present_deg, 0.0),
+            (begin_s + ramp_s, present_deg + ramp_deg, top),
+            (begin_s + ramp_s + steady_s, present_deg + way - ramp_deg, top),
+            (begin_s + 2 * ramp_s + steady_s, present_deg + way, 0.0),
         ]
         self._follow(begin_s, corners)
         return corners[-1][0]

@@ -79,8 +79,8 @@ class Tumbling:
             return
         self._asked = tuple(up)
         before = self._turns[-1].attitudes(np.array([t_s]))[0] if self._turns else self._first
-        there = np.asarray(up, dtype=np.float64) + np.radians(POSE_U_DEG) * self._rng.standard_normal(3)
-        axis, angle = between(before[2], there / np.linalg.norm(there))
+        up_at_rest = np.asarray(up, dtype=np.float64) + np.radians(POSE_U_DEG) * self._rng.standard_normal(3)
+        axis, angle = between(before[2], up_at_rest / np.linalg.norm(up_at_rest))
         duration_s = max(float(np.degrees(angle)) / self._rate_dps, SHORTEST_S)
         # what is up stays up in the laboratory: seen from the body it moves the other way round
         self._turns.append(_Turn(t_s + self._reaction_s, duration_s, -axis, angle, before))

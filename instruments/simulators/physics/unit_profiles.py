@@ -140,10 +140,10 @@ def rd2100(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
 
     def gain(temperature_c: Array) -> Array:
         u = (temperature_c - 35.0) / 10.0
-        own = 1.0 + 0.024 * lot[0] + u * (0.008 * lot[1] + u * 0.0015 * lot[2])
+        scale = 1.0 + 0.024 * lot[0] + u * (0.008 * lot[1] + u * 0.0015 * lot[2])
         k = np.zeros((len(temperature_c), len(axes), 3))
         for row, column in enumerate(inputs):
-            k[:, row, column] = own
+            k[:, row, column] = scale
         return k
 
     def offset(temperature_c: Array) -> Array:

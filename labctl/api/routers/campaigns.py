@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from labctl.answers.campaigns import CampaignRequest, CampaignResponse, EventResponse, ResumeRequest
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, EventResponse
 from labctl.answers.drafts import DraftsRequest, DraftsResponse
 from labctl.answers.plans import CampaignPlanResponse
 from labctl.answers.schedule import ScheduledResponse
@@ -19,10 +19,9 @@ from labctl.api.event_stream import EventStream
 from labctl.api.paging import AfterNumber, Limit, Search, in_parts
 from labctl.services.campaigns.plan_view import campaign_plan
 from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
-from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
 from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.registry import MAKE_DRAFTS
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.commands.requests import CampaignStart, ToCampaign
 from labctl.store.paging import PageRequest
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
@@ -69,12 +68,6 @@ def plan(campaign: int, service: ServiceDep) -> CampaignPlanResponse:
 
 for _act in CAMPAIGN_ACTS:
     add_act_route(router, _act)
-
-
-@command_route(router, RESUME_CAMPAIGN, "Resume a campaign")
-def resume(campaign: int, request: ResumeRequest, service: ServiceDep) -> CampaignResponse:
-    """Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first."""
-    return service.execute(RESUME_CAMPAIGN, CampaignResume(campaign, request))
 
 
 @command_route(router, MAKE_DRAFTS, "Make its drafts")

@@ -73,7 +73,7 @@ class SigningKey:
 
 
 def signatory_of(certificate: x509.Certificate) -> Signatory:
-    """Return who a certificate is of."""
+    """Return the subject of a certificate as a signatory."""
 
     return Signatory(
         subject=certificate.subject.rfc4514_string(),
@@ -83,7 +83,7 @@ def signatory_of(certificate: x509.Certificate) -> Signatory:
 
 
 def digest_of(public: PublicKey) -> Digest:
-    """Return the hash that fits a key: SHA-384 on P-384, else SHA-256."""
+    """Return the hash for a key: SHA-384 for P-384, else SHA-256."""
     return "sha384" if getattr(getattr(public, "curve", None), "name", "") == "secp384r1" else "sha256"
 
 
@@ -140,11 +140,11 @@ def _pem(content: bytes, password: bytes | None, location: str) -> tuple[object,
 def _pkcs12(content: bytes, password: bytes | None, location: str) -> tuple[object, list[x509.Certificate]]:
 
     try:
-        key, own, more = load_key_and_certificates(content, password)
+        key, certificate, more = load_key_and_certificates(content, password)
     except ValueError as error:
         is_der = content[:1] == b"\x30"
         raise _unreadable(location, password, encrypted=is_der) from error
-    return key, [*([own] if own else []), *more]
+    return key, [*([certificate] if certificate else []), *more]
 
 
 def _unreadable(location: str, password: bytes | None, *, encrypted: bool) -> BadInput:
@@ -229,11 +229,11 @@ def _own(
     """Return the certificate of a public key, and the others. Raises BadInput where none is."""
     if not certificates:
         raise BadInput(f"{location}: it holds no certificate; name a PEM file with it by {SIGN_CERTIFICATE_VARIABLE}")
-    own = next((certificate for certificate in certificates if certificate.public_key() == public), None)
-    if own is None:
+    matching = next((certificate for certificate in certificates if certificate.public_key() == public), None)
+    if matching is None:
         raise BadInput(_mismatch(location, signatory_of(certificates[0])))
-    _public(own, location)
-    return own, tuple(certificate for certificate in certificates if certificate is not own)
+    _public(matching, location)
+    return matching, tuple(certificate for certificate in certificates if certificate is not matching)
 
 
 def _mismatch(location: str, signatory: Signatory) -> str:

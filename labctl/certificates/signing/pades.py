@@ -45,10 +45,12 @@ class _CmsSigner(Signer):
     """A signing key as pyHanko uses one."""
 
     def __init__(self, key: SigningKey) -> None:
-        own, *chain = [Certificate.load(each.public_bytes(Encoding.DER)) for each in (key.certificate, *key.chain)]
+        certificate, *chain = [
+            Certificate.load(each.public_bytes(Encoding.DER)) for each in (key.certificate, *key.chain)
+        ]
         registry = SimpleCertificateStore()  # type: ignore[no-untyped-call]
-        registry.register_multiple([own, *chain])
-        super().__init__(signing_cert=own, cert_registry=registry)
+        registry.register_multiple([certificate, *chain])
+        super().__init__(signing_cert=certificate, cert_registry=registry)
         self._key = key
 
     async def async_sign_raw(self, data: bytes, digest_algorithm: str, dry_run: bool = False) -> bytes:  # noqa: ARG002

@@ -67,21 +67,21 @@ def signatures_of_dcc(xml: bytes, roots: Sequence[x509.Certificate] | None) -> l
 def _xades(root: Any, xml: bytes, roots: Sequence[x509.Certificate] | None) -> SignatureFound:
     try:
         texts = [each.text for each in root.findall(f"{{{DS}}}Signature//{{{DS}}}X509Certificate")]
-        own, *chain = [x509.load_pem_x509_certificate(_pem(text)) for text in texts]
+        certificate, *chain = [x509.load_pem_x509_certificate(_pem(text)) for text in texts]
     except (ValueError, TypeError) as error:
         return SignatureFound("XAdES", problem=f"its certificate cannot be read: {error}")
-    signature = SignatureFound("XAdES", signatory=signatory_of(own))
+    signature = SignatureFound("XAdES", signatory=signatory_of(certificate))
     try:
         stated = datetime.fromisoformat(root.findtext(f"{{{DS}}}Signature//{{{XADES}}}SigningTime"))
         config = XAdESSignatureConfiguration(location="./", verification_time=stated)
-        results = XAdESVerifier().verify(xml, x509_cert=own, expect_config=config)
+        results = XAdESVerifier().verify(xml, x509_cert=certificate, expect_config=config)
     except (SignXMLException, ValueError, TypeError, etree.LxmlError) as error:
         return replace(signature, problem=" ".join(str(error).split()) or type(error).__name__)
     if not any(result.signed_xml is not None and result.signed_xml.tag == root.tag for result in results):
         return replace(signature, problem="the signature is not over the whole certificate")
     (signed,) = [result for result in results if isinstance(result, XAdESVerifyResult)]
     at = datetime.fromisoformat(signed.signed_properties.findtext(f"{{{XADES}}}SigningTime"))
-    return _with_trust(replace(signature, valid=True, signed_at=at), at, own, chain, roots)
+    return _with_trust(replace(signature, valid=True, signed_at=at), at, certificate, chain, roots)
 
 
 def _pem(text: str) -> bytes:
@@ -111,12 +111,12 @@ def _attached(reader: PdfFileReader) -> Iterator[bytes]:
 
 
 def _pades(signature: EmbeddedPdfSignature, roots: Sequence[x509.Certificate] | None) -> SignatureFound:
-    own, *chain = [
+    certificate, *chain = [
         x509.load_der_x509_certificate(other_embedded_cert.dump())
         for other_embedded_cert in (signature.signer_cert, *signature.other_embedded_certs)
     ]
     at = signature.self_reported_timestamp
-    pades_signature = SignatureFound("PAdES", signatory=signatory_of(own), signed_at=at)
+    pades_signature = SignatureFound("PAdES", signatory=signatory_of(certificate), signed_at=at)
     try:
         intact, by_key = validate_sig_integrity(
             signature.signer_info, signature.signer_cert, "data", signature.compute_digest()
@@ -130,35 +130,39 @@ def _pades(signature: EmbeddedPdfSignature, roots: Sequence[x509.Certificate] | 
         return replace(pades_signature, problem="the file was changed after it was signed")
     if covered is not SignatureCoverageLevel.ENTIRE_FILE:
         return replace(pades_signature, problem="something was added to the file after it was signed")
-    first, last = own.not_valid_before_utc, own.not_valid_after_utc
+    first, last = certificate.not_valid_before_utc, certificate.not_valid_after_utc
     if at is None or not first <= at <= last:
         return replace(
             pades_signature, problem=f"its certificate is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d} only"
         )
-    return _with_trust(replace(pades_signature, valid=True), at, own, chain, roots)
+    return _with_trust(replace(pades_signature, valid=True), at, certificate, chain, roots)
 
 
 def _with_trust(
     signature: SignatureFound,
     at: datetime,
-    own: x509.Certificate,
+    certificate: x509.Certificate,
     chain: Sequence[x509.Certificate],
     roots: Sequence[x509.Certificate] | None,
 ) -> SignatureFound:
     """Return a valid signature with whether an authority that is trusted vouches for the signer at the time `at`."""
     if roots is None:
-        issuer_text = "self-signed" if own.issuer == own.subject else f"issued by {own.issuer.rfc4514_string()}"
+        issuer_text = (
+            "self-signed"
+            if certificate.issuer == certificate.subject
+            else f"issued by {certificate.issuer.rfc4514_string()}"
+        )
         return replace(
             signature, reason=f"{issuer_text}: trust not established; name the file of a trusted authority by --ca"
         )
     context = ValidationContext(trust_roots=[_asn1(root) for root in roots], allow_fetching=False, moment=at)
-    validator = CertificateValidator(_asn1(own), [_asn1(each) for each in chain], validation_context=context)
+    validator = CertificateValidator(_asn1(certificate), [_asn1(each) for each in chain], validation_context=context)
     try:
         in_own_thread(lambda: asyncio.run(validator.async_validate_path()))
     except (PathBuildingError, PathError, ValidationError) as error:
         return replace(signature, trust="not trusted", reason=" ".join(str(error).split()))
     return replace(
-        signature, trust="trusted", reason=f"issued by {own.issuer.rfc4514_string()}, valid on {at:%Y-%m-%d}"
+        signature, trust="trusted", reason=f"issued by {certificate.issuer.rfc4514_string()}, valid on {at:%Y-%m-%d}"
     )
 
 

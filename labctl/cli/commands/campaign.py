@@ -15,6 +15,7 @@ from labctl.cli.options import (
     Json,
     Limit,
     Search,
+    SimulatedSpeed,
     SimulatedStart,
     WireLog,
     simulated_start,
@@ -32,12 +33,6 @@ app = typer.Typer(
 Recipe = Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")]
 Clip = Annotated[
     bool, typer.Option("--clip", help="Leave out points beyond the limits of the bench or a unit, and list them.")
-]
-Speed = Annotated[
-    float | None,
-    typer.Option(
-        "--speed", metavar="X", help="Speed of a simulated bench: X times real time; default: as fast as possible."
-    ),
 ]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the simulated bench.")]
 At = Annotated[
@@ -143,7 +138,7 @@ def start(
     recipe: Recipe,
     bench: BenchName = None,
     clip: Clip = False,
-    speed: Speed = None,
+    speed: SimulatedSpeed = None,
     seed: Seed = None,
     at: At = None,
     cron: Cron = None,

@@ -1,6 +1,7 @@
-"""`labctl campaign` watch, resume, abort, confirm, draft: a campaign that runs, or was interrupted.
+"""`labctl campaign` watch, abort, draft: a campaign that runs, or has ended.
 
-A command that only sends the request of its act is no function here: `labctl.cli.campaign_acts` makes it.
+`labctl.cli.campaign_acts` makes the command of an act from its declaration. That of an abort is written by hand: it
+stops the bench before it loads the declarations, and answers how the campaign is once the bench is safe.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labctl.cli.campaign_acts import By, Id, Reason, person
+from labctl.cli.campaign_acts import Id, Reason
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import BenchName, CampaignId, Database, Json, WireLogOnly
+from labctl.cli.options import CampaignId, Database, Json
 from labctl.cli.output import console, print_json, stderr
-from labctl.cli.printing.campaigns import print_campaign, print_drafts, print_end
+from labctl.cli.printing.campaigns import print_campaign, print_drafts
 from labctl.cli.turn_text import turn_text
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
     from labctl.cli.progress_bar import CampaignProgress
     from labctl.services.commands.open import current_status
 
-    clock, asked_prompt, fault, turned = SystemClock(), "", "", ""
+    clock, asked_prompt, fault, turn_shown = SystemClock(), "", "", ""
     with one_clear_line(), CampaignProgress(quiet=as_json) as progress:
         while True:
             answer = current_status(database, campaign)
@@ -37,8 +38,8 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
             if not as_json and answer.prompt is not None and answer.prompt.id != asked_prompt:
                 asked_prompt = answer.prompt.id
                 console.print(f"question {asked_prompt}: {answer.prompt.text}", style="yellow")
-            if not as_json and (text := turn_text(answer)) and text != turned:
-                turned = text
+            if not as_json and (text := turn_text(answer)) and text != turn_shown:
+                turn_shown = text
                 console.print(text)
             if not as_json and answer.last_error and answer.last_error != fault:
                 fault = answer.last_error
@@ -47,47 +48,6 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
                 break
             clock.sleep(1.0)
     print_json(answer) if as_json else print_campaign(answer)
-
-
-def resume(
-    campaign: Annotated[
-        int | None,
-        typer.Argument(metavar="ID", help="Number of the campaign; default: the newest interrupted campaign."),
-    ] = None,
-    bench: BenchName = None,
-    power: Annotated[
-        str | None,
-        typer.Option(
-            "--power",
-            metavar="lost|kept",
-            help="Whether the units lost power during the interruption; default: lost if this computer was "
-            "restarted since then, else kept.",
-        ),
-    ] = None,
-    speed: Annotated[
-        float | None,
-        typer.Option(
-            "--speed", metavar="X", help="Speed of a simulated bench: X times real time; default: as fast as possible."
-        ),
-    ] = None,
-    wire_log: WireLogOnly = None,
-    by: By = None,
-    as_json: Json = False,
-    database: Database = None,
-) -> None:
-    """Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first."""
-    from labctl.answers.campaigns import ResumeRequest
-    from labctl.cli.campaign_terminal import campaign_terminal
-    from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
-    from labctl.services.commands.open import campaign_to_resume, open_commands
-    from labctl.services.commands.requests import CampaignResume
-
-    with one_clear_line():
-        request = ResumeRequest.model_validate({"by": person(by), "power": power})
-        campaign_resume = CampaignResume(campaign_to_resume(database, campaign), request, bench, speed, wire_log)
-        with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
-            answer = commands.execute(RESUME_CAMPAIGN, campaign_resume)
-    print_end(answer, as_json=as_json)
 
 
 def abort(
@@ -145,51 +105,6 @@ def _at_its_end(database: str | None, answer: CampaignResponse) -> CampaignRespo
     return answer
 
 
-def confirm(
-    prompt: Annotated[
-        str,
-        typer.Argument(
-            metavar="QUESTION",
-            help="Id of the question, as `labctl campaign status` or `labctl campaign watch` shows it.",
-        ),
-    ],
-    campaign: Annotated[
-        int | None,
-        typer.Option("--campaign", metavar="ID", help="Number of the campaign; default: the newest campaign."),
-    ] = None,
-    decline: Annotated[
-        str | None,
-        typer.Option(
-            "--decline",
-            metavar="WHY",
-            help="Answer that the action cannot be done, with the reason; the campaign ends.",
-        ),
-    ] = None,
-    again: Annotated[
-        bool, typer.Option("--again", help="For a turn by hand: the turn went wrong; request it again.")
-    ] = False,
-    by: By = None,
-    as_json: Json = False,
-    database: Database = None,
-) -> None:
-    """Answer a campaign's question: done, or cannot be done. An answer to an older question is refused."""
-    from labctl.answers.campaigns import ConfirmRequest
-    from labctl.errors import BadInput
-    from labctl.services.commands.acts.confirm import CONFIRM_PROMPT
-    from labctl.services.commands.open import current_status, execute
-    from labctl.services.commands.requests import ToCampaign
-
-    with one_clear_line():
-        campaign_number = campaign if campaign is not None else current_status(database, None).id
-        if again and decline is not None:
-            raise BadInput("--again and --decline answer the same question; give one of them")
-        request = ConfirmRequest(
-            prompt=prompt, by=person(by), confirmed=decline is None and not again, again=again, reason=decline or ""
-        )
-        answer = execute(database, CONFIRM_PROMPT, ToCampaign(campaign_number, request))
-    print_json(answer) if as_json else print_campaign(answer)
-
-
 def draft(
     campaign: CampaignId = None,
     again: Annotated[bool, typer.Option("--again", help="Also try again the drafts that failed before.")] = False,
@@ -217,5 +132,5 @@ def draft(
 
 def add_to(app: typer.Typer) -> None:
     """Put these commands beside the others of `labctl campaign`."""
-    for command in (watch, resume, abort, confirm, draft):
+    for command in (watch, abort, draft):
         app.command(command.__name__)(command)

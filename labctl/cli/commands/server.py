@@ -1,4 +1,4 @@
-"""`labctl serve`, `labctl simulator` and `labctl demo`: what runs for longer."""
+"""`labctl serve`, `labctl stop`, `labctl simulator` and `labctl demo`."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def serve(
 
 
 def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> None:
-    """Print where a service answers, and how its bench was found."""
+    """Print the address of a service and the state of its bench at the start."""
     from labctl.answers.service import ServiceReady
 
     named, start_at = request.bench_name, request.simulated_start

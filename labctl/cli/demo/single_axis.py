@@ -29,9 +29,9 @@ def play(demo: DemoRunner) -> None:
         "per turn, compensated", numbers=5,
     )  # fmt: skip
     for nominal_dps in np.unique(np.round(rate[np.abs(rate) >= MIN_RATE_DPS], 0))[::4]:
-        here = np.abs(rate - nominal_dps) < 0.5
-        before, after = raw[here], result.residual_dps["z"][here]
-        turns = (_rms(error_per_turn(errors, rate[here])) for errors in (before - bias, after))
+        at_rate = np.abs(rate - nominal_dps) < 0.5
+        before, after = raw[at_rate], result.residual_dps["z"][at_rate]
+        turns = (_rms(error_per_turn(errors, rate[at_rate])) for errors in (before - bias, after))
         rows.add_row(f"{nominal_dps:+.0f}", f"{_rms(before):.3f}", f"{_rms(after):.4f}", *(f"{t:.4f}" for t in turns))
     demo.console.print(rows)
     held = fitted.error.heldout_rms_dps

@@ -49,7 +49,7 @@ def _times(noises: Sequence[AllanJson]) -> list[float]:
 
 
 def _deviation(noise: AllanJson, tau: float) -> str:
-    near = (k for k, own in enumerate(noise["tau_s"]) if own is not None and abs(own - tau) <= SAME_TIME * tau)
+    near = (k for k, tau_s in enumerate(noise["tau_s"]) if tau_s is not None and abs(tau_s - tau) <= SAME_TIME * tau)
     k = next(near, None)
     return "" if k is None else format_number(noise["deviation_dps"][k])
 

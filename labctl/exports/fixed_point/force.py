@@ -78,9 +78,11 @@ class FixedForce:
     def corrected(self, raw_q31: Whole, temperature_q16: Whole, force_q16: Whole) -> tuple[Whole, NDArray[np.bool_]]:
         """Return corrected rates (n, axes) of outputs (n, axes) at temperatures (n,) and forces (n, 3), and outside."""
         held = np.clip(force_q16, -MAX_G << Q16, MAX_G << Q16)
-        own = held[:, [BODY_AXES.index(axis) for axis in self.force.axes]]
+        along_axes = held[:, [BODY_AXES.index(axis) for axis in self.force.axes]]
         error = product(
-            held @ self.per_g.T + product(own, own, Q16) * self.per_g2, np.ones(1, dtype=np.int64), Q16 + self.shift
+            held @ self.per_g.T + product(along_axes, along_axes, Q16) * self.per_g2,
+            np.ones(1, dtype=np.int64),
+            Q16 + self.shift,
         )
         rate, outside = self.fixed.corrected(raw_q31, temperature_q16) if self.is_direct else (raw_q31, None)
         limited = np.clip(rate - error, -MAX_Q31 - 1, MAX_Q31)

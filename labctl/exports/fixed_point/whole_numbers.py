@@ -21,11 +21,11 @@ from labctl.fitting.numeric.arrays import Array
 Whole = NDArray[np.int64]
 Q31, Q16, POSITION_BITS, RECIPROCAL_BITS = 31, 16, 24, 32
 MAX_Q31 = 2**31 - 1
-#: Highest order of the polynomials; the lowest order that is within NEAR of the calibration is taken, and the highest
-#: has to be within NEAR_ENOUGH, both as shares of the full scale; so has what several axes cause only together.
-MAX_ORDER, NEAR, NEAR_ENOUGH = 11, 2.0**-30, 2.0**-18
+#: Highest order of the polynomials. The lowest order within TARGET_DEVIATION of the calibration is taken; the highest
+#: has to be within MAX_DEVIATION, as does what several axes cause only together. Both are shares of the full scale.
+MAX_ORDER, TARGET_DEVIATION, MAX_DEVIATION = 11, 2.0**-30, 2.0**-18
 #: Coefficients of an axis may add up to this share of the full scale: no sum and no product leaves its 64 bits.
-FILLED = 0.99
+MAX_FILL = 0.99
 #: Full scale where the calibration has no range of rates, deg/s.
 UNLIMITED_DPS = 2048.0
 
@@ -84,7 +84,7 @@ class FixedPoint:
 
     @property
     def steepest(self) -> float:
-        """How much the error of an axis can change for each deg/s that all outputs change by: a bound."""
+        """Upper bound of the change of an error per change of all outputs, deg/s per deg/s."""
         powers = np.arange(self.tables.shape[2])[None, None, :, None]
         return float((np.abs(self.tables) * powers).max(axis=-1).sum(axis=(1, 2)).max() / 2.0 ** (Q31 + self.shift))
 
@@ -107,21 +107,21 @@ def fixed_point(part: StaticPart, nodes: int, format_name: str) -> FixedPoint:
     temperatures_c = np.linspace(low_q16, high_q16, nodes) / 2.0**Q16
     for order in range(MAX_ORDER + 1) if part.has_rates else (0,):
         coefficients, off = _polynomials(part, temperatures_c, (slowest, fastest), full_scale, order)
-        if off <= NEAR * full_scale:
+        if off <= TARGET_DEVIATION * full_scale:
             break
-    if off > NEAR_ENOUGH * full_scale:
+    if off > MAX_DEVIATION * full_scale:
         raise BadInput(
             f"format {format_name}: polynomials of order {MAX_ORDER} in the output differ from model "
             f"{part.calibration.fitted.model.name} by up to {off:.2g} deg/s; use format c or json"
         )
-    if (joint := _of_several_axes(part)) > NEAR_ENOUGH * full_scale:
+    if (joint := _of_several_axes(part)) > MAX_DEVIATION * full_scale:
         raise BadInput(
             f"format {format_name}: it adds up the errors that the output of each axis causes, and while several axes "
             f"turn model {part.calibration.fitted.model.name} differs from this sum by up to {joint:.2g} deg/s; use "
             "format c or json"
         )
     largest = float(np.abs(coefficients).max(axis=-1).sum(axis=(1, 2)).max())
-    room = FILLED * full_scale
+    room = MAX_FILL * full_scale
     shift = max(0, math.floor(math.log2(room / max(largest, full_scale * 2.0**-20))))
     if largest > room:
         raise BadInput(
@@ -135,7 +135,7 @@ def fixed_point(part: StaticPart, nodes: int, format_name: str) -> FixedPoint:
 
 
 def _of_several_axes(part: StaticPart) -> float:
-    """Return how far the error is from the sum of those that the output of each axis alone causes, deg/s."""
+    """Return the largest difference of the error from the sum of the errors by each output alone, deg/s."""
     raw, temperature_c = all_turning(part)
     apart = raw - part.rate(raw, temperature_c)
     still = -part.rate(np.zeros_like(raw), temperature_c)

@@ -45,7 +45,7 @@ class BiasCubic:
         return (
             Loss(
                 f"scale factor and its nonlinearity, {over} ({consumer} has no parameter for them)",
-                float(seen_differences.own.max()),
+                float(seen_differences.turning.max()),
             ),
             Loss(
                 f"misalignment, {over} of the other axes ({consumer} has no parameter for it)",
@@ -106,7 +106,7 @@ def hold_tolerance(options: Mapping[str, str], seen_differences: Differences, fo
         raise BadInput(
             f"format {format_name}: up to {at_most(seen_differences.together):.3g} deg/s of the correction would be "
             "lost (scale "
-            f"factor {at_most(float(seen_differences.own.max())):.3g}, misalignment "
+            f"factor {at_most(float(seen_differences.turning.max())):.3g}, misalignment "
             f"{at_most(float(seen_differences.cross.max())):.3g} deg/s), "
             f"more than option {TOLERANCE} = {limit:g} deg/s allows; use format c or json, or raise {TOLERANCE}"
         )

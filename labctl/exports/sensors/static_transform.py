@@ -66,24 +66,24 @@ def command_of(turned_rad: Array, child: str) -> str:
 
 def tf2(found: Parameters, head: Sequence[str]) -> str:
     """Return a shell script of one command. Raises BadInput where the alignment is unknown."""
-    turned, child, use = _turn("tf2", found)
+    rotation_rad, child, use = _turn("tf2", found)
     notes = [
         f"Rotation from {PARENT} (parent) to {child} (child); it turns a vector of the child into the parent's axes.",
         use,
         OFFSET,
     ]
-    return commented([*map(plain, head), *notes]) + command_of(turned, child) + "\n"
+    return commented([*map(plain, head), *notes]) + command_of(rotation_rad, child) + "\n"
 
 
 def urdf(found: Parameters, head: Sequence[str]) -> str:
     """Return two links and the fixed joint between them. Raises BadInput where the alignment is unknown."""
-    turned, child, use = _turn("urdf", found)
+    rotation_rad, child, use = _turn("urdf", found)
     notes = [
         *map(plain, head),
         "rpy: angles in rad about the fixed axes x, then y, then z of the parent (roll, pitch, yaw).", use, OFFSET,
     ]  # fmt: skip
     comment = "\n     ".join(notes).replace("--", "- -")  # two hyphens would end the comment
-    angles = " ".join(f"{value:.12g}" for value in roll_pitch_yaw_of(turned) + 0.0)
+    angles = " ".join(f"{value:.12g}" for value in roll_pitch_yaw_of(rotation_rad) + 0.0)
     return (
         f'<?xml version="1.0"?>\n<!-- {comment} -->\n<robot name="{PARENT}_and_{child}">\n'
         f'  <link name="{PARENT}"/>\n  <link name="{child}"/>\n'
@@ -98,10 +98,10 @@ def _turn(name: str, found: Parameters) -> tuple[Array, str, str]:
     """Return the rotation vector, the frame that is turned, and what the transform is for."""
     is_force = isinstance(found, AccelerometerParameters)
     child, use = ("gyro", RATES) if is_force else ("magnetometer", FIELD)
-    turned = found.gyro_turned_rad if isinstance(found, AccelerometerParameters) else found.turned_rad
-    if turned is None:
+    rotation_rad = found.gyro_turned_rad if isinstance(found, AccelerometerParameters) else found.turned_rad
+    if rotation_rad is None:
         raise BadInput(
             f"--export {name}: the alignment of the {child} is unknown; calibrate by the recording of a unit that was "
             "turned from pose to pose"
         )
-    return turned, child, use
+    return rotation_rad, child, use

@@ -65,8 +65,8 @@ def _angles_deg(k: Matrix) -> NDArray[np.float64]:
     skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
     sine = float(np.linalg.norm(skew)) / 2
     angle = float(np.arctan2(sine, (np.trace(rotation) - 1) / 2))
-    turned = skew / 2 * (angle / sine if sine > 1e-15 else 1.0)
+    rotation_rad = skew / 2 * (angle / sine if sine > 1e-15 else 1.0)
     # output = K rate: a triad turned by +a sees the rate turned by -a
     rows = symmetric / np.linalg.norm(symmetric, axis=1, keepdims=True)
     angle_errors_deg = [float(np.arcsin(np.clip(rows[i] @ rows[j], -1.0, 1.0))) for i, j in PAIRS]
-    return np.rad2deg(np.array([*(-turned), *angle_errors_deg]))
+    return np.rad2deg(np.array([*(-rotation_rad), *angle_errors_deg]))

@@ -71,8 +71,8 @@ def slope_over(temperature_c: Array, estimates: list[Estimate]) -> Estimate | No
     columns = np.column_stack([np.ones(len(temperature_c)), temperature_c - temperature_c.mean()])
     values, u, _ = _solved(columns, np.array([estimate.value for estimate in estimates]))
     weights = columns[:, 1] / float(columns[:, 1] @ columns[:, 1])
-    own = [estimate.u for estimate in estimates if estimate.u is not None]
-    carried = float(np.sqrt(np.sum((weights * np.array(own)) ** 2))) if len(own) == len(estimates) else None
+    known_u = [estimate.u for estimate in estimates if estimate.u is not None]
+    carried = float(np.sqrt(np.sum((weights * np.array(known_u)) ** 2))) if len(known_u) == len(estimates) else None
     stated_u = [each for each in (u[1], carried) if each is not None]
     return Estimate(values[1], max(stated_u) if stated_u else None)
 

@@ -128,9 +128,9 @@ def _turning(data: ReducedRecording, axis: str) -> list[Column]:
     if data.info.motion == "turns" or data.info.latitude_deg is None or "table_angle_deg" not in data.nodes:
         return []
     return [
-        Column(f"earth_{wave}_{there}", "deg/s", here.astype(np.float64), (wave, 1))
-        for there, here in data.nodes.positions()
-        if Position.of(there).axis != axis
+        Column(f"earth_{wave}_{position}", "deg/s", rows.astype(np.float64), (wave, 1))
+        for position, rows in data.nodes.positions()
+        if Position.of(position).axis != axis
         for wave in ("cos", "sin")
     ]
 

@@ -103,10 +103,10 @@ def _scales(
     residual = _base_residual(design, y - explained, white)
     scale = np.repeat(np.sqrt(white)[None, :], len(y), axis=0)
     for k in range(1, len(y)):
-        here = design.present[k]
-        if here.sum() < 8:
+        present = design.present[k]
+        if present.sum() < 8:
             continue
-        values = residual[k, here] / scale[k, here]
+        values = residual[k, present] / scale[k, present]
         spread = ROBUST * float(np.median(np.abs(values - np.median(values))))
         scale[k] *= max(spread, 1.0)
     return scale

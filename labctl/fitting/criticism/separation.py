@@ -53,14 +53,14 @@ def separation_chi2(
         if axis not in schedule.designs:
             continue
         options = schedule.options(axis)
-        own = [
+        candidates = [
             (_shape_distance(option.term, signal.term), option_rows)
             for option, option_rows in options
             if option.candidate == signal.term.effect and option_rows.stop - option_rows.start == len(values)
         ]
-        if not own:
+        if not candidates:
             continue
-        _, nearest = min(own, key=lambda pair: pair[0])
+        _, nearest = min(candidates, key=lambda pair: pair[0])
         eliminated = schedule.left[axis]
         size = float(values @ eliminated.gram[nearest, nearest] @ values)
         shared = max(
@@ -78,8 +78,8 @@ def separation_chi2(
 def _noise_ratio(schedule: Schedule, axis: str, floor_dps: float) -> float:
     """Return the variance of a mean on a schedule over that which was found, at most 1."""
     white = schedule.data.white_var
-    own = schedule.left[axis].noise.size_dps ** 2 + (float(np.median(white[axis])) if white is not None else 0.0)
-    return min(1.0, own / floor_dps**2) if floor_dps > 0 else 1.0
+    variance = schedule.left[axis].noise.size_dps ** 2 + (float(np.median(white[axis])) if white is not None else 0.0)
+    return min(1.0, variance / floor_dps**2) if floor_dps > 0 else 1.0
 
 
 def separation_power(chi2: float) -> float:

@@ -209,10 +209,11 @@ def _rival(data: FitData, model: ErrorModel, effect: str) -> LeftOut:
     rivals: list[tuple[Axis, NDArray[np.bool_], NDArray[np.float64]]] = []
     for in_fit, tested in stretches_of(data):
         residual = np.zeros(len(terms))
-        for axis, own in zip(axes, options, strict=True):
-            residual += [float(np.sum(axis.left_over_noise(columns, in_fit) ** 2)) for columns in own]
+        for axis, axis_options in zip(axes, options, strict=True):
+            residual += [float(np.sum(axis.left_over_noise(columns, in_fit) ** 2)) for columns in axis_options]
         best = int(np.argmin(residual))
         rivals += [
-            (axis, tested, axis.errors(own[best], in_fit, tested)) for axis, own in zip(axes, options, strict=True)
+            (axis, tested, axis.errors(axis_options[best], in_fit, tested))
+            for axis, axis_options in zip(axes, options, strict=True)
         ]
     return pooled(rivals)

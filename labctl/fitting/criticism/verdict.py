@@ -158,8 +158,8 @@ def is_at_end(comparison: Comparison, effect: Candidate, *, shortest: bool = Fal
         return False
     lead, sign = 0.0, -1.0 if shortest else 1.0
     for axis in effect.option:
-        own = {i: o.term for i, o in enumerate(comparison.designs[axis].options) if o.candidate == effect.id}
-        tau_s = {i: term.parameters["tau_s"] ** sign for i, term in own.items() if term is not None}
+        terms = {i: o.term for i, o in enumerate(comparison.designs[axis].options) if o.candidate == effect.id}
+        tau_s = {i: term.parameters["tau_s"] ** sign for i, term in terms.items() if term is not None}
         end, axis_log_bf = NEAR_END * max(tau_s.values()), comparison.axes[axis].log_bf
         last = max((float(axis_log_bf[i]) for i, tau in tau_s.items() if tau >= end), default=-np.inf)
         inner = max((float(axis_log_bf[i]) for i, tau in tau_s.items() if tau < end), default=-np.inf)

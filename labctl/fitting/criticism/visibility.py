@@ -106,9 +106,9 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
         for option, option_rows in schedule.options(axis):
             if option.candidate != effect_id:
                 continue
-            here = visible_share(schedule.left[axis], option_rows)
-            share = max(share, here)
-            if here < MIN_VISIBLE:
+            axis_share = visible_share(schedule.left[axis], option_rows)
+            share = max(share, axis_share)
+            if axis_share < MIN_VISIBLE:
                 continue
             norms = np.sqrt(np.maximum(np.diag(schedule.left[axis].gram)[option_rows], 0.0))
             best = int(np.argmax(norms))

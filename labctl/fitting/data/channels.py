@@ -111,9 +111,9 @@ class Channels:
             return self.harmonics[carrier]
         wave, n = carrier
         begin = np.deg2rad(np.asarray(self.columns["table_angle_deg"], dtype=np.float64))
-        turned = np.deg2rad(self.table_rate_dps() * self.durations_s())
-        at = n * (begin + turned / 2)
-        return np.asarray((np.cos(at) if wave == "cos" else np.sin(at)) * np.sinc(n * turned / 2 / np.pi))
+        turn_rad = np.deg2rad(self.table_rate_dps() * self.durations_s())
+        at = n * (begin + turn_rad / 2)
+        return np.asarray((np.cos(at) if wave == "cos" else np.sin(at)) * np.sinc(n * turn_rad / 2 / np.pi))
 
     def durations_s(self) -> Array:
         """Return how long each row lasted, (n,) s."""

@@ -51,8 +51,8 @@ def covered_by_readings(recording: Recording, up_rate_dps: float = 0.0) -> Cover
     temperature_c = temperature_of(columns)
     if not valid.any():
         return None
-    turned = recording.info.motion == "turns"
-    rate = (rates_as_turned(recording) if turned else np.asarray(columns["table_rate_dps"], dtype=np.float64))[valid]
+    by_hand = recording.info.motion == "turns"
+    rate = (rates_as_turned(recording) if by_hand else np.asarray(columns["table_rate_dps"], dtype=np.float64))[valid]
     starts = dataset_starts(np.asarray(columns["dataset"], dtype=np.int64)[valid])
     axis = recording.info.axes[0]
     position = np.asarray(columns["position"])[valid][starts] if "position" in columns else np.full(len(starts), axis)

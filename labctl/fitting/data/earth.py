@@ -80,8 +80,8 @@ def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array
     shrink = np.sinc(half / np.pi)  # the mean of a cosine over what was turned
     cosine, sine = np.cos(middle) * shrink, np.sin(middle) * shrink
     turning = []
-    for up_position, here in channels.positions():
+    for up_position, rows in channels.positions():
         if Position.of(up_position).axis != axis:
-            for part in channels.by_recording(here):  # the table's zero may point elsewhere on another day
+            for part in channels.by_recording(rows):  # the table's zero may point elsewhere on another day
                 turning += [np.where(part, cosine, 0.0), np.where(part, sine, 0.0)]
     return np.column_stack(turning) if turning else np.zeros((len(channels), 0))

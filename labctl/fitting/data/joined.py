@@ -171,8 +171,8 @@ def _renumbered(number: int, recording: Recording, first: RecordingInfo, counts:
         columns["previous_rate_dps"] = np.concatenate([[0.0], rate[:-1]])[:n]
     behind = dict(counts.last)
     for name in COUNTED:
-        own = np.asarray(columns.get(name, np.ones(n)), dtype=np.int64)
-        columns[name] = own - int(own.min(initial=1)) + 1 + behind[name]
+        numbers = np.asarray(columns.get(name, np.ones(n)), dtype=np.int64)
+        columns[name] = numbers - int(numbers.min(initial=1)) + 1 + behind[name]
         counts.last[name] = int(columns[name].max(initial=behind[name]))
     environment = _environment(recording, columns)
     shift_s = 0.0
@@ -200,8 +200,10 @@ def _environment(recording: Recording, columns: Rows) -> Rows:
         )
     environment_rows = {name: np.asarray(values) for name, values in source.items()}
     if "run" in environment_rows:
-        own = np.unique(np.asarray(recording.columns.get("run", np.ones(1))))
-        environment_rows["run"] = np.asarray(environment_rows["run"], dtype=np.int64) - int(own.min()) + int(runs.min())
+        run_numbers = np.unique(np.asarray(recording.columns.get("run", np.ones(1))))
+        environment_rows["run"] = (
+            np.asarray(environment_rows["run"], dtype=np.int64) - int(run_numbers.min()) + int(runs.min())
+        )
         return environment_rows
     repeated = {name: np.tile(values, len(runs)) for name, values in environment_rows.items()}
     return repeated | {"run": np.repeat(runs, len(environment_rows["t_s"]))}

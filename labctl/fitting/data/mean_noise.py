@@ -64,9 +64,9 @@ def quantisation_var_of(points: Recording, axis: str) -> Array:
 
 def response_dps(rates: Mapping[str, Array], output_dps: Array) -> Array:
     """Return the part of an output (m,) that is proportional to the rates along the body axes, (m,) each, deg/s."""
-    turned = np.column_stack(list(rates.values()))
-    gains, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(turned)), turned]), output_dps, rcond=None)
-    return np.asarray(turned @ gains[1:])
+    rate_columns = np.column_stack(list(rates.values()))
+    gains, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(rate_columns)), rate_columns]), output_dps, rcond=None)
+    return np.asarray(rate_columns @ gains[1:])
 
 
 def _scale(points: Recording, axis: str) -> float:

@@ -173,8 +173,8 @@ def angle_regressor(channels: Channels, name: str) -> Array:
 
 def turned_positions(channels: Channels) -> tuple[str, ...]:
     """Return the positions in which the table turned."""
-    turned = channels.table_rate_dps() != 0
-    return tuple(position for position, rows in channels.positions() if np.any(turned & rows))
+    is_turning = channels.table_rate_dps() != 0
+    return tuple(position for position, rows in channels.positions() if np.any(is_turning & rows))
 
 
 def mountings_of(channels: Channels) -> dict[str, float]:
@@ -247,8 +247,8 @@ def _shown(position: Position, names: Iterable[str]) -> list[float]:
     """Return what a mounting shows of angles, by their names."""
     regressors = {}
     for part, turned_deg in zip(PARTS, (position.unit_deg, position.turned_deg), strict=True):
-        turned = np.deg2rad(turned_deg)
-        for wave, value in zip(WAVES, (np.cos(turned), np.sin(turned)), strict=True):
+        angle_rad = np.deg2rad(turned_deg)
+        for wave, value in zip(WAVES, (np.cos(angle_rad), np.sin(angle_rad)), strict=True):
             regressors[f"{position.end} {part} {wave}"] = float(value)
     return [regressors.get(name, 0.0) for name in names]
 

@@ -1,8 +1,8 @@
-"""Rates that change, reading by reading, and what a gyro with a delay and a finite bandwidth sees of them.
+"""Rates that change from reading to reading, and their response through a delay and a finite bandwidth.
 
 The response is linear, so it is applied as a factor on the spectrum of each even stretch of readings: exact at every
 delay and time constant for rates that are sampled fast enough, derivatives along both included. The result is averaged
-over the windows over which the output was averaged, so that both sides of the comparison lost the same.
+over the windows of the output, so that averaging attenuates both sides of the comparison equally.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Columns, dataset_starts
 from labctl.recording.motions.windows import kept_windows, stretch_starts, window_labels
 
-#: Times after which a response has forgotten what was before: time constants, and steps of the readings.
-FORGOTTEN_TAUS, FORGOTTEN_STEPS = 30.0, 256
-#: Beyond the ends of a stretch a rate goes on for about this many steps with the slope that it had over as many.
+#: Length of the memory of a response: in time constants, and in sample intervals of the readings.
+MEMORY_TAUS, MEMORY_STEPS = 30.0, 256
+#: Extrapolation beyond the ends of a stretch: decay of the slope, and span from which the slope is taken, in samples.
 BEND_STEPS, SLOPE_STEPS = 64, 8
-#: Readings off an even spacing by more than this share of it are interpolated onto one, and back.
+#: Largest deviation from an even spacing, as a share of it; above it readings are resampled to one, and back.
 EVEN_SHARE = 1e-3
 #: Means over windows that are kept for another time: 0.2 MB each.
 MAX_CACHED = 128
@@ -33,7 +33,7 @@ Factor = Callable[[Array], NDArray[np.complex128]]
 
 @dataclass(frozen=True)
 class Response:
-    """A delay behind a first-order response: what an output follows of the rate, exp(-i w delay) / (1 + i w T)."""
+    """Frequency response of the output to the rate: a first-order lag and a delay, exp(-i w delay) / (1 + i w T)."""
 
     delay_s: float = 0.0
     time_constant_s: float = 0.0
@@ -43,9 +43,11 @@ class Response:
         return np.asarray(np.exp(-1j * rad_s * self.delay_s) / (1 + 1j * rad_s * self.time_constant_s))
 
     def slope(self, name: str, rad_s: Array) -> NDArray[np.complex128]:
-        """Return the derivative of the gain along `DELAY` or `TIME_CONSTANT`, 1/s."""
-        own = -1j * rad_s
-        return np.asarray(own * self.gain(rad_s) / (1.0 if name == DELAY else 1 + 1j * rad_s * self.time_constant_s))
+        """Return the derivative of the gain by `DELAY` or `TIME_CONSTANT`, 1/s."""
+        derivative = -1j * rad_s
+        return np.asarray(
+            derivative * self.gain(rad_s) / (1.0 if name == DELAY else 1 + 1j * rad_s * self.time_constant_s)
+        )
 
     def value(self, name: str) -> float:
         """Return a coefficient of the response by its name, s."""
@@ -57,8 +59,8 @@ class Response:
 
     @property
     def memory_s(self) -> float:
-        """How long it takes to forget, s."""
-        return 2 * abs(self.delay_s) + FORGOTTEN_TAUS * abs(self.time_constant_s)
+        """Duration after which the impulse response is negligible, s."""
+        return 2 * abs(self.delay_s) + MEMORY_TAUS * abs(self.time_constant_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +74,9 @@ class _Motion:
     known: dict[tuple[str, Response], Array] = field(default_factory=dict, repr=False)
 
     def means(self, name: str, response: Response, factor: Factor) -> Array:
-        """Return the means over all windows, (m,), of what a factor makes of the rates; kept under name and response.
+        """Return the means over all windows, (m,), of the rates filtered by a factor; cached by name and response.
 
-        Only the last ones are kept: a fit comes back to the same responses for every axis and every fold.
+        Only the last ones are kept: a fit evaluates the same responses for every axis and every fold.
         """
         key = (name, response)
         if key not in self.known:
@@ -92,21 +94,21 @@ class _Motion:
 
 @dataclass(frozen=True, eq=False)
 class RateProfile:
-    """The table's rate over some windows of a recording, through any response; it knows the rates of all readings."""
+    """The rate of the table over some windows of a recording, filtered by any response; holds all readings."""
 
     motion: _Motion
-    rows: NDArray[np.int64]  #: (n,) the windows that are meant
+    rows: NDArray[np.int64]  #: (n,) indices of the windows
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RateProfile:
         """Return the profile of some of these windows, by index or mask."""
         return replace(self, rows=self.rows[rows])
 
     def seen_dps(self, response: Response) -> Array:
-        """Return the mean over each window, (n,) deg/s, of the rate as it comes through a response."""
+        """Return the mean over each window, (n,) deg/s, of the rate filtered by a response."""
         return self.motion.means("", response, response.gain)[self.rows]
 
     def slope(self, name: str, response: Response) -> Array:
-        """Return the derivative of that along `DELAY` or `TIME_CONSTANT`, (n,) deg/s^2."""
+        """Return the derivative of `seen_dps` by `DELAY` or `TIME_CONSTANT`, (n,) deg/s^2."""
         return self.motion.means(name, response, lambda rad_s: response.slope(name, rad_s))[self.rows]
 
 
@@ -138,9 +140,9 @@ def _filtered(t_s: Array, rate_dps: Array, factor: Factor, memory_s: float) -> A
     even = t_s[0] + step_s * np.arange(n)
     is_even = bool(np.max(np.abs(t_s - even)) < EVEN_SHARE * step_s)
     values = rate_dps if is_even else CubicSpline(t_s, rate_dps)(even)
-    spare = FORGOTTEN_STEPS + int(np.ceil(memory_s / step_s))
+    spare = MEMORY_STEPS + int(np.ceil(memory_s / step_s))
     total = int(next_fast_len(n + 3 * spare, real=True))
-    back = total - n - 2 * spare  # the way back from the last rate to the first, smoothly
+    back = total - n - 2 * spare  # smooth transition from the last rate to the first: the spectrum is periodic
     bend = 0.5 - 0.5 * np.cos(np.pi * (np.arange(back) + 0.5) / back)
     before, after = _beyond(values[::-1], spare)[::-1], _beyond(values, spare)
     whole = np.concatenate([before, values, after, after[-1] + (before[0] - after[-1]) * bend])
@@ -151,7 +153,7 @@ def _filtered(t_s: Array, rate_dps: Array, factor: Factor, memory_s: float) -> A
 
 
 def _beyond(values: Array, number: int) -> Array:
-    """Return how values (n,) go on, (number,): with their slope at first, so that no kink rings, then constant."""
+    """Return the extrapolation of values (n,), (number,): first with their slope, against ringing, then constant."""
     last = min(SLOPE_STEPS, len(values) - 1)
     slope = float(values[-1] - values[-1 - last]) / last
     return np.asarray(values[-1] - slope * BEND_STEPS * np.expm1(-(np.arange(number) + 1) / BEND_STEPS))

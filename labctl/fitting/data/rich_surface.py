@@ -165,9 +165,11 @@ def _levels_of_temperature(temperature_c: Array, rate: Array) -> NDArray[np.floa
     level = temperature_levels(temperature_c)
     if level is None:
         return np.zeros((len(temperature_c), 0))
-    here = np.eye(int(level.max()) + 1)[level]
+    at_level = np.eye(int(level.max()) + 1)[level]
     within = temperature_c - level_centres(temperature_c, level)
-    return np.column_stack([here, here * rate[:, None], here * within[:, None], here * (within * rate)[:, None]])
+    return np.column_stack(
+        [at_level, at_level * rate[:, None], at_level * within[:, None], at_level * (within * rate)[:, None]]
+    )
 
 
 def _levels_of_rate(channels: Channels) -> NDArray[np.float64]:

@@ -92,13 +92,13 @@ def _every(channels: Channels, axis: str) -> Iterator[Shift]:
     of = np.asarray(channels[RECORDING])
     run, mounting = np.asarray(channels["run"]), np.asarray(channels["mounting"])
     for number in np.unique(run):
-        here = run == number
-        yield Shift("turn_on", int(of[here][0]), int(number), here.astype(np.float64))
+        rows = run == number
+        yield Shift("turn_on", int(of[rows][0]), int(number), rows.astype(np.float64))
     for number in recordings_in(channels.columns):
         yield Shift("day_to_day", number, number, np.where(of == number, channels.rate_dps(axis), 0.0))
     for other in channels.rates:
         if other != axis:
             for number in np.unique(mounting):
-                here = mounting == number
-                turned = np.where(here, channels.rate_dps(other), 0.0)
-                yield Shift("mounting", int(of[here][0]), int(number), turned, other)
+                rows = mounting == number
+                rate_dps = np.where(rows, channels.rate_dps(other), 0.0)
+                yield Shift("mounting", int(of[rows][0]), int(number), rate_dps, other)

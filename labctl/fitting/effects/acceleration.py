@@ -131,8 +131,8 @@ class CentripetalAcceleration(_Acceleration):
         if not term.parameters.get("by_position", 1.0):
             return [Column("centripetal", "deg/s/g", pull_g)]
         return [
-            Column(f"centripetal_{up_position}_up", "deg/s/g", np.where(here, pull_g, 0.0))
-            for up_position, here in channels.positions()
+            Column(f"centripetal_{up_position}_up", "deg/s/g", np.where(rows, pull_g, 0.0))
+            for up_position, rows in channels.positions()
         ]
 
     def options(self, span: Span) -> list[Term]:

@@ -25,18 +25,18 @@ class _Responding(Effect):
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the change of the rate by a delay or time constant that differs from the channels' response."""
-        profile, here = channels.profile, channels.response
+        profile, response = channels.profile, channels.response
         if profile is None:
             return [Column(self.name, "s", np.zeros(len(channels)))]
-        up, present = channels.up(axis), here.value(self.name)
+        up, present = channels.up(axis), response.value(self.name)
         value = term.parameters.get(self._parameter, present)
 
         def error_dps(coefficient: Array) -> Array:
-            then = here.with_value(self.name, float(coefficient[0]) if len(coefficient) else present)
-            return np.asarray(up * (profile.seen_dps(then) - profile.seen_dps(here)))
+            then = response.with_value(self.name, float(coefficient[0]) if len(coefficient) else present)
+            return np.asarray(up * (profile.seen_dps(then) - profile.seen_dps(response)))
 
         def slope(coefficient: Array) -> Array:
-            then = here.with_value(self.name, float(coefficient[0]) if len(coefficient) else present)
+            then = response.with_value(self.name, float(coefficient[0]) if len(coefficient) else present)
             return np.asarray(up * profile.slope(self.name, then))
 
         at = np.full(len(channels), value)

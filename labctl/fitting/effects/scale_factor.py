@@ -14,9 +14,9 @@ from labctl.fitting.effects.base import Column, Effect, Law, Parameter, Referenc
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.open_loop_sine import sine_ratio, sine_ratio_slope
 
-#: Parameter of a sine response whose size was fitted beside K: calibrations until 0.1 hold such.
+#: Parameter of a sine response whose amplitude was fitted beside K, in calibrations up to version 0.1.
 FREE_AMPLITUDE = "free_amplitude"
-#: Below this K^2 the law is its tangent.
+#: Below this K^2 the law is replaced by its tangent.
 MIN_K_SQUARED = 1e-6
 
 
@@ -63,7 +63,7 @@ class ScaleFactorTemperature(Effect):
         ]
 
     def options(self, span: Span) -> list[Term]:
-        return [Term(self.id, order) for order in (1, 2, 3)]  # a higher one would follow any curve
+        return [Term(self.id, order) for order in (1, 2, 3)]  # a higher order would follow any curve
 
     def least(self, term: Term) -> tuple[int, int]:
         return 2, self.order(term) + 1
@@ -85,7 +85,7 @@ class ScaleFactorAsymmetry(Effect):
 
 
 class _Power(Effect):
-    """Powers of the own rate, of one parity."""
+    """Even or odd powers of the rate about the axis itself."""
 
     first: ClassVar[int]
     origin: ClassVar[Origin] = "sensor"
@@ -165,8 +165,8 @@ class SineResponse(Effect):
         def slope(k_squared: Array) -> Array:
             return cube * sine_ratio_slope(k_squared * rate**2)
 
-        there = np.full(len(rate), at)
-        shape = error_dps(there) / at if abs(at) > MIN_K_SQUARED else slope(there)
+        amplitudes = np.full(len(rate), at)
+        shape = error_dps(amplitudes) / at if abs(at) > MIN_K_SQUARED else slope(amplitudes)
         return [Column("k_squared", "(rad/(rad/s))^2", shape, law=Law(error_dps, slope), start=at)]
 
     def shaped_by(self, term: Term, coefficients: Mapping[str, float]) -> Term:
@@ -186,7 +186,7 @@ class Saturation(Effect):
     one_sign = True
     experiment = "rates every 2 to 5 % above 70 % of full scale"
     draws = ("table_rate_dps", "map", "worst")
-    softness: ClassVar[float] = 0.02  #: of the knee: what saturates does not break off
+    softness: ClassVar[float] = 0.02  #: width of the knee, as a share: saturation sets in gradually
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate = channels.rate_dps(axis)

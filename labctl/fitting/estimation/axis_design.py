@@ -101,9 +101,9 @@ def _refuse_too_many(data: FitData, model: ErrorModel, axis: str, unknowns: int)
 
 def _tangent(column: Column, at: Array | None) -> tuple[Array, Array]:
     """Return the slope of a law at coefficients (m,), or where it starts, and what the law has beside the tangent."""
-    here = np.full(len(column.values), column.start) if at is None else at
-    slope = column.slope(here)
-    return slope, column.error_dps(here) - slope * here
+    point = np.full(len(column.values), column.start) if at is None else at
+    slope = column.slope(point)
+    return slope, column.error_dps(point) - slope * point
 
 
 def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) -> list[tuple[str, Column]]:

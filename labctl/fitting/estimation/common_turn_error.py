@@ -1,4 +1,4 @@
-"""An error that all turns of a recording have in common: no number of turns averages it out."""
+"""The error that all turns of a recording have in common, which their number does not reduce."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from labctl.fitting.numeric.least_squares import Solution
 def with_common_error(data: FitData, axis: str, columns: NDArray[np.float64], solution: Solution) -> Solution:
     """Return a solution whose covariance holds the turns' common error, `turn_common_u` of recording.toml.
 
-    All angles too large by a share make the fitted response to the rate too small by that share, in scale factor and
+    A common relative error of all angles is an equal and opposite relative error of scale factor and
     misalignment together (GUM F.1.2.3). `columns` (m, k) are the model's, the first k of the solution's.
     """
     share = data.info.turn_common_u

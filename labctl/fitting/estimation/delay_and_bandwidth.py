@@ -90,5 +90,5 @@ def _nearest(data: FitData, axis: str, responses: list[Response]) -> Response:
 
 def with_response(coefficients: dict[str, Array], response: Response) -> dict[str, Array]:
     """Return coefficients, name -> (nodes,), with those of a response in the place of theirs."""
-    here = {DELAY: response.delay_s, TIME_CONSTANT: response.time_constant_s}
-    return {name: np.full_like(at, here[name]) if name in here else at for name, at in coefficients.items()}
+    fitted_s = {DELAY: response.delay_s, TIME_CONSTANT: response.time_constant_s}
+    return {name: np.full_like(at, fitted_s[name]) if name in fitted_s else at for name, at in coefficients.items()}

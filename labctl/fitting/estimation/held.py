@@ -265,12 +265,15 @@ def _require_same_conversion(data: FitData, axis: str, fixed: Fixed) -> None:
     """Refuse coefficients of an output that is converted to deg/s by another scale or offset."""
     if axis not in fixed.output:
         return
-    here, there = data.info.output.get(axis, OutputUnit()), fixed.output[axis]  # type: ignore[call-overload]
-    if not (math.isclose(here.scale, there.scale) and math.isclose(here.offset, there.offset, abs_tol=1e-12)):
+    of_recording, of_file = data.info.output.get(axis, OutputUnit()), fixed.output[axis]  # type: ignore[call-overload]
+    if not (
+        math.isclose(of_recording.scale, of_file.scale)
+        and math.isclose(of_recording.offset, of_file.offset, abs_tol=1e-12)
+    ):
         raise BadInput(
-            f"{fixed.name}, axis {axis}: its coefficients are of an output of scale {there.scale:g} and offset "
-            f"{there.offset:g} {there.unit}, but the recording has scale {here.scale:g} and offset {here.offset:g} "
-            f"{here.unit}; give coefficients of the same conversion"
+            f"{fixed.name}, axis {axis}: its coefficients are of an output of scale {of_file.scale:g} and offset "
+            f"{of_file.offset:g} {of_file.unit}, but the recording has scale {of_recording.scale:g} and offset "
+            f"{of_recording.offset:g} {of_recording.unit}; give coefficients of the same conversion"
         )
 
 
@@ -280,7 +283,7 @@ def _require_reference(channels: Channels, model: ErrorModel, axis: str, fixed: 
         return
     shifted_model = replace(model, reference=Reference(model.reference.temperature_c + STEP_K))
     pairs = zip(model.columns(channels, axis), shifted_model.columns(channels, axis), strict=True)
-    centred = [effect for (effect, here), (_, there) in pairs if not np.array_equal(here.values, there.values)]
+    centred = [effect for (effect, column), (_, shifted) in pairs if not np.array_equal(column.values, shifted.values)]
     if centred:
         raise BadInput(
             f"{fixed.name}: effect {centred[0]} is centred on a reference temperature, on which the other coefficients "

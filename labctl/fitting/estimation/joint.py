@@ -189,7 +189,7 @@ def _repeatability(data: FitData, axis: str, solutions: AxisSolutions) -> list[R
     lines: list[RepeatabilityJson] = []
     present: set[ShiftKind] = {shift.kind for shift in shifts}
     for kind, component in zip(sorted(present), solution.components, strict=True):
-        own: list[ShiftJson] = [
+        shift_rows: list[ShiftJson] = [
             {
                 "recording": shift.recording, "number": shift.number, "along": shift.along,
                 "value": float(solution.values[begin + k]), "u": float(u[k]),
@@ -202,7 +202,7 @@ def _repeatability(data: FitData, axis: str, solutions: AxisSolutions) -> list[R
                 "kind": kind, "term": KINDS[kind].term, "unit": KINDS[kind].unit,
                 "value": component.value, "u": component.u, "low": component.low, "high": component.high,
                 "freedom": component.groups, "p_value": component.p_value, "seen": component.p_value < SEEN,
-                "shifts": own,
+                "shifts": shift_rows,
             }
         )  # fmt: skip
     return sorted(lines, key=lambda line: list(KINDS).index(line["kind"]))

@@ -56,9 +56,9 @@ def time_errors(data: FitData, axis: str) -> TimeErrors | None:
     own_s, common_s = (_stated(data, name) for name in (TIME_U_S, TIME_COMMON_U_S))
     slope = data.channels.up(axis) * profile.slope(DELAY, data.channels.response)
     sets = np.asarray(data.channels["dataset"], dtype=np.int64)
-    here = [sets == number for number in np.unique(sets[own_s > 0])]
-    columns = np.column_stack([slope * common_s, *(slope * own_s * rows for rows in here)])
-    own_u_s = _rms(np.array([own_s[rows].mean() for rows in here]))
+    by_set = [sets == number for number in np.unique(sets[own_s > 0])]
+    columns = np.column_stack([slope * common_s, *(slope * own_s * rows for rows in by_set)])
+    own_u_s = _rms(np.array([own_s[rows].mean() for rows in by_set]))
     return TimeErrors(columns, _rms(common_s[common_s > 0]), own_u_s, TIME_COMMON_U_S in data.channels)
 
 

@@ -85,10 +85,10 @@ def _beside_base(
     scatter = data.scatter(axis)
     white = scatter.white_var if scatter.white_var is not None else np.ones(len(data))
     rows = whitened(scatter, [solution.drift], white, np.column_stack([base, slopes]))[0][0]
-    own, moved = rows[:, : base.shape[1]], rows[:, base.shape[1] :]
-    size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
-    coordinates, *_ = np.linalg.lstsq(own / size, moved, rcond=1e-9)
-    residual = moved - own / size @ coordinates
+    base_columns, moved = rows[:, : base.shape[1]], rows[:, base.shape[1] :]
+    size = np.maximum(np.linalg.norm(base_columns, axis=0), 1e-300)
+    coordinates, *_ = np.linalg.lstsq(base_columns / size, moved, rcond=1e-9)
+    residual = moved - base_columns / size @ coordinates
     noise = float(np.sqrt(solution.scale)) if np.isfinite(solution.scale) else np.inf
     return np.asarray(residual / max(noise, 1e-300))
 

@@ -246,13 +246,13 @@ def moved_around(
     taus_s = structure.taus_s(logarithms)
     neighbours = []
     for axis in group:
-        own = axis.columns(structure, taus_s)
+        at_taus = axis.columns(structure, taus_s)
         moved = [
-            (axis.columns(structure, {**taus_s, name: taus_s[name] * np.exp(STEP)}) - own) / STEP
+            (axis.columns(structure, {**taus_s, name: taus_s[name] * np.exp(STEP)}) - at_taus) / STEP
             for name in structure.constants
         ]
-        rows = axis.over_noise(np.column_stack([axis.base, own, *moved, axis.y]), in_fit)
-        neighbours.append(Local(rows, axis.base.shape[1], own.shape[1]))
+        rows = axis.over_noise(np.column_stack([axis.base, at_taus, *moved, axis.y]), in_fit)
+        neighbours.append(Local(rows, axis.base.shape[1], at_taus.shape[1]))
     return neighbours
 
 

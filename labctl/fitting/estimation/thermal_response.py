@@ -76,11 +76,11 @@ def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalRes
     chosen, axis_errors = _told_apart(axes, tried, held_out, every)
     structures = dict.fromkeys((axis.name for axis in axes), chosen)
     if len(axes) > 1:
-        own = [_of_axis(axis, errors, stretches, every) for axis in axes]
-        held_out[BY_AXIS] = pooled([each for part in own for each in part.errors])
-        if len({part.structure.id for part in own}) > 1 and held_out[BY_AXIS].is_below(held_out[chosen.id]):
-            structures = {part.name: part.structure for part in own}
-            axis_errors = {part.name: part.taus_s for part in own}
+        by_axis = [_of_axis(axis, errors, stretches, every) for axis in axes]
+        held_out[BY_AXIS] = pooled([each for part in by_axis for each in part.errors])
+        if len({part.structure.id for part in by_axis}) > 1 and held_out[BY_AXIS].is_below(held_out[chosen.id]):
+            structures = {part.name: part.structure for part in by_axis}
+            axis_errors = {part.name: part.taus_s for part in by_axis}
             chosen = _by_axis(structures)
     return ThermalResponse(_term_of(axes, term, structures, axis_errors), chosen, held_out)
 
@@ -99,20 +99,20 @@ def _of_axis(
     axis: Axis, errors: Mapping[str, Errors], stretches: Sequence[Stretch], all_rows: NDArray[np.bool_]
 ) -> _OfAxis:
     """Return the structure of one axis by what was left out of it; of what each axis has by itself that is known."""
-    tried, own = [], {}
+    tried, by_structure = [], {}
     for structure in STRUCTURES:
         if structure is STRUCTURES[0]:  # on one axis the same as a time constant on each
             continue
         of_axis = structure.of_axis()
         axis_errors = [each for each in errors.get(structure.id, ()) if each[0] is axis]
         tried.append(of_axis)
-        own[of_axis.id] = axis_errors if structure.per_axis else errors_of([axis], of_axis, stretches)
-    held_out = {name: pooled(axis_terms) for name, axis_terms in own.items()}
+        by_structure[of_axis.id] = axis_errors if structure.per_axis else errors_of([axis], of_axis, stretches)
+    held_out = {name: pooled(axis_terms) for name, axis_terms in by_structure.items()}
     while True:
         structure, structure_errors = _told_apart([axis], tried, held_out, all_rows)
         taus_s = structure_errors[axis.name]
         if structure is tried[0] or _is_seen(axis, structure, taus_s, tried[0], all_rows):
-            return _OfAxis(axis.name, structure, taus_s, own[structure.id])
+            return _OfAxis(axis.name, structure, taus_s, by_structure[structure.id])
         tried.remove(structure)
 
 

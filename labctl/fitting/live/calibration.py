@@ -132,11 +132,11 @@ def needs_of_turns(up: NDArray[np.float64]) -> Array:
 
     An axis about which the unit has not turned yet comes first.
     """
-    turned = np.zeros(3)
+    turned_deg = np.zeros(3)
     for before, after in pairwise(up):
         axis, angle_deg = turn_between(before, after)
-        turned += axis**2 * angle_deg
-    return np.asarray(1.0 / (turned + 90.0))
+        turned_deg += axis**2 * angle_deg
+    return np.asarray(1.0 / (turned_deg + 90.0))
 
 
 #: Poses that are named in one message.

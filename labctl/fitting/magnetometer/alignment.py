@@ -134,8 +134,8 @@ def _start(parts: _Seen) -> NDArray[np.float64]:
     """Return the rotation (3, 3) from the magnetometer's to the body axes by the turns: linear in its elements."""
     gyro, moves = parts.solved.gyro, parts.solved.moves
     rows = [
-        np.kron(parts.direction[k], turned.T) - np.kron(parts.direction[k + 1], np.eye(3))
-        for k, turned, used in zip(moves.before, gyro.equations.rotations.matrix, gyro.used, strict=True)
+        np.kron(parts.direction[k], rotation.T) - np.kron(parts.direction[k + 1], np.eye(3))
+        for k, rotation, used in zip(moves.before, gyro.equations.rotations.matrix, gyro.used, strict=True)
         if used
     ]
     _, _, right = np.linalg.svd(np.vstack(rows))
@@ -160,36 +160,36 @@ def _equations(
     residual, jacobian = np.zeros(size), np.zeros((size, 4))
     by_seen, by_tilt = np.zeros((size, k, 3)), np.zeros((size, k, 3))
     by_bias, by_gyro, by_force = np.zeros((size, k, 3)), np.zeros((size, 9)), np.zeros((size, 9))
-    here = np.arange(len(at_rest))
-    residual[here] = np.sum(up[at_rest] * body[at_rest], axis=1) - dip
-    jacobian[here, :3] = -np.einsum("ka,kab->kb", up[at_rest], cross_matrix(body[at_rest]))
-    jacobian[here, 3] = -1.0
-    by_seen[here, at_rest] = up[at_rest] @ turn
-    by_tilt[here, at_rest] = np.einsum("ka,kab->kb", body[at_rest], level_by_reading(accelerometer)[at_rest])
-    by_force[here] = np.einsum("ka,kab->kb", body[at_rest], level_by_parameters(accelerometer)[at_rest])
-    own = np.zeros((size, size))
+    rest_rows = np.arange(len(at_rest))
+    residual[rest_rows] = np.sum(up[at_rest] * body[at_rest], axis=1) - dip
+    jacobian[rest_rows, :3] = -np.einsum("ka,kab->kb", up[at_rest], cross_matrix(body[at_rest]))
+    jacobian[rest_rows, 3] = -1.0
+    by_seen[rest_rows, at_rest] = up[at_rest] @ turn
+    by_tilt[rest_rows, at_rest] = np.einsum("ka,kab->kb", body[at_rest], level_by_reading(accelerometer)[at_rest])
+    by_force[rest_rows] = np.einsum("ka,kab->kb", body[at_rest], level_by_parameters(accelerometer)[at_rest])
+    by_move = np.zeros((size, size))
     before = moves.before[gyro.used]
     parts = gyro.equations.take(gyro.used).rotations
     start, end = body[before], body[before + 1]
     across, back = tangents(end), parts.matrix.transpose(0, 2, 1)
-    turned = across @ change_of_direction(start, parts.matrix)
+    by_rotation = across @ change_of_direction(start, parts.matrix)
     pairs = len(at_rest) + np.arange(size - len(at_rest)).reshape(-1, 2)
     residual[pairs] = np.einsum("mca,ma->mc", across, seen_at_end(start, parts.matrix) - end)
     jacobian[pairs, :3] = across @ (cross_matrix(end) - back @ cross_matrix(start))
     by_seen[pairs, before[:, None]] = across @ back @ turn
     by_seen[pairs, before[:, None] + 1] = -across @ turn
-    by_bias[pairs, before[:, None]] = turned @ parts.by_bias_before
-    by_bias[pairs, before[:, None] + 1] = turned @ parts.by_bias_after
-    by_gyro[pairs] = turned @ parts.by_error
-    each = of_each_move(moves.take(gyro.used), parts.white, turned, field.readings_u)
-    own[len(at_rest) :, len(at_rest) :] = block_diag(*each)
+    by_bias[pairs, before[:, None]] = by_rotation @ parts.by_bias_before
+    by_bias[pairs, before[:, None] + 1] = by_rotation @ parts.by_bias_after
+    by_gyro[pairs] = by_rotation @ parts.by_error
+    each = of_each_move(moves.take(gyro.used), parts.white, by_rotation, field.readings_u)
+    by_move[len(at_rest) :, len(at_rest) :] = block_diag(*each)
 
     flat = by_seen.reshape(size, -1)
     tilt = (by_tilt * accelerometer.u_rest_g[:, None]).reshape(size, -1)
     drift = (by_bias * np.radians(solved.bias.u_rest_dps)).reshape(size, -1)
     iron = np.einsum("rka,kab->rb", by_seen, field.by_parameters)
     noise = (
-        own + flat @ block_diag(*field.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
+        by_move + flat @ block_diag(*field.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
         + iron @ field.parameters @ iron.T + by_gyro @ gyro.covariance @ by_gyro.T
         + by_force @ accelerometer.covariance @ by_force.T
     )  # fmt: skip

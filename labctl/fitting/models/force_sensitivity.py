@@ -69,8 +69,8 @@ class ForceSensitivity:
         """Return the error, (n, axes) deg/s, of forces (n, 3) g; no number where a force is not finite."""
         is_known = np.isfinite(specific_force_g).all(axis=1, keepdims=True)
         force = np.where(is_known, specific_force_g, np.nan)
-        own = force[:, [BODY_AXES.index(axis) for axis in self.axes]]
-        return np.asarray(force @ self.known_per_g.T + self.known_per_g2 * own * own)
+        along_axes_g = force[:, [BODY_AXES.index(axis) for axis in self.axes]]
+        return np.asarray(force @ self.known_per_g.T + self.known_per_g2 * along_axes_g * along_axes_g)
 
     def forces(self, value: object, n: int) -> Array:
         """Return forces as (n, 3) g from (3,) or (n, 3); raises BadInput for another shape."""

@@ -57,11 +57,11 @@ def _by_newton(outputs: Mapping[str, Array], error_dps: ErrorOfRates) -> dict[st
     for _ in range(NEWTON_STEPS):
         nearer = {}
         for axis, output in outputs.items():
-            here = error_dps(rates, axis)
-            slope = (error_dps({**rates, axis: rates[axis] + SLOPE_STEP_DPS}, axis) - here) / SLOPE_STEP_DPS
+            at_rates = error_dps(rates, axis)
+            slope = (error_dps({**rates, axis: rates[axis] + SLOPE_STEP_DPS}, axis) - at_rates) / SLOPE_STEP_DPS
             if not np.all(slope > MIN_SLOPE - 1.0):
                 return None
-            nearer[axis] = rates[axis] - (rates[axis] + here - output) / (1.0 + slope)
+            nearer[axis] = rates[axis] - (rates[axis] + at_rates - output) / (1.0 + slope)
         change = _largest_change(nearer, rates)
         rates = nearer
         if change < ROUND_STEP_DPS:

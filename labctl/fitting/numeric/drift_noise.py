@@ -73,23 +73,23 @@ def whitened(
     order = np.lexsort((scatter.t_s, scatter.run))
     ordered = values[order]
     remaining, total, share = _filter(scatter, drifts, white_var, order)
-    before, own = (
+    before, shares = (
         remaining * np.roll(share, 1, axis=1),
         remaining * np.roll(1.0 - share, 1, axis=1),
     )  # kept is 0 in the first row
     expect = _expected_of_one if len(drifts) == 1 else _expected_of_many
-    expected = expect(ordered, before, own)
+    expected = expect(ordered, before, shares)
     np.subtract(ordered, expected, out=expected)
     expected /= np.sqrt(total)[:, :, None]
     return expected, np.log(total).sum(axis=1)
 
 
 def _expected_of_one(
-    ordered: NDArray[np.float64], before: NDArray[np.float64], own: NDArray[np.float64]
+    ordered: NDArray[np.float64], before: NDArray[np.float64], shares: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return what is expected of each row (m, k) from those before it, (1, m, k): the solution of a banded system."""
     band = np.ones((2, len(ordered)))
-    band[1, :-1] = -own[0, 1:]
+    band[1, :-1] = -shares[0, 1:]
     pull = np.zeros_like(ordered, order="F")
     pull[1:] = before[0, 1:, None] * ordered[:-1]
     expected, _ = dtbtrs(band, pull, uplo="L", diag="U", overwrite_b=True)
@@ -97,14 +97,14 @@ def _expected_of_one(
 
 
 def _expected_of_many(
-    ordered: NDArray[np.float64], before: NDArray[np.float64], own: NDArray[np.float64]
+    ordered: NDArray[np.float64], before: NDArray[np.float64], shares: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the same for many drifts, (drifts, m, k), row by row for all of them at once."""
     expected = np.empty((len(ordered), len(before), ordered.shape[1]))
     expected[0] = 0.0
     np.multiply(before.T[1:, :, None], ordered[:-1, None, :], out=expected[1:])
     pull = np.empty(expected.shape[1:])
-    for row, last, share in zip(expected[1:], expected[:-1], own.T[1:, :, None], strict=True):
+    for row, last, share in zip(expected[1:], expected[:-1], shares.T[1:, :, None], strict=True):
         np.multiply(share, last, out=pull)
         np.add(row, pull, out=row)
     return np.ascontiguousarray(expected.transpose(1, 0, 2))

@@ -110,15 +110,15 @@ class Steps:
         self, warming_s: float, cooling_s: float, cools: NDArray[np.bool_], begin: int, behind_k: float
     ) -> Array:
         """Return the follower from a step on, where it is known which steps cool (n,)."""
-        own = cools[begin:]
+        cooling = cools[begin:]
         after_begin = Steps(
             self.step_s[begin:] if len(self.step_s) > 1 else self.step_s,
             self.passed_s[begin:] - (self.passed_s[begin - 1] if begin else 0.0),
             self.fall_k[begin:], self.now_c[begin:],
         )  # fmt: skip
-        if own.all() or not own.any():
-            return after_begin.lagged(cooling_s if own[0] else warming_s, behind_k)
-        per_s = np.where(own, 1.0 / cooling_s, 1.0 / warming_s)
+        if cooling.all() or not cooling.any():
+            return after_begin.lagged(cooling_s if cooling[0] else warming_s, behind_k)
+        per_s = np.where(cooling, 1.0 / cooling_s, 1.0 / warming_s)
         ratios = after_begin.step_s * per_s
         exponents = _decaying_sum(1.0, ratios.copy(), 0.0)
         return _decayed(ratios, exponents, _means(ratios) * after_begin.fall_k, behind_k)

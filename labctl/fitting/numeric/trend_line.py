@@ -10,11 +10,11 @@ from scipy.special import stdtrit
 
 from labctl.fitting.numeric.arrays import Array
 
-#: Points without which a slope has no uncertainty.
+#: Least number of points for an uncertainty of the slope.
 MIN_POINTS = 3
 #: Probability of the intervals.
 LEVEL = 0.95
-#: How far ahead a line is followed, in units of its times, and in how many steps.
+#: Extrapolation: how far, in the unit of the times, and in how many steps.
 HORIZON, STEPS = 50.0, 5000
 
 
@@ -44,7 +44,7 @@ class TrendLine:
         return self.value + self.slope * time, self.factor * np.sqrt(np.maximum(variance, 0.0))
 
     def leaves(self, limit: float, after: float) -> tuple[float | None, float | None, float | None]:
-        """Return when the line's size passes a limit after a time: expected, earliest and latest of 95 %.
+        """Return when the magnitude of the line exceeds a limit after a time: expected, earliest and latest of 95 %.
 
         None: not within 50 years after it; the earliest is None without an uncertainty.
         """

@@ -25,14 +25,14 @@ class Local:
     along each parameter in turn, and what is to be explained.
     """
 
-    def __init__(self, rows: NDArray[np.float64], base: int, own: int) -> None:
-        whole, y = rows[:, : base + own], rows[:, -1]
+    def __init__(self, rows: NDArray[np.float64], base: int, shaped: int) -> None:
+        whole, y = rows[:, : base + shaped], rows[:, -1]
         size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
         directions, sizes, others = np.linalg.svd(whole / size, full_matrices=False)
         is_estimable = sizes > 1e-9 * sizes[0]
         directions, inner = directions[:, is_estimable], others[is_estimable].T / sizes[is_estimable]
         values = (inner @ (directions.T @ y)) / size
-        moved = rows[:, base + own : -1].reshape(len(rows), -1, own) @ values[base:]
+        moved = rows[:, base + shaped : -1].reshape(len(rows), -1, shaped) @ values[base:]
         #: What is left, (n,), and what each parameter moves beside the linear ones, (n, parameters).
         self.residual = y - directions @ (directions.T @ y)
         self.slopes = moved - directions @ (directions.T @ moved)
@@ -47,24 +47,24 @@ def refined(
     at: Callable[[Array], Sequence[Local]], begin: Array, bounds: tuple[float, float], most_steps: int
 ) -> Array:  # fmt: skip
     """Return the parameters (p,) at which the parts of the data leave least, all within the same bounds."""
-    here, parts = begin, at(begin)
+    point, parts = begin, at(begin)
     chi2 = sum(part.chi2 for part in parts)
     for _ in range(most_steps):
-        curvature = sum((part.slopes.T @ part.slopes for part in parts), np.zeros((len(here), len(here))))
-        pull = sum((part.slopes.T @ part.residual for part in parts), np.zeros(len(here)))
+        curvature = sum((part.slopes.T @ part.slopes for part in parts), np.zeros((len(point), len(point))))
+        pull = sum((part.slopes.T @ part.residual for part in parts), np.zeros(len(point)))
         curvature = curvature + np.diag(DAMPED * np.diag(curvature) + 1e-12)
         step = np.linalg.solve(curvature, pull)
         step *= min(1.0, LONGEST / max(float(np.max(np.abs(step))), 1e-300))
         for _ in range(HALVINGS):
-            there = np.clip(here + step, *bounds)
-            tried = at(there)
+            next_point = np.clip(point + step, *bounds)
+            tried = at(next_point)
             less = sum(part.chi2 for part in tried)
             if less < chi2:
                 break
             step = step / 2
         else:
             break
-        gained, here, parts, chi2 = chi2 - less, there, tried, less
+        gained, point, parts, chi2 = chi2 - less, next_point, tried, less
         if gained < DONE * chi2:
             break
-    return here
+    return point

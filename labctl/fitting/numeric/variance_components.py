@@ -106,13 +106,13 @@ def mixture(triangles: Triangles, random: RandomEffects) -> Mixture:
         gain = np.linalg.solve(triangles.r[d, :k, :k], triangles.r[d, :k, k:])
         fixed = np.linalg.solve(triangles.r[d, :k, :k], triangles.projected[d, :k]) - effects @ gain.T
         lever = np.vstack([-gain, np.eye(q)])
-        own = np.zeros((k + q, k + q))
-        own[:k, :k] = root @ root.T
+        conditional = np.zeros((k + q, k + q))
+        conditional[:k, :k] = root @ root.T
         share = weight[d, chosen]
         mean_inverse = np.tensordot(share, inverse, axes=1)
-        covariance += share.sum() * own + lever @ mean_inverse @ lever.T
+        covariance += share.sum() * conditional + lever @ mean_inverse @ lever.T
         values.append(np.column_stack([fixed, effects]))
-        variance = np.einsum("ki,nij,kj->nk", lever, inverse, lever) + np.diag(own)
+        variance = np.einsum("ki,nij,kj->nk", lever, inverse, lever) + np.diag(conditional)
         spreads.append(np.sqrt(np.maximum(variance, 0.0)))
         shares.append(share)
     each, spread, share = np.concatenate(values), np.concatenate(spreads), np.concatenate(shares)
@@ -153,10 +153,10 @@ def _grid(information: _Information, random: RandomEffects) -> NDArray[np.float6
     effects = inverse @ information.product
     sizes = []
     for kind in range(random.kinds):
-        here = random.kind == kind
-        uncertain = float(np.median(1.0 / np.sqrt(np.maximum(np.diag(information.matrix)[here], 1e-300))))
-        spread = _spread(effects[here])
-        largest = min(float(np.max(np.asarray(random.wide)[here])), MOST * max(spread, uncertain))
+        of_kind = random.kind == kind
+        uncertain = float(np.median(1.0 / np.sqrt(np.maximum(np.diag(information.matrix)[of_kind], 1e-300))))
+        spread = _spread(effects[of_kind])
+        largest = min(float(np.max(np.asarray(random.wide)[of_kind])), MOST * max(spread, uncertain))
         least = min(max(LEAST * uncertain, spread / IMPOSSIBLE), largest / 10)
         sizes.append(np.geomspace(least, largest, SIZES))
     points = np.stack(np.meshgrid(*sizes, indexing="ij"), axis=-1).reshape(-1, random.kinds)
@@ -183,12 +183,12 @@ def _counting(weight: Array) -> NDArray[np.int64]:
 def _component(
     kind: int, grid: NDArray[np.float64], weight: Array, information: _Information, random: RandomEffects
 ) -> Component:
-    here = random.kind == kind
-    sizes, place = np.unique(grid[:, np.flatnonzero(here)[0]], return_inverse=True)
+    of_kind = random.kind == kind
+    sizes, place = np.unique(grid[:, np.flatnonzero(of_kind)[0]], return_inverse=True)
     share = np.bincount(place, weight)
     middles = np.cumsum(share) - share / 2
     low, lower, value, upper, high = np.exp(np.interp([0.025, 0.16, 0.5, 0.84, 0.975], middles, np.log(sizes)))
-    chi2, groups = _scatter(information, here, random)
+    chi2, groups = _scatter(information, of_kind, random)
     p_value = float(chdtrc(groups, chi2)) if groups else 1.0
     return Component(float(value), float(upper - lower) / 2, float(low), float(high), groups, p_value)
 

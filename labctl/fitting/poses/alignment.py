@@ -47,8 +47,8 @@ def rotation_between(gyro: NDArray[np.float64], accelerometer: NDArray[np.float6
     """Return the rotation vector (3,), rad, that turns the accelerometer's frame to the gyro's, of errors (3, 3)."""
     from scipy.spatial.transform import Rotation
 
-    turned = frame_of(accelerometer) @ frame_of(gyro).T  # columns: the gyro's axes in the accelerometer's frame
-    return np.asarray(Rotation.from_matrix(turned).as_rotvec())
+    rotation = frame_of(accelerometer) @ frame_of(gyro).T  # columns: the gyro's axes in the accelerometer's frame
+    return np.asarray(Rotation.from_matrix(rotation).as_rotvec())
 
 
 def alignment_of(moves: Moves, accelerometer: Accelerometer, gyro: Gyroscope) -> Alignment:

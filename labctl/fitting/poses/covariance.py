@@ -33,18 +33,18 @@ def move_covariance(
     by_rest[rows, :, before, :3] = tilt[0] * accelerometer.u_rest_g[before][:, None, None]
     by_rest[rows, :, after, :3] = tilt[1] * accelerometer.u_rest_g[after][:, None, None]
     u_bias = np.radians(bias.u_rest_dps)
-    turned = (
+    by_bias = (
         equations.by_turn @ equations.rotations.by_bias_before,
         equations.by_turn @ equations.rotations.by_bias_after,
     )
-    by_rest[rows, :, before, 3:] += turned[0] * u_bias[before][:, None, :]
-    by_rest[rows, :, after, 3:] += turned[1] * u_bias[after][:, None, :]
+    by_rest[rows, :, before, 3:] += by_bias[0] * u_bias[before][:, None, :]
+    by_rest[rows, :, after, 3:] += by_bias[1] * u_bias[after][:, None, :]
     shared = by_rest.reshape(2 * m, -1)
     common = by_accelerometer(moves, accelerometer, equations)
     total = shared @ shared.T + common @ accelerometer.covariance @ common.T
-    own = of_each_move(moves, equations.rotations.white, equations.by_turn, readings_u)
+    of_moves = of_each_move(moves, equations.rotations.white, equations.by_turn, readings_u)
     for k in range(m):
-        total[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] += own[k]
+        total[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] += of_moves[k]
     return np.asarray(total)
 
 

@@ -17,7 +17,7 @@ from labctl.answers.poses import (
 from labctl.fitting.poses.alignment import Alignment
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, different_poses
 from labctl.fitting.poses.at_rest.bias import Bias
-from labctl.fitting.poses.at_rest.rests import FACTOR, WINDOW_S, Rests
+from labctl.fitting.poses.at_rest.rests import REST_FACTOR, WINDOW_S, Rests
 from labctl.fitting.poses.determination import condition_of, turned_deg
 from labctl.fitting.poses.gyroscope import Gyroscope
 from labctl.fitting.poses.moves import Moves
@@ -63,7 +63,7 @@ def _rests(rests: Rests, accelerometer: Accelerometer, bias: Bias) -> RestsJson:
         "poses": different_poses(accelerometer.up),
         "used": int(np.count_nonzero(accelerometer.used)),
         "window_s": WINDOW_S,
-        "factor": FACTOR,
+        "factor": REST_FACTOR,
         "noise": {"accel_g": rests.noise[:3].tolist(), "gyro_dps": rests.noise[3:].tolist()},
         "t_s": rests.t_s.tolist(),
         "duration_s": rests.duration_s.tolist(),

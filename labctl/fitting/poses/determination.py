@@ -62,13 +62,13 @@ def require_determined(serial: str, moves: Moves, equations: Equations, noise: N
     u = np.sqrt(np.diag(np.linalg.inv(white.T @ white + np.eye(9) / 0.5**2))).reshape(3, 3)
     if float(u.max()) <= LARGEST_U and condition_of(equations.jacobian, noise) <= LARGEST_CONDITION:
         return
-    turned = turned_deg(moves)
-    column = int(np.argmin(turned)) if turned.min() < MIN_TURN_DEG else int(np.argmax(u.max(axis=0)))
+    angle_deg = turned_deg(moves)
+    column = int(np.argmin(angle_deg)) if angle_deg.min() < MIN_TURN_DEG else int(np.argmax(u.max(axis=0)))
     row = int(np.argmax(u[:, column]))
     term_name = f"scale_factor of {AXES[row]}" if row == column else f"misalignment_{AXES[column]} of {AXES[row]}"
     reason = (
-        f"in all moves together the unit turned about {AXES[column]} by only {turned[column]:.0f} deg"
-        if turned[column] < MIN_TURN_DEG
+        f"in all moves together the unit turned about {AXES[column]} by only {angle_deg[column]:.0f} deg"
+        if angle_deg[column] < MIN_TURN_DEG
         else f"gravity changed too little in the turns about {AXES[column]}"
     )
     raise NotEnoughData(

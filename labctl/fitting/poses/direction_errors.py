@@ -47,20 +47,20 @@ def move_errors(recording: Recording, correct: Correct) -> MoveErrors:
     true, outside = correct(readings.gyro_dps)
     every = moves_between(readings, rests, true)
     moves = every.take(every.usable)
-    before, there = accelerometer.up[moves.before], accelerometer.up[moves.before + 1]
+    before, up_after = accelerometer.up[moves.before], accelerometer.up[moves.before + 1]
     gravity_seen = gravity_at_end(moves, accelerometer)
-    error_across = _square_to(there, gravity_seen - there)
+    error_across = _square_to(up_after, gravity_seen - up_after)
     # a small rotation by r turns gravity by r x up, so r = up x what gravity is off by
-    about = np.asarray(np.cross(there, np.einsum("mc,mca->ma", error_across, tangents(there))), dtype=np.float64)
+    about = np.asarray(np.cross(up_after, np.einsum("mc,mca->ma", error_across, tangents(up_after))), dtype=np.float64)
     counted = np.concatenate([[0], np.cumsum(outside)])
     within = np.searchsorted(readings.t_s, moves.t_s)
     return MoveErrors(
         per_second(error_across, moves.duration_s),
         per_second(about, moves.duration_s),
         moves.t_s,
-        angle_between_deg(before, there),
+        angle_between_deg(before, up_after),
         angle_between_deg(before, gravity_seen),
-        angle_between_deg(there, gravity_seen),
+        angle_between_deg(up_after, gravity_seen),
         tuple(
             f"move from {t[0]:.4g} to {t[1]:.4g} s: {reason}"
             for t, reason in zip(every.t_s, every.why_not, strict=True)
@@ -72,8 +72,8 @@ def move_errors(recording: Recording, correct: Correct) -> MoveErrors:
 
 def uncorrected_errors(moves: Moves, accelerometer: Accelerometer) -> NDArray[np.float64]:
     """Return the errors of gravity's direction by the moves' rates as they are, (m, 2) rad."""
-    there = accelerometer.up[moves.before + 1]
-    return _square_to(there, gravity_at_end(moves, accelerometer) - there)
+    up_after = accelerometer.up[moves.before + 1]
+    return _square_to(up_after, gravity_at_end(moves, accelerometer) - up_after)
 
 
 def gravity_at_end(moves: Moves, accelerometer: Accelerometer) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Two equations of each move: gravity's direction at its end, carried there by the gyro, minus that of the rest."""
+"""Two equations of each move: the direction of gravity at its end by the gyro, minus that of the rest."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from labctl.fitting.poses.triad import tangents
 
 @dataclass(frozen=True)
 class Equations:
-    """Residuals of m moves and their derivatives; two components each, square to gravity, rad.
+    """Residuals of m moves and their derivatives; two components each, perpendicular to gravity, rad.
 
-    A turn about the vertical leaves gravity where it is: of the three angles of a move two are seen.
+    A rotation about the vertical does not change the direction of gravity: two of three angles are observable.
     """
 
     residual: Array  #: (2m,)
@@ -42,9 +42,9 @@ def equations_of(moves: Moves, accelerometer: Accelerometer, bias: Bias, errors:
     """Return the equations of m moves at gyro errors E (3, 3)."""
     rotations = integrate(rate_without_bias(moves, bias), moves.step_s, moves.share, errors)
     up = accelerometer.up[moves.before]
-    there = accelerometer.up[moves.before + 1]
-    across = tangents(there)
-    residual = np.einsum("mca,ma->mc", across, seen_at_end(up, rotations.matrix) - there)
+    up_after = accelerometer.up[moves.before + 1]
+    across = tangents(up_after)
+    residual = np.einsum("mca,ma->mc", across, seen_at_end(up, rotations.matrix) - up_after)
     by_turn = across @ change_of_direction(up, rotations.matrix)
     return Equations(residual.reshape(-1), (by_turn @ rotations.by_error).reshape(-1, 9), across, by_turn, rotations)
 

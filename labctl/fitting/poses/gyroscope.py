@@ -143,8 +143,8 @@ def _solved(
             if change > SETTLED:
                 pose_g2, extra = noises.variances(equations, rows)
             noise = noises.total(equations, pose_g2)
-        here = noise[np.ix_(rows, rows)]
-        step, _ = gls(equations.jacobian[rows], equations.residual[rows], here + extra * np.eye(len(here)))
+        row_noise = noise[np.ix_(rows, rows)]
+        step, _ = gls(equations.jacobian[rows], equations.residual[rows], row_noise + extra * np.eye(len(row_noise)))
         if first:
             break
         errors = errors - step.reshape(3, 3)

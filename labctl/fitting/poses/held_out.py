@@ -32,10 +32,10 @@ class HeldOut:
 
 
 def held_out_moves(equations: Equations, covariance: NDArray[np.float64], used: NDArray[np.bool_]) -> HeldOut:
-    """Return what each of m moves is off from what coefficients fitted to the used ones, mask (m,), without it say.
+    """Return the prediction error of each of m moves by coefficients fitted to the other used moves, mask (m,).
 
-    `covariance` (2m, 2m) is that of the residuals. The fit without a used move is that to all with two unknowns more,
-    which absorb the whole of its residual, so none has to be made again.
+    `covariance` (2m, 2m) is that of the residuals. The fit without a used move equals the fit to all
+    moves with two further unknowns, which absorb its residual, so that no fit is repeated.
     """
     rows = np.repeat(used, 2)
     jacobian, residual = equations.jacobian[rows], equations.residual[rows]
@@ -47,10 +47,10 @@ def held_out_moves(equations: Equations, covariance: NDArray[np.float64], used: 
     residual_inverse = inverse - weighted @ gain
     error, spread = np.zeros((len(used), 2)), np.zeros((len(used), 2, 2))
     for place, move in enumerate(np.flatnonzero(used)):
-        here = slice(2 * place, 2 * place + 2)
-        own = np.linalg.solve(residual_inverse[here, here], residual_inverse[here])
-        without = -jacobian[here] @ (gain - normal @ weighted[here].T @ own)
-        without[:, here] += np.eye(2)
+        pair = slice(2 * place, 2 * place + 2)
+        move_inverse = np.linalg.solve(residual_inverse[pair, pair], residual_inverse[pair])
+        without = -jacobian[pair] @ (gain - normal @ weighted[pair].T @ move_inverse)
+        without[:, pair] += np.eye(2)
         error[move], spread[move] = without @ residual, without @ move_covariance @ without.T
     for move in np.flatnonzero(~used):
         both = np.array([2 * move, 2 * move + 1])

@@ -41,15 +41,15 @@ def integrate(
     for k in range(vectors.shape[1]):  # of all moves at once: a product goes step by step
         middle[:, k] = matrix @ half[:, k]
         matrix = middle[:, k] @ half[:, k]
-    turned = middle @ inverse  # (m, n, 3, 3): from an error in the outputs' axes to one in the body axes at the start
+    to_start = middle @ inverse  # (m, n, 3, 3): from an error in the outputs' axes to one in the body axes at the start
     weight = (share[:, :-1] + share[:, 1:]) / 2 * step_s
-    by_error = -np.einsum("mkai,mkj->maij", turned, mean).reshape(len(rate), 3, 9)
+    by_error = -np.einsum("mkai,mkj->maij", to_start, mean).reshape(len(rate), 3, 9)
     return Rotations(
         matrix,
         by_error,
-        -np.einsum("mkai,mk->mai", turned, step_s - weight),
-        -np.einsum("mkai,mk->mai", turned, weight),
-        np.einsum("mkai,mkbi,mk->mab", turned, turned, step_s),
+        -np.einsum("mkai,mk->mai", to_start, step_s - weight),
+        -np.einsum("mkai,mk->mai", to_start, weight),
+        np.einsum("mkai,mkbi,mk->mab", to_start, to_start, step_s),
     )
 
 

@@ -70,12 +70,12 @@ def response_budgets(
     by_axis: dict[str, dict[str, Budget]] = {}
     for axis, fit in fitted.axes.items():
         for name in (name for name, owner in zip(fit.names, fit.effects, strict=True) if owner in response.IDS):
-            own, axis_evidence = OwnCoefficient(axis, name), evidence.get(axis)
+            coefficient, axis_evidence = OwnCoefficient(axis, name), evidence.get(axis)
             if not np.isfinite(fit.u_of(name)):
                 continue
             at_c = fitted.model.reference.temperature_c  # it is the same at all temperatures
-            lines = [coefficient_line(fitted, own, at_c, axis_evidence, "s")]
-            lines += [source.lines[0] for source in time_lines(fitted, [own], at_c, bench)]
+            lines = [coefficient_line(fitted, coefficient, at_c, axis_evidence, "s")]
+            lines += [source.lines[0] for source in time_lines(fitted, [coefficient], at_c, bench)]
             by_axis.setdefault(axis, {})[name] = budget_of(name, "s", lines, fit.value_of(name))
     return by_axis
 

@@ -43,9 +43,15 @@ def slope_error(model_error: LocalModelError, temperature_c: float, across: str 
     beyond = model_error.left_var[is_finite] - model_error.white_var[is_finite]
     slope_variance = nnls(root[:, None] * (squares / size), root * beyond)[0] / size
     column = 1 if across is None else 2 + list(model_error.across_dps or {}).index(across)
-    turned = weight * (squares[:, column] > 0)
+    turning_weight = weight * (squares[:, column] > 0)
     noise = float(weight @ model_error.white_var[is_finite] / weight.sum()) + slope_variance[0]
-    unseen = MIN_SHARE * np.sqrt(2 / effective_number(turned)) * noise * turned.sum() / (turned @ squares[:, column])
+    unseen = (
+        MIN_SHARE
+        * np.sqrt(2 / effective_number(turning_weight))
+        * noise
+        * turning_weight.sum()
+        / (turning_weight @ squares[:, column])
+    )
     return float(np.sqrt(max(slope_variance[column], unseen)))
 
 
@@ -59,10 +65,10 @@ def slope_unknown(model_error: LocalModelError, temperature_c: float, across: st
     rates = (
         model_error.rate_dps if across is None else (model_error.across_dps or {}).get(across, np.zeros(len(is_finite)))
     )
-    turned = is_finite & (rates != 0)
-    if not turned.any():
+    is_turning = is_finite & (rates != 0)
+    if not is_turning.any():
         return f"no data set in which the unit turned about {across or 'its own axis'} could be left out of the fit"
-    if model_error.warmth_away(temperature_c)[turned].min() > FARTHEST:
+    if model_error.warmth_away(temperature_c)[is_turning].min() > FARTHEST:
         return NONE_NEAR
     return None
 
@@ -110,9 +116,9 @@ def model_line(
 
     Its degrees of freedom are taken as infinite: the estimate has a floor that covers its own scatter.
     """
-    own, across = rates_dps.get(axis, 0.0), {name: rate for name, rate in rates_dps.items() if name != axis}
-    u = evidence.model_error.at(own, temperature_c, across) if evidence else None
-    reason = evidence.model_error.unknown_at(own, temperature_c, across) if evidence else _lacking(fitted)
+    rate_dps, across = rates_dps.get(axis, 0.0), {name: rate for name, rate in rates_dps.items() if name != axis}
+    u = evidence.model_error.at(rate_dps, temperature_c, across) if evidence else None
+    reason = evidence.model_error.unknown_at(rate_dps, temperature_c, across) if evidence else _lacking(fitted)
     return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=reason or BY_HELD_OUT)
 
 

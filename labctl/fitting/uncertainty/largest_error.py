@@ -35,7 +35,7 @@ def widening(
     """
     outputs = uncertainties[0].outputs
     counts = np.array(
-        [[output in here for output in outputs] for here in outputs_by_place or [outputs] * len(uncertainties)]
+        [[output in counted for output in outputs] for counted in outputs_by_place or [outputs] * len(uncertainties)]
     )
     size = (
         max((abs(rate) for uncertainty in uncertainties for rate in uncertainty.rates_dps.values()), default=0.0) or 1.0
@@ -44,11 +44,11 @@ def widening(
         [[1.0, *(uncertainty.rates_dps[axis] / size for axis in BODY_AXES)] for uncertainty in uncertainties]
     )
     covariance = np.array([uncertainty.covariance for uncertainty in uncertainties])
-    own = np.einsum("pii->pi", covariance)
-    if not np.isfinite(own[counts]).all():
+    variances = np.einsum("pii->pi", covariance)
+    if not np.isfinite(variances[counts]).all():
         return float("nan")
     covariance = np.nan_to_num(covariance)
-    u = np.sqrt(own[counts]).max()
+    u = np.sqrt(variances[counts]).max()
     drawn = np.random.default_rng(SEED).normal(size=(DRAWS, len(outputs) * terms.shape[1])) @ _root(terms, covariance).T
     errors = np.einsum("dit,pt->dpi", drawn.reshape(DRAWS, len(outputs), -1), terms)
     largest = np.abs(errors)[:, counts].max(axis=1)

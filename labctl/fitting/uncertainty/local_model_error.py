@@ -56,16 +56,17 @@ class LocalModelError:
         """
         if self.unknown_at(rate_dps, temperature_c, across_dps) is not None:
             return None
-        own = self._variance(self._away(rate_dps, temperature_c))
-        turned = {axis: rate for axis, rate in across_dps.items() if rate}
-        if not turned:
-            return float(np.sqrt(own))
+        variance = self._variance(self._away(rate_dps, temperature_c))
+        turning_dps = {axis: rate for axis, rate in across_dps.items() if rate}
+        if not turning_dps:
+            return float(np.sqrt(variance))
         away = self._away(0.0, temperature_c)
-        remaining = own if _unknown(away) else self._variance(away)
+        remaining = variance if _unknown(away) else self._variance(away)
         beyond = (
-            self._variance(self._away_across(axis, rate, temperature_c)) - remaining for axis, rate in turned.items()
+            self._variance(self._away_across(axis, rate, temperature_c)) - remaining
+            for axis, rate in turning_dps.items()
         )
-        return float(np.sqrt(own + sum(max(each, 0.0) for each in beyond)))
+        return float(np.sqrt(variance + sum(max(each, 0.0) for each in beyond)))
 
     def _variance(self, distance: Array) -> float:
         """Return the variance left, (deg/s)^2, where the data sets with a known one are so far away, in widths."""

@@ -53,10 +53,10 @@ class LawFunction:
 
     def gradient(self, fitted: FittedModel, temperature_c: float) -> Array:
         """Return its derivative along the coefficients of the axis, (k*m,), temperature functions running fastest."""
-        here, fit = self._channels(temperature_c), fitted.axes[self.axis]
+        channels, fit = self._channels(temperature_c), fitted.axes[self.axis]
         n = len(self.weights)
         basis = fitted.model.temperature.basis(np.array([temperature_c]))[0]
-        columns = {column.name: column for _, column in fitted.model.columns(here, self.axis)}
+        columns = {column.name: column for _, column in fitted.model.columns(channels, self.axis)}
         slopes = [
             float(self.weights @ columns[name].slope(np.full(n, at @ basis))) if name in columns else 0.0
             for name, at in zip(fit.names, fit.values, strict=True)
@@ -112,12 +112,12 @@ def response(fitted: FittedModel, rates_dps: Mapping[str, float], temperature_c:
     """Return the slopes of the n outputs along the rates about x, y and z at a rate vector, (n, 3)."""
     axes = tuple(fitted.axes)
     slopes = np.zeros((len(axes), len(BODY_AXES)))
-    for column, turned in enumerate(BODY_AXES):
-        at = rates_dps.get(turned, 0.0)
-        ends = {name: np.full(2, rate) for name, rate in rates_dps.items()} | {turned: np.array([at, at + STEP_DPS])}
+    for column, body_axis in enumerate(BODY_AXES):
+        at = rates_dps.get(body_axis, 0.0)
+        ends = {name: np.full(2, rate) for name, rate in rates_dps.items()} | {body_axis: np.array([at, at + STEP_DPS])}
         for row, axis in enumerate(axes):
             error = fitted.error_dps(channels_at(axis, ends, 2, temperature_c), axis)
-            slopes[row, column] = np.diff(error)[0] / STEP_DPS + (axis == turned)
+            slopes[row, column] = np.diff(error)[0] / STEP_DPS + (axis == body_axis)
     return slopes
 
 
@@ -129,8 +129,8 @@ def correction_gain(fitted: FittedModel, response_of_outputs: Array) -> Array:
     axes = tuple(fitted.axes)
     if fitted.model.argument != "rate":
         return np.eye(len(axes))
-    own = response_of_outputs[:, [BODY_AXES.index(axis) for axis in axes]]
-    return np.asarray(np.linalg.inv(own), dtype=np.float64)
+    square = response_of_outputs[:, [BODY_AXES.index(axis) for axis in axes]]
+    return np.asarray(np.linalg.inv(square), dtype=np.float64)
 
 
 def coefficients_of(axis: str) -> dict[str, tuple[str, LawFunction]]:

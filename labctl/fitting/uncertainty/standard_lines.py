@@ -60,9 +60,9 @@ class Sensitivities:
         level: float = 0.0,
     ) -> Sensitivities:
         """Return those of a single result, 0 where not named; `gains` is how `angle` follows each kind of angle."""
-        own = [np.full((1, 1), each) for each in (relative_rate, rate_dps, temperature, level)]
+        arrays = [np.full((1, 1), each) for each in (relative_rate, rate_dps, temperature, level)]
         angles = {name: np.full((1, 1), angle * (gains.of(name) if gains else 1.0)) for name in ANGLE_QUANTITIES}
-        return Sensitivities(own[0], own[1], own[2], angles, own[3], np.array([angle_squared]))
+        return Sensitivities(arrays[0], arrays[1], arrays[2], angles, arrays[3], np.array([angle_squared]))
 
 
 @dataclass(frozen=True)

@@ -69,8 +69,8 @@ def within_runs(data: FitData, values: Array) -> Array:
         return values
     residuals_within = values.copy()
     for number in numbers:
-        here = (runs == number) & np.isfinite(values)
-        residuals_within[here] -= values[here].mean() if here.any() else 0.0
+        in_run = (runs == number) & np.isfinite(values)
+        residuals_within[in_run] -= values[in_run].mean() if in_run.any() else 0.0
     return residuals_within
 
 
@@ -193,8 +193,8 @@ def use_evidence(
 
 def _turned_across(data: FitData, axis: str) -> dict[str, Array]:
     """Return the rates about the body axes beside one, those about which the table turned the unit."""
-    turned = {name for name in BODY_AXES if np.any(data.channels.up(name) * data.channels.table_rate_dps())}
-    return {name: data.true_rate_dps(name) for name in BODY_AXES if name in turned - {axis}}
+    turned_about = {name for name in BODY_AXES if np.any(data.channels.up(name) * data.channels.table_rate_dps())}
+    return {name: data.true_rate_dps(name) for name in BODY_AXES if name in turned_about - {axis}}
 
 
 def _correlation(residual_dps: Mapping[str, Array]) -> dict[str, dict[str, float]]:

@@ -167,25 +167,25 @@ def _opened(path: Path) -> Iterator[Any]:
 
 def _topic(path: Path, bag: Any, topic: str | None, kind: str, option: str) -> str | None:
     """Return the topic of a kind of message; None where the bag has no temperature."""
-    there = sorted(name for name, info in bag.topics.items() if info.msgtype == kind)
+    topics = sorted(name for name, info in bag.topics.items() if info.msgtype == kind)
     if topic is not None:
-        if topic not in there:
+        if topic not in topics:
             raise BadInput(
-                f"{path}: the bag has no topic {topic!r} of {kind}; choose one of {', '.join(there) or 'none'}"
+                f"{path}: the bag has no topic {topic!r} of {kind}; choose one of {', '.join(topics) or 'none'}"
             )
         return topic
-    if len(there) == 1:
-        return str(there[0])
+    if len(topics) == 1:
+        return str(topics[0])
     if kind == TEMPERATURE:
         return None
-    if not there:
+    if not topics:
         names = ", ".join(f"{name} ({info.msgtype})" for name, info in list(bag.topics.items())[:10])
         raise BadRecording(
             f"{path}: the bag has no topic of {kind} (its topics: {names or 'none'}); record a topic with the "
             "output of the gyro"
         )
     raise BadInput(
-        f"{path}: the topics {' and '.join(there)} are all of {kind}; choose one with --option {option}=NAME"
+        f"{path}: the topics {' and '.join(topics)} are all of {kind}; choose one with --option {option}=NAME"
     )
 
 

@@ -40,12 +40,12 @@ def rate_change(
     allowed = SHARE * np.maximum(np.abs(low), np.abs(high)) + MIN_DPS
     ends = np.append(starts[1:], len(rate))
     for k in np.flatnonzero(high - low > allowed):
-        here = rate[starts[k] : ends[k]]
-        if not _is_sustained(here, float(allowed[k])):
+        segment = rate[starts[k] : ends[k]]
+        if not _is_sustained(segment, float(allowed[k])):
             continue
-        first = float(np.median(here[: max(len(here) // PIECES, 1)]))
-        at = int(np.argmax(np.abs(here - first) > allowed[k]))
-        return RateChange(int(number[starts[k]]), int(rows[starts[k] + at]), first, float(here[at]))
+        first = float(np.median(segment[: max(len(segment) // PIECES, 1)]))
+        at = int(np.argmax(np.abs(segment - first) > allowed[k]))
+        return RateChange(int(number[starts[k]]), int(rows[starts[k] + at]), first, float(segment[at]))
     return None
 
 

@@ -31,7 +31,7 @@ def turned_points(
     """
     t_s = np.asarray(rows["t_s"], dtype=np.float64)
     sets = [slice(int(begin), int(begin + n)) for begin, n in zip(starts, counts, strict=True)]
-    length = np.array([t_s[here][-1] - t_s[here][0] for here in sets])
+    length = np.array([t_s[span][-1] - t_s[span][0] for span in sets])
     lasting_s = np.maximum(length, 1e-12)
     turn = np.asarray(points["turn_deg"], dtype=np.float64)
     point_recording: dict[str, NDArray[np.generic]] = {
@@ -42,8 +42,8 @@ def turned_points(
         if not name.startswith("gyro_"):
             continue
         readings = np.asarray(values, dtype=np.float64)
-        point_recording[name] = np.array([trapezoidal_mean(t_s[here], readings[here]) for here in sets])
-        point_recording[f"{name}{TIME}"] = np.array([_time_std(t_s[here], readings[here]) for here in sets])
+        point_recording[name] = np.array([trapezoidal_mean(t_s[span], readings[span]) for span in sets])
+        point_recording[f"{name}{TIME}"] = np.array([_time_std(t_s[span], readings[span]) for span in sets])
     return point_recording
 
 

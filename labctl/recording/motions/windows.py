@@ -75,9 +75,9 @@ def white_std_of_profile(columns: Columns, output: NDArray[np.float64]) -> NDArr
     white_std_dps, sizes = np.full(len(rate), np.nan), np.diff(np.append(starts, len(rate)))
     for begin, size in zip(starts.tolist(), sizes.tolist(), strict=True):
         for first in range(begin, begin + size, PIECE):
-            here = slice(first, min(first + PIECE, begin + size))
-            if here.stop - here.start >= MIN_FOR_SPECTRUM + 6 * LAGS:
-                white_std_dps[here] = white_std(_not_followed(rate[here], output[here]))
+            piece = slice(first, min(first + PIECE, begin + size))
+            if piece.stop - piece.start >= MIN_FOR_SPECTRUM + 6 * LAGS:
+                white_std_dps[piece] = white_std(_not_followed(rate[piece], output[piece]))
     is_finite = np.isfinite(white_std_dps)
     if not is_finite.any():
         return None

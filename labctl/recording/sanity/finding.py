@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from labctl.answers.inspection import FindingJson, Part, Severity
+from labctl.answers.inspection import Part, Severity
 
 
 @dataclass(frozen=True)
@@ -29,20 +29,6 @@ class Finding:
     def text(self) -> str:
         """One sentence: where, what, and what to do."""
         return f"{self.where}: {self.said} (expected {self.expected}); {self.do}"
-
-    def to_json(self) -> FindingJson:
-        """Return the finding as JSON, with its sentence."""
-        finding_json: FindingJson = {
-            "what": self.what, "severity": self.severity, "where": self.where, "said": self.said, "value": self.value,
-            "unit": self.unit, "expected": self.expected, "do": self.do, "text": self.text, "part": self.part,
-        }  # fmt: skip
-        if self.n is not None:
-            finding_json["channel"], finding_json["n"], finding_json["may_leave_out"] = (
-                self.channel,
-                self.n,
-                self.may_leave_out,
-            )
-        return finding_json
 
 
 def certain(findings: Iterable[Finding]) -> list[Finding]:

@@ -48,7 +48,7 @@ FACTORS = (
 
 def check_responses(summary: Summary, responses_by_axis: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
     """Yield what is wrong with known responses."""
-    own: dict[str, list[tuple[str, Response]]] = {}
+    by_axis: dict[str, list[tuple[str, Response]]] = {}
     crossed: dict[str, str] = {}  # position -> the output that follows the table instead
     for position, outputs in responses_by_axis.items():
         axis = Position.of(position).axis
@@ -57,9 +57,9 @@ def check_responses(summary: Summary, responses_by_axis: Mapping[str, Mapping[st
         if (other := _follower(axis, outputs)) is not None:
             crossed[position] = other
         else:
-            own.setdefault(axis, []).append((position, outputs[axis]))
+            by_axis.setdefault(axis, []).append((position, outputs[axis]))
     yield from _crossed(crossed, responses_by_axis)
-    for axis, own_response in own.items():
+    for axis, own_response in by_axis.items():
         yield from _of_axis(summary, axis, own_response)
 
 

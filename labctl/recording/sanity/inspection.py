@@ -216,9 +216,9 @@ def check_reference(summary: Summary) -> list[Finding]:
     usable = np.isfinite(turning) & (np.abs(rate) >= MIN_DPS)
     ways = {"forwards": usable & (rate > 0), "backwards": usable & (rate < 0)}
     deviations = {
-        way: 1e6 * np.array(_deviation(rate[here], turning[here], u[here]))
-        for way, here in ways.items()
-        if np.count_nonzero(here) >= (MIN_SETS if np.isnan(u[here]).any() else 1)
+        way: 1e6 * np.array(_deviation(rate[of_way], turning[of_way], u[of_way]))
+        for way, of_way in ways.items()
+        if np.count_nonzero(of_way) >= (MIN_SETS if np.isnan(u[of_way]).any() else 1)
     }
     off = [way for way, (ppm, u_ppm) in deviations.items() if max(NO_PPM, COVERAGE * u_ppm) < abs(ppm)]
     if not off or max(abs(ppm) for ppm, _ in deviations.values()) > LARGEST_PPM:

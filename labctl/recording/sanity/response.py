@@ -41,16 +41,16 @@ def responses(summary: Summary) -> dict[str, dict[str, Response]]:
     """Return position -> output axis -> response, where the table's rates determine one."""
     position = np.asarray(summary["position"]).astype(np.str_)
     by_axis: dict[str, dict[str, Response]] = {}
-    for there in dict.fromkeys(position.tolist()):
-        rows = position == there
+    for up_axis in dict.fromkeys(position.tolist()):
+        rows = position == up_axis
         rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)[rows]
         span = float(np.ptp(rate))
         if span < MIN_SPAN_DPS or (len(rate) == 2 and span < TWO_POINT_SPAN_DPS):
             continue
         fast = float(np.abs(rate).max())
         design = _design(rate / fast, np.asarray(summary["temperature_c"], dtype=np.float64)[rows])
-        by_axis[there] = {
-            axis: _response(there, axis, rows, design, summary.of_axis("mean", axis)[rows], fast)
+        by_axis[up_axis] = {
+            axis: _response(up_axis, axis, rows, design, summary.of_axis("mean", axis)[rows], fast)
             for axis in summary.info.axes
         }
     return by_axis

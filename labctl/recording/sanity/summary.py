@@ -205,9 +205,9 @@ def _of_readings(recording: Recording) -> Summary:
         for begin, end in zip(starts, np.append(starts[1:], len(rows["dataset"])), strict=True)
     ]
     if recording.info.motion == "profile":
-        sets = [one for here in whole for one in _stretches(recording.info, rows, outputs, here)]
+        sets = [one for in_piece in whole for one in _stretches(recording.info, rows, outputs, in_piece)]
     else:
-        sets = [_one_set(recording.info, rows, outputs, here) for here in whole]
+        sets = [_one_set(recording.info, rows, outputs, in_piece) for in_piece in whole]
     return Summary(recording.info, {name: np.array([one[name] for one in sets]) for name in sets[0]})
 
 
@@ -249,19 +249,19 @@ def _stretches(
 ) -> list[dict[str, Any]]:
     """Return stretches of a data set whose rate changes, with the output as if it were not late."""
     rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)[all_rows]
-    here = {name: values[all_rows] for name, values in rows.items()}
-    place = _place(info, here, 0)
+    values_of = {name: values[all_rows] for name, values in rows.items()}
+    place = _place(info, values_of, 0)
     axis = Position.of(place["position"]).axis
-    steps = np.diff(np.asarray(here["t_s"], dtype=np.float64))
+    steps = np.diff(np.asarray(values_of["t_s"], dtype=np.float64))
     lag = lag_of(
         rate, outputs.get(axis, next(iter(outputs.values())))[all_rows], float(np.median(steps)) if len(steps) else 1.0
     )
     n = len(rate) - abs(lag)
     early, late = max(-lag, 0), max(lag, 0)
-    here = {name: values[early : early + n] for name, values in here.items()}
+    values_of = {name: values[early : early + n] for name, values in values_of.items()}
     moved = {name: values[all_rows][late : late + n] for name, values in outputs.items()}
     ends = {"rate_low_dps": float(rate.min()), "rate_high_dps": float(rate.max())}
-    return [{**_one_set(info, here, moved, part), **ends} for part in stretches(n)]
+    return [{**_one_set(info, values_of, moved, part), **ends} for part in stretches(n)]
 
 
 def _place(info: RecordingInfo, rows: Columns, row: int) -> dict[str, Any]:

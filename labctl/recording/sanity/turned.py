@@ -44,11 +44,11 @@ def is_turned(summary: Summary) -> NDArray[np.bool_]:
 
 def off_turns(summary: Summary) -> list[OffTurn]:
     """Return the turns whose integral is far from their angle, by the other turns' ratio of the two."""
-    turned = is_turned(summary)
-    if not turned.any():
+    is_turn = is_turned(summary)
+    if not is_turn.any():
         return []
     turn, u_deg = (np.asarray(summary[name], dtype=np.float64) for name in ("turn_deg", "turn_u_deg"))
-    ratio = _ratios(summary, turned)
+    ratio = _ratios(summary, is_turn)
     axis = np.char.lstrip(np.asarray(summary["position"]).astype(np.str_), "-")
     turns = []
     for row in np.flatnonzero(np.isfinite(ratio)):
@@ -64,16 +64,16 @@ def off_turns(summary: Summary) -> list[OffTurn]:
     return turns
 
 
-def _ratios(summary: Summary, turned: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _ratios(summary: Summary, is_turn: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the integral of each turn over its stated angle, (m,); NaN at rest and where its axis has no output."""
     position = np.asarray(summary["position"]).astype(np.str_)
     turn, duration_s = (np.asarray(summary[name], dtype=np.float64) for name in ("turn_deg", "duration_s"))
     ratios = np.full(len(summary), np.nan)
     for axis in summary.info.axes:
         mean = summary.of_axis("mean", axis)
-        for there, sign in ((axis, 1.0), (f"-{axis}", -1.0)):
-            rows = turned & (position == there)
-            rests = ~turned & (position == there) if np.any(~turned & (position == there)) else ~turned
+        for up_axis, sign in ((axis, 1.0), (f"-{axis}", -1.0)):
+            rows = is_turn & (position == up_axis)
+            rests = ~is_turn & (position == up_axis) if np.any(~is_turn & (position == up_axis)) else ~is_turn
             bias = float(np.median(mean[rests])) if rests.any() else 0.0
             ratios[rows] = (mean[rows] - bias) * duration_s[rows] / (sign * turn[rows])
     return ratios

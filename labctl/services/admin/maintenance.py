@@ -64,7 +64,7 @@ def _anchor(text: str) -> ChainHead:
 
 
 def migrate(database: str | None, *, copy: bool = True) -> MigrationResponse:
-    """Bring a database to today's schema, after a verified copy beside it. Raises BadInput, StoreError, Conflict."""
+    """Migrate a database to the present schema after copying it. Raises BadInput, StoreError, Conflict."""
     location = database or default_database()
     done = migrate_database(location, copy=copy)
     return MigrationResponse(

@@ -1,4 +1,4 @@
-"""Which clock a campaign's times are of, and whether an instrument was simulated, by the bench as its file says it."""
+"""Whether the bench of a campaign had a simulated clock, or simulated instruments, by its bench file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from labctl.answers.json_object import JsonObject
 
 
 def has_simulated_time(bench: JsonObject) -> bool:
-    """Return whether a bench, as its file says it, keeps a simulated clock, which may run faster than real time."""
+    """Return whether a bench has a simulated clock by its file; such a clock may run faster than real time."""
     simulation = bench.get("simulation")
     if isinstance(simulation, Mapping) and simulation.get("control"):  # simulators in another process set the pace
         return True

@@ -113,8 +113,8 @@ def _refuse_other_adapter(
     )
 
 
-def _other_unit(name: str, serial: str, own: tuple[str, str], before: CampaignRow) -> str:
-    was, other_serial = own
+def _other_unit(name: str, serial: str, reported: tuple[str, str], before: CampaignRow) -> str:
+    was, other_serial = reported
     owner = _owner(before, OWN, other_serial)
     swapped = f", which {owner} had: the two are exchanged" if owner and owner != name else ""
     return (

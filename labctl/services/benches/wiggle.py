@@ -169,9 +169,9 @@ def _unit(bench: BenchFile, name: str, moved_units: list[str], moved: Mapping[st
         text = f"{' and '.join(moved_units)} moved: turn only the named unit, and start again"
     else:
         (other,) = moved_units
-        there = settings[other].port or settings[other].host
+        link = settings[other].port or settings[other].host
         exchanged = "the two ports are exchanged" if moved.get(other) == [name] else "the ports do not fit the names"
-        text = f"{other} moved instead, so {exchanged}: set port = '{there}' for {name} in the bench file"
+        text = f"{other} moved instead, so {exchanged}: set port = '{link}' for {name} in the bench file"
     return WiggleUnit(
         unit=name, serial=settings[name].serial, port=port, moved=moved_units, ok=moved_units == [name], text=text
     )

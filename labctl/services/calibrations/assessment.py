@@ -116,8 +116,8 @@ def _lacks_something(criticism: CriticismResponse) -> bool:
 
 def _of_errors(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
     """Yield an objection for every error before it that is smaller: raw, its parent's, that of the one in force."""
-    own = _errors(row)
-    for finding in worse_than_raw(own):
+    errors = _errors(row)
+    for finding in worse_than_raw(errors):
         yield Objection(what="worse", text=finding.said, do=finding.do)
     history = store.calibrations.history(row.serial)
     in_force = history[0].version if history and history[0].act == "certify" else None
@@ -128,7 +128,7 @@ def _of_errors(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
         other = store.calibrations.get(row.serial, version)
         if other.recordings != row.recordings:
             continue
-        worse = worse_than_version(_errors(other), own)
+        worse = worse_than_version(_errors(other), errors)
         if worse:
             text = f"{worse} of version {version}, {role}, on the same recording"
             yield Objection(what="worse", text=text, do=f"certify version {version}, or improve this version")

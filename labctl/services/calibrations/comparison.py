@@ -69,14 +69,14 @@ def _of_change(said: str, first: float, second: float) -> Finding:
     )
 
 
-def worse_than_version(other: Errors, own: Errors) -> str:
+def worse_than_version(other: Errors, errors: Errors) -> str:
     """Return in words by which error a version is worse than another one of the same recording; empty where it is not.
 
     The held-out error decides; where one of them has none, the error of their own data.
     """
     for name, first, second in (
-        ("held-out", other.heldout_rms_dps, own.heldout_rms_dps),
-        ("RMS", other.rms_dps, own.rms_dps),
+        ("held-out", other.heldout_rms_dps, errors.heldout_rms_dps),
+        ("RMS", other.rms_dps, errors.rms_dps),
     ):
         if first is not None and second is not None:
             text = f"the version's {name} error, {second:.4g} deg/s, is larger than the {first:.4g} deg/s"

@@ -19,7 +19,7 @@ from labctl.fitting import fit
 from labctl.fitting.effects.response import IDS
 from labctl.fitting.models.memory import split_memory
 from labctl.fitting.uncertainty import evidence_of
-from labctl.recording.info import REFERENCES, RecordingInfo
+from labctl.recording.info import REFERENCES
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
@@ -97,14 +97,14 @@ def several(recordings: tuple[int, ...]) -> dict[str, list[int]]:
 
 def reference_of(rows: Sequence[RecordingRow]) -> dict[str, str]:
     """Return what a calibration's provenance says of the rates of its recordings, where that is known."""
-    infos = [RecordingInfo.model_validate(row.info) for row in rows]
+    infos = [row.recording_info for row in rows]
     references = dict.fromkeys(REFERENCES[info.rate_reference] for info in infos if info.rate_reference is not None)
     return {"rate_reference": "; ".join(references)} if references else {}
 
 
 def days_of(rows: Sequence[RecordingRow]) -> list[date]:
     """Return the days on which recordings were begun; of one without a date that of its import, the latest possible."""
-    return [RecordingInfo.model_validate(row.info).started_at.date() for row in rows]
+    return [row.recording_info.started_at.date() for row in rows]
 
 
 def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:

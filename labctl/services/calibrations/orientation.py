@@ -18,7 +18,7 @@ from labctl.error_per_turn import static_bias
 from labctl.errors import BadInput, BadRecording, NotCertified, NotEnoughData
 from labctl.fitting.numeric.arrays import Array
 from labctl.orientation import Orientation
-from labctl.recording import OutputUnit, RecordingInfo
+from labctl.recording import OutputUnit
 from labctl.recording.recording import Columns
 from labctl.services.calibrations.served import calibration_file
 from labctl.services.recordings.loading import newest_row
@@ -58,7 +58,7 @@ def orientation_of_recording(
             f"recording {recording} holds {row.kind}, but an angle is integrated from single "
             "readings; name a recording of readings"
         )
-    info = RecordingInfo.model_validate(row.info)
+    info = row.recording_info
     parts = [columns for _, columns in store.recordings.iter_datasets(recording)]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}
     return _follow(
@@ -204,11 +204,11 @@ def _between_stops(
 
 
 def _axis(source: _Source, asked: str | None) -> str:
-    there = [axis for axis in get_args(Axis) if f"gyro_{axis}" in source.columns]
-    if asked is None and len(there) == 1:
-        return there[0]
-    if asked is None or asked not in there:
-        text = ", ".join(there) or "none"
+    axes = [axis for axis in get_args(Axis) if f"gyro_{axis}" in source.columns]
+    if asked is None and len(axes) == 1:
+        return axes[0]
+    if asked is None or asked not in axes:
+        text = ", ".join(axes) or "none"
         raise BadInput(
             f"{source.what}: axis {asked or 'not named'}; name an axis that the data have a column for ({text})"
         )

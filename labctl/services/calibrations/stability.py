@@ -72,15 +72,15 @@ def stability_of(store: Store, serial: str, version: int, about: About = "own ax
     calibration = read_calibration(store.calibrations.get(serial, version).document)
     assert last is not None
     grid = ErrorGrid.of(calibration, about)
-    own = _own(store, versions_apart(certified, last, MIN_INTERVAL), grid)
-    if isinstance(own, Stability) and own.intervals >= MIN_INTERVALS:
-        return own
+    of_unit = _own(store, versions_apart(certified, last, MIN_INTERVAL), grid)
+    if isinstance(of_unit, Stability) and of_unit.intervals >= MIN_INTERVALS:
+        return of_unit
     drift = drift_of_type(store, last, calibration, grid)
     if isinstance(drift, str):
-        return f"{own}; {drift}" if isinstance(own, str) else own
-    if isinstance(own, Stability) and not _is_typical(own, drift.predicted):
-        return own
-    return Stability(drift.predicted, own.intervals if isinstance(own, Stability) else 0, drift)
+        return f"{of_unit}; {drift}" if isinstance(of_unit, str) else of_unit
+    if isinstance(of_unit, Stability) and not _is_typical(of_unit, drift.predicted):
+        return of_unit
+    return Stability(drift.predicted, of_unit.intervals if isinstance(of_unit, Stability) else 0, drift)
 
 
 def _own(store: Store, versions: list[CertifiedVersion], grid: ErrorGrid) -> Stability | str:
@@ -94,10 +94,10 @@ def _own(store: Store, versions: list[CertifiedVersion], grid: ErrorGrid) -> Sta
     return Stability(predicted, int(np.min(predicted.freedom)))
 
 
-def _is_typical(own: Stability, of_type: DriftPrediction) -> bool:
+def _is_typical(of_unit: Stability, of_type: DriftPrediction) -> bool:
     """Return whether the root mean square of a unit's own drift is within what its type predicts, at every place."""
     within = np.abs(of_type.mean_dps) + of_type.spread_dps
-    return bool(np.all(own.predicted.u_dps <= within))
+    return bool(np.all(of_unit.predicted.u_dps <= within))
 
 
 def years_until(measured: datetime, until: datetime) -> float:

@@ -97,5 +97,5 @@ def _error(fitted: FittedModel, axis: str, rates: Array, temperatures: Array, he
         "position": np.full(n, axis),
     }
     true = {name: rate if name == axis else np.zeros(n) for name in BODY_AXES}
-    here = Channels(columns, true)
-    return errors_at_true_rates(fitted, here)[axis].reshape(len(temperatures), len(rates))
+    channels = Channels(columns, true)
+    return errors_at_true_rates(fitted, channels)[axis].reshape(len(temperatures), len(rates))

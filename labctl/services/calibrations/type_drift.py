@@ -49,16 +49,18 @@ class _History:
     years: Array  #: (intervals,)
 
 
-def drift_of_type(store: Store, own: CertifiedVersion, calibration: Calibration, grid: ErrorGrid) -> TypeDrift | str:
+def drift_of_type(
+    store: Store, version: CertifiedVersion, calibration: Calibration, grid: ErrorGrid
+) -> TypeDrift | str:
     """Return the drift of the type of a unit on a grid, or why it is not known; the unit itself is left out.
 
-    The type is the model of the unit, letter by letter. Simulated units are a type of their own. `own` is the version
-    that the grid is of, `calibration` its content.
+    The type is the model of the unit, letter by letter. Simulated units are a type of their own. The grid is that of
+    `version`, whose content is `calibration`.
     """
-    model = store.units.get(own.serial).model
+    model = store.units.get(version.serial).model
     if not model.strip():
         return NO_MODEL
-    every = _histories(store, own, calibration, model, grid)
+    every = _histories(store, version, calibration, model, grid)
     grids = [each for each in every if np.isfinite(each.rates_dps).any()]
     units = int(np.min(np.sum([np.isfinite(each.rates_dps).any(axis=0) for each in grids], axis=0))) if grids else 0
     if units < MIN_UNITS:
@@ -74,17 +76,17 @@ def drift_of_type(store: Store, own: CertifiedVersion, calibration: Calibration,
 
 
 def _histories(
-    store: Store, own: CertifiedVersion, calibration: Calibration, model: str, grid: ErrorGrid
+    store: Store, latest: CertifiedVersion, calibration: Calibration, model: str, grid: ErrorGrid
 ) -> Iterator[_History]:
     """Yield the changes of each other unit of a model that was as real, or as simulated, as the unit itself."""
-    chosen = list(_chosen(store.certified_versions.of_model(model, own.serial)))
+    chosen = list(_chosen(store.certified_versions.of_model(model, latest.serial)))
     every = [version for unit in chosen for version in unit]
     calibrations = calibrations_of(store, every)
-    campaigns = frozenset[int]().union(own.campaigns, *(each.campaigns for each in every))
+    campaigns = frozenset[int]().union(latest.campaigns, *(each.campaigns for each in every))
     simulated = {
         number: has_simulated_instrument(bench) for number, bench in store.certified_versions.benches(campaigns).items()
     }
-    is_wanted = _is_simulated(own, calibration, simulated)
+    is_wanted = _is_simulated(latest, calibration, simulated)
     for unit in chosen:
         if all(_is_simulated(each, calibrations[each.id], simulated) == is_wanted for each in unit):
             yield _History(*rates_of(unit, calibrations, grid))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Hashable
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.services.campaigns.status import event_answer
@@ -46,7 +46,8 @@ class StatusCache:
         pending = self._found.get(what)
         if pending is None:
             pending = self._found[what] = asyncio.ensure_future(asyncio.to_thread(look))
-        return cast(T, await asyncio.shield(pending))  # one who leaves does not end it for the others
+        found: T = await asyncio.shield(pending)  # one who leaves does not end it for the others
+        return found
 
 
 class Bell:

@@ -83,7 +83,7 @@ def _engine(
     lending: BenchLending | None = None,
 ) -> Engine:
     row = store.campaigns.get(prepared.id)
-    bench = BenchFile.model_validate({**row.bench, "simulation": None})
+    bench = row.bench_file
     today = prepared.clock.utc().date()
     serials = {gyro.name: gyro.serial for gyro in bench.gyros}
     journal = LoggedJournal(store.campaigns.journal(prepared.id), prepared.id, row.bench_name, prepared.plan, serials)
@@ -238,7 +238,7 @@ def run_attended(
 
     observer = None if observe is None else lambda progress: observe(answer_of(row, progress))
     engine = _engine(store, prepared, control, observer)
-    bench = BenchFile.model_validate({**row.bench, "simulation": None})
+    bench = row.bench_file
     try:
         with answering_stops(store, bench, row.id, control):
             try:

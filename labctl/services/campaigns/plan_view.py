@@ -1,4 +1,4 @@
-"""The plan of a campaign as it was written down, and what became of each step."""
+"""The stored plan of a campaign, with the outcome of each step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from procedures.planning.turn_steps import DATA_SETS_OF_TURN
 
 
 def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
-    """Return a campaign's steps as they were written down, with what became of each. Raises NotFound."""
+    """Return the stored steps of a campaign with the outcome of each. Raises NotFound."""
     row = store.campaigns.get(campaign)
     steps = store.campaigns.steps(campaign)
     columns = timeline_columns([step.body for step in steps])

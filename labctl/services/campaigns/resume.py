@@ -132,7 +132,7 @@ def _mark_resumed(store: Store, row: CampaignRow, standing: ResumePoint, how: Re
 
 def _other_drivers(row: CampaignRow, bench_file: BenchFile) -> str:
     """Return which instruments have another driver, or another release of it, than when the campaign began."""
-    was = BenchFile.model_validate({**row.bench, "simulation": None}).drivers
+    was = row.bench_file.drivers
     changed = [
         f"; driver of {device}: {now.driver} of {now.distribution} {now.version} instead of "
         f"{then.driver} of {then.distribution} {then.version}"
@@ -147,11 +147,11 @@ def _same_units(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
 
     Raises Conflict where it carries other units, BadBench for a driver.
     """
-    here = {gyro.serial for gyro in bench_file.gyros}
-    if set(row.recordings) != here:
+    serials = {gyro.serial for gyro in bench_file.gyros}
+    if set(row.recordings) != serials:
         raise Conflict(
             f"campaign {row.id} measures the units {', '.join(sorted(row.recordings))}, but bench "
-            f"{bench_file.name} has the units {', '.join(sorted(here))}; name the bench of the campaign with --bench"
+            f"{bench_file.name} has the units {', '.join(sorted(serials))}; name the bench of the campaign with --bench"
         )
     return pinned(with_drivers(bench_file), reported_in(row))
 

@@ -9,7 +9,6 @@ from typing import Literal
 
 from pydantic import TypeAdapter
 
-from instruments.bench_config import BenchFile
 from labctl.answers.campaign_parts import DriverResponse, OutputResponse, PromptResponse, TurnResponse
 from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.services.benches.bench_clock import has_simulated_time
@@ -86,7 +85,7 @@ def statuses_of(store: Store, rows: Sequence[CampaignRow]) -> list[CampaignRespo
 
 
 def _from_summary(row: CampaignRow, seen: CampaignSummary) -> CampaignResponse:
-    current, there = seen.current, seen.environment
+    current, environment = seen.current, seen.environment
     over = row.state in ENDED
     return CampaignResponse(
         id=row.id,
@@ -99,10 +98,10 @@ def _from_summary(row: CampaignRow, seen: CampaignSummary) -> CampaignResponse:
         step_text="" if current is None else current.kind.replace("_", " "),
         progress=1.0 if row.state is CampaignState.DONE else min(seen.done_s / max(row.expected_s, 1e-9), 1.0),
         expected_end=None if over or seen.last_at is None else seen.last_at + timedelta(seconds=seen.left_s),
-        t_s=None if seen.last_t_s is None else max(there.t_s or 0.0, seen.last_t_s),
-        chamber_c=there.chamber_c,
-        setpoint_c=there.setpoint_c,
-        gyro_c=there.temperature_c,
+        t_s=None if seen.last_t_s is None else max(environment.t_s or 0.0, seen.last_t_s),
+        chamber_c=environment.chamber_c,
+        setpoint_c=environment.setpoint_c,
+        gyro_c=environment.temperature_c,
         rate_dps=None if current is None else current.body.get("rate_dps", 0.0),
         last_error=seen.last_error,
         repeated=seen.repeated,
@@ -169,8 +168,7 @@ def describe_interrupted(answer: CampaignResponse) -> str:
 
 def outlives_its_process(row: CampaignRow) -> bool:
     """Return whether a campaign's bench is still there, as it was, when the process that drove it is gone."""
-    # the simulation may be that of another version of labctl, whose settings are not known any more
-    return not BenchFile.model_validate({**row.bench, "simulation": None}).is_simulated
+    return not row.bench_file.is_simulated
 
 
 def mark_abandoned(answer: CampaignResponse, *, attended: bool) -> CampaignResponse:

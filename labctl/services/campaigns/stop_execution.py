@@ -12,7 +12,7 @@ from labctl.log import get_logger
 from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.campaign_job import CampaignJob
 from labctl.services.campaigns.recovery import CampaignRecovery
-from labctl.services.campaigns.stop_requests import CampaignStop, IdleStop, NotHere
+from labctl.services.campaigns.stop_requests import CampaignStop, IdleStop, StopElsewhere
 from labctl.stop.latch import StopRequest
 from labctl.stop.wire import Stopping
 
@@ -50,7 +50,7 @@ class StopExecution:
         """Begin a stop; returns how it goes on. Waits for no lock, no disk and no database."""
         job = self._job()
         if job is not None and stop.campaign not in {None, job.row.id}:
-            return NotHere(_another(job, stop), stands=False)
+            return StopElsewhere(_another(job, stop), stands=False)
         if job is None:
             self._latch.remember(stop)  # also that of a campaign that has ended: a start asked for before it waits here
             return IdleStop(lambda: self._idle(stop))

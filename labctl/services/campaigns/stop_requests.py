@@ -1,4 +1,4 @@
-"""A stop that was asked of a bench, as the one who asked follows it: of a campaign that runs, or of a bench at rest."""
+"""The progress of a stop that was requested: of a campaign that runs, or of a bench without one."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Callable
 from labctl.services.campaigns.campaign_job import CampaignJob
 from procedures.contracts.control import Control
 
-#: How often the end of a campaign's thread is looked for while its table is not known to stand, s.
-LOOK_S = 0.2
+#: Interval at which the end of a campaign is checked until its table is confirmed to be at rest, s.
+POLL_S = 0.2
 
 
 class CampaignStop:
@@ -37,8 +37,8 @@ class CampaignStop:
     def is_over(self, within_s: float) -> bool:
         """Wait until the table stands, or the engine has ended without that; returns whether either came."""
         waited_s = 0.0
-        while not self._control.is_at_rest(min(LOOK_S, within_s)):
-            waited_s += LOOK_S
+        while not self._control.is_at_rest(min(POLL_S, within_s)):
+            waited_s += POLL_S
             ended = self._has_ended()
             if ended or waited_s >= within_s:
                 return ended
@@ -51,14 +51,14 @@ class CampaignStop:
 
     @property
     def text(self) -> str:
-        """How far the stop is, or what keeps it."""
+        """State of the stop, or what delays it."""
         if self._control.hindrance:
             return f"campaign {self.campaign}: {self._control.hindrance}"
         return f"campaign {self.campaign}: {'the table is at rest' if self.stands else 'the table is being stopped'}"
 
 
 class IdleStop:
-    """A stop while no campaign runs: the instruments are made safe, once what has the bench now has let it go."""
+    """A stop while no campaign runs: the instruments are made safe as soon as the bench is released."""
 
     campaign: int | None = None
 
@@ -106,7 +106,7 @@ class IdleStop:
         return self._trouble or "no campaign runs, and the table is at rest"
 
 
-class NotHere:
+class StopElsewhere:
     """A stop of a campaign that does not run here, or of a service that drives no bench."""
 
     campaign: int | None = None

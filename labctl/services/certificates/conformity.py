@@ -183,10 +183,10 @@ def _until(stability: StabilityResult | None) -> str:
 
 def _otherwise(ordered: OrderedConformity) -> str:
     """Return what else can be agreed where the guard band is too wide."""
-    own = (
+    about_text = (
         'about = "own axis", if the item turns about one axis at a time, or on ' if ordered.about == "any axis" else ""
     )
-    return f'{own}rule = "simple"'
+    return f'{about_text}rule = "simple"'
 
 
 def _about_any(ordered: OrderedConformity, any_axis: tuple[AnyAxisResult, ...]) -> tuple[float, str]:
@@ -208,8 +208,10 @@ def _about_any(ordered: OrderedConformity, any_axis: tuple[AnyAxisResult, ...]) 
 def _about_own(results: tuple[ResultPoint, ...]) -> tuple[float, str]:
     """Return U and for which rotations it holds: those of the results."""
     rates = [point.rate_dps for point in results]
-    turned = f"turned about the axis of one output, the others at rest, at {min(rates):.4g} to {max(rates):.4g} °/s"
-    return max(point.expanded_dps for point in results), turned
+    motion_text = (
+        f"turned about the axis of one output, the others at rest, at {min(rates):.4g} to {max(rates):.4g} °/s"
+    )
+    return max(point.expanded_dps for point in results), motion_text
 
 
 def _temperatures(results: tuple[ResultPoint, ...]) -> str:

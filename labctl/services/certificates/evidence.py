@@ -164,8 +164,8 @@ def _require_cover(verified: Sequence[VerifiedError], calibration: Calibration, 
         low, high = 0.0, 0.0
     third = END_SHARE * (high - low)
     for output in calibration.axes:
-        for place, turned in enumerate(BODY_AXES):
-            if about == "own axis" and turned != output:
+        for place, turning in enumerate(BODY_AXES):
+            if about == "own axis" and turning != output:
                 continue
             rates = [each.rates_dps[place] for each in verified if each.output == output]
             if rates and min(rates) <= low + third + 1e-9 and max(rates) >= high - third - 1e-9:
@@ -173,7 +173,7 @@ def _require_cover(verified: Sequence[VerifiedError], calibration: Calibration, 
             text = f"at {min(rates):.4g} to {max(rates):.4g} deg/s" if rates else "at no rate"
             beyond = f" ({outside} data sets lie beyond the range of the calibration)" if outside else ""
             raise NotVerified(
-                f"output {output} was verified about {turned} {text}{beyond}; a statement about {about} for {low:.4g} "
+                f"output {output} was verified about {turning} {text}{beyond}; a statement about {about} for {low:.4g} "
                 f"to {high:.4g} deg/s needs rates in the outer thirds of this range. Verify there ([verification] of "
                 "the recipe), or leave [conformity] out of the order"
             )

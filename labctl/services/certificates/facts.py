@@ -11,7 +11,6 @@ from instruments.laboratory import Laboratory
 from instruments.standards import SIMULATED, Standard
 from labctl.answers.certificates import CertificateOrder
 from labctl.calibration import Calibration, read_calibration
-from labctl.recording import RecordingInfo
 from labctl.services.certificates.missing import of_contact
 from labctl.services.certificates.sensors import Sensors, missing_of
 from labctl.services.standards.usage import performed
@@ -128,4 +127,4 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
 
 def _standards(rows: tuple[RecordingRow, ...]) -> tuple[Standard, ...]:
     """Return the standards that the recordings were made with, each once: those whose uncertainties are in U."""
-    return tuple(dict.fromkeys(each for row in rows for each in RecordingInfo.model_validate(row.info).standards))
+    return tuple(dict.fromkeys(each for row in rows for each in row.recording_info.standards))

@@ -121,11 +121,11 @@ def accelerometer_result(
         for i, axis in enumerate(AXES)
     ]  # fmt: skip
     for place, (i, j) in enumerate(UPPER, start=len(AXES)):
-        name, own = AXES[i] + AXES[j], float(i == j)
+        name, identity = AXES[i] + AXES[j], float(i == j)
         was = result.scale_factor[AXES[i]] if i == j else result.misalignment[name]
-        value = ratio * (own + was.value) - own
+        value = ratio * (identity + was.value) - identity
         named = f"scale factor {AXES[i]}" if i == j else f"misalignment {name}"
-        found.append(_coefficient(named, value, "1", (ratio * u[place], freedom), (own + value) * relative_u))
+        found.append(_coefficient(named, value, "1", (ratio * u[place], freedom), (identity + value) * relative_u))
     found += [] if result.alignment is None else _aligned("gyro triad", result.alignment["axes"])
     found += [] if result.temperature is None else _over_temperature(result.temperature, ratio, freedom)
     reference = SensorReference(

@@ -92,10 +92,11 @@ def until(stability: StabilityResult | None, results: Sequence[ResultPoint]) -> 
 
 def _drift(stability: StabilityResult) -> str:
     """Return in words what the drift is known from."""
-    turned = "turned about any axis" if stability.about == "any axis" else "turned about the axis of one output"
+    motion_text = "turned about any axis" if stability.about == "any axis" else "turned about the axis of one output"
     intervals = f"{stability.intervals} {'interval' if stability.intervals == 1 else 'intervals'}"
     figures = {
-        "per_year": stability.per_year_dps, "turned": turned, "until": stability.until, "drift": stability.drift_dps,
+        "per_year": stability.per_year_dps, "turned": motion_text, "until": stability.until,
+        "drift": stability.drift_dps,
     }  # fmt: skip
     if stability.type is None:
         return OF_ITEM.format(intervals=intervals, **figures)

@@ -61,14 +61,14 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
     answers = [_answer(signature, expected) for signature in signatures]
     certificate = None if row is None else certificate_by_number(store, row.number)
     # a DCC that is attached to a PDF is signed by itself, which says nothing of the pages
-    own = [answer for answer in answers if answer.valid and answer.form == OWN.get(form)]
-    by = [each.signed_by for each in own]
+    from_labctl = [answer for answer in answers if answer.valid and answer.form == OWN.get(form)]
+    by = [each.signed_by for each in from_labctl]
     if form == "json" and certificate is not None and in_register == "same":
         by = [certificate.signed_by]
     against = in_register == "differs" or not all(answer.valid for answer in answers)
     against = against or any(answer.trust == "not trusted" or answer.expected is False for answer in answers)
     against = against or (bool(expected) and not any(_is_one_of(each, expected) for each in by))
-    vouched = in_register == "same" or any(each.trust == "trusted" for each in own)
+    vouched = in_register == "same" or any(each.trust == "trusted" for each in from_labctl)
     state: CertificateState | Literal["unknown"] = "unknown" if certificate is None else certificate.state
     return VerifiedFileResponse(
         format=form,

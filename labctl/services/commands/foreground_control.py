@@ -27,7 +27,7 @@ from procedures.contracts.campaign_state import CampaignState
 
 @dataclass(frozen=True)
 class CampaignTerminal:
-    """What a campaign in the foreground shows and asks: its progress, its prompts, and remarks beside them."""
+    """Terminal of a campaign in the foreground: its progress, its prompts and its messages."""
 
     observe: Observe | None = None
     attend: Attend | None = None

@@ -97,9 +97,14 @@ class DatabaseCommands:
         return execute(self._database, command, request)
 
 
-def execute(database: str | None, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
-    """Execute one command on a database. Raises LabctlError."""
-    with open_commands(database) as commands:
+def execute(
+    database: str | None,
+    command: Command[RequestT, ResponseT],
+    request: RequestT,
+    open_terminal: OpenTerminal | None = None,
+) -> ResponseT:
+    """Execute one command on a database, as `open_commands` opens it. Raises LabctlError."""
+    with open_commands(database, open_terminal) as commands:
         return commands.execute(command, request)
 
 

@@ -26,7 +26,6 @@ from labctl.services.certificates import issue as certificates
 from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
 from labctl.services.commands.acts.check import CHECK_BENCH
 from labctl.services.commands.acts.live import END_LIVE, START_LIVE
-from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
 from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.command import Command, Newest, NoContent
 from labctl.services.commands.context import CommandContext
@@ -224,7 +223,7 @@ REVOKE_KEY = Command(method="POST", path="/api/keys/{name}/revoke", handler=_rev
 NOTE_BACKUP = Command(method="POST", path="/api/backups", handler=_note_backup, responses={204: NoContent})
 
 _ELSEWHERE: tuple[Command[Any, Any], ...] = (
-    START_CAMPAIGN, RESUME_CAMPAIGN, *(act.command for act in CAMPAIGN_ACTS), CHECK_BENCH, START_LIVE, END_LIVE,
+    START_CAMPAIGN, *(act.command for act in CAMPAIGN_ACTS), CHECK_BENCH, START_LIVE, END_LIVE,
     ADD_STANDARD, ADD_STANDARD_CERTIFICATE, ADD_STANDARD_CHECK, MARK_STANDARD_BAD, WITHDRAW_FINDING, SET_CHECK_GYRO,
     ADD_ENVIRONMENT, KEEP_ACCELEROMETER, KEEP_MAGNETOMETER,
 )  # fmt: skip

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from datetime import datetime
 from pathlib import Path
-from typing import ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic, Self, TypeVar
 
 from labctl.answers.base import Request
 from labctl.answers.campaigns import CampaignRequest, ResumeRequest
@@ -24,6 +24,10 @@ class Addressed:
     def address(self) -> dict[str, object]:
         """Return all fields but the body, by name."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "body"}
+
+    def to_driver(self) -> Self:
+        """Return the request as the service that drives the bench takes it."""
+        return self
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,10 @@ class CampaignStart(Addressed):
     simulated_start: datetime | None = None  #: aware
     wire_log: Path | None = None  #: file that gets every byte between labctl and the bench
 
+    def to_driver(self) -> Self:
+        """Return the request without its bench, which is the service's own."""
+        return replace(self, bench=None)
+
 
 @dataclass(frozen=True)
 class CampaignResume(Addressed):
@@ -125,6 +133,10 @@ class CampaignResume(Addressed):
     bench: str | None = None
     speed: float | None = None
     wire_log: Path | None = None  #: file that gets every byte between labctl and the bench
+
+    def to_driver(self) -> Self:
+        """Return the request without its bench, which is the service's own."""
+        return replace(self, bench=None)
 
 
 @dataclass(frozen=True)

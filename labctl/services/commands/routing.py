@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import replace
-from typing import cast
 
 from instruments.clock import Clock
 from labctl.services.benches.lease import driver_of
 from labctl.services.commands.command import Command, CommandExecutor, RequestT, ResponseT
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.commands.requests import Addressed, CampaignResume, CampaignStart, ToCampaign
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.store import Store
 
@@ -41,6 +39,6 @@ class RoutedExecutor:
             driver = None if bench is None else driver_of(store, bench, self._clock.utc())
         if driver is None or driver.url is None:
             return self._local.execute(command, request)
-        if isinstance(request, CampaignStart | CampaignResume):  # it is this service's own
-            request = cast(RequestT, replace(request, bench=None))
+        if isinstance(request, Addressed):
+            request = request.to_driver()
         return self._remote(driver.url).execute(command, request)

@@ -194,8 +194,10 @@ def _compared(store: Store, row: RecordingRow, version: CalibrationRecord | None
 def _source(row: RecordingRow, version: CalibrationRecord | None) -> str:
     if version is None:
         return f"uncorrected outputs of recording {row.id}"
-    own = "which the version was fitted to" if row.id in version.recordings else "which the version was not fitted to"
-    return f"version {version.version} without refitting, on recording {row.id}, {own}"
+    fitted_text = (
+        "which the version was fitted to" if row.id in version.recordings else "which the version was not fitted to"
+    )
+    return f"version {version.version} without refitting, on recording {row.id}, {fitted_text}"
 
 
 def _response(axis: AxisCoefficients, budgets: Mapping[str, BudgetJson]) -> tuple[Response, AxisResponse] | None:

@@ -50,24 +50,24 @@ def lines_over(
     level = rate_levels(rate)
     rates = np.unique(level_centres(rate, level))
     over_rate, over_temperature = [], []
-    for there in np.unique(position).tolist():
+    for up_axis in np.unique(position).tolist():
         for axis in (axis for axis in data.info.axes if axis in fitted.axes):
             warm = channels.temperature_c(axis)
             temperatures = np.unique(level_centres(warm, temperature_rows(warm, position, level)))
 
-            def error(across: Array, down: Array, *, by_rate: bool, axis: str = axis, there: str = there) -> Any:
+            def error(across: Array, down: Array, *, by_rate: bool, axis: str = axis, up_axis: str = up_axis) -> Any:
                 grid = np.meshgrid(across, down)
                 r, t = grid if by_rate else grid[::-1]
-                return _rounded(_on_grid(fitted, axis, there, r, t, held, up_dps))
+                return _rounded(_on_grid(fitted, axis, up_axis, r, t, held, up_dps))
 
             lines, at = _picked(temperatures), _along(rates)
             over_rate.append(ModelLines(
-                axis=axis, position=there, level=lines.tolist(), levels=len(temperatures), at=at.tolist(),
+                axis=axis, position=up_axis, level=lines.tolist(), levels=len(temperatures), at=at.tolist(),
                 error_dps=error(at, lines, by_rate=True),
             ))  # fmt: skip
             lines, at = _picked(rates, keep=0.0), _along(temperatures)
             over_temperature.append(ModelLines(
-                axis=axis, position=there, level=lines.tolist(), levels=len(rates), at=at.tolist(),
+                axis=axis, position=up_axis, level=lines.tolist(), levels=len(rates), at=at.tolist(),
                 error_dps=error(at, lines, by_rate=False),
             ))  # fmt: skip
     return over_rate, over_temperature
@@ -85,8 +85,8 @@ def _picked(levels: Array, keep: float | None = None) -> Array:
 
 def _along(measured: Array) -> Array:
     """Return where a line is drawn: finely, and at every measured level, so that no bend lies between two points."""
-    own = _picked(measured)
-    return np.unique(np.concatenate([np.linspace(measured[0], measured[-1], POINTS), own]))
+    chosen = _picked(measured)
+    return np.unique(np.concatenate([np.linspace(measured[0], measured[-1], POINTS), chosen]))
 
 
 def _on_grid(
@@ -95,11 +95,11 @@ def _on_grid(
 ) -> Array:  # fmt: skip
     """Return the error of an output axis, in the shape of the grids of table rate and temperature."""
     n = rate.size
-    there = np.full(n, position)
+    positions = np.full(n, position)
     columns: dict[str, Any] = {name: np.full(n, value) for name, value in held.items()}
-    columns |= {"temperature_c": temperature.ravel(), "table_rate_dps": rate.ravel(), "position": there}
-    here = Channels(columns, body_rates(rate.ravel() + up_dps, there))
-    return errors_at_true_rates(fitted, here)[axis].reshape(rate.shape)
+    columns |= {"temperature_c": temperature.ravel(), "table_rate_dps": rate.ravel(), "position": positions}
+    channels = Channels(columns, body_rates(rate.ravel() + up_dps, positions))
+    return errors_at_true_rates(fitted, channels)[axis].reshape(rate.shape)
 
 
 def _rounded(values: Array) -> list[list[float]]:
@@ -149,13 +149,13 @@ def drawn_comparison(store: Store, serial: str, version: int, recording: int) ->
 
 def _source(calibration: Calibration, fitted_to: Sequence[int], measured: Measurements) -> str:
     fitted = "was fitted" if set(fitted_to) >= set(measured.recordings) else "was not fitted"
-    own = f"which the version {fitted} to"
+    fitted_text = f"which the version {fitted} to"
     if 0 < len(set(fitted_to) & set(measured.recordings)) < len(measured.recordings):
-        own = (
+        fitted_text = (
             "of which the version was fitted to "
             f"{', '.join(map(str, sorted(set(fitted_to) & set(measured.recordings))))}"
         )
-    return f"version {calibration.version} without refitting, on {measured.named}, {own}"
+    return f"version {calibration.version} without refitting, on {measured.named}, {fitted_text}"
 
 
 def _columns(data: FitData, errors: Mapping[str, Array], recording: int) -> ComparisonColumns:
@@ -177,8 +177,8 @@ def _axis(
 ) -> dict[str, list[int] | list[str] | list[float] | list[float | None]]:
     """Return the rows of one output axis."""
     channels = data.channels
-    rate, own, warm = channels.table_rate_dps(), channels.rate_dps(axis), channels.temperature_c(axis)
-    measured = data.outputs[axis] - own
+    rate, own_rate_dps, warm = channels.table_rate_dps(), channels.rate_dps(axis), channels.temperature_c(axis)
+    measured = data.outputs[axis] - own_rate_dps
     own_turn = axis_in(position) == axis
     before, after = (
         turn_errors(error - bias_at_rest(error, rate, warm, position), np.where(own_turn, rate, 0.0))
@@ -188,7 +188,7 @@ def _axis(
         "axis": [axis] * len(data),
         "position": position.tolist(),
         "table_rate_dps": rate.tolist(),
-        "own_rate_dps": own.tolist(),
+        "own_rate_dps": own_rate_dps.tolist(),
         "temperature_c": warm.tolist(),
         "temperature_level_c": level_centres(warm, temperature_rows(warm, position, level)).tolist(),
         "rate_level_dps": rate_level.tolist(),

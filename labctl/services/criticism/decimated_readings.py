@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labctl.recording import Columns, Recording, RecordingInfo
+from labctl.recording import Columns, Recording
 from labctl.recording.decimation import decimate
 from labctl.recording.points import longest_undivided_s, to_points
 from labctl.services.forked import Forked
@@ -49,7 +49,7 @@ def read_recording_of(store: Store, row: RecordingRow) -> ReadRecording:
     """Return what a criticism takes of the readings of a recording, each of which is read once."""
     from labctl.services.recordings.allan import StillReadings  # noqa: PLC0415  slow to import
 
-    info = RecordingInfo.model_validate(row.info)
+    info = row.recording_info
     longest_s, still = longest_undivided_s(info.motion), StillReadings(store, row)
     parts, pieces = list[Columns](), {}
     for number, columns in store.recordings.iter_datasets(row.id):
@@ -68,8 +68,8 @@ def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decim
     wanted = [row for row in rows if is_decimated(row)]
 
     def read() -> dict[int, ReadRecording]:
-        with open_store(store.location, write=False) as own:
-            return {row.id: read_recording_of(own, row) for row in wanted}
+        with open_store(store.location, write=False) as second_store:
+            return {row.id: read_recording_of(second_store, row) for row in wanted}
 
     with closing(Forked(read)) as forked:
         found: dict[int, ReadRecording] = {}

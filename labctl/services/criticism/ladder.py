@@ -26,20 +26,20 @@ def ladder(store: Store, serial: str, recording: int | None = None) -> LadderRes
     together: Sequence[int | None] = (recording,)
     if recording is None:
         chosen, together = newest_version.recording, newest_version.recordings
-    here = [row for row in rows if _is_of(row, chosen, together)]
-    if not here:
+    on_recording = [row for row in rows if _is_of(row, chosen, together)]
+    if not on_recording:
         fitted = sorted({row.recording for row in rows if row.recording is not None})
         raise BadInput(
             f"no version of {serial} was fitted to recording {recording} (the unit's versions were fitted to "
             f"recordings {', '.join(map(str, fitted)) or 'none'}); `labctl fit {serial} --recording "
             f"{recording}` makes a version"
         )
-    steps = [_step(row) for row in _by_parentage(here)]
+    steps = [_step(row) for row in _by_parentage(on_recording)]
     newest = max(steps, key=lambda step: step.version)
     return LadderResponse(
         serial=serial,
         recording=chosen,
-        recordings=list(here[0].recordings),
+        recordings=list(on_recording[0].recordings),
         steps=steps,
         others=_applied_here(store, [row for row in rows if not _is_of(row, chosen, together)], chosen),
         noise_floor_dps=newest.noise_floor_dps,

@@ -18,7 +18,7 @@ from labctl.fitting.data.static_record import StaticRecord
 from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.columns import OWN_DATASET, RECORDING
-from labctl.recording.info import GIVE_DATE, RecordingInfo, measured_at
+from labctl.recording.info import GIVE_DATE, measured_at
 from labctl.recording.output_steps import per_reading, quantisation_of
 from labctl.services.criticism.decimated_readings import (
     Decimated,
@@ -159,9 +159,9 @@ class Measurements:
         columns = self.readings.columns
         if RECORDING not in columns:
             return longest
-        own = np.asarray(columns[OWN_DATASET])[np.asarray(columns[RECORDING]) == recording]
+        own_numbers = np.asarray(columns[OWN_DATASET])[np.asarray(columns[RECORDING]) == recording]
         joined = np.asarray(columns["dataset"])[np.asarray(columns[RECORDING]) == recording]
-        first, last = (int(joined[own == n][0]) for n in (longest.first_dataset, longest.last_dataset))
+        first, last = (int(joined[own_numbers == n][0]) for n in (longest.first_dataset, longest.last_dataset))
         return replace(longest, first_dataset=first, last_dataset=last)
 
     def question(self) -> dict[str, object]:
@@ -194,7 +194,7 @@ def undated_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
 
 def other_settings_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
     """Yield that the unit was set otherwise in one of several recordings than in the first one that says how."""
-    configurations = [(row.id, RecordingInfo.model_validate(row.info).configuration) for row in rows]
+    configurations = [(row.id, row.recording_info.configuration) for row in rows]
     first, *others = [configuration for configuration in configurations if configuration[1]] or [(0, {})]
     for number, settings in others:
         if differs := changed(first[1], settings):

@@ -148,7 +148,7 @@ def _recipe_like(criticism: Criticism) -> Recipe:
             "name": data.info.serial,
             "temperatures_c": levels[:: max(len(levels) // 12, 1)].tolist(),
             "rates_dps": rates[:: max(len(rates) // 25, 1)].tolist(),
-            "positions": sorted(there for there, _ in data.nodes.positions()),
+            "positions": sorted(position for position, _ in data.nodes.positions()),
             "mounting": {"repower_each": each},
             "acquire": {"duration_s": float(np.clip(np.median(lasted), 1.0, 120.0))},
         }

@@ -69,7 +69,7 @@ def _shared(sets: Channels, dataset: np.ndarray, points: Recording, recording: i
     single = {"recording": [recording] * len(dataset), "dataset": dataset.tolist()}
     return {
         **(own_numbers(sets, recording) if RECORDING in sets else single),
-        "position": [str(there) for there in sets["position"]],
+        "position": [str(position) for position in sets["position"]],
         "run": np.rint(sets["run"]).astype(int).tolist() if "run" in sets else [1] * len(dataset),
         "n": [set_numbers.get(number) for number in dataset.tolist()],
     }

@@ -130,13 +130,13 @@ def _point(
     data = Measurements(store, (row,))
     at = {each.id: ordered_at(each.info) for each in measured}
     before = [v for v in versions if v.recordings and all(at[n] < at[row.id] for n in v.recordings if n in at)]
-    own = [v for v in versions if row.id in v.recordings]
+    fitted_versions = [v for v in versions if row.id in v.recordings]
     point = TrendPoint(
         recording=row.id, at=at[row.id], as_found=_applied(store, before[-1:], data),
-        as_left=_applied(store, own[-1:], data), rms_dps=None, axes={},
+        as_left=_applied(store, fitted_versions[-1:], data), rms_dps=None, axes={},
     )  # fmt: skip
     try:
-        angles = mounting_angles_of(read_calibration(own[-1].document)) if own else None
+        angles = mounting_angles_of(read_calibration(fitted_versions[-1].document)) if fitted_versions else None
         errors, _ = applied_errors(read_calibration(reference.document), data.points, angles_rad=angles)
         channels = fit_data_of(data.points)
     except LabctlError as error:
@@ -161,15 +161,15 @@ def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measureme
 
 def line_left(error_dps: Array, rate_dps: Array) -> AxisPoint:
     """Return what is left of bias and scale factor on one axis: a straight line over the rate, by least squares."""
-    turned = len(np.unique(np.round(rate_dps, 3))) >= MIN_RATES
-    columns = np.column_stack([np.ones(len(rate_dps)), rate_dps] if turned else [np.ones(len(rate_dps))])
+    has_rates = len(np.unique(np.round(rate_dps, 3))) >= MIN_RATES
+    columns = np.column_stack([np.ones(len(rate_dps)), rate_dps] if has_rates else [np.ones(len(rate_dps))])
     coefficients, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
     residual = error_dps - columns @ coefficients
     variance = float(residual @ residual) / max(len(residual) - columns.shape[1], 1)
     u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
     return AxisPoint(
         bias_dps=float(coefficients[0]), u_bias_dps=float(u[0]),
-        scale_factor=float(coefficients[1]) if turned else None, u_scale_factor=float(u[1]) if turned else None,
+        scale_factor=float(coefficients[1]) if has_rates else None, u_scale_factor=float(u[1]) if has_rates else None,
     )  # fmt: skip
 
 

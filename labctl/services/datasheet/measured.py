@@ -1,4 +1,4 @@
-"""Figures of a data sheet from the data sets of one recording; the outputs as they are, nothing corrected."""
+"""Figures of a data sheet from the data sets of one recording, of the uncorrected outputs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from labctl.recording.positions import Position, axis_in
 
 #: Figures at one temperature are at the level nearest to this, deg C.
 USUAL_C = 25.0
-#: Different rates of the table that a line takes.
+#: Least number of different table rates for a straight line.
 MIN_RATES = 2
 PAIRS = ("xy", "xz", "yz")
 
@@ -43,7 +43,7 @@ class Figure:
     id: str
     axis: str
     estimate: Estimate
-    rows: NDArray[np.bool_]  #: the data sets behind it, (m,)
+    rows: NDArray[np.bool_]  #: the data sets that it is computed from, (m,)
     along: str = ""
 
 
@@ -64,7 +64,7 @@ class _Columns:
         """The level nearest to `USUAL_C`."""
         return int(np.argmin(np.abs(self.level_c - USUAL_C)))
 
-    def own(self, axis: str) -> NDArray[np.bool_]:
+    def turning_about(self, axis: str) -> NDArray[np.bool_]:
         """Return which data sets turn about an axis, (m,)."""
         return np.asarray(axis_in(self.position) == axis)
 
@@ -75,7 +75,7 @@ class _Columns:
     def line_about(self, axis: str, about: str, rows: NDArray[np.bool_]) -> StraightLine | None:
         """Return the line of an output over the true rate about an axis; None unless the table ran different rates.
 
-        The Earth's rate differs from position to position: it is no rate that a line could be drawn over.
+        A line over the Earth's rate alone, which differs from position to position, is not fitted.
         """
         if different_rates(self.table_dps[rows]) < MIN_RATES:
             return None
@@ -96,7 +96,7 @@ def figures_of(data: FitData) -> list[Figure]:
 
 
 def _spread(rows: NDArray[np.bool_], among: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return a mask of the data sets of another mask as one of all, (m,)."""
+    """Return a mask over the data sets of another mask as a mask over all data sets, (m,)."""
     is_spread = np.zeros(len(among), dtype=bool)
     is_spread[among] = rows
     return is_spread
@@ -115,46 +115,50 @@ def _columns(data: FitData) -> _Columns:
 
 
 def _of_rates(seen: _Columns, axis: str) -> Iterator[Figure]:
-    """Yield what the rates about an axis say of it: at the usual temperature, over temperature, and from run to run."""
-    own = seen.own(axis)
-    here = own & (seen.level == seen.usual)
-    line = seen.line(axis, here)
+    """Yield the figures by rates about an axis: at the usual temperature, over temperature, and from run to run."""
+    about_axis = seen.turning_about(axis)
+    at_usual_level = about_axis & (seen.level == seen.usual)
+    line = seen.line(axis, at_usual_level)
     if line is None:
         return
     standards = standards_u(seen.bench, Sensitivities.of_one(relative_rate=line.scale_factor.value))
-    yield Figure("scale_factor", axis, _with(line.scale_factor, standards), here)
-    yield Figure("bias", axis, line.bias_dps, here)
-    rate = seen.data.true_rate_dps(axis)[here]
-    if different_rates(seen.table_dps[here]) > MIN_RATES:
+    yield Figure("scale_factor", axis, _with(line.scale_factor, standards), at_usual_level)
+    yield Figure("bias", axis, line.bias_dps, at_usual_level)
+    rate = seen.data.true_rate_dps(axis)[at_usual_level]
+    if different_rates(seen.table_dps[at_usual_level]) > MIN_RATES:
         white = seen.data.white_var
-        u = None if white is None else np.sqrt(white[axis][here])
-        yield Figure("scale_factor_nonlinearity", axis, nonlinearity_ppm(line, float(np.max(np.abs(rate))), u), here)
-    if (value := asymmetry_ppm(rate, seen.data.outputs[axis][here])) is not None:
-        yield Figure("scale_factor_asymmetry", axis, value, here)
-    yield from _over_temperature(seen, axis, own, line.scale_factor.value)
-    yield from _from_run_to_run(seen, axis, own, line.scale_factor.value)
+        u = None if white is None else np.sqrt(white[axis][at_usual_level])
+        yield Figure(
+            "scale_factor_nonlinearity", axis, nonlinearity_ppm(line, float(np.max(np.abs(rate))), u), at_usual_level
+        )
+    if (value := asymmetry_ppm(rate, seen.data.outputs[axis][at_usual_level])) is not None:
+        yield Figure("scale_factor_asymmetry", axis, value, at_usual_level)
+    yield from _over_temperature(seen, axis, about_axis, line.scale_factor.value)
+    yield from _from_run_to_run(seen, axis, about_axis, line.scale_factor.value)
 
 
-def _over_temperature(seen: _Columns, axis: str, own: NDArray[np.bool_], scale_factor: float) -> Iterator[Figure]:
+def _over_temperature(
+    seen: _Columns, axis: str, about_axis: NDArray[np.bool_], scale_factor: float
+) -> Iterator[Figure]:
     lines = {
         level: line
         for level in range(len(seen.level_c))
-        if (line := seen.line(axis, own & (seen.level == level))) is not None
+        if (line := seen.line(axis, about_axis & (seen.level == level))) is not None
     }
     temperature_c = seen.level_c[list(lines)]
     bias = slope_over(temperature_c, [line.bias_dps for line in lines.values()])
     scale = slope_over(temperature_c, [line.scale_factor for line in lines.values()])
     if bias is not None:
-        yield Figure("bias_temperature", axis, bias, own)
+        yield Figure("bias_temperature", axis, bias, about_axis)
     if scale is not None:
-        yield Figure("scale_factor_temperature", axis, _times(scale, PPM / scale_factor), own)
+        yield Figure("scale_factor_temperature", axis, _times(scale, PPM / scale_factor), about_axis)
 
 
-def _from_run_to_run(seen: _Columns, axis: str, own: NDArray[np.bool_], scale_factor: float) -> Iterator[Figure]:
+def _from_run_to_run(seen: _Columns, axis: str, about_axis: NDArray[np.bool_], scale_factor: float) -> Iterator[Figure]:
     biases, scales = [], []
     for level in range(len(seen.level_c)):
-        for position in np.unique(seen.position[own]):
-            rows = own & (seen.level == level) & (seen.position == position)
+        for position in np.unique(seen.position[about_axis]):
+            rows = about_axis & (seen.level == level) & (seen.position == position)
             lines = {
                 int(run): line
                 for run in np.unique(seen.run[rows])
@@ -163,13 +167,13 @@ def _from_run_to_run(seen: _Columns, axis: str, own: NDArray[np.bool_], scale_fa
             biases.append({run: line.bias_dps.value for run, line in lines.items()})
             scales.append({run: line.scale_factor.value for run, line in lines.items()})
     if (value := repeatability(biases)) is not None:
-        yield Figure("bias_repeatability", axis, value[0], own)
+        yield Figure("bias_repeatability", axis, value[0], about_axis)
     if (value := repeatability(scales)) is not None:
-        yield Figure("scale_factor_repeatability", axis, _times(value[0], PPM / scale_factor), own)
+        yield Figure("scale_factor_repeatability", axis, _times(value[0], PPM / scale_factor), about_axis)
 
 
 def _at_rest(seen: _Columns, axis: str) -> Iterator[Figure]:
-    """Yield what is known at rest alone: bias and its repeatability where no rate was run, and the g-sensitivity."""
+    """Yield the figures at rest: bias and its repeatability where no rate was run, and the g-sensitivity."""
     still = seen.table_dps == 0
     error = seen.data.outputs[axis] - seen.data.true_rate_dps(axis)
     if not np.any(seen.table_dps):
@@ -205,7 +209,7 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
     k, u, has_u = np.eye(3), np.zeros((3, 3)), True
     used = np.zeros(len(seen.data), dtype=bool)
     for j, about in enumerate(AXES):
-        rows = seen.own(about) & (seen.level == seen.usual)
+        rows = seen.turning_about(about) & (seen.level == seen.usual)
         used |= rows
         leaning = standards_u(seen.bench, Sensitivities.of_one(angle=1.0, gains=seen.bench.angle_gains(about)))
         for i, axis in enumerate(AXES):
@@ -217,7 +221,7 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
             u[i, j] = math.hypot(line.scale_factor.u or 0.0, 0.0 if i == j else leaning)
     try:
         alignment = alignment_of(k, u if has_u else None)
-    except ValueError:  # an axis has its sign reversed: no rotation takes it there
+    except ValueError:  # the sign of an axis is reversed, which no rotation does
         return
     for axis, estimate in zip(AXES, alignment.misalignment_deg, strict=True):
         yield Figure("misalignment", axis, estimate, used)

@@ -15,7 +15,6 @@ from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.progress import report_stage
-from labctl.recording import RecordingInfo
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.datasheet.measured import Figure, figures_of
 from labctl.services.recordings.allan import MAX_RECORDINGS, noise_of_recordings
@@ -117,7 +116,7 @@ def datasheet(store: Store, serial: str) -> DatasheetResponse:
 
 
 def _of_recording(store: Store, row: RecordingRow) -> Iterator[Characteristic]:
-    info = RecordingInfo.model_validate(row.info)
+    info = row.recording_info
     if row.kind == "coefficients" or info.motion not in {"rates", "rest"}:
         return
     try:
@@ -197,7 +196,7 @@ def _bandwidth(store: Store, serial: str) -> Iterator[Characteristic]:
 def _response(
     unit: Unit, rows: Sequence[RecordingRow], characteristics: Mapping[Key, Characteristic]
 ) -> DatasheetResponse:
-    infos = [RecordingInfo.model_validate(row.info) for row in rows]
+    infos = [row.recording_info for row in rows]
     specified: dict[str, float] = {}
     for info in reversed(infos):  # the newest recording says it last
         specified |= info.datasheet
@@ -221,9 +220,9 @@ def _lines(
     if line.id in OF_THREE_AXES and len(axes) < 3:
         return []
     limit = None if line.key is None else specified.get(line.key)
-    here = [each for (name, _, _), each in sorted(characteristics.items()) if name == line.id]
-    if here:
-        return [decided(line, each, limit) for each in here]
+    of_line = [each for (name, _, _), each in sorted(characteristics.items()) if name == line.id]
+    if of_line:
+        return [decided(line, each, limit) for each in of_line]
     return [
         Characteristic(
             id=line.id, title=line.title, axis="", value=None, u=None, unit=line.unit, conditions=None,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter
 
 from instruments.bench_config import BenchFile, is_simulated_address
 from labctl.errors import StoreError
-from procedures.contracts.steps import CheckHome, Home, Mount, MoveChamber, Step
+from procedures.contracts.steps import CheckHome, Home, Mount, MoveChamber
 from procedures.planning.earlier_times import ChamberMoves, DoneStep, EarlierTimes, earlier_times
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def times_on_bench(store: Store | None, bench: BenchFile) -> EarlierTimes | None
         for row in store.campaigns.done_steps(bench.name, KINDS, MAX_CAMPAIGNS):
             step = _STEP.validate_python(row.body)
             if _is_same(row.bench, bench, "chamber" if isinstance(step, MoveChamber) else "table"):
-                done.append(DoneStep(row.campaign, cast(Step, step), row.took_s))
+                done.append(DoneStep(row.campaign, step, row.took_s))
     stated = bench.chamber.ramp_c_per_min if bench.chamber is not None else 1.0
     return earlier_times(done, stated)
 

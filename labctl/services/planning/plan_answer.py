@@ -107,10 +107,10 @@ def _wider(recipe: Recipe) -> Iterator[tuple[str, str, Recipe]]:
     if recipe.indexing is not None:
         table = recipe.indexing.model_dump(exclude_defaults=True)
     for what, key, angle in TURNS:
-        there = table.get(key, ())
-        if angle not in there:
-            turned = Indexing.model_validate({**table, key: (*there, angle)})
-            yield what, _toml("indexing", turned), recipe.model_copy(update={"indexing": turned})
+        angles = table.get(key, ())
+        if angle not in angles:
+            indexing = Indexing.model_validate({**table, key: (*angles, angle)})
+            yield what, _toml("indexing", indexing), recipe.model_copy(update={"indexing": indexing})
     listed = set(recipe.positions)
     if recipe.inverted is None and not all(str(Position.of(each).upside_down) in listed for each in listed):
         inverted = Inverted.model_validate(points)

@@ -20,12 +20,12 @@ def timeline_columns(steps: Sequence[StepJson]) -> TimelineColumns:
     start_s: list[float] = []
     temperature_c: list[float | None] = []
     position: list[str | None] = []
-    now_s, now_c, here = 0.0, None, None
+    now_s, now_c, now_position = 0.0, None, None
     for step in steps:
-        now_c, here = step.get("temperature_c", now_c), step.get("position", here)
+        now_c, now_position = step.get("temperature_c", now_c), step.get("position", now_position)
         start_s.append(now_s)
         temperature_c.append(now_c)
-        position.append(here)
+        position.append(now_position)
         now_s += step["expected_s"]
     return TimelineColumns(
         number=list(range(1, len(steps) + 1)),

@@ -36,7 +36,7 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanRespon
             f"recording {recording} holds {head.kind}: an Allan deviation needs single readings; name a recording of "
             "readings"
         )
-    info = RecordingInfo.model_validate(head.info)
+    info = head.recording_info
     if info.motion == "poses":
         raise BadInput(
             f"recording {recording} is of poses (turned by hand between rests), from which no Allan deviation "
@@ -106,7 +106,7 @@ class StillReadings:
     """Collects of a recording, while its readings are read for something else, those that its static record needs."""
 
     def __init__(self, store: Store, row: RecordingRow) -> None:
-        self._info = RecordingInfo.model_validate(row.info)
+        self._info = row.recording_info
         _, still = _still(store, row.id)
         self._still, self._parts = set(still), list[Columns]()
 

@@ -12,7 +12,7 @@ from labctl.answers.recordings import AllanResponse
 from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.fitting.data.static_record import ONE_TEMPERATURE_K, StaticRecord, static_record, stretch_of
 from labctl.fitting.numeric.allan import MIN_READINGS, Allan, allan
-from labctl.recording import Recording, RecordingInfo, read_recording
+from labctl.recording import Recording, read_recording
 from labctl.recording.column_map import ColumnMap
 from labctl.recording.data_files import read_table
 from labctl.recording.points import temperature_of
@@ -35,7 +35,7 @@ def allan_of_unit(store: Store, serial: str, recording: int | None, column: str 
     row = newest_row(store, serial, recording, to_fit=True)
     if column is None:
         return allan_unit(store, row.id, None)
-    info = RecordingInfo.model_validate(row.info)
+    info = row.recording_info
     parts = [columns for _, columns in store.recordings.iter_datasets(row.id)]
     _refuse_unknown(f"recording {row.id}", column, parts[0] if parts else {})
     joined_columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -15,7 +15,7 @@ from labctl.answers.recordings import (
     RecordingWithPoints,
     SamplesResponse,
 )
-from labctl.recording import Recording, RecordingInfo
+from labctl.recording import Recording
 from labctl.recording.columns import RATE_TIME_U
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.store import MeanRow, RecordingRow, Store
@@ -32,7 +32,7 @@ def page_of_recordings(
 
 
 def _of_simulated_time(store: Store, rows: Sequence[RecordingRow]) -> set[int | None]:
-    """Return those campaigns of the recordings whose times are of a simulated clock."""
+    """Return the campaigns of these recordings that ran on a simulated clock."""
     campaigns = sorted({row.campaign for row in rows if row.campaign is not None})
     return {number for number, bench in store.campaigns.benches(campaigns).items() if has_simulated_time(bench)}
 
@@ -41,7 +41,7 @@ def _line(row: RecordingRow, simulated_time: bool) -> RecordingResponse:
     return RecordingResponse(
         id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
         readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
-        motion=RecordingInfo.model_validate(row.info).motion, simulated_time=simulated_time,
+        motion=row.recording_info.motion, simulated_time=simulated_time,
     )  # fmt: skip
 
 
@@ -83,7 +83,7 @@ def _of_rows(numbers: list[int], means: list[MeanRow]) -> dict[str, ChannelColum
     return {name: ChannelColumns(mean=mean, std=std) for name, (mean, std) in by_column.items()}
 
 
-#: Columns of a table of points that say which data set it is, or how its mean was made.
+#: Columns of a table of points that identify a data set, or describe its mean.
 NO_CHANNEL = frozenset(
     {
         "dataset", "t_s", "position", "run", "mounting", "table_rate_dps", "computed_rate_dps", "encoder_rate_u_dps",
@@ -93,7 +93,7 @@ NO_CHANNEL = frozenset(
 
 
 def _of_table(numbers: list[int], points: Recording) -> dict[str, ChannelColumns]:
-    """Return the figures of points that were imported as such; they stand in the table itself."""
+    """Return the figures of points that were imported as points, from their own columns."""
     order = np.argsort(np.asarray(points.columns["dataset"]), kind="stable")
     nothing: list[float | None] = [None] * len(numbers)
     by_name: dict[str, ChannelColumns] = {}

@@ -83,11 +83,11 @@ def _made(store: Store, recording: int, channel: str) -> Envelope:
 
 def _bounds(values: Array, begins: NDArray[np.int64], width: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return least, largest, mean and number of finite values (n,) in each bin, as (4, bins)."""
-    there = np.isfinite(values)
+    is_finite = np.isfinite(values)
     count, low, high, total = width, values, values, values
-    if not there.all():  # an instrument may send no number with a reading that it marks as bad
-        count = np.add.reduceat(there.astype(np.int64), begins)
-        low, high, total = (np.where(there, values, instead) for instead in (np.inf, -np.inf, 0.0))
+    if not is_finite.all():  # an instrument may send no number with a reading that it marks as bad
+        count = np.add.reduceat(is_finite.astype(np.int64), begins)
+        low, high, total = (np.where(is_finite, values, instead) for instead in (np.inf, -np.inf, 0.0))
     return np.stack(
         [
             np.minimum.reduceat(low, begins),

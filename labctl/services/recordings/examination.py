@@ -24,7 +24,7 @@ from labctl.store import Store
 def inspection_of_recording(store: Store, recording: int) -> InspectionResponse:
     """Return the inspection of a stored recording; computed once. Raises NotFound."""
     row = store.recordings.get(recording)
-    info = RecordingInfo.model_validate(row.info)
+    info = row.recording_info
     stored_warnings = inspect_stored(store, row).warnings
     return _answer(
         f"recording {recording}", recording, info, row.readings or 0, stored_warnings, examined_stored(store, row)

@@ -151,6 +151,6 @@ def _count(samples: Path) -> int:
 def _is_stored(store: Store, info: RecordingInfo, readings: int) -> bool:
     """Return whether a recording of the unit began at the same time and has as many readings."""
     return any(
-        row.readings == readings and RecordingInfo.model_validate(row.info).started_at == info.started_at
+        row.readings == readings and row.recording_info.started_at == info.started_at
         for row in store.recordings.of_unit(info.serial)
     )

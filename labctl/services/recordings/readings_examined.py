@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from labctl.answers.inspection import ReadingsExamined
-from labctl.recording import Recording, RecordingInfo
+from labctl.recording import Recording
 from labctl.recording.recording import Columns
 from labctl.recording.sanity.readings import examination, joined_examinations
 from labctl.services.cache import cached
@@ -33,7 +33,7 @@ def _examined(store: Store, row: RecordingRow, recording: Recording | None) -> R
     if recording is not None:
         result = examination(recording)
     else:
-        info = RecordingInfo.model_validate(row.info)
+        info = row.recording_info
         result = joined_examinations([examination(Recording(info, columns)) for columns in _together(store, row.id)])
     return ReadingsExamined(
         warnings=[warning_of(finding) for finding in result.findings], courses=result.courses, marks=result.marks

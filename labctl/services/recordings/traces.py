@@ -26,7 +26,7 @@ def trace(
     Raises NotFound, and BadInput for a channel that is not there, a window that is none, or means without times.
     """
     head = store.recordings.get(recording)
-    info = RecordingInfo.model_validate(head.info)
+    info = head.recording_info
     rows = [row for row in store.recordings.data_sets(recording) if row.state == "complete" and row.n]
     if head.kind == "samples":
         courses = courses_of(store.recordings.dataset(recording, rows[0].number)) if rows else []
@@ -111,8 +111,8 @@ def _readings(store: Store, recording: int, channel: str, rows: list[DataSetRow]
 def _as_it_is(t_s: NDArray[np.generic], values: NDArray[np.generic]) -> Envelope:
     """Return an envelope whose bins are single readings."""
     numbers = np.asarray(values, dtype=np.float64)
-    there = np.isfinite(numbers)
-    numbers, times = numbers[there], np.asarray(t_s, dtype=np.float64)[there]
+    is_finite = np.isfinite(numbers)
+    numbers, times = numbers[is_finite], np.asarray(t_s, dtype=np.float64)[is_finite]
     return Envelope(times, numbers, numbers, numbers, np.ones(len(numbers)))
 
 

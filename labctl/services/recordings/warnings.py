@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from labctl.answers.inspection import DataWarning, FindingJson
+from dataclasses import asdict
+
+from labctl.answers.inspection import DataWarning
+from labctl.answers.json_object import JsonObject
 from labctl.recording.sanity import Finding
+
+#: Fields of a warning about single readings; one about anything else is kept without them.
+_OF_READINGS = {"channel", "n", "may_leave_out"}
 
 
 def warning_of(finding: Finding) -> DataWarning:
     """Return a finding as a response."""
-    return DataWarning.model_validate(finding.to_json(), extra="forbid")
+    return DataWarning.model_validate({**asdict(finding), "text": finding.text}, extra="forbid")
 
 
 def finding_of(warning: DataWarning) -> Finding:
@@ -19,8 +25,6 @@ def finding_of(warning: DataWarning) -> Finding:
     )  # fmt: skip
 
 
-def as_json(warning: DataWarning) -> FindingJson:
+def as_json(warning: DataWarning) -> JsonObject:
     """Return a warning as it is kept with a version."""
-    document = finding_of(warning).to_json()
-    document["text"] = warning.text
-    return document
+    return warning.model_dump(mode="json", exclude=_OF_READINGS if warning.n is None else None)

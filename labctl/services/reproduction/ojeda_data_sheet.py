@@ -30,13 +30,13 @@ def lines_of(surface: Surface) -> Lines | None:
     level = np.round(surface.temperature_c / LEVEL_C)
     lines = []
     for number in np.unique(level):
-        here = level == number
-        rate, error = surface.rate_dps[here], surface.raw_dps[here]
+        at_level = level == number
+        rate, error = surface.rate_dps[at_level], surface.raw_dps[at_level]
         if len(np.unique(np.round(rate))) < MIN_RATES:
             continue
         slope, bias = np.polyfit(rate, error, 1)
         residual_dps = float(np.sqrt(np.mean((error - slope * rate - bias) ** 2)))
-        lines.append((float(surface.temperature_c[here].mean()), float(slope), float(bias), residual_dps))
+        lines.append((float(surface.temperature_c[at_level].mean()), float(slope), float(bias), residual_dps))
     if not lines:
         return None
     return Lines(*np.array(lines).T)

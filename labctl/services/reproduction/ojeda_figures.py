@@ -41,7 +41,7 @@ def of_surface(surface: Surface) -> tuple[list[PaperFigure], list[Missing]]:
     name, n = surface.name, len(surface.rate_dps)
     fourth, missing = _over_temperature(surface)
     turning = int(np.isfinite(surface.turn_before_deg).sum())
-    turned = f"{turning} of {n} data sets, those from 5 deg/s on; below, the error per turn grows without bound."
+    note = f"{turning} of {n} data sets, those from 5 deg/s on; below, the error per turn grows without bound."
     traces = [
         _pair(surface, 3, "error against rate", surface.raw_dps, f"All {n} data sets: output less table rate.",
               one=True),
@@ -52,9 +52,9 @@ def of_surface(surface: Surface) -> tuple[list[PaperFigure], list[Missing]]:
         _pair(surface, 7, "error after compensation", surface.left_dps,
               f"All {n} data sets, corrected output less table rate, on the data of the fit. The scale is its own."),
         _pair(surface, 8, "error per turn, static bias off only", surface.turn_before_deg,
-              f"{turned} The static bias is that of the data sets at rest, at each temperature.", y=TURN),
+              f"{note} The static bias is that of the data sets at rest, at each temperature.", y=TURN),
         _pair(surface, 9, "error per turn, full compensation", surface.turn_after_deg,
-              f"{turned} Surface and remaining static bias are taken off (eq. 16). The scale is its own.", y=TURN),
+              f"{note} Surface and remaining static bias are taken off (eq. 16). The scale is its own.", y=TURN),
     ]  # fmt: skip
     for figure in traces:
         figure["title"] = f"{figure['title']}, {name}"
@@ -119,12 +119,12 @@ def _over_temperature(surface: Surface) -> tuple[list[PaperFigure], list[Missing
             if abs(nearest - rate) > NEAR_DPS:
                 absent.append(f"{rate:+g}")
                 continue
-            here, sign = centre == nearest, "+" if rate > 0 else "-"
+            at_rate, sign = centre == nearest, "+" if rate > 0 else "-"
             sentences.append(f"{nearest:+.1f}")
-            temperature_c, output = surface.temperature_c[here], float(surface.output_dps[here].mean())
+            temperature_c, output = surface.temperature_c[at_rate], float(surface.output_dps[at_rate].mean())
             grid = np.linspace(temperature_c.min(), temperature_c.max(), ALONG)
             traces += [
-                trace(f"measured, {sign} deg/s", temperature_c, surface.raw_dps[here]),
+                trace(f"measured, {sign} deg/s", temperature_c, surface.raw_dps[at_rate]),
                 trace(f"model, {sign} deg/s", grid, _modelled(surface, np.full(ALONG, output), grid), "line"),
             ]
         if traces:

@@ -33,17 +33,17 @@ def surface_of(measured: Measured, axis: str) -> Surface:
     """Fit the paper's model, and return what it leaves of the data sets that turned the axis. Raises LabctlError."""
     data = fit_data_of(measured.recording)
     result = fit(measured.recording, "ojeda2000")
-    own = np.char.lstrip(np.asarray(data.channels["position"]).astype(np.str_), "-") == axis
-    if not np.any(own):
+    about_axis = np.char.lstrip(np.asarray(data.channels["position"]).astype(np.str_), "-") == axis
+    if not np.any(about_axis):
         raise BadInput(f"the recording never turns axis {axis}; name another axis with --axis")
-    rate, temperature_c = data.true_rate_dps(axis)[own], data.channels.temperature_c(axis)[own]
-    table = data.channels.table_rate_dps()[own]
-    position = np.asarray(data.channels["position"]).astype(np.str_)[own]
-    raw, residual = data.outputs[axis][own] - rate, result.residual_dps[axis][own]
+    rate, temperature_c = data.true_rate_dps(axis)[about_axis], data.channels.temperature_c(axis)[about_axis]
+    table = data.channels.table_rate_dps()[about_axis]
+    position = np.asarray(data.channels["position"]).astype(np.str_)[about_axis]
+    raw, residual = data.outputs[axis][about_axis] - rate, result.residual_dps[axis][about_axis]
     before, after = (
         np.array(turn_errors(error - bias_at_rest(error, table, temperature_c, position), table), dtype=np.float64)
         for error in (raw, residual)
     )
     return Surface(
-        measured.name, axis, result, rate, data.outputs[axis][own], temperature_c, raw, residual, before, after
+        measured.name, axis, result, rate, data.outputs[axis][about_axis], temperature_c, raw, residual, before, after
     )

@@ -33,7 +33,7 @@ AT_REST = (
     "labctl simulate gyrostar-at-rest --bench gyrostar-sim --out rest; labctl import rest; labctl orientation "
     "GYROSTAR-0001 --version 0 --warm-up-s 600 --stop-every-s 120."
 )
-OPTIONS = OrientationOptions(warm_up_s=paper.WARM_UP_S, stop_every_s=paper.STOP_EVERY_S)
+OPTIONS = OrientationOptions(warm_up_s=paper.WARM_UP_S, stop_every_s=paper.OFFSET_EVERY_S)
 RECORD_TABLE = "rates of both signs at the report's temperatures: labctl campaign start gyrostar"
 RECORD_REST = "22 min at rest from power-on: labctl campaign start gyrostar-at-rest"
 UNIT = "ENV-05S, simulated"
@@ -83,7 +83,7 @@ def _tables(measured: Measured, axis: str) -> Findings:
     assert isinstance(table, LagrangeTable)
     nodes = np.array(table.nodes_c)
     scale, offset = _in_report_units(result, measured.recording, axis)
-    own = measured.recording.info.kind == "coefficients"
+    is_printed = measured.recording.info.kind == "coefficients"
     for temperature in paper.TEMPERATURES_C:
         inside = nodes[0] - 0.5 <= temperature <= nodes[-1] + 0.5
         for name, values, reason in (
@@ -91,7 +91,7 @@ def _tables(measured: Measured, axis: str) -> Findings:
             ("offset", offset, "another unit: its curve is of the same shape, not of the same numbers"),
         ):
             value = float(np.interp(temperature, nodes, values)) if inside else None
-            said = "taken in as it is printed" if own else reason
+            said = "taken in as it is printed" if is_printed else reason
             findings.values.append(
                 Value(
                     f"{name}_{temperature:g}",
@@ -101,7 +101,7 @@ def _tables(measured: Measured, axis: str) -> Findings:
                 )
             )
     findings.values += _claims(measured.name, nodes, scale, offset)
-    if not own:
+    if not is_printed:
         findings.values += _nonlinearity(measured, result, axis)
     findings.figures.append(_figure(measured.name, nodes, scale, offset))
     return findings
@@ -127,10 +127,10 @@ def _claims(name: str, nodes: Array, scale: Array, offset: Array) -> list[Value]
         Value("scale_high", name, float(deviation.max()), "of the table's values, which exceed the claim"),
     ]
     for which, (low, high) in (("slope_steep", paper.STEEP_C), ("slope_flat", paper.FLAT_C)):
-        here = (nodes >= low - 0.5) & (nodes <= high + 0.5)
+        in_range = (nodes >= low - 0.5) & (nodes <= high + 0.5)
         slope = None
-        if np.count_nonzero(here) > 1:
-            slope = float(np.polyfit(nodes[here], offset[here], 1)[0]) / (paper.NOMINAL_MV / 1000.0)
+        if np.count_nonzero(in_range) > 1:
+            slope = float(np.polyfit(nodes[in_range], offset[in_range], 1)[0]) / (paper.NOMINAL_MV / 1000.0)
         claims.append(Value(which, name, slope, "least squares; one number for a curve" if slope is not None else
                           "fewer than two temperatures there"))  # fmt: skip
     return claims

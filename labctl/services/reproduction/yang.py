@@ -116,8 +116,10 @@ def reproduce_own() -> Findings:
 
 def _built_in(name: str) -> bool:
     """Return whether the simulated unit was given a number: K and B at 25 deg C, and what they leave of an own axis."""
-    own = {f"table4_{axis}_{axis}_proposed" for axis in "xy"} | {f"table3_{axis}_{axis}_RMS after" for axis in "xyz"}
-    return name in own or name.startswith(("proposed_", "curve_", "rate_", "temperature_"))
+    own_axis = {f"table4_{axis}_{axis}_proposed" for axis in "xy"} | {
+        f"table3_{axis}_{axis}_RMS after" for axis in "xyz"
+    }
+    return name in own_axis or name.startswith(("proposed_", "curve_", "rate_", "temperature_"))
 
 
 def reproduce(measured: Measured, axis: str | None) -> Findings:

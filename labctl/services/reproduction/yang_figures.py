@@ -68,18 +68,18 @@ def _paper_name(coefficient: str, out: str) -> str:
 
 def errors(judged: Judged, shown: tuple[NDArray[np.bool_], float]) -> list[PaperFigure]:
     """Return figures 7 to 9: nine panels each, turning about x, y, z in rows and outputs x, y, z in columns."""
-    here, at_c = shown
+    at_shown_level, at_c = shown
     data, n = judged.data, len(judged.data)
     methods = {"uncompensated": judged.raw, "traditional": judged.traditional, "proposed": judged.proposed}
-    at_level = {name: {a: v[here] for a, v in method.items()} for name, method in methods.items()}
+    at_level = {name: {a: v[at_shown_level] for a, v in method.items()} for name, method in methods.items()}
     said = f"Rows: axis that is turned; columns: output. Errors after compensation: {judged.how}."
-    level = f"The {int(here.sum())} of {n} data sets at {at_c:.1f} deg C, the level nearest to 25."
+    level = f"The {int(at_shown_level.sum())} of {n} data sets at {at_c:.1f} deg C, the level nearest to 25."
     return [
         _surface(data, judged.raw, "7", "before compensation", f"All {n} data sets. {said}"),
         _surface(data, judged.proposed, "7", "after compensation, proposed", f"{_drawn(data, judged.proposed)} {said}"),
-        _lines(data.take(here), at_level, "8", "uncompensated, traditional, proposed", f"{level} {said}"),
+        _lines(data.take(at_shown_level), at_level, "8", "uncompensated, traditional, proposed", f"{level} {said}"),
         _lines(
-            data.take(here), {name: at_level[name] for name in ("traditional", "proposed")}, "9",
+            data.take(at_shown_level), {name: at_level[name] for name in ("traditional", "proposed")}, "9",
             "traditional and proposed, on their own scale", f"{level} {said}",
         ),
     ]  # fmt: skip
@@ -93,16 +93,16 @@ def _drawn(data: FitData, by_axis: Mapping[str, Array]) -> str:
 def _panels(data: FitData) -> list[tuple[str, str, NDArray[np.bool_]]]:
     """Return axis that is turned, output, and the data sets (m,) of each panel."""
     turning = np.char.lstrip(np.asarray(data.channels["position"]).astype(np.str_), "-")
-    return [(turned, out, turning == turned) for turned in paper.AXES if turned in turning for out in data.outputs]
+    return [(axis, out, turning == axis) for axis in paper.AXES if axis in turning for out in data.outputs]
 
 
 def _surface(data: FitData, by_axis: Mapping[str, Array], number: str, title: str, caption: str) -> PaperFigure:
     rate, warm = data.channels.table_rate_dps(), data.temperature_c
     panels: list[PaperPanel] = []
-    for turned, out, rows in _panels(data):
+    for axis, out, rows in _panels(data):
         known = rows & np.isfinite(by_axis[out])
         traces = [trace("data sets", rate[known], by_axis[out][known], colour=warm[known])]
-        panels.append(panel(f"turning {turned}, output {out}", RATE, ERROR, traces, "deg C"))
+        panels.append(panel(f"turning {axis}, output {out}", RATE, ERROR, traces, "deg C"))
     return {
         "id": f"figure-{number}-{title.split(maxsplit=1)[0]}", "title": f"Figure {number}: error {title}",
         "caption": caption,
@@ -115,12 +115,12 @@ def _lines(
 ) -> PaperFigure:
     rate = data.channels.table_rate_dps()
     panels: list[PaperPanel] = []
-    for turned, out, rows in _panels(data):
+    for axis, out, rows in _panels(data):
         traces: list[PaperTrace] = []
         for name, by_axis in methods.items():
             known = rows & np.isfinite(by_axis[out])
             traces.append(trace(name, rate[known], by_axis[out][known]))
-        panels.append(panel(f"turning {turned}, output {out}", RATE, ERROR, traces))
+        panels.append(panel(f"turning {axis}, output {out}", RATE, ERROR, traces))
     return {
         "id": f"figure-{number}", "title": f"Figure {number}: {title}", "caption": caption,
         "columns": len(data.outputs), "panels": panels,

@@ -83,23 +83,23 @@ def largest_cross(judged: Judged) -> Iterator[Value]:
 
 
 def tables(judged: Judged) -> Iterator[Value]:
-    here, at_c = at_shown(judged.data)
-    data = judged.data.take(here)
+    at_shown_level, at_c = at_shown(judged.data)
+    data = judged.data.take(at_shown_level)
     of = f"{judged.name}, {at_c:.1f} deg C"
     split = {
-        name: by_turning_axis(data, {axis: values[here] for axis, values in errors.items()})
+        name: by_turning_axis(data, {axis: values[at_shown_level] for axis, values in errors.items()})
         for name, errors in (("raw", judged.raw), ("traditional", judged.traditional), ("proposed", judged.proposed))
     }
-    for turned, outputs in split["raw"].items():
+    for turning, outputs in split["raw"].items():
         for output, before in outputs.items():
-            traditional, after = (split[name][turned][output] for name in ("traditional", "proposed"))
-            yield from _cells(of, turned, output, before, traditional, after)
-            yield from _gains(of, turned, output, before, traditional, after)
+            traditional, after = (split[name][turning][output] for name in ("traditional", "proposed"))
+            yield from _cells(of, turning, output, before, traditional, after)
+            yield from _gains(of, turning, output, before, traditional, after)
 
 
-def _gains(of: str, turned: str, output: str, before: Spread, traditional: Spread, after: Spread) -> Iterator[Value]:
+def _gains(of: str, turning: str, output: str, before: Spread, traditional: Spread, after: Spread) -> Iterator[Value]:
     """Yield by how much the proposed method is below no compensation, and below the traditional method, per cent."""
-    mean = turned == paper.MEANS
+    mean = turning == paper.MEANS
     for against, spread in zip(paper.TABLE_4_COLUMNS[:2], (before, traditional), strict=True):
         first, last = ((s.mean_dps, s.rms_dps)[not mean] for s in (spread, after))
         reason = (
@@ -107,26 +107,26 @@ def _gains(of: str, turned: str, output: str, before: Spread, traditional: Sprea
             if mean
             else "of the RMS errors above"
         )
-        if turned != output and not mean and against == "traditional":
+        if turning != output and not mean and against == "traditional":
             reason = "of two errors of the size of the noise; the paper's 2.110 and 8.130 are 0.211 and 0.813"
-        yield _cell(f"gain_{turned}_{output}_{against}", of, 100.0 * (1.0 - abs(last) / abs(first)), reason)
+        yield _cell(f"gain_{turning}_{output}_{against}", of, 100.0 * (1.0 - abs(last) / abs(first)), reason)
 
 
-def _cells(of: str, turned: str, output: str, before: Spread, traditional: Spread, after: Spread) -> Iterator[Value]:
-    own, mean = turned == output, turned == paper.MEANS
+def _cells(of: str, turning: str, output: str, before: Spread, traditional: Spread, after: Spread) -> Iterator[Value]:
+    is_own_axis, mean = turning == output, turning == paper.MEANS
     third = {
         "mean before": (before.mean_dps, "bias at this temperature, and its drift"),
-        "RMS before": (before.rms_dps, _before(own=own, mean=mean)),
+        "RMS before": (before.rms_dps, _before(is_own_axis=is_own_axis, mean=mean)),
         "mean after": (after.mean_dps, "drift of the bias between two campaigns"),
         "RMS after": (
             after.rms_dps,
             "the curve that K and B cannot follow, of the size of Table 4 (z: of Table 3)"
-            if own
+            if is_own_axis
             else "noise of a data set and drift; the paper prints less than its own mean in four cells",
         ),
     }
     for column, (value, reason) in third.items():
-        yield _cell(f"table3_{turned}_{output}_{column}", of, value, reason)
+        yield _cell(f"table3_{turning}_{output}_{column}", of, value, reason)
     whys = (
         (
             "bias at this temperature, and its drift",
@@ -135,20 +135,20 @@ def _cells(of: str, turned: str, output: str, before: Spread, traditional: Sprea
         )
         if mean
         else (
-            _before(own=own, mean=False),
+            _before(is_own_axis=is_own_axis, mean=False),
             "the one-temperature K is 4.1e-4 off here about x and y, by the paper's two columns of K_g: 0.087 deg/s "
             "at the RMS of the rates"
-            if own
+            if is_own_axis
             else CROSS,
-            "the curve that K and B cannot follow, made to be of this size" if own else CROSS,
+            "the curve that K and B cannot follow, made to be of this size" if is_own_axis else CROSS,
         )
     )
     for column, spread, reason in zip(paper.TABLE_4_COLUMNS, (before, traditional, after), whys, strict=True):
-        yield _cell(f"table4_{turned}_{output}_{column}", of, spread.mean_dps if mean else spread.rms_dps, reason)
+        yield _cell(f"table4_{turning}_{output}_{column}", of, spread.mean_dps if mean else spread.rms_dps, reason)
 
 
-def _before(*, own: bool, mean: bool) -> str:
-    if own:
+def _before(*, is_own_axis: bool, mean: bool) -> str:
+    if is_own_axis:
         return "K - 1 times the RMS of the rates, bias and curve" + (
             "" if mean else "; Tables 3 and 4 print two values"
         )
@@ -166,9 +166,9 @@ def own_axis(judged: Judged) -> Iterator[Value]:
         left, low, high = paper.unexplained_dps(axis)
         reason = f"root of RMS before^2 - (K - 1)^2 RMS(rates)^2 - B^2; {low:.3f} to {high:.3f} by the rounding of K"
         yield Value(f"curve_{axis}", "printed numbers", left, reason)
-    here, at_c = at_shown(judged.data)
+    at_shown_level, at_c = at_shown(judged.data)
     for axis, outputs in by_turning_axis(
-        judged.data.take(here), {a: v[here] for a, v in judged.proposed.items()}
+        judged.data.take(at_shown_level), {a: v[at_shown_level] for a, v in judged.proposed.items()}
     ).items():
         if axis in outputs and np.isfinite(outputs[axis].sd_dps):
             yield Value(f"curve_{axis}", f"{judged.name}, {at_c:.1f} deg C", outputs[axis].sd_dps,
@@ -176,10 +176,10 @@ def own_axis(judged: Judged) -> Iterator[Value]:
 
 
 def lacking(judged: Judged) -> Iterator[Missing]:
-    turned, outputs = set(_turning(judged.data).tolist()), set(judged.data.outputs)
+    turned_about, outputs = set(_turning(judged.data).tolist()), set(judged.data.outputs)
     if lacking := sorted(set(paper.AXES) - outputs):
         yield Missing(f"outputs {', '.join(lacking)} of Tables 3 and 4 and figures 4 to 9",
                       f"the recording has axes {', '.join(sorted(outputs))} only", RECORD)  # fmt: skip
-    if lacking := sorted(set(paper.AXES) - turned):
+    if lacking := sorted(set(paper.AXES) - turned_about):
         yield Missing(f"Tables 3 and 4 and figures 7 to 9, turning about {', '.join(lacking)}",
                       f"the unit was not turned about {', '.join(lacking)}", RECORD)  # fmt: skip

@@ -42,23 +42,23 @@ def moment(text: str, zone: ZoneInfo, now: datetime) -> datetime:
     try:
         said = datetime.fromisoformat(text)
         meant = said.replace(tzinfo=zone) if said.tzinfo is None else said.astimezone(zone)
-        there = meant.astimezone(UTC)
+        start = meant.astimezone(UTC)
     except (ValueError, OverflowError) as error:
         raise BadInput(
             f"time {text!r} cannot be read; write it as 2026-03-28T22:00, 2026-03-28T22:00+01:00 or "
             "2026-03-28T22:00Z, or write `now`"
         ) from error
-    if there.astimezone(zone).replace(tzinfo=None, fold=0) != meant.replace(tzinfo=None, fold=0):
+    if start.astimezone(zone).replace(tzinfo=None, fold=0) != meant.replace(tzinfo=None, fold=0):
         raise BadInput(
             f"time {text!r} does not exist in {zone.key}: the change to summer time skips it; give another time"
         )
-    if there <= now:
-        here = now.astimezone(zone)
+    if start <= now:
+        local_now = now.astimezone(zone)
         raise BadInput(
-            f"time {text!r} ({meant:%Y-%m-%d %H:%M %z}) is in the past: it is now {here:%Y-%m-%d %H:%M %z} in "
+            f"time {text!r} ({meant:%Y-%m-%d %H:%M %z}) is in the past: it is now {local_now:%Y-%m-%d %H:%M %z} in "
             f"{zone.key}; give a later time, or `now`"
         )
-    return there
+    return start
 
 
 def next_due(line: str, zone: ZoneInfo, after: datetime) -> datetime | None:

@@ -103,7 +103,7 @@ class _Walk:
             warm = self._world.heat.sensor_c(self._settings.name, times)
             air = self._world.heat.airs_c(times)
             rows = zip(times.tolist(), warm.tolist(), air.tolist(), strict=True)
-            self._environment += [(t, self._run, sensor, there, self._setpoint) for t, sensor, there in rows]
+            self._environment += [(t, self._run, sensor, value_c, self._setpoint) for t, sensor, value_c in rows]
 
     def _acquire(self, step: Acquire) -> None:
         if step.course is None:

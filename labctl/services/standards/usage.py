@@ -9,7 +9,6 @@ from datetime import date, timedelta
 from instruments.standards import Standard
 from labctl.answers.standards import AffectedCalibration, AffectedResponse
 from labctl.errors import BadInput
-from labctl.recording import RecordingInfo
 from labctl.recording.info import measured_at
 from labctl.store import (
     CalibrationRecord,
@@ -67,7 +66,7 @@ def is_named(standard: RegisteredStandard, entry: Standard) -> bool:
 
 def uses(row: RecordingRow, standard: RegisteredStandard) -> bool:
     """Return whether a recording was measured with a standard."""
-    return any(is_entry_of(standard, each) for each in RecordingInfo.model_validate(row.info).standards)
+    return any(is_entry_of(standard, each) for each in row.recording_info.standards)
 
 
 def overlaps(first: date | None, last: date | None, bad_from: date | None, bad_until: date | None) -> bool:

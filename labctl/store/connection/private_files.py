@@ -20,11 +20,11 @@ def make_private(path: Path) -> None:
 
 
 def write_private(path: Path, text: str) -> None:
-    """Write a file over the one before. Raises OSError, which names the path."""
+    """Replace the content of a file. Raises OSError, which names the path."""
     make_private(path)
     try:
         path.write_text(text, encoding="utf-8")
-    except OSError as error:  # a write that fails does not say where
+    except OSError as error:  # the error of a write does not name the file
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
@@ -37,7 +37,7 @@ def close_to_others(*paths: Path) -> None:
 
 
 def make_private_folder(folder: Path) -> None:
-    """Make a folder, and those above it, where there is none; it is the owner's alone. Raises OSError."""
+    """Make a folder and its parents where they are missing; only the owner may use it. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True, mode=FOLDER)
     with suppress(OSError):
         if folder.stat().st_mode & 0o777 != FOLDER:

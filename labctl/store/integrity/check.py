@@ -260,14 +260,14 @@ class _Check:
         from labctl.calibration import read_calibration  # noqa: PLC0415  it loads every model, which no other part needs
 
         c = tables.calibrations.c
-        for serial, version, own, document in connection.execute(sa.select(c.serial, c.version, c.hash, c.document)):
+        for serial, version, digest, document in connection.execute(sa.select(c.serial, c.version, c.hash, c.document)):
             self.calibrations += 1
             try:
                 calibration = read_calibration(document if isinstance(document, bytes) else str(document).encode())
             except BadCalibrationFile as error:
                 self.find("calibrations", f"{serial} version {version}: {error}")
                 continue
-            if (calibration.serial, calibration.version, calibration.hash) != (serial, version, own):
+            if (calibration.serial, calibration.version, calibration.hash) != (serial, version, digest):
                 version_text = f"{calibration.serial} version {calibration.version}"
                 self.find(
                     "calibrations", f"{serial} version {version}: the stored calibration was changed ({version_text})"

@@ -78,15 +78,20 @@ def append(connection: sa.Connection, at: datetime, manifest: Manifest) -> Chain
     before = ChainHead(int(last_entry.length), str(last_entry.hash)) if last_entry is not None else last(connection)
     length = before.length + 1
     document = canonical(_document(connection, at, manifest, length, before.hash))
-    own = hash_of(document)
+    digest = hash_of(document)
     connection.execute(
         sa.insert(m).values(
-            sequence=length, kind=manifest.kind, record=manifest.record, act=manifest.act, hash=own, document=document
+            sequence=length,
+            kind=manifest.kind,
+            record=manifest.record,
+            act=manifest.act,
+            hash=digest,
+            document=document,
         )
     )
     if last_entry is not None:  # a head that was removed is never made again: the check reports that it is missing
-        connection.execute(sa.update(h).where(h.c.id == HEAD_ID).values(length=length, hash=own))
-    head = ChainHead(length, own)
+        connection.execute(sa.update(h).where(h.c.id == HEAD_ID).values(length=length, hash=digest))
+    head = ChainHead(length, digest)
     connection.info[_GROWN] = head
     connection.info.pop(_AUDITED, None)
     return head

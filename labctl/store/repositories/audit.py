@@ -62,15 +62,15 @@ def append(
     h = tables.audit_head
     head = connection.execute(sa.select(h.c.length, h.c.hash).where(h.c.id == HEAD_ID).with_for_update()).first()
     previous = head.hash if head is not None else _last_hash(connection)
-    own = _hash(previous, at, who, action, subject, detail)
+    digest = _hash(previous, at, who, action, subject, detail)
     connection.execute(
         sa.insert(tables.audit).values(
-            at=at, actor=who, action=action, subject=subject, detail=detail, previous_hash=previous, hash=own
+            at=at, actor=who, action=action, subject=subject, detail=detail, previous_hash=previous, hash=digest
         )
     )
     chain.note_audit_row(connection, at)
     if head is not None:  # a head that was removed is never made again: verification reports that it is missing
-        connection.execute(sa.update(h).where(h.c.id == HEAD_ID).values(length=head.length + 1, hash=own))
+        connection.execute(sa.update(h).where(h.c.id == HEAD_ID).values(length=head.length + 1, hash=digest))
 
 
 def _last_hash(connection: sa.Connection) -> str:
@@ -103,15 +103,15 @@ def first_broken(connection: sa.Connection, anchor: Head | None = None) -> Broke
     # not converted: what another program wrote there need not be an instant, or JSON
     at, detail = sa.type_coerce(a.at, sa.BigInteger), sa.cast(a.detail, sa.Text)
     query = sa.select(a.id, at, a.actor, a.action, a.subject, detail, a.previous_hash, a.hash).order_by(a.id)
-    for number, *content, before, own in connection.execute(query):
-        if own != _hash_of_row(before, *content):
+    for number, *content, before, digest in connection.execute(query):
+        if digest != _hash_of_row(before, *content):
             return Broken(int(number), "its content was changed")
         if before != previous:
             return Broken(
                 int(number), f"this row does not follow row {last}: a row between them is missing, or rows were moved"
             )
-        previous, last, length = own, int(number), length + 1
-        if anchor is not None and length == anchor.length and own != anchor.hash:
+        previous, last, length = digest, int(number), length + 1
+        if anchor is not None and length == anchor.length and digest != anchor.hash:
             return Broken(last, "this row is not the row that the anchor names: the trail was rewritten")
     if anchor is not None and length < anchor.length:
         return Broken(last + 1, f"{anchor.length - length} rows that the anchor counts are missing at the end")

@@ -249,13 +249,13 @@ class StoreJournal:
             d = tables.data_sets.c
             mine = d.recording_id.in_(self._recordings.values())
             this_one = (mine, d.number == dataset, d.state == DataSetState.OPEN.value)
-            there = set(connection.scalars(sa.select(d.recording_id).where(*this_one)))
+            recordings = set(connection.scalars(sa.select(d.recording_id).where(*this_one)))
             if state is DataSetState.PARTIAL:
                 withdrawn = (mine, d.number == dataset, d.state == DataSetState.COMPLETE.value)
                 values = {"state": state.value, "reason": reason}
                 connection.execute(sa.update(tables.data_sets).where(*withdrawn).values(**values))
             for gyro, recording in self._recordings.items():
-                if recording in there:
+                if recording in recordings:
                     raw = self._raw_of(connection, gyro, recording, dataset)
                     self._close_one(connection, gyro, recording, dataset, state, reason, raw)
         for gyro in self._recordings:
@@ -281,18 +281,18 @@ class StoreJournal:
         d = tables.data_sets
         this = (d.c.recording_id == recording, d.c.number == dataset)
         n = 0
-        turned: dict[str, float] = {}
+        late_values: dict[str, float] = {}
         if raw is not None:
             valid = raw["valid"] != 0
             n = int(valid.sum())
             head = connection.execute(sa.select(d).where(*this)).mappings().one()
             columns = scaled(raw, self._channels[gyro], head_of(head))
             if head["turn_deg"] is not None:  # how long it took is known only now
-                turned = {name: float(columns[key][-1].item()) for name, key in KNOWN_LATE.items()}
+                late_values = {name: float(columns[key][-1].item()) for name, key in KNOWN_LATE.items()}
             means = means_rows(recording, dataset, columns, valid)
             connection.execute(sa.insert(tables.data_set_means), means)
             write_final_block(connection, recording, dataset, raw)
-        connection.execute(sa.update(d).where(*this).values(state=state.value, reason=reason, n=n, **turned))
+        connection.execute(sa.update(d).where(*this).values(state=state.value, reason=reason, n=n, **late_values))
 
     @outlasting
     def environment(self, sample: EnvironmentSample) -> None:

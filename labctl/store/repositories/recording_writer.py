@@ -1,7 +1,7 @@
-"""Writes recordings: the row of one that is measured here, and one made elsewhere, under a mark until all of it is in.
+"""Writes recordings: the row of a measured one, and an imported one, marked as unfinished until it is complete.
 
-An import is a sequence of short transactions, so that a campaign's journal never waits for a long one. A recording
-under the mark is seen by no reading method; what a killed process left is discarded by `Imports.discard_unfinished`.
+An import is a sequence of short transactions, so that a campaign's journal never waits for a long one. No method
+reads an unfinished recording; `Imports.discard_unfinished` discards those of a process that was killed.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from labctl.store.repositories.units import add_missing_unit, remember_unit
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import prepared_recordings, seal
 
-#: Where several processes write (PostgreSQL): an import that gave no sign for so long belongs to no process any more.
+#: Where several processes write (PostgreSQL): an import without a heartbeat for so long has no process any more.
 ABANDONED_AFTER = timedelta(minutes=15)
 
 
-#: What a recording has beside its blocks: tables, and the column by which their rows are removed some at a time.
+#: Tables with rows of a recording, other than its blocks, and the column by which rows are removed in batches.
 _REST = (("block_digests", "number"), ("data_set_means", "number"), ("data_sets", "number"), ("environment", "id"))
 
 
 @dataclass(frozen=True)
 class ImportTicket:
-    """The right to write to a recording that is under the mark: numbers are given again, tokens are not."""
+    """The right to write to an unfinished recording; a number may be used again, a token may not."""
 
     recording: int
     token: str
@@ -75,7 +75,7 @@ class Imports:
 
     @transaction
     def begin(self, info: RecordingInfo, at: datetime) -> ImportTicket:
-        """Make a recording under the mark, without content."""
+        """Make an unfinished recording without content."""
         token = secrets.token_hex(16)
         marked = {"channels": [], "importing": token, "import_sign_at": sa.func.now()}
         with self._database.writing(synced=False) as connection:
@@ -96,7 +96,7 @@ class Imports:
 
     @transaction
     def finish(self, ticket: ImportTicket, at: datetime, action: str, detail: JsonObject) -> int:
-        """Take the mark away and write the audit row; returns the recording's number. Raises Conflict as `add_part`."""
+        """Mark a recording as complete and write the audit row; returns its number. Raises Conflict as `add_part`."""
         r, record = tables.recordings, (RECORDING.name, str(ticket.recording))
         parts = prepared_recordings(self._database, [record])[record]
         with self._database.writing() as connection:
@@ -112,17 +112,17 @@ class Imports:
 
     @transaction
     def discard(self, ticket: ImportTicket) -> None:
-        """Remove all of a recording that is under the mark, in short transactions; nothing where it is gone already."""
+        """Remove an unfinished recording in short transactions; does nothing where it was removed before."""
         with suppress(Conflict):
             while self._discard_some(ticket):
                 pass
 
     def discard_unfinished(self) -> int:
-        """Discard what processes left that ended during an import; returns how many there were.
+        """Discard the imports of processes that ended during them; returns their number.
 
-        SQLite has one service or command at a time, so the next one finds only what the one before left. Elsewhere an
-        import may be another process's, which lives: it is left alone until it gave no sign for 15 minutes, by the
-        server's clock.
+        SQLite has one service or command at a time, so every unfinished import is an abandoned one. Elsewhere another
+        process may still write: its import is discarded only after 15 minutes without a heartbeat, by the clock of
+        the server.
         """
         r = tables.recordings.c
         with self._database.reading() as connection:
@@ -137,7 +137,7 @@ class Imports:
 
     @transaction
     def claim(self, ticket: ImportTicket) -> ImportTicket:
-        """Return a ticket that only the caller has: the process that had it before can write no further part.
+        """Return a new ticket; with the previous ticket no further part can be written.
 
         Raises Conflict when the import was discarded or finished meanwhile.
         """
@@ -147,7 +147,7 @@ class Imports:
         return mine
 
     def _discard_some(self, ticket: ImportTicket) -> bool:
-        """Delete some rows of a recording, in the end its own; returns whether there is more."""
+        """Delete a batch of rows of a recording, last its own row; returns whether rows are left."""
         number = ticket.recording
         with self._database.writing(synced=False) as connection:
             _give_sign(connection, ticket)
@@ -167,7 +167,7 @@ class Imports:
 
 
 def _give_sign(connection: sa.Connection, ticket: ImportTicket, *, token: str | None = None) -> None:
-    """Note that an import lives, and perhaps give it a new token. Raises Conflict when it is discarded or finished."""
+    """Write the heartbeat of an import, and a new token if given. Raises Conflict when it is discarded or finished."""
     r = tables.recordings
     mine = sa.and_(r.c.id == ticket.recording, r.c.importing == ticket.token)
     signed = sa.update(r).where(mine).values(import_sign_at=sa.func.now(), importing=token or ticket.token)

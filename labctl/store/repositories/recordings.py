@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from labctl.answers.json_object import JsonObject
 from labctl.errors import LabctlError, NotFound
-from labctl.recording import Recording, RecordingInfo, refuse_too_many_data_sets
+from labctl.recording import Recording, refuse_too_many_data_sets
 from labctl.recording.columns import RATE_TIME_U, READING_TIMES, VERIFICATION
 from labctl.store.connection.database import Database
 from labctl.store.import_parts import WHOLE_TABLE, import_parts
@@ -197,7 +197,7 @@ class Recordings:
         `head` is the recording's head where it was read already.
         """
         head = head or self.get(recording)
-        info = RecordingInfo.model_validate(head.info)
+        info = head.recording_info
         with self._database.reading() as connection:
             environment = _environment(connection, recording)
             if head.kind != "samples":
@@ -213,7 +213,7 @@ class Recordings:
         head = self.get(recording)
         if head.kind != "samples":
             return self.points(recording)
-        info = RecordingInfo.model_validate(head.info)
+        info = head.recording_info
         parts = [columns for _, columns in self.iter_datasets(recording, times=times)]
         names = dict.fromkeys(name for part in parts for name in part)
         # a campaign of before they were stored may end with them

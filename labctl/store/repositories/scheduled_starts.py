@@ -196,9 +196,9 @@ class Starts:
         """End an entry; what it has started runs on. Raises NotFound, Conflict."""
         row = self.get(start)
         s = tables.scheduled_starts
-        there = sa.update(s).where(s.c.id == start, s.c.state.in_(_OPEN))
+        entry = sa.update(s).where(s.c.id == start, s.c.state.in_(_OPEN))
         with self._database.writing() as connection:
-            if connection.execute(there.values(state="cancelled")).rowcount != 1:
+            if connection.execute(entry.values(state="cancelled")).rowcount != 1:
                 raise Conflict(
                     f"scheduled start {start} has already ended (state: {self.get(start).state}); add a new "
                     "start to the schedule"

@@ -58,7 +58,7 @@ class SensorVersions:
     def add(self, new: NewSensorVersion, at: datetime) -> SensorVersionRow:
         """Keep the next version; a unit that is not there yet is added. Raises VersionTaken; nothing was changed."""
         document = canonical(new.result)
-        own = hashlib.sha256(document).hexdigest()
+        digest = hashlib.sha256(document).hexdigest()
         t, key = tables.sensor_versions, acting_key()
         try:
             with self._database.writing() as connection:
@@ -67,10 +67,10 @@ class SensorVersions:
                 version = int(connection.scalar(last) or 0) + 1
                 values = {
                     "serial": new.serial, "sensor": new.sensor, "version": version, "verdict": new.verdict,
-                    "data": dict(new.data), "document": document, "hash": own, "by": new.by, "by_key": key, "at": at,
+                    "data": dict(new.data), "document": document, "hash": digest, "by": new.by, "by_key": key, "at": at,
                 }  # fmt: skip
                 number = connection.scalar(sa.insert(t).values(**values).returning(t.c.id))
-                detail: dict[str, Any] = {"verdict": new.verdict, "hash": own, "data": dict(new.data), "by": new.by}
+                detail: dict[str, Any] = {"verdict": new.verdict, "hash": digest, "data": dict(new.data), "by": new.by}
                 subject = f"{new.serial} {new.sensor} version {version}"
                 append(connection, at, f"{new.sensor} version", subject, detail, who=key or new.by)
                 seal(connection, (SENSOR_VERSION.name, str(number)), at, "kept")
@@ -79,7 +79,7 @@ class SensorVersions:
                 f"a version of the {new.sensor} of {new.serial} was stored by another request in the meantime; send "
                 "this one again"
             ) from error
-        return SensorVersionRow(**vars(new), version=version, hash=own, by_key=key, at=at)
+        return SensorVersionRow(**vars(new), version=version, hash=digest, by_key=key, at=at)
 
     def of_unit(self, serial: str) -> list[SensorVersionRow]:
         """Return every version of a unit's sensors, by sensor, newest first. Raises StoreError for a changed one."""

@@ -44,8 +44,8 @@ def write_step_clock(
 
 def _correct_rates(connection: sa.Connection, recordings: list[int], factor: Callable[[float], float]) -> None:
     d = tables.data_sets
-    turned = (d.c.recording_id.in_(recordings), d.c.table_rate_dps != 0.0, d.c.turn_deg.is_(None))
-    query = sa.select(d.c.recording_id, d.c.number, d.c.table_rate_dps, d.c.gate_from_s).where(*turned)
+    at_constant_rate = (d.c.recording_id.in_(recordings), d.c.table_rate_dps != 0.0, d.c.turn_deg.is_(None))
+    query = sa.select(d.c.recording_id, d.c.number, d.c.table_rate_dps, d.c.gate_from_s).where(*at_constant_rate)
     changes = [
         {"of": row.recording_id, "at": row.number, "rate": row.table_rate_dps * factor(row.gate_from_s)}
         for row in connection.execute(query)

@@ -18,7 +18,7 @@ from labctl.processes.settings import BenchSettings
 from labctl.processes.supervision import SAID_BY_BENCH, Supervision
 from labctl.processes.waker import Waker
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.stop_requests import NotHere
+from labctl.services.campaigns.stop_requests import StopElsewhere
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store, open_store
 from procedures.contracts.control import Control
@@ -80,7 +80,7 @@ def test_a_stuck_engine_sends_one_beat_to_its_supervisor_and_no_more(
     settings = BenchSettings(str(tmp_path / "lab.sqlite"), None, False, 1.0, tmp_path, "http://127.0.0.1:1")
     waker = Waker()
     here, there = Pipe()
-    address = HeldAddress(lambda _: NotHere("no bench", stands=True), lambda: "")
+    address = HeldAddress(lambda _: StopElsewhere("no bench", stands=True), lambda: "")
     guarded = Supervision(settings, store, waker, lambda: stuck[0], address, lambda: False)
     guarded.take_charge(settings, there)
     assert value_of(SAID_BY_BENCH, receive(here)) == "beat"  # the answer that it is in charge

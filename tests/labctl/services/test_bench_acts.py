@@ -18,7 +18,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
-from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.api import create_app
 from labctl.api.act_routes import add_act_route
 from labctl.cli.app import app
@@ -31,9 +31,12 @@ from labctl.services.campaigns.status import campaign_status
 from labctl.services.campaigns.unattended import not_running
 from labctl.services.commands.acts import catalogue
 from labctl.services.commands.acts.campaign_act import CampaignAct
+from labctl.services.commands.acts.campaign_command import CampaignCommand
 from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
+from labctl.services.commands.acts.confirm import CONFIRM
+from labctl.services.commands.acts.resume import RESUME
 from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
-from labctl.services.commands.requests import ToCampaign
+from labctl.services.commands.requests import CampaignResume, ToCampaign
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store, open_store
@@ -55,10 +58,13 @@ def _hold_in_foreground(_: Foreground, context: CommandContext, asked: Asked) ->
 HOLD = CampaignAct(
     name="hold",
     body=ReasonRequest,
+    asked=Asked,
     summary="Hold the temperature",
     description="Stay in the present soak.",
-    command_help="Stay in the present soak until the campaign is resumed.",
-    command_defaults={"reason": "held from the command line"},
+    command_line=CampaignCommand(
+        help="Stay in the present soak until the campaign is resumed.",
+        defaults={"reason": "held from the command line"},
+    ),
     in_service=_hold_in_service,
     in_foreground=_hold_in_foreground,
     is_urgent=True,
@@ -97,7 +103,9 @@ def with_hold(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_declared_act_has_a_command_with_an_option_for_each_field_of_its_request(tmp_path: Path) -> None:
     database = str(tmp_path / "lab.sqlite")
     shown = CliRunner().invoke(app, ["campaign", "hold", "--help"], env={"COLUMNS": "200"})
-    assert all(text in shown.stdout for text in (HOLD.command_help, "--reason", "--by", "--json", "--database"))
+    assert all(
+        text in shown.stdout for text in ("until the campaign is resumed", "--reason", "--by", "--json", "--database")
+    )
     asked = ["campaign", "hold", "7", "--by", "Ada", "--database", database]
     refused = CliRunner().invoke(app, asked)
     assert (refused.exit_code, "campaign 7 is not in this database" in refused.stderr) == (2, True), refused.output
@@ -105,18 +113,51 @@ def test_a_declared_act_has_a_command_with_an_option_for_each_field_of_its_reque
     assert (empty.exit_code, "--reason" in empty.stderr) == (2, True)
 
 
-@pytest.mark.usefixtures("with_hold")
-def test_the_command_of_an_act_sends_its_request(monkeypatch: pytest.MonkeyPatch) -> None:
-    sent: list[object] = []
+@pytest.fixture
+def sent(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
+    """What commands have carried out, which is refused: database, command and request."""
+    received: list[tuple[object, ...]] = []
 
-    def execute(database: str | None, command: object, asked: object) -> CampaignResponse:
-        sent.extend((database, command, asked))
+    def execute(database: str | None, command: object, asked: object, terminal: object) -> CampaignResponse:
+        received.append((database, command, asked, terminal is not None))
         raise Conflict("it was sent; nothing more is to be done")
 
     monkeypatch.setattr("labctl.services.commands.open.execute", execute)
+    return received
+
+
+@pytest.mark.usefixtures("with_hold")
+def test_the_command_of_an_act_sends_its_request(sent: list[tuple[object, ...]]) -> None:
     CliRunner().invoke(app, ["campaign", "hold", "7", "--by", "Ada", "--database", "lab.sqlite"])
     request = ReasonRequest(reason="held from the command line", by="Ada")
-    assert sent == ["lab.sqlite", HOLD.command, ToCampaign(7, request)]
+    assert sent == [("lab.sqlite", HOLD.command, ToCampaign(7, request), False)]
+
+
+@pytest.mark.parametrize(
+    ("options", "answer"),
+    [
+        ([], {"confirmed": True, "again": False, "reason": ""}),
+        (["--decline", "no hand free"], {"confirmed": False, "again": False, "reason": "no hand free"}),
+        (["--again"], {"confirmed": False, "again": True, "reason": ""}),
+    ],
+)
+def test_the_options_of_a_command_become_the_request_as_its_act_states(
+    sent: list[tuple[object, ...]], options: list[str], answer: dict[str, Any]
+) -> None:
+    CliRunner().invoke(app, ["campaign", "confirm", "q1", "--campaign", "7", "--by", "Ada", *options])
+    assert sent == [(None, CONFIRM.command, ToCampaign(7, ConfirmRequest(prompt="q1", by="Ada", **answer)), False)]
+
+
+def test_two_answers_to_one_question_are_refused_before_anything_is_sent(sent: list[tuple[object, ...]]) -> None:
+    both = ["campaign", "confirm", "q1", "--campaign", "7", "--again", "--decline", "no hand free"]
+    refused = CliRunner().invoke(app, both)
+    assert (refused.exit_code, "give one of them" in refused.stderr, sent) == (2, True, [])
+
+
+def test_an_option_that_is_no_field_of_the_request_goes_into_its_address(sent: list[tuple[object, ...]]) -> None:
+    CliRunner().invoke(app, ["campaign", "resume", "7", "--by", "Ada", "--power", "kept", "--speed", "2"])
+    request = ResumeRequest(by="Ada", power="kept")
+    assert sent == [(None, RESUME.command, CampaignResume(7, request, speed=2.0), True)]
 
 
 @pytest.mark.usefixtures("with_hold")
@@ -124,7 +165,7 @@ def test_the_reference_of_the_command_line_has_a_declared_act() -> None:
     written = get_docs_for_click(obj=get_command(app), ctx=Context(get_command(app)), name="labctl")
     entry = written.partition("### `labctl campaign hold`")[2].partition("### ")[0]
     assert "* `--reason TEXT`: Reason for this action; it is recorded.  [default: held from the command line]" in entry
-    assert written.index("`labctl campaign hold`") < written.index("### `labctl campaign resume`")
+    assert written.index("`labctl campaign hold`") < written.index("### `labctl campaign abort`")
 
 
 def test_every_act_has_a_command_that_is_made_or_written() -> None:
@@ -140,7 +181,8 @@ def sent_by_client(act: CampaignAct[Any]) -> str:
     if method is None:
         return f"Client has no method {act.name}"
     given = {name: SAMPLES.get(name, f"the {name}") for name in act.body.model_fields}
-    if set(signature(method).parameters) != {"self", "campaign", *given}:
+    parameters = {"request": act.body.model_validate(given)} if act is RESUME else given
+    if set(signature(method).parameters) != {"self", "campaign", *parameters}:
         return f"Client.{act.name} takes {', '.join(signature(method).parameters)}; its request has {', '.join(given)}"
     sent: list[httpx.Request] = []
 
@@ -149,7 +191,7 @@ def sent_by_client(act: CampaignAct[Any]) -> str:
         return httpx.Response(404, json={"title": "gone", "detail": "gone"})
 
     with Client(transport=httpx.MockTransport(answer)) as client, pytest.raises(ServiceRefused):
-        getattr(client, act.name)(7, **given)
+        getattr(client, act.name)(7, **parameters)
     (request,) = sent
     if (request.method, request.url.path) != (act.command.method, act.command.path.format(campaign=7)):
         return f"Client.{act.name} sends {request.method} {request.url.path}"
@@ -157,8 +199,8 @@ def sent_by_client(act: CampaignAct[Any]) -> str:
     return "" if body == given else f"Client.{act.name} sends {body} for {given}"
 
 
-#: Values that are no text.
-SAMPLES = {"confirmed": True, "again": False}
+#: Values that are not any text.
+SAMPLES = {"confirmed": True, "again": False, "power": "lost"}
 
 
 def test_the_client_has_a_method_for_each_act_that_sends_its_request() -> None:

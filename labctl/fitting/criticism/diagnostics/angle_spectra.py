@@ -30,20 +30,20 @@ def angle_lines(within: Within, residual: Residual, axis: str) -> list[AngleSpec
     """Return the mean power of waves in the table angle over white noise, by cycles per turn."""
     if within.angle is None:
         return []
-    count = within.there.sum(axis=1).astype(np.int64)
+    count = within.presence.sum(axis=1).astype(np.int64)
     last = np.take_along_axis(within.angle, np.maximum(count - 1, 0)[:, None], axis=1)[:, 0]
-    turned = np.abs(last - within.angle[:, 0])
-    rows = np.flatnonzero((turned >= TURNS) & (count >= MIN_READINGS))
+    turns = np.abs(last - within.angle[:, 0])
+    rows = np.flatnonzero((turns >= TURNS) & (count >= MIN_READINGS))
     if len(rows) < MIN_SETS:
         return []
-    window = _hann(count[rows], residual.dps.shape[1]) * residual.there[rows]
+    window = _hann(count[rows], residual.dps.shape[1]) * residual.presence[rows]
     bins = np.floor(np.mod(within.angle[rows], 1.0) * ANGLE_BINS).astype(np.int64) % ANGLE_BINS
     flat = bins + ANGLE_BINS * np.arange(len(rows))[:, None]
     sums = np.bincount(flat.ravel(), (residual.dps[rows] * window).ravel(), ANGLE_BINS * len(rows))
     power = np.abs(np.fft.rfft(sums.reshape(len(rows), ANGLE_BINS), axis=1)[:, 1 : MAX_PER_TURN + 1]) ** 2
     energy, whole = (window**2).sum(axis=1)[:, None], window.sum(axis=1)[:, None]
     cycles = np.arange(1, MAX_PER_TURN + 1)
-    followed = cycles[None, :] < 0.5 * count[rows][:, None] / turned[rows][:, None]
+    followed = cycles[None, :] < 0.5 * count[rows][:, None] / turns[rows][:, None]
     enough = followed.sum(axis=0) >= MIN_SETS
     cycles, sets = cycles[enough], followed.sum(axis=0)[enough]
     if not len(cycles):
@@ -90,7 +90,7 @@ def _hann(count: NDArray[np.int64], n: int) -> NDArray[np.float64]:
 
 def frequency_lines(within: Within, residual: Residual, axis: str) -> list[FrequencySpectrum]:
     """Return the mean power of waves in time within data sets over white noise, by frequency."""
-    count = within.there.sum(axis=1).astype(np.int64)
+    count = within.presence.sum(axis=1).astype(np.int64)
     usual = int(np.median(count))
     rows = np.flatnonzero(count >= usual)
     if usual < MIN_READINGS or len(rows) < MIN_SETS:
@@ -117,17 +117,17 @@ def frequency_lines(within: Within, residual: Residual, axis: str) -> list[Frequ
 
 def start_profile(within: Within, residual: Residual, axis: str) -> list[StartProfile]:
     """Return the mean course within data sets: plain, and by the step in rate that came before, per deg/s of it."""
-    values = (residual.dps + residual.slope[:, None] * within.basis[-1]) * residual.there
-    usual = int(np.median(within.there.sum(axis=1)))
+    values = (residual.dps + residual.slope[:, None] * within.basis[-1]) * residual.presence
+    usual = int(np.median(within.presence.sum(axis=1)))
     edges = np.unique(np.linspace(0, usual, min(PROFILE_POINTS, usual) + 1).round().astype(np.int64))[:-1]
     seconds = within.since_s[:, :usual]
     step = (within.rate_dps - within.previous_dps) * within.up(axis)
-    there = residual.there[:, :usual]
-    sums, counts = (np.add.reduceat(part[:, :usual], edges, axis=1) for part in (values, residual.there))
+    presence = residual.presence[:, :usual]
+    sums, counts = (np.add.reduceat(part[:, :usual], edges, axis=1) for part in (values, residual.presence))
     total = np.maximum(counts.sum(axis=0), 1.0)
     size = np.maximum((step[:, None] ** 2 * counts).sum(axis=0), 1e-300)
-    time = np.add.reduceat((seconds * there).sum(axis=0), edges) / np.maximum(
-        np.add.reduceat(there.sum(axis=0), edges), 1.0
+    time = np.add.reduceat((seconds * presence).sum(axis=0), edges) / np.maximum(
+        np.add.reduceat(presence.sum(axis=0), edges), 1.0
     )
     profile: StartProfile = {
         "axis": axis,

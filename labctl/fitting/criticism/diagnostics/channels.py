@@ -126,9 +126,9 @@ def channel_lines(view: AxisView) -> Iterator[ChannelLine]:
             yield _channel_line(view, name, running_mean(view, view.channel(name), everywhere))
     position, rate = view.position(), view.channel("table_rate_dps")
     for up_position in np.unique(position):
-        here = position == up_position
-        if np.ptp(rate[here]) > 0:
-            line = _channel_line(view, "table_rate_dps", running_mean(view, rate, here))
+        in_position = position == up_position
+        if np.ptp(rate[in_position]) > 0:
+            line = _channel_line(view, "table_rate_dps", running_mean(view, rate, in_position))
             line["position"] = str(up_position)
             yield line
 

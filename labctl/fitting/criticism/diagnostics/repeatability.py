@@ -14,11 +14,11 @@ from labctl.fitting.data.noise_floor import REPEAT_RATE, REPEAT_TEMPERATURE_C
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 
-#: A temperature that went back by this much has turned.
+#: Least change of the temperature in the other direction that counts as a reversal, K.
 TURN_K = 2.0
 #: Data sets reached from below and from above are compared at temperatures as close as this.
 SAME_TEMPERATURE_K = 2.0
-#: Pairs that are drawn one by one; of more than these, some of every size of difference.
+#: Largest number of pairs that are drawn; of more, a selection over all sizes of the difference.
 MAX_PAIRS = 3000
 
 
@@ -87,8 +87,8 @@ def _matched(
 def repeats(view: AxisView) -> Repeats | None:
     """Return how far data sets at one rate, temperature and position scatter; None without any.
 
-    The floor is what noise gives two data sets that far apart in time: drift moves neighbours alike. `apart_s` is
-    there only where times are known.
+    The floor is the expected difference by noise and drift of two data sets at that distance in time. `apart_s` is
+    present only where times are known.
     """
     temperature_c, rate, position = view.temperature_c(), view.channel("table_rate_dps"), view.position()
     near = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)

@@ -31,7 +31,7 @@ class Within:
     """Readings of m data sets, up to n each, with zeros where there is none."""
 
     recording: Recording  #: thinned
-    there: NDArray[np.float64]  #: (m, n)
+    presence: NDArray[np.float64]  #: (m, n)
     index: NDArray[np.int64]  #: (m, n) row of the thinned recording
     since_s: NDArray[np.float64]  #: (m, n)
     angle: NDArray[np.float64] | None  #: (m, n) turns of the table
@@ -43,7 +43,7 @@ class Within:
 
     def of(self, values: Array) -> NDArray[np.float64]:
         """Return a column of the thinned recording as (m, n)."""
-        return np.where(self.there > 0, values[self.index], 0.0)
+        return np.where(self.presence > 0, values[self.index], 0.0)
 
     def up(self, axis: str) -> Array:
         """Return how the table's rate is felt along an axis, (m,): 1, -1 or 0."""
@@ -52,16 +52,16 @@ class Within:
     def axis(self, axis: str) -> Residual:
         """Return what one axis has besides mean, slope and the stepper's lines."""
         values = self.of(self.recording.gyro_dps(axis))
-        values = values - np.einsum("mn,mn->m", values, self.there)[:, None] / self.there.sum(axis=1)[:, None]
+        values = values - np.einsum("mn,mn->m", values, self.presence)[:, None] / self.presence.sum(axis=1)[:, None]
         inner = np.einsum("rmn,mn->rm", self.basis, values)
-        values = (values - np.einsum("rm,rmn->mn", inner, self.basis)) * self.there
+        values = (values - np.einsum("rm,rmn->mn", inner, self.basis)) * self.presence
         values = values - self._earth(values, axis)
-        spread = 1.4826 * float(np.median(np.abs(values[self.there > 0])))
+        spread = 1.4826 * float(np.median(np.abs(values[self.presence > 0])))
         inside = np.abs(values) <= OUTLIER * spread
-        n_inside = (self.there * inside).sum(axis=1)
+        n_inside = (self.presence * inside).sum(axis=1)
         # where most readings are equal, as of a coarse output, the usual spread says nothing of the others
-        inside |= (n_inside < MIN_KEPT * self.there.sum(axis=1))[:, None]
-        return Residual(np.where(inside, values, 0.0), self.there * inside, inner[-1], spread, inner[1:-1])
+        inside |= (n_inside < MIN_KEPT * self.presence.sum(axis=1))[:, None]
+        return Residual(np.where(inside, values, 0.0), self.presence * inside, inner[-1], spread, inner[1:-1])
 
     def _earth(self, values: NDArray[np.float64], axis: str) -> NDArray[np.float64]:
         """Return what once per turn belongs to the Earth's rate, by position: where the latitude is known."""
@@ -73,7 +73,7 @@ class Within:
             if Position.of(up_position).axis == axis:
                 continue
             waves = np.stack([np.cos(2 * np.pi * self.angle[rows]), np.sin(2 * np.pi * self.angle[rows])])
-            waves = waves * self.there[rows]
+            waves = waves * self.presence[rows]
             inner = np.einsum("rmn,kmn->rkm", self.basis[:, rows], waves)
             waves = waves - np.einsum("rkm,rmn->kmn", inner, self.basis[:, rows])
             normal = np.einsum("kmn,lmn->kl", waves, waves)
@@ -87,7 +87,7 @@ class Residual:
     """One axis within the data sets."""
 
     dps: NDArray[np.float64]  #: (m, n)
-    there: NDArray[np.float64]  #: (m, n), without outliers
+    presence: NDArray[np.float64]  #: (m, n), without outliers
     slope: Array  #: (m,) coordinate of the slope that was taken out
     spread_dps: float  #: robust, of one reading
     lines: NDArray[np.float64]  #: (4, m) coordinates of the stepper's lines, cos and sin of each
@@ -107,7 +107,7 @@ def within_of(recording: Recording) -> Within | None:
     offset = np.arange(n)
     inside = offset[None, :] < counts[:, None]
     index = np.where(inside, starts[:, None] + offset, starts[:, None])
-    there = inside.astype(np.float64)
+    presence = inside.astype(np.float64)
     t_s = np.asarray(thinned.columns["t_s"], dtype=np.float64)
     since = np.where(inside, t_s[index] - t_s[starts][:, None], 0.0)
     angle = None
@@ -119,7 +119,7 @@ def within_of(recording: Recording) -> Within | None:
         position = np.asarray(thinned.columns["position"])[starts].astype(np.str_)
     period_s = float(np.median(np.diff(t_s[:MAX_READINGS])))
     return Within(
-        thinned, there, index, since, angle, _basis(there, since, angle), position, rate,
+        thinned, presence, index, since, angle, _basis(presence, since, angle), position, rate,
         np.concatenate([[0.0], rate[:-1]]), period_s,
     )  # fmt: skip
 

@@ -30,7 +30,7 @@ class NonMeanProducts:
 
     of_base: NDArray[np.float64]  #: (kb, kb), with the base's prior
     crossed: NDArray[np.float64]  #: (kb, k)
-    own: NDArray[np.float64]  #: (k, k)
+    of_rows: NDArray[np.float64]  #: (k, k)
 
 
 class ScaledBase:
@@ -43,8 +43,8 @@ class ScaledBase:
 
     def products(self, rows: NDArray[np.float64]) -> NonMeanProducts:
         """Return the inner products of the base and of rows (R, m, k)."""
-        own = stack(rows, self._scale, self._present)
-        return NonMeanProducts(self._of_base, self._columns.T @ own, own.T @ own)
+        columns = stack(rows, self._scale, self._present)
+        return NonMeanProducts(self._of_base, self._columns.T @ columns, columns.T @ columns)
 
 
 @dataclass(frozen=True)
@@ -78,13 +78,13 @@ class MeansByNoise:
         products: dict[Noise, MeanProducts] = {}
         for tau_s in dict.fromkeys(noise.tau_s for noise in noises):
             modes = DriftModes.of(tau_s, white_var, design.t_s, design.run)
-            here = [noise for noise in noises if noise.tau_s == tau_s]
+            of_tau = [noise for noise in noises if noise.tau_s == tau_s]
             base, columns = modes.amplitudes(design.base[0]), modes.amplitudes(means)
-            weights, log_dets = zip(*(modes.weights(noise.size_dps) for noise in here), strict=True)
+            weights, log_dets = zip(*(modes.weights(noise.size_dps) for noise in of_tau), strict=True)
             shares = np.array(weights) ** 2
             pairs = shares @ (columns[:, options.left] * columns[:, options.right])
             with_data = shares @ (columns * columns[:, -1:])
-            for k, noise in enumerate(here):
+            for k, noise in enumerate(of_tau):
                 weighted = shares[k][:, None] * base
                 products[noise] = MeanProducts(
                     noise, log_dets[k], weighted.T @ base, weighted.T @ columns, pairs[k], with_data[k]
@@ -101,7 +101,7 @@ def gains_by_noise(means: MeansByNoise, other_products: NonMeanProducts) -> tupl
     options). The same as from `WhitenedBase`, without the inner products between options, which are most of the work.
     """
     left, right = means.options.left, means.options.right
-    own_pairs, own_with_data = other_products.own[left, right], other_products.own[:, -1]
+    own_pairs, own_with_data = other_products.of_rows[left, right], other_products.of_rows[:, -1]
     single = means.options.single
     log_p, gain = np.empty(len(means.noises)), np.empty((len(means.noises), len(means.slices)))
     dimensions = np.empty(gain.shape, dtype=np.int64)
@@ -147,7 +147,7 @@ class WhitenedBase:
             self._means.T @ whitened + other_products.crossed,
         )
         crossed, log_det = _projected(of_base, crossed)
-        before = whitened.T @ whitened + other_products.own
+        before = whitened.T @ whitened + other_products.of_rows
         gram = before - crossed.T @ crossed
         chi2 = float(gram[-1, -1])
         return EliminatedBase(

@@ -47,8 +47,8 @@ class OptionPairs:
         groups, left, right, count = [], [], [], 0
         for width in np.unique(widths).tolist():
             options = np.flatnonzero(widths == width)
-            here = [slices[i] for i in options.tolist()]
-            columns = np.array([np.arange(option_rows.start, option_rows.stop) for option_rows in here])
+            option_slices = [slices[i] for i in options.tolist()]
+            columns = np.array([np.arange(option_rows.start, option_rows.stop) for option_rows in option_slices])
             i, j = np.triu_indices(width)
             among = np.zeros((width, width), dtype=np.int64)
             among[i, j] = among[j, i] = np.arange(len(i))
@@ -69,9 +69,9 @@ class OptionPairs:
         gain, dimensions = np.zeros(self.number), np.zeros(self.number, dtype=np.int64)
         size = np.sqrt(np.maximum(squared_norms, 1e-300))
         for group in self.groups:
-            here = size[group.columns]
-            scaled = products[group.pairs] / (here[:, :, None] * here[:, None, :])
-            inner = data_products[group.columns] / here
+            column_size = size[group.columns]
+            scaled = products[group.pairs] / (column_size[:, :, None] * column_size[:, None, :])
+            inner = data_products[group.columns] / column_size
             if scaled.shape[1] == 1:
                 values = scaled[:, :, 0]
             else:

@@ -20,16 +20,16 @@ MIN_INDEPENDENT_SHARE = 0.1
 
 
 def orthonormal_basis(
-    presence: NDArray[np.float64], since: NDArray[np.float64], turned: NDArray[np.float64],
+    presence: NDArray[np.float64], since: NDArray[np.float64], turn_rad: NDArray[np.float64],
     angle: NDArray[np.float64] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:  # fmt: skip
     """Return orthonormal functions, (R, m, n), and which exist in which data set, (R, m).
 
     By Gram-Schmidt, twice (Kahan), over readings (m, n): `presence` is 1 where there is one, `since` the time in its
-    data set in s, `turned` the angle that the table turned and `angle` where it stands (None: not recorded), rad.
+    data set in s, `turn_rad` the angle that the table turned and `angle` where it stands (None: not recorded), rad.
     """
     basis_functions = [presence, since, np.exp(-since / START_TAU_S)]
-    lines = [wave(k * turned) for k in STEP_LINES for wave in (np.cos, np.sin)]
+    lines = [wave(k * turn_rad) for k in STEP_LINES for wave in (np.cos, np.sin)]
     if angle is not None:
         basis_functions += [wave(k * angle) for k in WAVES for wave in (np.cos, np.sin)]
     functions = [*lines, *basis_functions]

@@ -37,9 +37,9 @@ def reduce_profile(recording: Recording) -> ReducedRecording:
     points = to_points(recording)
     channels = channels_of(points, up_rate_dps(points.info), profile_of(recording))
     assert channels.profile is not None
-    index, there = _pieces(points)
-    basis, present = _basis(_functions(points, channels.profile), index, there)
-    count = there.sum(axis=1)
+    index, presence = _pieces(points)
+    basis, present = _basis(_functions(points, channels.profile), index, presence)
+    count = presence.sum(axis=1)
     basis /= np.sqrt(count)[None, :, None]
     outputs: dict[str, NDArray[np.float64]] = {
         axis: np.einsum("rmb,mb->rm", basis, points.gyro_dps(axis)[index]) for axis in points.info.axes
@@ -48,7 +48,7 @@ def reduce_profile(recording: Recording) -> ReducedRecording:
     for axis in points.info.axes:
         variance = white_var_of(points, axis)
         if variance is not None:
-            white[axis] = (variance[index] * there).sum(axis=1) / count**2
+            white[axis] = (variance[index] * presence).sum(axis=1) / count**2
     has_white = len(white) == len(outputs) and all(np.all(each > 0) for each in white.values())
     return ReducedRecording(
         points.info, channels.take(index.ravel()), basis, {}, outputs, present, white if has_white else None,
@@ -75,8 +75,8 @@ def _pieces(points: Recording) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     ]
     most = max(map(len, groups))
     index = np.array([np.concatenate([group, np.repeat(group[-1:], most - len(group))]) for group in groups])
-    there = np.arange(most)[None, :] < np.array(list(map(len, groups)))[:, None]
-    return index, there.astype(np.float64)
+    presence = np.arange(most)[None, :] < np.array(list(map(len, groups)))[:, None]
+    return index, presence.astype(np.float64)
 
 
 def _functions(points: Recording, profile: RateProfile) -> list[Array]:

@@ -32,12 +32,12 @@ LONGEST = 4
 class Padded:
     """Readings as (m, n), n those of the longest data set, with zeros where there is none."""
 
-    there: NDArray[np.float64]  #: (m, n) 1 where there is a reading
+    presence: NDArray[np.float64]  #: (m, n) 1 where there is a reading
     index: NDArray[np.int64]  #: (m, n) its row
 
     def of(self, values: Array) -> NDArray[np.float64]:
         """Return a column (rows,) as (m, n)."""
-        return np.where(self.there > 0, values[self.index], 0.0)
+        return np.where(self.presence > 0, values[self.index], 0.0)
 
 
 def pad(dataset: NDArray[np.int64]) -> Padded:
@@ -45,8 +45,8 @@ def pad(dataset: NDArray[np.int64]) -> Padded:
     starts = dataset_starts(dataset)
     counts = np.diff(np.append(starts, len(dataset)))
     offset = np.arange(int(counts.max()))
-    there = offset[None, :] < counts[:, None]
-    return Padded(there.astype(np.float64), np.where(there, starts[:, None] + offset, 0))
+    presence = offset[None, :] < counts[:, None]
+    return Padded(presence.astype(np.float64), np.where(presence, starts[:, None] + offset, 0))
 
 
 def piece_labels(columns: Mapping[str, NDArray[np.generic]], motion: Motion = "rates") -> NDArray[np.int64]:
@@ -98,7 +98,7 @@ def nodes_of(
     if RECORDING in numbers:  # nothing is remembered from one recording to the next
         previous[1:][np.diff(numbers[RECORDING][begin]) != 0] = 0.0
     columns["previous_rate_dps"] = np.repeat(previous, bins)
-    spacing = float(np.median(np.diff(since[0][: int(padded.there[0].sum())]))) if n > 1 else 1.0 / FASTEST_HZ
+    spacing = float(np.median(np.diff(since[0][: int(padded.presence[0].sum())]))) if n > 1 else 1.0 / FASTEST_HZ
     middle = averaged(since)
     length = np.maximum(inside, 1.0) * spacing
     columns["since_begin_s"] = np.maximum(middle - length / 2, 0.0).ravel()
@@ -115,22 +115,24 @@ def reduce_samples(recording: Recording, *, outliers: bool) -> ReducedRecording:
     """Return the coordinates of every data set; without `outliers` every valid reading counts."""
     numbers, dataset, texts = decimated_columns(with_quantisation(recording))
     padded = pad(piece_labels({"dataset": dataset, **numbers}, recording.info.motion))
-    m = len(padded.there)
+    m = len(padded.presence)
     begin = padded.index[:, 0]
     t_s = numbers.get("t_s", np.arange(len(dataset), dtype=np.float64) / FASTEST_HZ)
-    since = padded.of(t_s - t_s[begin].repeat(padded.there.sum(axis=1).astype(int)))
+    since = padded.of(t_s - t_s[begin].repeat(padded.presence.sum(axis=1).astype(int)))
     angle = np.deg2rad(padded.of(numbers["table_angle_deg"])) if "table_angle_deg" in numbers else None
     axes: tuple[str, ...] = recording.info.axes
     outputs = {axis: padded.of(numbers[f"gyro_{axis}"]) for axis in axes}
-    there, steps = padded.there, output_steps(recording)
+    presence, steps = padded.presence, output_steps(recording)
     for axis in axes if outliers else ():
-        there = there * inlier_mask(outputs[axis], padded.there, steps[axis].step_dps if axis in steps else 0.0)
+        presence = presence * inlier_mask(
+            outputs[axis], padded.presence, steps[axis].step_dps if axis in steps else 0.0
+        )
     # the lines of the steps need the angle turned, from any origin: both of their waves are removed
-    turned = angle if angle is not None else np.deg2rad(padded.of(numbers["table_rate_dps"])) * since
-    basis, present = orthonormal_basis(there, since, turned, angle)
-    count = np.maximum(there.sum(axis=1), 1.0)
+    turn_rad = angle if angle is not None else np.deg2rad(padded.of(numbers["table_rate_dps"])) * since
+    basis, present = orthonormal_basis(presence, since, turn_rad, angle)
+    count = np.maximum(presence.sum(axis=1), 1.0)
     basis /= np.sqrt(count)[None, :, None]
-    nodes, weights = nodes_of(recording, numbers, texts, padded, there, since, basis)
+    nodes, weights = nodes_of(recording, numbers, texts, padded, presence, since, basis)
     waves = {}
     if angle is not None:
         for k in WAVES:
@@ -139,12 +141,12 @@ def reduce_samples(recording: Recording, *, outliers: bool) -> ReducedRecording:
     coordinates = {axis: np.einsum("rmn,mn->rm", basis, outputs[axis]) for axis in axes}
     white = {}
     for axis in axes:
-        noise = white_level_dps(outputs[axis], there) ** 2
+        noise = white_level_dps(outputs[axis], presence) ** 2
         white[axis] = np.full(m, noise) / count + _steps_var(recording, numbers, axis)[begin]
     has_white = all(np.all(values > 0) for values in white.values())  # else no reading differs from the next
     return ReducedRecording(
         recording.info, nodes, weights, waves, coordinates, present, white if has_white else None, dataset[begin],
-        int(padded.there.sum() - there.sum()),
+        int(padded.presence.sum() - presence.sum()),
     )  # fmt: skip
 
 

@@ -56,11 +56,13 @@ def channels_of_free_shape(
     for axis, exact in designs_beside(first, model, {}).items():
         rivals = _shapes(first, axis)
         options = [shape for shapes in rivals.values() for shape in shapes]
-        own = _named(first, axis, terms, catalogue)
-        log_bf_by_shape = _weighed(first, beside, axis, replace(first.designs[axis], options=[*options, *own])).log_bf
+        first_options = _named(first, axis, terms, catalogue)
+        log_bf_by_shape = _weighed(
+            first, beside, axis, replace(first.designs[axis], options=[*options, *first_options])
+        ).log_bf
         for channels, shapes in rivals.items():
-            here, log_bf_by_shape = log_bf_by_shape[: len(shapes)], log_bf_by_shape[len(shapes) :]
-            free[channels] = free.get(channels, 0.0) + float(here.max(initial=0.0))
+            log_bf_free, log_bf_by_shape = log_bf_by_shape[: len(shapes)], log_bf_by_shape[len(shapes) :]
+            free[channels] = free.get(channels, 0.0) + float(log_bf_free.max(initial=0.0))
         wrong_by = beside.axes[axis].log_p - _weighed(first, beside, axis, replace(exact, options=[])).log_p
         named += float(log_bf_by_shape.max(initial=0.0)) + max(wrong_by, 0.0)
     best = max(free, key=lambda channels: free[channels], default=())

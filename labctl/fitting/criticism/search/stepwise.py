@@ -65,9 +65,9 @@ def is_shape_error(before: Comparison, named_step: Step, after: Comparison, step
         return True
     least = NEXT_SHARE if _are_one(before, named_step) else NEXT_SHARE_AMBIGUOUS
     of_new, of_old = _within_and_between(after, step.leader), _within_and_between(before, named_step.leader)
-    there = int(np.argmax(of_new))
-    could = max(float(of_old[there]), MIN_PART) * named_step.leader.log_bf
-    return bool(of_new[there] * step.leader.log_bf < least * could)
+    largest = int(np.argmax(of_new))
+    could = max(float(of_old[largest]), MIN_PART) * named_step.leader.log_bf
+    return bool(of_new[largest] * step.leader.log_bf < least * could)
 
 
 def _are_one(comparison: Comparison, named_step: Step) -> bool:

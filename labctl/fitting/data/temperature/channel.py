@@ -36,8 +36,8 @@ def with_temperature(recording: Recording) -> Recording:
         )
     if environment is not None:
         theirs = {name: values for name, values in environment.items() if name != "temperature_c"}
-        there = temperature_of(theirs)
-        environment = None if there is None else {**theirs, "temperature_c": there}
+        known_c = temperature_of(theirs)
+        environment = None if known_c is None else {**theirs, "temperature_c": known_c}
     return replace(recording, columns={**columns, "temperature_c": temperature_c}, environment=environment)
 
 

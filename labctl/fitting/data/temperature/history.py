@@ -83,10 +83,10 @@ class TemperatureHistory:
         run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
         lag_k = np.zeros((len(t_s), len(taus_s)))
         for number, course in self.courses.items():
-            here = run == number
-            if here.any():
+            in_run = run == number
+            if in_run.any():
                 lags = _lags_two_ways(course.temperature_c, taus_s, cooling_taus_s)
-                lag_k[here] = np.column_stack([course.at(lag, t_s[here]) for lag in lags.T])
+                lag_k[in_run] = np.column_stack([course.at(lag, t_s[in_run]) for lag in lags.T])
         return lag_k
 
     def hysteresis_state(self, columns: LoggedColumns, width_k: float, *, rounded: bool = False) -> Array:
@@ -110,11 +110,11 @@ class TemperatureHistory:
         cache = self._known.setdefault((function, parameters), {})
         evaluated = np.zeros(len(t_s))
         for number, course in self.courses.items():
-            here = run == number
-            if here.any():
+            in_run = run == number
+            if in_run.any():
                 if number not in cache:
                     cache[number] = function(course.temperature_c, *parameters)
-                evaluated[here] = course.at(cache[number], t_s[here])
+                evaluated[in_run] = course.at(cache[number], t_s[in_run])
         return evaluated
 
 
@@ -218,20 +218,20 @@ def _middle_s(columns: LoggedColumns) -> float:
 def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int, TemperatureCourse]:
     t_s = np.asarray(source["t_s"], dtype=np.float64)
     temperature_c = np.asarray(source["temperature_c"], dtype=np.float64)
-    there = np.asarray(source["run"]) if "run" in source else np.ones(len(t_s), dtype=np.int64)
+    run_of_row = np.asarray(source["run"]) if "run" in source else np.ones(len(t_s), dtype=np.int64)
     runs = np.unique(np.asarray(columns["run"])) if "run" in columns else np.array([1])
     courses = {}
     for run in runs:
-        here = (there == run) & np.isfinite(temperature_c)
+        rows = (run_of_row == run) & np.isfinite(temperature_c)
         if "run" not in source:
-            here = np.isfinite(temperature_c)
-        if here.sum() < 2:
+            rows = np.isfinite(temperature_c)
+        if rows.sum() < 2:
             continue
-        order = np.argsort(t_s[here], kind="stable")
-        times, values = t_s[here][order], temperature_c[here][order]
+        order = np.argsort(t_s[rows], kind="stable")
+        times, values = t_s[rows][order], temperature_c[rows][order]
         if source is columns and "duration_s" in columns:
             times, values = _to_the_ends(
-                times, values, np.asarray(columns["duration_s"], dtype=np.float64)[here][order]
+                times, values, np.asarray(columns["duration_s"], dtype=np.float64)[rows][order]
             )
         grid = np.arange(times[0], times[-1] + SPACING_S, SPACING_S)
         courses[int(run)] = TemperatureCourse(float(grid[0]), np.interp(grid, times, values))

@@ -44,9 +44,9 @@ def from_scale_offset(recording: Recording, model: str) -> FitResult:
 
 def _axis(recording: Recording, axis: Axis) -> tuple[Array, AxisFit]:
     columns = recording.columns
-    here = np.asarray(columns["axis"]) == axis if "axis" in columns else np.ones(len(recording), dtype=bool)
-    order = rising(recording, numbers(recording, "temperature_c", here), axis, 2)
-    rows = np.flatnonzero(here)[order]
+    of_axis = np.asarray(columns["axis"]) == axis if "axis" in columns else np.ones(len(recording), dtype=bool)
+    order = rising(recording, numbers(recording, "temperature_c", of_axis), axis, 2)
+    rows = np.flatnonzero(of_axis)[order]
     output = recording.info.output.get(axis, OutputUnit())
     values = np.array(
         [

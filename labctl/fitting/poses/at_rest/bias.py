@@ -20,7 +20,7 @@ from labctl.fitting.poses.triad import unit
 class Bias:
     """Bias of three axes, rest by rest, and over the recording with its sensitivity to specific force."""
 
-    rest_dps: NDArray[np.float64]  #: (k, 3) without what the specific force adds
+    rest_dps: NDArray[np.float64]  #: (k, 3) without the effect of the specific force
     u_rest_dps: NDArray[np.float64]  #: (k, 3) standard uncertainty as the bias of the moves beside the rest
     solutions: tuple[Solution, ...]  #: three, bias and g-sensitivities (4,) of each axis, with the drift
 
@@ -36,10 +36,10 @@ class Bias:
 
 
 def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], used: NDArray[np.bool_]) -> Bias:
-    """Return the bias in the rests, whose specific forces are `force_g` (k, 3); over those that agree with gravity.
+    """Return the bias in the rests with specific forces `force_g` (k, 3); its mean is over the `used` ones, (k,).
 
-    Where the latitude is known the vertical part of the Earth's rate is taken off. Its horizontal part turns with the
-    unknown heading; it scatters from pose to pose, and is in the uncertainty by that.
+    Where the latitude is known the vertical part of the Earth's rate is taken off. Its horizontal part depends on
+    the unknown heading; it is part of the scatter from pose to pose, and so of the uncertainty.
     """
     rest_rate_dps = rests.gyro_dps - up_rate_dps(readings.info) * unit(force_g)
     white = rests.gyro_white_var
@@ -55,7 +55,7 @@ def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], 
     per_g = np.array([solution.values[1:] for solution in solutions])
     residual = rest_rate_dps - force_g @ per_g.T
     change = np.diff(residual, axis=0)
-    # robust: a pull at the cable in one rest is no drift
+    # robust: a disturbance in one rest, such as by the cable, is not a drift
     scatter = (1.4826 * np.median(np.abs(change), axis=0)) ** 2 / 2
     extra = np.maximum(scatter - np.median(white, axis=0), 0.0)
     return Bias(residual, np.sqrt(white + extra), solutions)
@@ -64,7 +64,7 @@ def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], 
 def _with_earth(solution: Solution, axis: int, readings: PoseReadings) -> Solution:
     """Return a solution (4,) with what an unknown latitude adds to the uncertainty of the own axis' g-sensitivity.
 
-    The vertical part of the Earth's rate, its sine, lies along the specific force in every pose and looks like one.
+    The vertical part of the Earth's rate is parallel to the specific force in every pose, so the two are not separable.
     """
     if readings.info.latitude_deg is not None:
         return solution

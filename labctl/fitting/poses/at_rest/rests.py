@@ -1,8 +1,8 @@
 """Rests: the stretches in which no reading scatters by more than the sensors' own noise.
 
 Tedaldi et al. (2014, section IV.C) compare the variance in a window with that of a first long rest. Here the static
-noise is found from all windows, so that no first rest is demanded, and the gyro's readings count beside the
-accelerometer's: a turn about the vertical does not change the specific force.
+noise is estimated from all windows, so that no initial rest is needed, and the readings of the gyro are used too: a
+rotation about the vertical does not change the specific force.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.readings import PoseReadings
 
-#: Window in which a scatter is taken, s, and readings that it has at least.
+#: Length of the windows, s, and the least number of readings of one.
 WINDOW_S, MIN_IN_WINDOW = 0.5, 8
-#: A window rests where each channel scatters by less than this many times its static noise.
-FACTOR = 3.0
-#: No reading at rest scatters by more than this: what does is in motion throughout.
-NOISIEST_G, NOISIEST_DPS = 0.05, 3.0
-#: The quietest share of windows, from which the static noise is found first, and rounds in which it settles.
-QUIETEST, ROUNDS = 0.1, 6
-#: Half seconds at rest, beyond one per rest, that show the noise of a mean; with fewer, readings count as independent.
+#: Limit of the standard deviation of each channel in a window at rest, as a multiple of its static noise.
+REST_FACTOR = 3.0
+#: Largest static noise; a recording above it has no rest.
+MAX_NOISE_G, MAX_NOISE_DPS = 0.05, 3.0
+#: Quantile of the standard deviations that is the first estimate of the static noise, and largest number of iterations.
+QUIET_QUANTILE, MAX_ITERATIONS = 0.1, 6
+#: Least degrees of freedom of the noise of a mean over half seconds; with fewer, readings are taken as independent.
 MIN_BLOCKS = 20
-#: Both ends of a quiet stretch are cut by this share of a window: the turn begins there.
+#: Margin that is cut off both ends of a quiet stretch, as a share of a window: the turn begins there.
 MARGIN = 0.5
-#: A rest lasts at least so long, s, after its ends were cut.
+#: Least duration of a rest without its margins, s.
 MIN_REST_S = 0.5
-#: A rest whose gyro means differ from those of most rests by more than this, deg/s, and by so many deviations turns.
+#: Limit of the difference of the gyro means of a rest from their median, deg/s, plus a multiple of their spread.
 TURNING_DPS, TURNING_DEVIATIONS = 2.0, 12.0
 
 
@@ -78,7 +78,7 @@ def find_rests(readings: PoseReadings) -> Rests:
     spread = _spread(channels, size)
     noise = _static_noise(spread, _steps(channels))
     _require_quiet(readings.info.serial, noise)
-    quiet = np.all(spread < FACTOR * noise, axis=1) & ~_broken(readings.breaks, size)
+    quiet = np.all(spread < REST_FACTOR * noise, axis=1) & ~_broken(readings.breaks, size)
     inside = _union(quiet, size, len(readings))
     begin, end = _stretches(inside & ~readings.breaks, inside)
     margin = round(MARGIN * size)
@@ -108,7 +108,7 @@ def _density(
 ) -> Array:  # fmt: skip
     """Return the variance of a mean over one second of each channel, (channels,): from means over half a second.
 
-    A filter inside the sensor lets neighbouring readings agree, so that a mean is less certain than their number says.
+    A filter inside the sensor correlates neighbouring readings, so that the noise of a mean exceeds white / sqrt(n).
     """
     squares, freedom = np.zeros(channels.shape[1]), 0
     for first, last in zip(begin, end, strict=True):
@@ -121,7 +121,7 @@ def _density(
     white = noise**2 * spacing_s
     if freedom < MIN_BLOCKS:
         return np.asarray(white)
-    # rounding leaves means that agree better than their readings allow
+    # rounding may make the means agree better than the noise of the readings allows
     return np.asarray(np.maximum(squares / freedom * size * spacing_s, white / 4))
 
 
@@ -133,19 +133,19 @@ def density_in_rests(channels: NDArray[np.float64], rests: Rests, spacing_s: flo
 
 
 def _require_quiet(serial: str, noise: Array) -> None:
-    """Raise NotEnoughData where even the quietest windows scatter as no sensor at rest does."""
+    """Raise NotEnoughData where the static noise is larger than that of any sensor at rest."""
     accel, gyro = float(noise[:3].max()), float(noise[3:].max())
-    if accel > NOISIEST_G or gyro > NOISIEST_DPS:
+    if accel > MAX_NOISE_G or gyro > MAX_NOISE_DPS:
         raise NotEnoughData(
             f"{serial}: the unit is never at rest in this recording: its quietest half seconds scatter by "
-            f"{accel:.2g} g and {gyro:.2g} deg/s (limit for rest: {NOISIEST_G:g} g and {NOISIEST_DPS:g} deg/s); "
+            f"{accel:.2g} g and {gyro:.2g} deg/s (limit for rest: {MAX_NOISE_G:g} g and {MAX_NOISE_DPS:g} deg/s); "
             "lay the unit down "
             "between turns for 2 s or more, in many poses"
         )
 
 
 def _spread(channels: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-    """Return the standard deviation in every window of so many readings, (n - size + 1, channels)."""
+    """Return the standard deviation in every window of `size` readings, (n - size + 1, channels)."""
     centred = channels - np.median(channels, axis=0)
     sums = np.concatenate([np.zeros((1, channels.shape[1])), np.cumsum(centred, axis=0)])
     squares = np.concatenate([np.zeros((1, channels.shape[1])), np.cumsum(centred**2, axis=0)])
@@ -155,16 +155,16 @@ def _spread(channels: NDArray[np.float64], size: int) -> NDArray[np.float64]:
 
 
 def _steps(channels: NDArray[np.float64]) -> Array:
-    """Return the scatter that rounding alone leaves of each channel, (channels,): its smallest step over sqrt(12)."""
+    """Return the standard deviation by rounding alone of each channel, (channels,): its step over sqrt(12)."""
     steps = [np.diff(np.unique(channel)) for channel in channels.T]
     return np.array([float(step.min()) / np.sqrt(12.0) if len(step) else 0.0 for step in steps])
 
 
 def _static_noise(spread: NDArray[np.float64], rounding: Array) -> Array:
-    """Return the static noise of each channel, (channels,): the median scatter of the windows that rest."""
-    noise = np.maximum(np.quantile(spread, QUIETEST, axis=0), rounding)
-    for _ in range(ROUNDS):
-        quiet = np.all(spread < FACTOR * noise, axis=1)
+    """Return the static noise of each channel, (channels,): its median standard deviation in windows at rest."""
+    noise = np.maximum(np.quantile(spread, QUIET_QUANTILE, axis=0), rounding)
+    for _ in range(MAX_ITERATIONS):
+        quiet = np.all(spread < REST_FACTOR * noise, axis=1)
         if not quiet.any():
             break
         noise = np.maximum(np.median(spread[quiet], axis=0), rounding)
@@ -187,7 +187,7 @@ def _union(quiet: NDArray[np.bool_], size: int, n: int) -> NDArray[np.bool_]:
 
 
 def _stretches(joined: NDArray[np.bool_], inside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return first reading and end of each stretch; one that goes on over a break begins anew there."""
+    """Return first reading and end of each stretch; a break divides a stretch."""
     before = np.concatenate([[False], inside[:-1]])
     begin = np.flatnonzero(inside & (~before | ~joined))
     after = np.concatenate([inside[1:] & joined[1:], [False]])
@@ -200,7 +200,7 @@ def _means(values: NDArray[np.float64], begin: NDArray[np.int64], end: NDArray[n
 
 
 def _turning(gyro_dps: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which rests turn steadily, (k,): their gyro means are far from those of most."""
+    """Return in which rests the unit turns steadily, (k,): by the deviation of their gyro means from the median."""
     away = np.abs(gyro_dps - np.median(gyro_dps, axis=0))
     usual = 1.4826 * np.median(away, axis=0)
     return np.asarray(np.any(away > TURNING_DPS + TURNING_DEVIATIONS * usual, axis=1))

@@ -97,9 +97,9 @@ class TemperatureLaw:
         force, inverse = self.forces(theta)
         pull = -np.einsum("ki,kij->kj", unit(force), inverse)
         nine = SizeLaw.columns(pull, force)
-        own = pull * force
+        per_scale = pull * force
         warmer = [pull * power[:, None] for power in self._powers(0).T] + [
-            own * power[:, None] for power in self._powers(1).T
+            per_scale * power[:, None] for power in self._powers(1).T
         ]
         return np.hstack([nine, *warmer])
 

@@ -150,10 +150,10 @@ def check_clipped(series: Series, repeated: Rows) -> Iterator[Marked]:
         step, noise = series.code_steps[name], series.noises[name]
         ends = []
         for sign in (1.0, -1.0):
-            turned = sign * values
-            top = float(turned.max())
-            at_end = turned >= top - 0.25 * step if step else turned == top
-            if _is_pile(turned[~repeated], at_end[~repeated], top, step, noise):
+            signed = sign * values
+            top = float(signed.max())
+            at_end = signed >= top - 0.25 * step if step else signed == top
+            if _is_pile(signed[~repeated], at_end[~repeated], top, step, noise):
                 ends.append((sign * top, at_end))
         if not ends:
             continue

@@ -23,20 +23,20 @@ from labctl.recording.sanity.readings.series import (
 DEG_PER_RAD = 180.0 / np.pi
 #: Factors of a range that was switched while the old scale was kept; a gain of any other size is no switch.
 RANGES = (2.0, 4.0, 8.0, 16.0)
-#: Level and noise agree with a factor within so many standard uncertainties, and disagree with none by so many.
+#: Limits in standard uncertainties: agreement of level and noise with a factor, and significance of their changes.
 AGREES, LEVEL_CHANGES, NOISE_CHANGES = 3.5, 6.0, 3.0
 #: Standard uncertainty of the logarithm of a noise of n readings, by third differences, times sqrt(n): they are
 #: correlated, the sum of the squares of their correlations is 2.31.
 U_LOG_NOISE = 1.1
-#: An output whose step is above so many noises shows neither.
+#: Largest resolution of an output, as a multiple of its noise; above it, level and noise are not known.
 COARSE = 1.5
-#: A level is known to this share of itself, and the slope of a drift changes by as much as it is beside.
+#: Relative standard uncertainty of a level, beside that of its readings and its drift.
 LEVEL_SHARE = 1e-3
 #: A sign changes at once: so many readings next to the row differ as the levels do, within this share. Smaller levels
 #: than so many noises may change theirs by drift.
 AT_ONCE, AT_ONCE_SHARE, LEVEL_NOISES = 3, 0.35, 3.0
-#: The noise of all readings after a row over that of all before it is the factor, within this, as a logarithm.
-LASTS = 0.4
+#: Largest difference of the logarithms of the factor and of the ratio of the noise after a row to that before it.
+MAX_LOG_DIFFERENCE = 0.4
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Change:
 def check_factors(series: Series) -> Iterator[Marked]:
     """Yield the outputs whose level and noise are both multiplied by one known factor from a row on."""
     if series.motion not in ("rest", "rates"):
-        return  # where the rate changes all the time no level is known beside a row
+        return  # while the rate changes, the level beside a row is not known
     by_change: dict[str, tuple[int, Change]] = {}
     for name, values in series.outputs.items():
         if series.code_steps[name] > COARSE * series.noises[name]:
@@ -68,16 +68,16 @@ def check_factors(series: Series) -> Iterator[Marked]:
 
 
 def _change(series: Series, values: Array, rows: Iterable[int]) -> Change | None:
-    """Return the surest change by a factor at one of some rows within the readings of a data set, (n,)."""
+    """Return the most significant change by a factor at one of some rows within the readings of a data set, (n,)."""
     factors = [DEG_PER_RAD, 1 / DEG_PER_RAD, *RANGES, *(1 / each for each in RANGES)]
     if series.motion == "rates":
-        factors.append(-1.0)  # at rest a unit that was turned over shows as much of the Earth's rate
+        factors.append(-1.0)  # at rest the reversal of a unit changes the sign of the Earth's rate too
     changes = [change for row in rows for change in _by_factors(values, row, factors)]
     return max(changes, key=lambda each: each.size, default=None)
 
 
 def _by_factors(values: Array, row: int, factors: Sequence[float]) -> Iterator[Change]:
-    """Yield the change at a row by each factor that level and noise beside it agree with, and not with none."""
+    """Yield the change at a row by each factor that both level and noise agree with, if they changed at all."""
     edges = edges_of(values, row)
     if edges is None:
         return
@@ -100,14 +100,16 @@ def _by_factors(values: Array, row: int, factors: Sequence[float]) -> Iterator[C
             above_noise = min(abs(level) for level in levels) > LEVEL_NOISES * max(noises)
             agrees = above_noise and _is_at_once(values, row, levels[1] - levels[0])
         else:
-            agrees = abs(ratio) >= NOISE_CHANGES * u_noise and _lasts(values, row, factor)
+            agrees = abs(ratio) >= NOISE_CHANGES * u_noise and _persists(values, row, factor)
         if agrees:
             yield Change(row, factor, size)
 
 
-def _lasts(values: Array, row: int, factor: float) -> bool:
+def _persists(values: Array, row: int, factor: float) -> bool:
     """Whether the noise of all readings after a row, of (n,), over that of all before it is a factor."""
-    return bool(abs(np.log(spread_of(values[row + GUARD :]) / spread_of(values[: row - GUARD]) / factor)) < LASTS)
+    return bool(
+        abs(np.log(spread_of(values[row + GUARD :]) / spread_of(values[: row - GUARD]) / factor)) < MAX_LOG_DIFFERENCE
+    )
 
 
 def beside(values: Array, row: int) -> tuple[Array, Array]:

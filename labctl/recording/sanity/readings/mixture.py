@@ -267,8 +267,8 @@ def _alternates(values: Array) -> bool:
     swing = np.diff(values)
     sign = np.where(np.arange(len(swing)) % 2, -1.0, 1.0)
     mean = float(np.median(sign * swing))
-    own = float(np.median(np.abs(values[2:] - values[:-2]))) * ROBUST / np.sqrt(2)
-    if abs(mean) <= BY_TURNS * max(own, 1e-300):
+    spread = float(np.median(np.abs(values[2:] - values[:-2]))) * ROBUST / np.sqrt(2)
+    if abs(mean) <= BY_TURNS * max(spread, 1e-300):
         return False
     blocks = [float(np.median(block)) for block in np.array_split(sign * swing, STEADY_BLOCKS)]
     return float(np.ptp(blocks)) < 2 * STEADY * abs(mean)

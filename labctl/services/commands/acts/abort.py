@@ -61,9 +61,11 @@ def _in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> Camp
     return abort_abandoned(context.store, asked.campaign, asked.body.text, context.now())
 
 
+#: Its command of the command line is written by hand: it stops the bench before it loads what declares the acts.
 ABORT = CampaignAct(
     name="abort",
     body=ReasonRequest,
+    asked=Asked,
     summary="End a campaign",
     description="""End a running campaign now, in the safe state. The data measured so far are stored.
 

@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 from labctl.answers.base import Request
 from labctl.answers.campaigns import CampaignResponse
+from labctl.services.commands.acts.campaign_command import CampaignCommand
 from labctl.services.commands.command import Command
 from labctl.services.commands.context import BenchAct
-from labctl.services.commands.requests import ToCampaign
+from labctl.services.commands.requests import Addressed
 
-BodyT = TypeVar("BodyT", bound=Request)
+AskedT = TypeVar("AskedT", bound=Addressed)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CampaignAct(BenchAct[ToCampaign[BodyT], CampaignResponse]):
+class CampaignAct(BenchAct[AskedT, CampaignResponse], Generic[AskedT]):
     """An act on one campaign, which answers how the campaign is then."""
 
-    body: type[BodyT]  #: of the request
+    body: type[Request]  #: of the request
+    asked: Callable[..., AskedT]  #: the request with its address: of `campaign`, `body` and fields of its own
     summary: str  #: in the description of the API
     description: str
-    command_help: str = ""  #: of its command, which is made from the request; empty: that is written by hand
-    command_defaults: Mapping[str, object] = field(default_factory=dict)  #: option -> default, on the command line only
+    command_line: CampaignCommand | None = None  #: None: its command is written by hand
     is_urgent: bool = False  #: over HTTP it has threads that other requests cannot fill
 
     @cached_property
-    def command(self) -> Command[ToCampaign[BodyT], CampaignResponse]:
+    def command(self) -> Command[AskedT, CampaignResponse]:
         """Its command, whose path ends with the name of the act."""
         return Command(
             method="POST",

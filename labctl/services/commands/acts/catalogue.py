@@ -15,7 +15,7 @@ from labctl.services.commands.acts.start import SCHEDULE, START
 from labctl.services.commands.context import BenchAct
 
 #: Acts on one campaign, in the order of the API's description.
-CAMPAIGN_ACTS: tuple[CampaignAct[Any], ...] = (ABORT, PAUSE, CONFIRM)
-_ALL: tuple[BenchAct[Any, Any], ...] = (START, SCHEDULE, RESUME, *CAMPAIGN_ACTS, CHECK, START_LIVE_ACT, END_LIVE_ACT)
+CAMPAIGN_ACTS: tuple[CampaignAct[Any], ...] = (ABORT, PAUSE, CONFIRM, RESUME)
+_ALL: tuple[BenchAct[Any, Any], ...] = (START, SCHEDULE, *CAMPAIGN_ACTS, CHECK, START_LIVE_ACT, END_LIVE_ACT)
 #: All of them by name.
 BENCH_ACTS: dict[str, BenchAct[Any, Any]] = {act.name: act for act in _ALL}

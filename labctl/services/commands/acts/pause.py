@@ -5,6 +5,7 @@ from __future__ import annotations
 from labctl.answers.campaigns import CampaignResponse, ReasonRequest
 from labctl.services.campaigns.unattended import not_running
 from labctl.services.commands.acts.campaign_act import CampaignAct
+from labctl.services.commands.acts.campaign_command import CampaignCommand
 from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
 
@@ -27,11 +28,14 @@ def _in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> Camp
 PAUSE = CampaignAct(
     name="pause",
     body=ReasonRequest,
+    asked=Asked,
     summary="Hold a campaign",
     description="Hold after the present data set. `wish` says that it was asked; `state` becomes `paused` when it "
     "holds.",
-    command_help="Pause a running campaign after the present data set; the bench is still monitored.",
-    command_defaults={"reason": "paused from the command line"},
+    command_line=CampaignCommand(
+        help="Pause a running campaign after the present data set; the bench is still monitored.",
+        defaults={"reason": "paused from the command line"},
+    ),
     in_service=_in_service,
     in_foreground=_in_foreground,
     is_urgent=True,

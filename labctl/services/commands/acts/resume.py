@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from labctl.answers.campaigns import CampaignResponse
+from labctl.answers.campaigns import CampaignResponse, ResumeRequest
 from labctl.errors import Conflict
-from labctl.services.commands.command import Command
-from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
+from labctl.services.commands.acts.campaign_act import CampaignAct
+from labctl.services.commands.acts.campaign_command import CampaignCommand, CommandOption
+from labctl.services.commands.context import OPENS_BENCH_S, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import CampaignResume
 
 
@@ -24,10 +25,36 @@ def _in_foreground(control: Foreground, _: CommandContext, asked: CampaignResume
     return control.resume_campaign(asked)
 
 
-RESUME = BenchAct(name="resume", in_service=_in_service, in_foreground=_in_foreground, wait_s=OPENS_BENCH_S)
-RESUME_CAMPAIGN = Command(
-    method="POST",
-    path="/api/campaigns/{campaign}/resume",
-    handler=RESUME.execute,
-    responses={200: CampaignResponse},
+CAMPAIGN = CommandOption(
+    name="campaign",
+    kind=int | None,
+    metavar="ID",
+    is_argument=True,
+    default=None,
+    help="Number of the campaign; default: the newest interrupted campaign.",
+)
+POWER = CommandOption(
+    name="power",
+    kind=str | None,
+    metavar="lost|kept",
+    default=None,
+    help="Whether the units lost power during the interruption; default: lost if this computer was restarted since "
+    "then, else kept.",
+)
+DESCRIPTION = "Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first."
+RESUME = CampaignAct(
+    name="resume",
+    body=ResumeRequest,
+    asked=CampaignResume,
+    summary="Resume a campaign",
+    description=DESCRIPTION,
+    in_service=_in_service,
+    in_foreground=_in_foreground,
+    wait_s=OPENS_BENCH_S,
+    command_line=CampaignCommand(
+        help=DESCRIPTION,
+        options=(CAMPAIGN, "bench", POWER, "speed", "wire_log", "by"),
+        default_campaign="resumable",
+        runs_here=True,
+    ),
 )

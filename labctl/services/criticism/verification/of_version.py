@@ -77,7 +77,7 @@ def _number(axis: AxisCoefficients | None) -> int:
 def judged(
     errors: Mapping[str, Array],
     expected_dps: float | None,
-    own: Mapping[str, OwnError],
+    by_axis: Mapping[str, OwnError],
     groups: int,
     mounted_dps: Mapping[str, float] | None = None,
 ) -> dict[str, AxisVerification]:
@@ -86,14 +86,14 @@ def judged(
     `groups` is the number of parts of the recording whose errors are independent of each other; `mounted_dps`, by axis,
     what its mountings add, which are not those of the fit.
     """
-    pooled = math.sqrt(sum(own[axis].rms_dps ** 2 for axis in errors) / len(errors)) if own else 0.0
+    pooled = math.sqrt(sum(by_axis[axis].rms_dps ** 2 for axis in errors) / len(errors)) if by_axis else 0.0
     verifications = {}
     for axis, values in errors.items():
         size, expected, limit = rms(values), None, None
         if expected_dps is not None:
-            expected = expected_dps * own[axis].rms_dps / pooled if own else expected_dps
+            expected = expected_dps * by_axis[axis].rms_dps / pooled if by_axis else expected_dps
             expected = math.hypot(expected, (mounted_dps or {}).get(axis, 0.0))
-            limit = expected * largest_ratio(len(errors), groups, own[axis].freedom if own else None)
+            limit = expected * largest_ratio(len(errors), groups, by_axis[axis].freedom if by_axis else None)
         verifications[axis] = AxisVerification(
             rms_dps=size, max_dps=float(np.max(np.abs(values))), bias_dps=float(np.mean(values)),
             expected_dps=expected, limit_dps=limit, ok=None if limit is None else size <= limit,
@@ -185,8 +185,10 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
     Raises BadInput, NotEnoughData as `left_by`.
     """
     errors_left, expected = left_by(store, row, measured), expected_dps(row)
-    own = _own_errors(store, row, measured, errors_left) if expected is not None and len(errors_left.errors) > 1 else {}
-    axes = judged(errors_left.errors, expected, own, errors_left.groups, errors_left.mounted_dps)
+    by_axis = (
+        _own_errors(store, row, measured, errors_left) if expected is not None and len(errors_left.errors) > 1 else {}
+    )
+    axes = judged(errors_left.errors, expected, by_axis, errors_left.groups, errors_left.mounted_dps)
     return VerificationResponse(
         serial=row.serial,
         version=row.version,
@@ -221,11 +223,15 @@ def left_by(store: Store, row: CalibrationRecord, measured: Measurements) -> Lef
         return Left(pooled, errors, outside, is_part=False, groups=1)
     aside = verification_part(measured.points)
     points = measured.points if aside is None else aside
-    own = measured.row.id in row.recordings
-    angles = mounting_angles_of(calibration, anew=aside is not None) if own else None
+    is_fitted = measured.row.id in row.recordings
+    angles = mounting_angles_of(calibration, anew=aside is not None) if is_fitted else None
     errors, outside = applied_errors(calibration, points, angles_rad=angles)
     pooled = np.concatenate(list(errors.values()))
-    mounted = _mounted_dps(calibration, fit_data_of(points), own=own) if aside is not None or not own else {}
+    mounted = (
+        _mounted_dps(calibration, fit_data_of(points), is_fitted=is_fitted)
+        if aside is not None or not is_fitted
+        else {}
+    )
     return Left(pooled, errors, outside, aside is not None, independent_groups(points), mounted)
 
 
@@ -285,14 +291,14 @@ def applied_errors(
     return errors, corrected.outside
 
 
-def _mounted_dps(calibration: Calibration, data: FitData, *, own: bool) -> dict[str, float]:
+def _mounted_dps(calibration: Calibration, data: FitData, *, is_fitted: bool) -> dict[str, float]:
     """Return axis -> what mountings that are not those of the fit add to its errors, root mean square, deg/s.
 
     The unit was placed anew. On another day the angles of fixture and table are in the errors of a version that is
     free of them.
     """
     standards = () if calibration.bench is None else calibration.bench.standards
-    of_bench = not own and bool(mounting_angles_of(calibration))
+    of_bench = not is_fitted and bool(mounting_angles_of(calibration))
     u_rad = stated_rad(standards, ANGLE_QUANTITIES) if of_bench else placed_rad(standards)
     table_dps = data.channels.table_rate_dps()
     across = {axis: np.where(data.channels.up(axis) == 0, table_dps, 0.0) for axis in calibration.axes}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import tempfile
+from datetime import UTC, datetime
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ from labctl.services.campaigns.resume import prepare_resume, resume_here
 from labctl.services.planning.loading import load_bench
 from labctl.store import CampaignRow, Store, open_store
 from labctl.store.connection.database import Database
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.control import Control
 from studies import crash_recovery, faults
 from studies.crashable_process import all_readings, complete_data_sets
@@ -214,10 +215,14 @@ def test_another_release_of_a_driver_is_stated_when_a_campaign_is_resumed() -> N
     bench = load_bench("single-axis-sim")
     record = bench.model_dump(mode="json")
     record["drivers"]["fog"] |= {"distribution": "acme-fog", "version": "0.1"}
-    row = cast(CampaignRow, SimpleNamespace(bench=record))
+
+    def row() -> CampaignRow:
+        at, state = datetime(2026, 3, 2, tzinfo=UTC), CampaignState.INTERRUPTED
+        return CampaignRow(1, "short", {}, bench.name, dict(record), "", 0.0, state, "", at, at, None, {})
+
     now = bench.drivers["fog"]
-    assert resume._other_drivers(row, bench) == (
+    assert resume._other_drivers(row(), bench) == (
         f"; driver of fog: kvh-rd2100 of labctl {now.version} instead of kvh-rd2100 of acme-fog 0.1"
     )
     del record["drivers"]
-    assert resume._other_drivers(row, bench) == "", "a campaign of an earlier labctl"
+    assert resume._other_drivers(row(), bench) == "", "a campaign of an earlier labctl"

@@ -17,7 +17,6 @@ from instruments.standards import Standard
 from labctl.answers.calibrations import FitRequest
 from labctl.calibration import read_calibration
 from labctl.errors import Conflict
-from labctl.recording import RecordingInfo
 from labctl.services.benches.check import check_bench
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.uncertainty import coefficients_at
@@ -131,7 +130,7 @@ def test_a_campaign_records_what_the_register_predicts(store: Store) -> None:
     made = prepare(store, "short", bench(thermometer("T-2", due="2026-06-30")), VirtualClock(), clip=False)
     answer = run(store, made)
     (row,) = store.recordings.of_unit("FOG-0001")
-    recorded = {each.quantity: each for each in RecordingInfo.model_validate(row.info).standards}
+    recorded = {each.quantity: each for each in row.recording_info.standards}
     assert recorded["thermometer"].standard_u == pytest.approx(0.0447, abs=1e-3)
     assert recorded["thermometer"].value == pytest.approx(0.05, abs=1e-3)
     assert store.campaigns.get(answer.id).bench["standards"][0]["u"] == 0.02  # what the bench file said is kept
