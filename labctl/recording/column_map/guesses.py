@@ -26,6 +26,8 @@ SLOWEST_HZ, FASTEST_HZ = 0.5, 8192.0
 #: Units that the numbers of a clock may be in; a date comes first, since a clock since power-on is seldom as large.
 _DATES = ("epoch s", "epoch ms", "epoch us", "epoch ns", "filetime", "excel days", "datenum")
 _CLOCKS = (*_DATES, "s", "ms", "us", "ns")
+#: Units of dates that are asked for and never taken: seconds since 1904 are of LabVIEW, those since 1900 look the same.
+_ASKED = ("epoch 1904 s",)
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,17 @@ def time_unit(values: Array, temperature_c: Array | None = None) -> Guess:
     possible = [name for name in _CLOCKS if _is_possible(name, values, step, temperature_c)]
     dates = [name for name in possible if name in _DATES]
     if dates:
-        unit = _unit(dates[0])
-        at = np.datetime64(0, "s") + np.timedelta64(int(float(values[0]) * unit.factor + unit.zero), "s")
-        return Guess(dates[0], f"{values[0]:.0f} is {at} UTC, and {_rate(step, dates[0])}")
+        return Guess(dates[0], f"{values[0]:.0f} is {_date(values, dates[0])}, and {_rate(step, dates[0])}")
+    if asked := [name for name in _ASKED if _is_possible(name, values, step, temperature_c)]:
+        return Guess("", f"in {asked[0]}, of LabVIEW, it would begin {_date(values, asked[0])}")
     if len(possible) == 1:
         return Guess(possible[0], f"steps of {step:.6g} are {_rate(step, possible[0])}")
     return Guess("", "; or ".join(f"in {name} it is {_rate(step, name)}" for name in possible))
+
+
+def _date(values: Array, name: str) -> str:
+    unit = _unit(name)
+    return f"{np.datetime64(0, 's') + np.timedelta64(int(float(values[0]) * unit.factor + unit.zero), 's')} UTC"
 
 
 def _is_possible(name: str, values: Array, step: float, temperature_c: Array | None) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections import defaultdict
 from dataclasses import replace
 
@@ -59,11 +60,15 @@ def seen_as_time(table: RawTable) -> str:
     """Return in words which column of a file looks like one of time and is none, in brackets; empty for no such."""
     for name, column in table.columns.items():
         if name_says(name).target == "t_s" and column.words is not None and len(column.words):
-            first = str(column.words[0])[:40]
+            first = next((word[:40] for word in column.words.tolist() if not _is_number(word)), "")
             return f" (column {name[:40]!r} holds texts such as {first!r}; expected {EXPECTED})"
         if COUNTERS.fullmatch(folded(name)) and column.is_number and bool((np.diff(column.values) == 1).all()):
             return f" (column {name[:40]!r} counts the readings, at a rate that the file does not state)"
     return ""
+
+
+def _is_number(word: str) -> bool:
+    return re.fullmatch(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?", word.strip()) is not None
 
 
 def without_headers(raw_columns: dict[str, RawColumn], problems: Problems) -> dict[str, RawColumn]:

@@ -27,6 +27,9 @@ SHORTEST_STEP_S, LONGEST_STEP_S = 1.0 / FASTEST_HZ, 86_400.0
 RATE_WITHIN = 0.02
 #: Counters that begin again, bits.
 _COUNTERS = (16, 24, 32)
+#: Clocks that begin again, s, and the steps within which the readings go on.
+_PERIODS_S = {86_400.0: "day", 604_800.0: "week"}
+_NEXT_STEPS = 3.0
 
 
 @dataclass(frozen=True)
@@ -157,6 +160,12 @@ def _refuse_backwards(column: RawColumn, raw: Array, t_s: Array, problems: Probl
 
 def _advice_on_order(t_s: Array) -> str:
     """Return what to do with times, (n,) s, that do not rise: a clock that was set back needs another remedy."""
+    falls = np.flatnonzero(np.diff(t_s) <= 0) + 1
+    usual = float(np.median(np.diff(t_s)))
+    for period_s, name in _PERIODS_S.items():
+        if len(falls) == 1 and abs(t_s[falls[0]] + period_s - t_s[falls[0] - 1]) < _NEXT_STEPS * usual:
+            row = int(falls[0]) + 1
+            return f"the time of {name} began again; add {period_s:g} s to the time stamps from row {row} on"
     series = Series(t_s - t_s[0], np.ones(len(t_s), dtype=np.int64), None, np.zeros(len(t_s), dtype=bool), {}, {}, {},
                     "rest")  # fmt: skip
     finding = next((marked.finding for marked in check_clock(series)), None) if np.isfinite(t_s).all() else None

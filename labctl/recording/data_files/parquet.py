@@ -91,8 +91,8 @@ def _read(path: Path, accept: Callable[[pa.Schema], None] | None, *, with_stamps
 
 
 def _nanoseconds(stamps: pa.Array) -> pa.Array:
-    """Return time stamps as whole ns since 1970, UTC; stamps without a zone as they are written."""
-    return stamps.cast(pa.timestamp("ns", stamps.type.tz)).cast(pa.int64())
+    """Return time stamps as ns since 1970, UTC, to 256 ns; stamps without a zone as they are written."""
+    return stamps.cast(pa.timestamp("ns", stamps.type.tz)).cast(pa.int64()).cast(pa.float64(), safe=False)
 
 
 def _refuse_large_footer(path: Path) -> None:
