@@ -23,7 +23,10 @@ _OF_DAY = re.compile(_CLOCK)
 _DAY = timedelta(days=1)
 #: Units of a column of dates -> whether the day comes before the month; None: as the dates show it.
 ORDERS: dict[str, bool | None] = {"date-time": None, "date-time d/m/y": True, "date-time m/d/y": False}
-EXPECTED = "dates such as 2026-01-05T08:00:00.250Z, 05/01/2026 08:00:00.250 or 5-Jan-2026 08:00:00, or times of day such as 08:00:00.250"
+EXPECTED = (
+    "dates such as 2026-01-05T08:00:00.250Z, 05/01/2026 08:00:00.250 or 5-Jan-2026 08:00:00, or times of day such as "
+    "08:00:00.250"
+)
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,9 @@ class Instants:
 
 def is_date(word: str) -> bool:
     """Whether a word is a date with a time, or a time of day."""
-    return bool(_ISO.match(word) or any(form.fullmatch(word) for form in (_YEAR_FIRST, _YEAR_LAST, _NAMED_MONTH, _OF_DAY)))
+    return bool(
+        _ISO.match(word) or any(form.fullmatch(word) for form in (_YEAR_FIRST, _YEAR_LAST, _NAMED_MONTH, _OF_DAY))
+    )
 
 
 def instants(words: Sequence[str], unit: str) -> Instants:

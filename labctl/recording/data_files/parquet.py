@@ -55,7 +55,9 @@ def is_boolean(kind: pa.DataType) -> bool:
     return bool(pa.types.is_boolean(kind.value_type if pa.types.is_dictionary(kind) else kind))
 
 
-def _read(path: Path, accept: Callable[[pa.Schema], None] | None, *, with_stamps: bool) -> dict[str, NDArray[np.generic]]:
+def _read(
+    path: Path, accept: Callable[[pa.Schema], None] | None, *, with_stamps: bool
+) -> dict[str, NDArray[np.generic]]:
     _refuse_large_footer(path)
     with pq.ParquetFile(path, buffer_size=BUFFER_BYTES, pre_buffer=False) as opened:
         metadata, schema = opened.metadata, opened.schema_arrow
