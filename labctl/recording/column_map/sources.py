@@ -85,11 +85,13 @@ def without_headers(raw_columns: dict[str, RawColumn], problems: Problems) -> di
     )
     return {
         target: replace(
-            column, wrong=tuple(each for each in column.wrong if each[0] not in rows), n_wrong=column.n_wrong - len(rows),
+            column,
+            wrong=tuple(each for each in column.wrong if each[0] not in rows),
+            n_wrong=column.n_wrong - len(rows),
             values=_bridged(column.values, np.array(rows) - 1),
         )
         for target, column in raw_columns.items()
-    }  # fmt: skip
+    }
 
 
 def _bridged(values: NDArray[np.float64], at: NDArray[np.int64]) -> NDArray[np.float64]:

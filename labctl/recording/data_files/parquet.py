@@ -64,8 +64,7 @@ def _read(
     rows = metadata.num_rows
     checked_names(path, schema.names)
     for field in schema:
-        if not (with_stamps and pa.types.is_timestamp(field.type)):
-            _refuse_type(path, field)
+        _refuse_type(path, field, with_stamps=with_stamps)
     if accept is not None:
         accept(schema)
     refuse_too_many(path, rows, len(schema.names))
@@ -84,7 +83,7 @@ def _read(
         for group in range(metadata.num_row_groups):
             for piece in opened.iter_batches(PIECE_ROWS, row_groups=[group], use_threads=False):
                 for column, values in zip(columns, piece.columns, strict=True):
-                    column.add(_nanoseconds(values) if pa.types.is_timestamp(values.type) else values)
+                    column.add(_without_stamps(values))
     if any(column.rows != rows for column in columns):
         raise BadRecording(
             f"{path}: its footer states {rows} rows, but the file has {columns[0].rows}; write the file again"
@@ -92,8 +91,10 @@ def _read(
     return {column.name: column.whole() for column in columns}
 
 
-def _nanoseconds(stamps: pa.Array) -> pa.Array:
-    """Return time stamps as ns since 1970, UTC, to 256 ns; stamps without a zone as they are written."""
+def _without_stamps(stamps: pa.Array) -> pa.Array:
+    """Return time stamps as ns since 1970, UTC, to 256 ns, without a zone as they are written; other values as is."""
+    if not pa.types.is_timestamp(stamps.type):
+        return stamps
     return stamps.cast(pa.timestamp("ns", stamps.type.tz)).cast(pa.int64()).cast(pa.float64(), safe=False)
 
 
@@ -108,7 +109,9 @@ def _refuse_large_footer(path: Path) -> None:
         )
 
 
-def _refuse_type(path: Path, field: pa.Field) -> None:
+def _refuse_type(path: Path, field: pa.Field, *, with_stamps: bool) -> None:
+    if with_stamps and pa.types.is_timestamp(field.type):
+        return
     kind = field.type.value_type if pa.types.is_dictionary(field.type) else field.type
     number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
     if number or holds_words(kind) or pa.types.is_boolean(kind) or pa.types.is_null(kind):

@@ -203,7 +203,8 @@ def _whole_lines(stream: TextStream) -> Iterator[pa.Buffer]:
         left = text[end:]
         if len(left) > MAX_LINE_BYTES:
             raise BadRecording(
-                f"{stream.path}: a line has more than {MAX_LINE_BYTES >> 20} MiB; write one row of readings on each line"
+                f"{stream.path}: a line has more than {MAX_LINE_BYTES >> 20} MiB; write one row of readings on each "
+                "line"
             )
         if end:
             yield _copied(text[:end])
