@@ -71,7 +71,10 @@ def _is_possible(name: str, values: Array, step: float, temperature_c: Array | N
     low, high = EPOCH_S if unit.is_epoch else (-LONGEST_UPTIME_S, LONGEST_UPTIME_S)
     if not low <= first_s <= high:
         return False
-    return temperature_c is None or not too_steep((values - values[0]) * unit.factor, temperature_c)
+    if temperature_c is None:
+        return True
+    passed = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(values)))])  # of a clock that was set back too
+    return not too_steep(passed * unit.factor, temperature_c)
 
 
 def usual_step(values: Array) -> float:
