@@ -320,10 +320,8 @@ def test_a_measured_rate_goes_before_the_commanded_one(order: tuple[str, str], t
     columns = np.column_stack([ROWS[:, 0], *(both[each] for each in order), ROWS[:, 3] + rates, ROWS[:, 4]])
     header = ["t [s]", *(f"{each} [deg/s]" for each in order), "gyro_z [deg/s]", "temp [degC]"]
     path = text(lines([header], columns.round(6).tolist()))(tmp_path)
-    recording = log_with_map(path, None, {}, None).recording
-    np.testing.assert_allclose(
-        np.asarray(recording.columns["table_rate_dps"], dtype=np.float64), 1.001 * rates, rtol=0, atol=1e-6
-    )
+    taken = np.asarray(log_with_map(path, None, {}, None).recording.columns["table_rate_dps"], dtype=np.float64)
+    assert taken == pytest.approx(1.001 * rates, abs=1e-6)
 
 
 def test_only_the_calling_thread_reads_a_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
