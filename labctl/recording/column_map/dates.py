@@ -12,14 +12,21 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 _CLOCK = r"(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d)(?:[.,](?P<f>\d{1,9}))?)?\s*(?P<half>[AaPp][Mm])?"
-_ISO = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d")
+_ISO = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d|\d{8}T\d{4}")
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_NAMED_MONTH = re.compile(
+    rf"(?P<a>\d{{1,2}})[ -](?P<b>{'|'.join(_MONTHS)})[a-z]*[ -](?P<y>\d{{4}}),?[ T]+{_CLOCK}", re.IGNORECASE
+)
 _YEAR_FIRST = re.compile(rf"(?P<y>\d{{4}})[/.](?P<a>\d{{1,2}})[/.](?P<b>\d{{1,2}})[ T]+{_CLOCK}")
 _YEAR_LAST = re.compile(rf"(?P<a>\d{{1,2}})(?P<sep>[/.-])(?P<b>\d{{1,2}})[/.-](?P<y>\d{{4}}),?[ T]+{_CLOCK}")
 _OF_DAY = re.compile(_CLOCK)
 _DAY = timedelta(days=1)
 #: Units of a column of dates -> whether the day comes before the month; None: as the dates show it.
 ORDERS: dict[str, bool | None] = {"date-time": None, "date-time d/m/y": True, "date-time m/d/y": False}
-EXPECTED = "dates such as 2026-01-05T08:00:00.250Z or 05/01/2026 08:00:00.250, or times of day such as 08:00:00.250"
+EXPECTED = (
+    "dates such as 2026-01-05T08:00:00.250Z, 05/01/2026 08:00:00.250 or 5-Jan-2026 08:00:00, or times of day such as "
+    "08:00:00.250"
+)
 
 
 @dataclass(frozen=True)
@@ -32,7 +39,9 @@ class Instants:
 
 def is_date(word: str) -> bool:
     """Whether a word is a date with a time, or a time of day."""
-    return bool(_ISO.match(word) or any(form.fullmatch(word) for form in (_YEAR_FIRST, _YEAR_LAST, _OF_DAY)))
+    return bool(
+        _ISO.match(word) or any(form.fullmatch(word) for form in (_YEAR_FIRST, _YEAR_LAST, _NAMED_MONTH, _OF_DAY))
+    )
 
 
 def instants(words: Sequence[str], unit: str) -> Instants:
@@ -47,6 +56,8 @@ def instants(words: Sequence[str], unit: str) -> Instants:
         return _times_of_day(words)
     if _YEAR_FIRST.fullmatch(first):
         return _since_first([_parts(word, _YEAR_FIRST, day_first=False) for word in words])
+    if _NAMED_MONTH.fullmatch(first):
+        return _since_first([_parts(word, _NAMED_MONTH, day_first=True) for word in words])
     stated = ORDERS.get(unit)
     day_first = _day_first(words) if stated is None else stated
     return _since_first([_parts(word, _YEAR_LAST, day_first=day_first) for word in words])
@@ -77,7 +88,8 @@ def _parts(word: str, form: re.Pattern[str], *, day_first: bool) -> datetime:
     match = form.fullmatch(word)
     if match is None:
         raise ValueError(f"{word[:40]!r} is no date like the others")
-    a, b = int(match["a"]), int(match["b"])
+    a = int(match["a"])
+    b = int(match["b"]) if match["b"].isdigit() else _MONTHS.index(match["b"][:3].lower()) + 1
     month, day = (b, a) if day_first else (a, b)
     try:
         return datetime(int(match["y"]), month, day) + _clock(match)  # noqa: DTZ001  as the file has it, UTC

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.column_map.implied import EPOCH_S, too_steep
-from labctl.recording.column_map.units import STANDARD_GRAVITY, find_unit
+from labctl.recording.column_map.implied import EPOCH_S, LONGEST_UPTIME_S, too_steep
+from labctl.recording.column_map.units import STANDARD_GRAVITY, Unit, find_unit
 
 Array = NDArray[np.float64]
 #: Words per g of common accelerometers: powers of two, by the range that is set.
@@ -24,7 +24,10 @@ _NO_FAHRENHEIT = 55.0
 #: Readings per second that a log has where its unit of time is not stated.
 SLOWEST_HZ, FASTEST_HZ = 0.5, 8192.0
 #: Units that the numbers of a clock may be in; a date comes first, since a clock since power-on is seldom as large.
-_CLOCKS = ("epoch s", "epoch ms", "epoch us", "epoch ns", "s", "ms", "us", "ns")
+_DATES = ("epoch s", "epoch ms", "epoch us", "epoch ns", "filetime", "excel days", "datenum")
+_CLOCKS = (*_DATES, "s", "ms", "us", "ns")
+#: Units of dates that are asked for and never taken: seconds since 1904 are of LabVIEW, those since 1900 look the same.
+_ASKED = ("epoch 1904 s",)
 
 
 @dataclass(frozen=True)
@@ -43,37 +46,54 @@ def time_unit(values: Array, temperature_c: Array | None = None) -> Guess:
     steps = np.diff(values)
     if not len(steps):
         return Guess()
-    step = float(np.median(steps))
+    step = usual_step(values)
     possible = [name for name in _CLOCKS if _is_possible(name, values, step, temperature_c)]
-    dates = [name for name in possible if name.startswith("epoch")]
+    dates = [name for name in possible if name in _DATES]
     if dates:
-        unit = find_unit("s", dates[0])
-        assert unit is not None
-        at = np.datetime64(0, "s") + np.timedelta64(int(float(values[0]) * unit.factor), "s")
-        return Guess(dates[0], f"{values[0]:.0f} is {at} UTC, and {_rate(step, dates[0])}")
+        return Guess(dates[0], f"{values[0]:.0f} is {_date(values, dates[0])}, and {_rate(step, dates[0])}")
+    if asked := [name for name in _ASKED if _is_possible(name, values, step, temperature_c)]:
+        return Guess("", f"in {asked[0]}, of LabVIEW, it would begin {_date(values, asked[0])}")
     if len(possible) == 1:
         return Guess(possible[0], f"steps of {step:.6g} are {_rate(step, possible[0])}")
     return Guess("", "; or ".join(f"in {name} it is {_rate(step, name)}" for name in possible))
 
 
+def _date(values: Array, name: str) -> str:
+    unit = _unit(name)
+    return f"{np.datetime64(0, 's') + np.timedelta64(int(float(values[0]) * unit.factor + unit.zero), 's')} UTC"
+
+
 def _is_possible(name: str, values: Array, step: float, temperature_c: Array | None) -> bool:
-    factor = _factor(name)
-    if not SLOWEST_HZ <= 1.0 / max(step * factor, 1e-12) <= FASTEST_HZ:
+    unit = _unit(name)
+    if not SLOWEST_HZ <= 1.0 / max(step * unit.factor, 1e-12) <= FASTEST_HZ:
         return False
-    is_date = EPOCH_S[0] <= float(values[0]) * factor <= EPOCH_S[1]
-    if name.startswith("epoch") != is_date:
+    first_s = float(values[0]) * unit.factor + unit.zero
+    low, high = EPOCH_S if unit.is_epoch else (-LONGEST_UPTIME_S, LONGEST_UPTIME_S)
+    if not low <= first_s <= high:
         return False
-    return temperature_c is None or not too_steep(values * factor, temperature_c)
+    if temperature_c is None:
+        return True
+    passed = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(values)))])  # of a clock that was set back too
+    return not too_steep(passed * unit.factor, temperature_c)
 
 
-def _factor(name: str) -> float:
+def usual_step(values: Array) -> float:
+    """Return the usual step of a clock, (n,); the mean one where most readings share their stamp with the one before.
+
+    Stamps of whole seconds have a median step of 0.
+    """
+    step = float(np.median(np.diff(values)))
+    return step if step != 0 else float(values[-1] - values[0]) / (len(values) - 1)
+
+
+def _unit(name: str) -> Unit:
     unit = find_unit("s", name)
     assert unit is not None  # of _CLOCKS
-    return unit.factor
+    return unit
 
 
 def _rate(step: float, name: str) -> str:
-    return f"{1.0 / (step * _factor(name)):.4g} readings a second"
+    return f"{1.0 / (step * _unit(name).factor):.4g} readings a second"
 
 
 def temperature_unit(values: Array) -> Guess:

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-#: Instants since 1970 that logs can be of: 2001 to 2100, s.
-EPOCH_S = (1e9, 4.2e9)
+#: Instants since 1970 that logs can be of: 2001 to 2060, s. Seconds since 1904, of LabVIEW, begin beyond.
+EPOCH_S = (1e9, 2.84e9)
+#: No clock that counts from power-on, in a unit that is only guessed, shows more than this: three years, s.
+LONGEST_UPTIME_S = 1e8
 #: The fastest outputs of gyros have 32,000 readings a second; a wrong prefix implies a thousand times as many.
 FASTEST_HZ = 50_000.0
 #: A thermal stream warms a part by some kelvin in a second, and no chamber does.

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from labctl.recording.column_map.units import QUANTITIES, find_unit, is_lsb, names_of_units, unit_of_target
 from labctl.recording.columns import BY_NAME
 
+#: The axis or index at the end of a name whose unit stands before it: `gyro_dps[0]`, `gyro_dps_x`.
+_AFTER_UNIT = re.compile(r"^(.+?)(\[[012]\]|[_. ][xyzXYZ])$")
 _BRACKETS = re.compile(r"^(.*?)[\s_.-]*[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 #: Units that stand at the end of a name without brackets, longest first; in place of a stroke also "_" or "_per_".
 _ENDINGS = tuple(
@@ -24,10 +26,18 @@ _AXIS = r"(?P<axis>[xyz])"
 _INDEX = {"0": "x", "1": "y", "2": "z"}
 _ANY = r"(?:.*[_ ])?"
 _RAW = r"[_ ]?(?:raw[_ ]?)?"
-_GYRO = "gyroscope|gyro|gyr|angularvelocity|angular velocity|angvel|angular rate|omega|rotationrate|rotation rate"
+_GYRO = (
+    "gyroscope|gyro|gyr|angularvelocity|angular velocity|angvel|angular rate|omega|rotationrate|rotation rate|drehrate|"
+    "winkelgeschwindigkeit"
+)
 _ACCEL = "accelerometer|acceleration|accel|acc|specific force|linear acceleration"
 _TABLE = "table|rig|turntable|stage"
-_TIME = "time ?stamp|time|clock|datetime|date|millis|micros|nanos|epoch|stamp|t|elapsed|uptime|seconds"
+_TIME = (
+    "time ?stamp|time|clock|datetime|date|millis|micros|nanos|epoch|stamp|t|elapsed|uptime|seconds|filetime|datenum|"
+    "i?tow|time of week|seconds of week|zeit|uhrzeit|zeitstempel|datum"
+)
+#: Axes of a vehicle's rates (ISO 8855, aviation): x forward, y across, z along the third.
+_VEHICLE = {"roll": "x", "pitch": "y", "yaw": "z"}
 
 #: Names, folded -> column of a recording; `{axis}` is the axis that the name has.
 _RULES: tuple[tuple[str, str], ...] = (
@@ -35,6 +45,7 @@ _RULES: tuple[tuple[str, str], ...] = (
     (rf"(?:g|w|imu g|imu w){_AXIS}", "gyro_{axis}"),
     (rf"{_AXIS}[_ ]?(?:gyroscope|gyro|gyr|omega|angular velocity|rate)", "gyro_{axis}"),
     (rf"rate[_ ]?{_AXIS}", "gyro_{axis}"),
+    *((rf"(?:(?:{_GYRO}|imu|body)[_ ])?{turn}[_ ]?rate", f"gyro_{axis}") for turn, axis in _VEHICLE.items()),
     (rf"{_ANY}(?:{_ACCEL}){_RAW}{_AXIS}", "accel_{axis}_g"),
     (rf"(?:a|f|imu a){_AXIS}", "accel_{axis}_g"),
     (rf"{_AXIS}[_ ]?(?:accelerometer|acceleration|accel|acc)", "accel_{axis}_g"),
@@ -43,11 +54,12 @@ _RULES: tuple[tuple[str, str], ...] = (
         rf"{_ANY}(?:{_TABLE}|reference|ref|true|commanded|cmd)[_ ](?:angular )?(?:rate|speed|velocity|omega)",
         "table_rate_dps",
     ),
+    (r"(?:rate|speed|omega)[_ ](?:command|commanded|cmd|demand|demanded|setpoint|set)", "table_rate_dps"),
     (rf"{_ANY}(?:{_TABLE}|encoder)[_ ](?:angle|position|pos)", "table_angle_deg"),
     (r"(?:turn|turned|turn angle|turned angle)", "turn_deg"),
     (r"(?:chamber|oven|ambient|air|env|environment)(?:[_ ](?:temperature|temp|t|air))?", "chamber_c"),
     (r"(?:chamber|oven)?[_ ]?(?:setpoint|set point)(?:[_ ](?:temperature|temp))?", "chamber_setpoint_c"),
-    (rf"{_ANY}(?:temperature|temp|thermometer)(?:[_ ](?:imu|gyro|die|raw|1))?", "temperature_c"),
+    (rf"{_ANY}(?:temperature|temp|thermometer|temperatur)(?:[_ ](?:imu|gyro|die|raw|1))?", "temperature_c"),
     (r"(?:d|die|imu|gyro|t)temp", "temperature_c"),
     (r"(?:supply|vcc|vdd|supply voltage|voltage)", "supply_v"),
     (rf"{_ANY}(?:{_TIME})(?:[_ ]?(?:utc|boot|sample|since boot))?", "t_s"),
@@ -92,6 +104,8 @@ def name_says(name: str) -> NameSays:
         return NameSays(stripped, "" if stripped.startswith("gyro_") else unit)
     for stem, unit in _divided(stripped):
         target = _target(stem)
+        if unit and not _is_unit_of(target, unit) and (by_unit := _by_unit(stem, unit)).target:
+            return by_unit
         if target and _is_unit_of(target, unit):
             return NameSays(target, unit or (_CLOCKS.get(folded(stem), "") if target == "t_s" else ""))
     brackets = _BRACKETS.match(stripped)
@@ -102,6 +116,16 @@ def name_says(name: str) -> NameSays:
         # of another quantity than the name says: T[C] is no time, and temp [V] no temperature yet
         return _by_unit(brackets[1], brackets[2])
     return NameSays(target, "")  # a unit that is not known is none
+
+
+def is_commanded(name: str) -> bool:
+    """Whether a name is of what an instrument was asked for, and not of what was measured."""
+    return re.search(r"\b(?:command|commanded|cmd|demand|demanded|setpoint|set|target)\b", folded(name)) is not None
+
+
+def is_second_choice(name: str) -> bool:
+    """Whether a column gives way to another of the same meaning: a rate that was asked for, or one of a vehicle."""
+    return is_commanded(name) or re.match(rf"(?:{'|'.join(_VEHICLE)})[_ ]?rate\b", folded(name)) is not None
 
 
 def is_unit(text: str) -> bool:
@@ -129,12 +153,20 @@ def _divided(name: str) -> list[tuple[str, str]]:
     pairs: list[tuple[str, str]] = []
     if (brackets := _BRACKETS.match(name)) is not None and brackets[2] not in _INDEX:
         pairs.append((brackets[1], _plain_unit(brackets[2])))
-    lower = name.lower()
+    pairs += _ended(name)
+    if (after := _AFTER_UNIT.match(name)) is not None:
+        pairs += [(stem + after[2], unit) for stem, unit in _ended(after[1])]
+    return [*pairs, (name, "")]
+
+
+def _ended(name: str) -> list[tuple[str, str]]:
+    """Return how a name divides into a stem and a unit at its end, the longest unit first."""
+    lower, pairs = name.lower(), []
     for ending in _ENDINGS:
         stem = name[: len(name) - len(ending)]
         if lower.endswith(ending) and stem and (stem[-1] in "_ .-/" or len(ending) > 3):
             pairs.append((stem.rstrip("_ .-/"), _plain_unit(ending)))
-    return [*pairs, (name, "")]
+    return pairs
 
 
 def _plain_unit(text: str) -> str:

@@ -22,7 +22,7 @@ from labctl.recording.column_map.model import (
     UnitKeys,
 )
 from labctl.recording.column_map.movement import Movement, movement
-from labctl.recording.column_map.names import COUNTERS, PARTS, NameSays, folded, in_unit, name_says
+from labctl.recording.column_map.names import COUNTERS, PARTS, NameSays, folded, in_unit, is_second_choice, name_says
 from labctl.recording.column_map.units import find_unit, is_lsb, unit_of_target
 from labctl.recording.columns import holds_flags
 from labctl.recording.raw_table import RawColumn, RawTable
@@ -114,7 +114,7 @@ def _by_names(table: RawTable, guesses: list[str], units_given: Units) -> dict[s
         keys = stated_units(says.target, units_given)
         unit = keys.unit if keys is not None else column.unit or says.unit
         held = columns.get(says.target)
-        if held is not None and (_has_unit(says.target, held) or not unit):
+        if held is not None and not _takes_its_place(name, unit, says.target, held):
             continue
         if keys is not None and column.is_number:
             columns[says.target] = MappedColumn.of(name)  # what was stated is filled in later
@@ -172,8 +172,12 @@ def _with_unit(
     return MappedColumn.of(name, "" if is_lsb(unit) else unit)
 
 
-def _has_unit(target: str, mapped: MappedColumn) -> bool:
-    return bool(mapped.unit) or not unit_of_target(target)
+def _takes_its_place(name: str, unit: str, target: str, held: MappedColumn) -> bool:
+    """Whether a column is one of a recording rather than the one held: with a unit, or the one that is surer meant."""
+    has_unit = bool(held.unit) or not unit_of_target(target)
+    if not is_second_choice(name) and is_second_choice(str(held.source)):
+        return bool(unit) or not has_unit
+    return bool(unit) and not has_unit
 
 
 def _dates(column: RawColumn) -> bool:

@@ -21,7 +21,7 @@ from labctl.recording.column_map.motion import free_motion, missing_columns, mot
 from labctl.recording.column_map.movement import Movement, movement
 from labctl.recording.column_map.problems import Problems, rows_text
 from labctl.recording.column_map.proposal import serial_of
-from labctl.recording.column_map.sources import refuse_wrong_cells, sources, unused
+from labctl.recording.column_map.sources import refuse_wrong_cells, seen_as_time, sources, unused, without_headers
 from labctl.recording.column_map.time_axis import TimeAxis, time_axis
 from labctl.recording.column_map.units import find_unit
 from labctl.recording.columns import BY_NAME, holds_flags
@@ -118,6 +118,7 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
             "no column is known to be the output of a gyro (it has "
             f"{', '.join(repr(name[:40]) for name in list(table.columns)[:20])}); write [columns.gyro_x], _y or _z"
         )
+    raw_columns = without_headers(raw_columns, problems)
     valid = raw_columns.get("valid")
     for target, column in raw_columns.items():
         if target == "t_s" and column.is_text and _is_date(column_map, column):
@@ -126,7 +127,7 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
             allowed = valid is not None and target.startswith("gyro_")
             allowed |= column_map.kind == "samples" and is_thermometer(target)  # these are filled in, or refused, below
             refuse_wrong_cells(column, target, problems, empty_allowed=allowed)
-    times = _times(column_map, raw_columns.get("t_s"), table.rows, problems)
+    times = _times(table, column_map, raw_columns.get("t_s"), problems)
     if column_map.kind == "points" and times is None and "t_s" not in column_map.columns:
         problems.lines = [line for line in problems.lines if not line.startswith("no column of time")]
         times = TimeAxis(np.arange(table.rows, dtype=np.float64), None)
@@ -137,10 +138,10 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
     return _assembled(table, column_map, usable, columns, times, problems)
 
 
-def _times(column_map: ColumnMap, column: RawColumn | None, rows: int, problems: Problems) -> TimeAxis | None:
+def _times(table: RawTable, column_map: ColumnMap, column: RawColumn | None, problems: Problems) -> TimeAxis | None:
     if column is not None and column.is_boolean:
         return None  # that is a problem already
-    return time_axis(column_map, column, rows, problems)
+    return time_axis(column_map, column, table.rows, problems, seen_as_time(table) if column is None else "")
 
 
 def _is_date(column_map: ColumnMap, column: RawColumn) -> bool:

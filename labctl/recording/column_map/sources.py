@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from labctl.recording.column_map.dates import EXPECTED
 from labctl.recording.column_map.model import ColumnMap
+from labctl.recording.column_map.names import COUNTERS, folded, name_says
 from labctl.recording.column_map.problems import Problems, rows_text
 from labctl.recording.columns import holds_flags
 from labctl.recording.raw_table import RawColumn, RawTable
@@ -49,6 +54,52 @@ def unused(table: RawTable, column_map: ColumnMap) -> list[str]:
     named += [column_map.datasets.column] if column_map.datasets.column is not None else []
     used = {column.name for each in named if (column := source(table, each)) is not None}
     return [name for name in table.columns if name not in used]
+
+
+def seen_as_time(table: RawTable) -> str:
+    """Return in words which column of a file looks like one of time and is none, in brackets; empty for no such."""
+    for name, column in table.columns.items():
+        if name_says(name).target == "t_s" and column.words is not None and len(column.words):
+            first = next((word[:40] for word in column.words.tolist() if not _is_number(word)), "")
+            return f" (column {name[:40]!r} holds texts such as {first!r}; expected {EXPECTED})"
+        if COUNTERS.fullmatch(folded(name)) and column.is_number and bool((np.diff(column.values) == 1).all()):
+            return f" (column {name[:40]!r} counts the readings, at a rate that the file does not state)"
+    return ""
+
+
+def _is_number(word: str) -> bool:
+    return re.fullmatch(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?", word.strip()) is not None
+
+
+def without_headers(raw_columns: dict[str, RawColumn], problems: Problems) -> dict[str, RawColumn]:
+    """Return columns without the cells that repeat their own name, which are one problem: a second file's header."""
+    repeated = [
+        {row for row, text in column.wrong if text.strip() == column.name.strip()} for column in raw_columns.values()
+    ]
+    rows = sorted(set.intersection(*repeated)) if repeated else []
+    if not rows:
+        return raw_columns
+    problems.add(
+        f"{rows_text(rows)}: the names of the columns again, as where logs were joined; import each part as a file of "
+        "its own, or leave these rows out"
+    )
+    return {
+        target: replace(
+            column,
+            wrong=tuple(each for each in column.wrong if each[0] not in rows),
+            n_wrong=column.n_wrong - len(rows),
+            values=_bridged(column.values, np.array(rows) - 1),
+        )
+        for target, column in raw_columns.items()
+    }
+
+
+def _bridged(values: NDArray[np.float64], at: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return (n,) values with those at some rows on a straight line between their neighbours."""
+    others = np.setdiff1d(np.arange(len(values)), at)
+    bridged = values.copy()
+    bridged[at] = np.interp(at, others, values[others])
+    return bridged
 
 
 def refuse_wrong_cells(column: RawColumn, target: str, problems: Problems, *, empty_allowed: bool) -> None:

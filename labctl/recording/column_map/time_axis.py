@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from labctl.recording.checks import LONGEST_RECORDING_S
 from labctl.recording.column_map.dates import EXPECTED, ORDERS, instants
-from labctl.recording.column_map.guesses import time_unit
+from labctl.recording.column_map.guesses import time_unit, usual_step
 from labctl.recording.column_map.implied import EPOCH_S, FASTEST_HZ
 from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.problems import Problems, rows_text
 from labctl.recording.column_map.stamps import Spread, spread_between, spread_packets
 from labctl.recording.column_map.units import Unit, find_unit, names_of
 from labctl.recording.raw_table import RawColumn
+from labctl.recording.sanity.readings.series import Series
+from labctl.recording.sanity.readings.time_stamps import check_clock
 
 Array = NDArray[np.float64]
 #: Usual steps of time that a log can have, s: 50,000 readings a second to once a day.
@@ -25,6 +27,9 @@ SHORTEST_STEP_S, LONGEST_STEP_S = 1.0 / FASTEST_HZ, 86_400.0
 RATE_WITHIN = 0.02
 #: Counters that begin again, bits.
 _COUNTERS = (16, 24, 32)
+#: Clocks that begin again, s, and the steps within which the readings go on.
+_PERIODS_S = {86_400.0: "day", 604_800.0: "week"}
+_NEXT_STEPS = 3.0
 
 
 @dataclass(frozen=True)
@@ -36,13 +41,19 @@ class TimeAxis:
     said: str = ""
 
 
-def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, problems: Problems) -> TimeAxis | None:
-    """Return the times of `rows` readings; None, and a problem, where they are not known."""
+def time_axis(
+    column_map: ColumnMap, column: RawColumn | None, rows: int, problems: Problems, seen: str = ""
+) -> TimeAxis | None:
+    """Return the times of `rows` readings; None, and a problem, where they are not known.
+
+    `seen` says in words which column of the file looks like one of time, and why it is none.
+    """
     if column is None:
         if column_map.sample_rate_hz is None:
             if "t_s" not in column_map.columns:
                 problems.add(
-                    "no column of time; write [columns.t_s] with from and unit, or sample_rate_hz = readings per second"
+                    f"no column of time{seen}; write [columns.t_s] with from and unit, or sample_rate_hz = readings "
+                    "per second"
                 )
             return None
         return TimeAxis(np.arange(rows) / column_map.sample_rate_hz, None)
@@ -59,7 +70,7 @@ def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, proble
     values = column.values
     if mapped.wrap_bits is not None:
         values = np.unwrap(values, period=2.0**mapped.wrap_bits)
-    counted = values * unit.factor
+    counted = values * unit.factor + unit.zero
     started = None
     # a unit without "epoch" whose numbers count from 1970: no clock since power-on has run for 30 years
     if unit.is_epoch or (len(values) and EPOCH_S[0] <= counted[0] <= EPOCH_S[1]):
@@ -73,7 +84,7 @@ def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, proble
 
 def _unknown(column: RawColumn, rows: int) -> str:
     readable = rows > 1 and not column.is_text
-    step = float(np.median(np.diff(column.values))) if readable else float("nan")
+    step = usual_step(column.values) if readable else float("nan")
     implied = time_unit(column.values).why if readable else ""
     implied_text = f"; {implied}" if implied else ""
     location = "[units] or [columns.t_s] of the column map"
@@ -131,19 +142,37 @@ def _refuse_backwards(column: RawColumn, raw: Array, t_s: Array, problems: Probl
         advice = (
             f"a counter of {bits} bits that began again? write wrap_bits = {bits} in [columns.t_s]"
             if bits is not None
-            else "rows must be in the order of measurement, each later than the row before; sort the rows, or leave "
-            "these rows out"
+            else _advice_on_order(t_s)
         )
-        problems.add(
-            f"column {column.name!r} (time), {rows_text(wrong)}: {raw[row]:.12g} does not follow "
-            f"{raw[row - 1]:.12g}; {advice}"
+        before, after = (
+            (repr(str(column.words[each])[:40]) for each in (row - 1, row))
+            if column.words is not None
+            else (f"{raw[each]:.12g}" for each in (row - 1, row))
         )
+        problems.add(f"column {column.name!r} (time), {rows_text(wrong)}: {after} does not follow {before}; {advice}")
     elif len(steps) and t_s[-1] - t_s[0] > LONGEST_RECORDING_S:
         row = int(np.argmax(steps)) + 1
         problems.add(
             f"column {column.name!r} (time), row {row + 1}: {raw[row]:.12g} after {raw[row - 1]:.12g}; a recording "
             f"lasts at most {LONGEST_RECORDING_S:.9g} s; leave out rows with a damaged time, or check the column's unit"
         )
+
+
+def _advice_on_order(t_s: Array) -> str:
+    """Return what to do with times, (n,) s, that do not rise: a clock that was set back needs another remedy."""
+    falls = np.flatnonzero(np.diff(t_s) <= 0) + 1
+    usual = float(np.median(np.diff(t_s)))
+    for period_s, name in _PERIODS_S.items():
+        if len(falls) == 1 and abs(t_s[falls[0]] + period_s - t_s[falls[0] - 1]) < _NEXT_STEPS * usual:
+            row = int(falls[0]) + 1
+            return f"the time of {name} began again; add {period_s:g} s to the time stamps from row {row} on"
+    series = Series(t_s - t_s[0], np.ones(len(t_s), dtype=np.int64), None, np.zeros(len(t_s), dtype=bool), {}, {}, {},
+                    "rest")  # fmt: skip
+    finding = next((marked.finding for marked in check_clock(series)), None) if np.isfinite(t_s).all() else None
+    if finding is None:
+        return "rows must be in the order of measurement; sort the rows, or leave these rows out"
+    remedy = ", or `--leave-out time_back` does so at the import" if finding.may_leave_out else ""
+    return f"{finding.said}; {finding.do}{remedy}"
 
 
 def _refuse_impossible(

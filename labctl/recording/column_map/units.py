@@ -20,7 +20,7 @@ class Unit:
     factor: float = 1.0
     zero: float = 0.0
     aliases: tuple[str, ...] = ()
-    is_epoch: bool = False  #: a time since 1970-01-01T00:00:00Z
+    is_epoch: bool = False  #: a date: seconds since 1970-01-01T00:00:00Z = factor x value + zero
 
 
 _RATE = (
@@ -43,6 +43,10 @@ _TIME = (
     Unit("epoch ms", 1e-3, is_epoch=True, aliases=("epoch_ms", "unix ms")),
     Unit("epoch us", 1e-6, is_epoch=True, aliases=("epoch_us", "unix us")),
     Unit("epoch ns", 1e-9, is_epoch=True, aliases=("epoch_ns", "unix ns")),
+    Unit("filetime", 1e-7, -11_644_473_600.0, is_epoch=True, aliases=("windows filetime", "100 ns since 1601")),
+    Unit("excel days", 86_400.0, -25_569.0 * 86_400.0, is_epoch=True, aliases=("excel date", "serial date")),
+    Unit("datenum", 86_400.0, -719_529.0 * 86_400.0, is_epoch=True, aliases=("matlab datenum", "matlab days")),
+    Unit("epoch 1904 s", 1.0, -2_082_844_800.0, is_epoch=True, aliases=("labview s", "labview", "epoch_1904_s")),
     Unit("date-time", 1.0, is_epoch=True, aliases=("iso", "iso8601", "iso 8601", "datetime")),
     Unit("date-time d/m/y", 1.0, is_epoch=True, aliases=("d/m/y", "dd/mm/yyyy")),
     Unit("date-time m/d/y", 1.0, is_epoch=True, aliases=("m/d/y", "mm/dd/yyyy")),
@@ -83,6 +87,8 @@ QUANTITIES: dict[str, tuple[Unit, ...]] = {
 }  # fmt: skip
 #: A word of a converter, of any quantity; it needs its scale.
 LSB = "LSB"
+#: Signs that keyboards and fonts have in place of the degree sign: the ordinal and the ring above.
+_DEGREES = str.maketrans({"º": "°", "˚": "°"})
 _LSB = frozenset({"lsb", "count", "counts", "raw", "digit", "digits", "adc"})
 
 
@@ -125,4 +131,4 @@ def names_of(quantity: str) -> str:
 
 
 def _folded(text: str) -> str:
-    return re.sub(r"[\s]+", " ", text.strip().lower()).replace("deg ", "deg")
+    return re.sub(r"[\s]+", " ", text.strip().lower().translate(_DEGREES)).replace("deg ", "deg")

@@ -25,14 +25,17 @@ MAX_FOOTER_BYTES = 16 << 20
 MAGIC = b"PAR1"
 
 
-def read_parquet(path: Path, accept: Callable[[pa.Schema], None] | None = None) -> dict[str, NDArray[np.generic]]:
+def read_parquet(
+    path: Path, accept: Callable[[pa.Schema], None] | None = None, *, with_stamps: bool = False
+) -> dict[str, NDArray[np.generic]]:
     """Read a Parquet file into named columns; raises BadRecording naming file, column and row.
 
     Rows x columns and the size unpacked are compared with the limits by the footer alone, before a value is read.
-    `accept` is shown the types of the columns before that, and raises where they are not wanted.
+    `accept` is shown the types of the columns before that, and raises where they are not wanted. `with_stamps`: columns
+    of time stamps are read too, as ns since 1970.
     """
     with parsed_by_library(path, "Parquet file", "write or copy it again"):
-        return _read(path, accept)
+        return _read(path, accept, with_stamps=with_stamps)
 
 
 def refuse_booleans(path: Path, schema: pa.Schema) -> None:
@@ -52,14 +55,16 @@ def is_boolean(kind: pa.DataType) -> bool:
     return bool(pa.types.is_boolean(kind.value_type if pa.types.is_dictionary(kind) else kind))
 
 
-def _read(path: Path, accept: Callable[[pa.Schema], None] | None) -> dict[str, NDArray[np.generic]]:
+def _read(
+    path: Path, accept: Callable[[pa.Schema], None] | None, *, with_stamps: bool
+) -> dict[str, NDArray[np.generic]]:
     _refuse_large_footer(path)
     with pq.ParquetFile(path, buffer_size=BUFFER_BYTES, pre_buffer=False) as opened:
         metadata, schema = opened.metadata, opened.schema_arrow
     rows = metadata.num_rows
     checked_names(path, schema.names)
     for field in schema:
-        _refuse_type(path, field)
+        _refuse_type(path, field, with_stamps=with_stamps)
     if accept is not None:
         accept(schema)
     refuse_too_many(path, rows, len(schema.names))
@@ -78,12 +83,19 @@ def _read(path: Path, accept: Callable[[pa.Schema], None] | None) -> dict[str, N
         for group in range(metadata.num_row_groups):
             for piece in opened.iter_batches(PIECE_ROWS, row_groups=[group], use_threads=False):
                 for column, values in zip(columns, piece.columns, strict=True):
-                    column.add(values)
+                    column.add(_without_stamps(values))
     if any(column.rows != rows for column in columns):
         raise BadRecording(
             f"{path}: its footer states {rows} rows, but the file has {columns[0].rows}; write the file again"
         )
     return {column.name: column.whole() for column in columns}
+
+
+def _without_stamps(stamps: pa.Array) -> pa.Array:
+    """Return time stamps as ns since 1970, UTC, to 256 ns, without a zone as they are written; other values as is."""
+    if not pa.types.is_timestamp(stamps.type):
+        return stamps
+    return stamps.cast(pa.timestamp("ns", stamps.type.tz)).cast(pa.int64()).cast(pa.float64(), safe=False)
 
 
 def _refuse_large_footer(path: Path) -> None:
@@ -97,7 +109,9 @@ def _refuse_large_footer(path: Path) -> None:
         )
 
 
-def _refuse_type(path: Path, field: pa.Field) -> None:
+def _refuse_type(path: Path, field: pa.Field, *, with_stamps: bool) -> None:
+    if with_stamps and pa.types.is_timestamp(field.type):
+        return
     kind = field.type.value_type if pa.types.is_dictionary(field.type) else field.type
     number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
     if number or holds_words(kind) or pa.types.is_boolean(kind) or pa.types.is_null(kind):

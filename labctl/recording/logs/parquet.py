@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
@@ -33,13 +34,15 @@ def probe(path: Path) -> float:
 def read(path: Path, _: TableOptions) -> RawTable:
     """Return the table of a Parquet file; raises BadRecording naming file, column and row."""
     head_of(path)
-    booleans: list[str] = []
-    columns = read_parquet(path, lambda schema: booleans.extend(f.name for f in schema if is_boolean(f.type)))
+    types: dict[str, pa.DataType] = {}
+    columns = read_parquet(
+        path, lambda schema: types.update({each.name: each.type for each in schema}), with_stamps=True
+    )
     _refuse_damaged_values(path, columns)
     rows = len(next(iter(columns.values()), ()))
     return RawTable(
         path,
-        {name: _column(name, values, is_boolean=name in booleans) for name, values in columns.items()},
+        {name: _column(name, values, types[name]) for name, values in columns.items()},
         rows,
     )
 
@@ -84,10 +87,11 @@ def _zeroed(values: NDArray[np.generic]) -> tuple[int, int] | None:
     return (first, after) if len(np.unique(others)) > MIN_DISTINCT_SHARE * len(others) else None
 
 
-def _column(name: str, values: np.ndarray, *, is_boolean: bool) -> RawColumn:
+def _column(name: str, values: np.ndarray, kind: pa.DataType) -> RawColumn:
     if values.dtype.kind == "U":
         return RawColumn(name, np.full(len(values), np.nan), words=values.astype(np.str_))
-    return RawColumn(name, values.astype(np.float64), is_boolean=is_boolean)
+    unit = "epoch ns" if pa.types.is_timestamp(kind) else ""
+    return RawColumn(name, values.astype(np.float64), unit=unit, is_boolean=is_boolean(kind))
 
 
 IMPORTER = TableImporter("a Parquet file", probe, read, TableOptions)

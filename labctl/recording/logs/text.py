@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from labctl.recording.column_map.problems import rows_text
 from labctl.recording.data_files.last_line import cut_last_line
 from labctl.recording.data_files.limits import MAX_COLUMNS, refuse_too_many
 from labctl.recording.importer import TableImporter, TableOptions
-from labctl.recording.logs.encoding import TextStream
+from labctl.recording.logs.encoding import BLOCK_BYTES, TextStream
 from labctl.recording.logs.layout import layout_of, split
 from labctl.recording.logs.recognition import MAX_TEXT_BYTES, head_of, refuse_large, refuse_other
 from labctl.recording.raw_table import SHOWN_ROWS, FileLayout, RawColumn, RawTable
@@ -32,6 +32,7 @@ MAX_WRONG_CELLS = 20
 #: A column is of words where more than this share of its cells are no numbers.
 WORDS = 0.5
 LONGEST_WORD = 64
+MAX_LINE_BYTES = 1 << 20
 
 
 def column_of(name: str, pieces: Sequence[pa.Array], decimal: str, unit: str = "") -> RawColumn:
@@ -154,10 +155,16 @@ def _refuse_names(path: Path, names: list[str]) -> None:
 
 
 def _blocks(path: Path, layout: FileLayout, names: list[str]) -> tuple[list[Any], list[tuple[int, int]]]:
+    """Return the rows as batches, and the number (0: not known) and the width of each row of another width.
+
+    The threads of pyarrow get no object of Python: one that takes the interpreter's lock while it ends aborts it.
+    """
     ragged: list[tuple[int, int]] = []
+    blocks: list[Any] = []
+    before = rows = 0
 
     def wrong_width(row: Any) -> str:
-        ragged.append((0 if row.number is None else row.number - (layout.data - 1), row.actual_columns))
+        ragged.append((0 if row.number is None else before + row.number - skipped, row.actual_columns))
         return "skip"
 
     parse = pacsv.ParseOptions(
@@ -166,20 +173,49 @@ def _blocks(path: Path, layout: FileLayout, names: list[str]) -> tuple[list[Any]
     convert = pacsv.ConvertOptions(
         column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False, quoted_strings_can_be_null=False
     )
-    layout_options = pacsv.ReadOptions(column_names=names, skip_rows=layout.data - 1, use_threads=False)
-    blocks, rows = [], 0
+    skipped = layout.data - 1
     with closing(TextStream(path, layout.encoding, blanks=layout.separator == " ")) as stream:
-        try:
-            with pacsv.open_csv(stream, layout_options, parse, convert) as opened:
-                for block in opened:
-                    rows += block.num_rows
-                    refuse_too_many(path, rows, len(names))
-                    blocks.append(block)
-        except pa.ArrowInvalid as error:
-            raise BadRecording(
-                f"{path}: row {rows + 1} or later: {str(error).splitlines()[0][:200]}; correct it"
-            ) from error
+        for piece in _whole_lines(stream):
+            options = pacsv.ReadOptions(
+                column_names=names, skip_rows=skipped, use_threads=False, block_size=piece.size + 1
+            )
+            try:
+                read = pacsv.read_csv(pa.BufferReader(piece), options, parse, convert)
+            except pa.ArrowInvalid as error:
+                if "Empty CSV" in str(error):  # lines of the head, or blank ones
+                    continue
+                raise BadRecording(
+                    f"{path}: row {rows + 1} or later: {str(error).splitlines()[0][:200]}; correct it"
+                ) from error
+            blocks += read.to_batches()
+            rows += read.num_rows
+            refuse_too_many(path, rows, len(names))
+            before, skipped = rows + len(ragged), 0
     return blocks, ragged
+
+
+def _whole_lines(stream: TextStream) -> Iterator[pa.Buffer]:
+    """Yield a text in pieces of whole lines, each in memory of pyarrow's own."""
+    left = b""
+    while piece := stream.read(BLOCK_BYTES):
+        text = left + piece
+        end = max(text.rfind(b"\n"), text.rfind(b"\r")) + 1
+        left = text[end:]
+        if len(left) > MAX_LINE_BYTES:
+            raise BadRecording(
+                f"{stream.path}: a line has more than {MAX_LINE_BYTES >> 20} MiB; write one row of readings on each "
+                "line"
+            )
+        if end:
+            yield _copied(text[:end])
+    if left:
+        yield _copied(left)
+
+
+def _copied(text: bytes) -> pa.Buffer:
+    with pa.BufferOutputStream() as copy:
+        copy.write(text)
+        return copy.getvalue()
 
 
 def _ragged_lines(ragged: list[tuple[int, int]], width: int, layout: FileLayout) -> list[str]:

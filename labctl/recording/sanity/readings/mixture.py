@@ -36,6 +36,8 @@ APART_ALONE, ALONE_SHARE = 6.0, 0.1
 STEPS_USUAL = 6.0
 #: Within a drift: the readings next to the step show it as the means do, and no step leads back by this share of it.
 AT_ONCE, BACK_SHARE = (0.6, 1.7), 0.3
+#: The level at the beginning and that at the end of a data set differ by at least this share of a step that lasts.
+OUTER_SHARE = 0.25
 #: Readings change by turns between two devices where the difference is as steady as this, over so many blocks; a line
 #: at half the sampling rate swells and fades.
 STEADY, STEADY_BLOCKS = 0.2, 8
@@ -370,7 +372,9 @@ def _lasts(values: Array, row: int, noise: float, steps: Array) -> bool:
     if abs(step) <= 2.5 * noise:
         return False
     whole = float(np.median(values[row:]) - np.median(values[:row]))
-    if 0.5 < whole / step < 2.0:
+    # within a motion that ends, half of the readings on either side are not yet, or no longer, of it
+    outer = float(np.median(values[row + (len(values) - row) // 2 :]) - np.median(values[: max(row // 2, 1)]))
+    if 0.5 < whole / step < 2.0 and outer / step > OUTER_SHARE:
         return True
     # with a drift of the same size the medians differ by something else
     at_once = AT_ONCE[0] < step / noise / steps[row] < AT_ONCE[1]

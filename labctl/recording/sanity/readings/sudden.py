@@ -33,6 +33,8 @@ ALONE = 2.5
 MAX_SPIKE_SHARE = 0.02
 #: A rest is examined in blocks of this long, s, and at least so many readings, against the median of so many blocks.
 BLOCK_S, BLOCK_READINGS, LEVEL_BLOCKS = 0.5, 8, 601
+#: The median of such a block is near the level where the unit swings to and fro within it: then shorter blocks, s.
+SWING_BLOCK_S = 0.1
 #: A unit moves where a block's median is off by so many usual distances, and by this much, deg/s, in a record at rest.
 MOVED_NOISES, MOVED_DPS = 12.0, 0.02
 #: The same of a data set at rest on a table, whose output has the turns before it to follow.
@@ -115,14 +117,15 @@ def check_moved(series: Series) -> Iterator[Marked]:
     """Yield the outputs that leave their level while the unit is said to rest."""
     if not series.still.any():
         return
-    block = max(round(BLOCK_S / series.step_s), BLOCK_READINGS)
+    blocks = [max(round(each_s / series.step_s), BLOCK_READINGS) for each_s in (BLOCK_S, SWING_BLOCK_S)]
     for name, values in series.outputs.items():
         rows = np.zeros(len(values), dtype=bool)
         size = np.zeros(len(values))
         least = max(MOVED_DPS if series.motion == "rest" else MOVED_ON_TABLE_DPS, 2.5 * series.code_steps[name])
         for part in series.parts:
-            if series.still[part].all():
-                rows[part], size[part] = _moves(values[part], block, least, series.step_s, series.noises[name])
+            for block in blocks if series.still[part].all() else ():
+                if not rows[part].any():
+                    rows[part], size[part] = _moves(values[part], block, least, series.step_s, series.noises[name])
         n = int(rows.sum())
         if not n:
             continue

@@ -35,6 +35,9 @@ BEGIN = datetime(2026, 3, 14, 23, 59, 50, tzinfo=UTC)
         ("az_m_s2", "accel_z_g", 1 / 9.80665),
         ("mag_x_nT", "field_x_ut", 1e-3),
         ("vdd_mV", "supply_v", 1e-3),
+        ("gyro_dps[1]", "gyro_y", 1.0),
+        ("gyro_mdps_z", "gyro_z", 1e-3),
+        ("T_degF", "temperature_c", 5 / 9),
     ],
 )
 def test_a_name_says_its_unit(name: str, target: str, factor: float) -> None:

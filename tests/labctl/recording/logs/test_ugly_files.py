@@ -5,14 +5,18 @@ What "right" is comes from the numbers that the files were made of: times, rates
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from labctl.errors import LabctlError
 from labctl.recording.column_map import parse_map
+from labctl.recording.logs.encoding import TextStream
 from labctl.services.recordings.importers import log_with_map
 from tests.helpers import ugly_files as made
 from tests.helpers.ugly_files import EPOCH_S, UNITS, clock, dates, gz, lines, log, names, npz, numbers, text, truth, xz
@@ -57,6 +61,28 @@ CASES: dict[str, tuple[made.Maker, str, Right | str]] = {
     "seconds since 1970 with fractions": (log([f"{EPOCH_S + k / 100:.2f}" for k in range(1000)]), "", D),
     "a second a row, or a millisecond": (log(range(1000)), "", "in s it is 1 readings .* in ms it is 1000 readings"),
     "steps of 1000 of an unknown unit": (log(range(0, 1_000_000, 1000)), "", "no unit is given .*in ms .*in us"),
+    "whole seconds since 1970 without a unit": (log([EPOCH_S + k // 100 for k in range(1000)]), "", D),
+    "100 ns since 1601": (log([(EPOCH_S + 11_644_473_600) * 10**7 + k * 100_000 for k in range(1000)]), "", D),
+    "days of a spreadsheet": (
+        log([f"{EPOCH_S / 86400 + 25569 + k / 8_640_000:.12f}" for k in range(1000)]), "", Right(DATED, 1e-4),
+    ),
+    "days of datenum": (
+        log([f"{EPOCH_S / 86400 + 719529 + k / 8_640_000:.12f}" for k in range(1000)], stamp="datenum"), "",
+        Right(DATED, 1e-4),
+    ),
+    "seconds since 1904 without a unit": (
+        log([f"{EPOCH_S + 2_082_844_800 + k / 100:.2f}" for k in range(1000)]), "",
+        "in epoch 1904 s, of LabVIEW, it would begin 2024-01-25T08:00:00 UTC",
+    ),
+    "seconds since 1904 by the map": (
+        log([f"{EPOCH_S + 2_082_844_800 + k / 100:.2f}" for k in range(1000)]),
+        '[units]\ntime = { unit = "epoch 1904 s" }\n', D,
+    ),
+    "time of week": (log([f"{432_000 + k / 100:.2f}" for k in range(1000)], stamp="TOW"), "", R),
+    "time of week that begins again": (
+        log([f"{(604_795 + k / 100) % 604_800:.2f}" for k in range(1000)], stamp="TOW"), "",
+        "the time of week began again; add 604800 s to the time stamps from row 501 on",
+    ),
     # clocks with a unit that is right, or cannot be
     "unit in the name": (log(clock(1e6), "us"), "", R),
     "a name that is a unit": (log(clock(1e3), stamp="millis"), "", R),
@@ -103,6 +129,18 @@ CASES: dict[str, tuple[made.Maker, str, Right | str]] = {
         text(lines([["time", *names()[1:]]], numbers(dates("%Y-%m-%d %H:%M:%S"))[:330] +
                    numbers(dates("%Y-%m-%d %H:%M:%S"))[365:])), "", "readings share a stamp.*write sample_rate_hz",
     ),
+    "dates with the name of a month": (log(dates("%d-%b-%Y %H:%M:%S.%f"), stamp="time"), "", D),
+    "ISO dates without separators": (log(dates("%Y%m%dT%H%M%S.%f"), stamp="time"), "", D),
+    "years of two digits": (
+        log(dates("%d.%m.%y %H:%M:%S"), stamp="time"), "", "'time' holds texts such as '25.01.24 08:00:00'; expected",
+    ),
+    "a clock that was set back": (
+        log(clock(1e3, 9.0)[:500] + clock(1e3, 4.0)[500:], "ms"), "", "set back by 5 s at row 501.*; add 5 s to",
+    ),
+    "thousands": (
+        log([f"{k:,}" for k in clock(1e3)], "ms"), "", "no column of time .column 't .ms.' holds texts such as '1,000'",
+    ),
+    "a count of the readings": (log(range(1000), stamp="sample"), "", "column 'sample' counts the readings, at a rate"),
     "a date that is none": (log([*dates("%d/%m/%Y %H:%M:%S")[:-1], "31/02/2024 8:00:09"], stamp="time"), "", "out of"),
     # headers and texts
     "units in a second row": (text(lines([made.NAMES, UNITS], numbers())), "", R),
@@ -111,6 +149,21 @@ CASES: dict[str, tuple[made.Maker, str, Right | str]] = {
         text(lines([made.NAMES, ("ms", *UNITS[1:])], numbers(clock(1e3)))), "", R,
     ),
     "T[C]": (text(lines([["t", *names()[1:4], "T[C]"]], numbers())), "", R),
+    "T_degC": (text(lines([["t", *names()[1:4], "T_degC"]], numbers())), "", R),
+    "ordinals for degrees": (text(PLAIN.replace("deg/s", "º/s").replace("degC", "ºC")), "", R),
+    "German": (
+        text(lines([["Zeit (s)", *(f"Drehrate {axis} (°/s)" for axis in "XYZ"), "Temperatur (°C)"]], numbers())), "", R,
+    ),
+    "roll, pitch and yaw": (
+        text(lines([["t", "Roll rate [deg/s]", "Pitch rate [deg/s]", "Yaw rate [deg/s]", "T [C]"]], numbers())), "", R,
+    ),
+    "yaw beside z": (
+        text(lines([["yaw rate [deg/s]", *names()]], [["7", *row] for row in numbers()])), "", R,
+    ),
+    "the header again": (
+        text(lines([names()], [*numbers()[:500], names(), *numbers()[500:]])), "",
+        "row 501: the names of the columns again, as where logs were joined",
+    ),
     "latin-1 degrees": (text(PLAIN.replace("deg/s", "°/s").replace("degC", "°C"), encoding="latin-1"), "", R),
     "UTF-16": (text(PLAIN, encoding="utf-16"), "", R),
     "semicolons and decimal commas": (text(lines([names()], numbers(decimal=","), ";")), "", R),
@@ -169,6 +222,7 @@ CASES: dict[str, tuple[made.Maker, str, Right | str]] = {
         "a zip archive or a spreadsheet",
     ),
     "npz": (npz(**ARRAYS), UNIT_MAP, R),
+    "npz with units in the names": (npz(t_s=ROWS[:, 0], gyro_dps=ROWS[:, 1:4], temp_c=ROWS[:, 4]), "", R),
     "npz without the gyro's unit": (npz(time=ROWS[:, 0], gyro=ROWS[:, 1:4]), "", "for gyro_x: no unit is given"),
     "npz, outputs as rows": (npz(time=ROWS[:, 0], gyro=ROWS[:, 1:4].T, temperature=ROWS[:, 4]), UNIT_MAP, R),
     "npz with a field for each column": (
@@ -247,6 +301,53 @@ def test_read_right(kind: str, tmp_path: Path) -> None:
         )
     date = f"{info.measured_at:%Y-%m-%dT%H:%M:%S}" if info.measured_at is not None else ""
     assert date == expected.started
+
+
+@pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
+def test_time_stamps_of_parquet(zone: str | None, tmp_path: Path) -> None:
+    stamps = pa.array([(EPOCH_S * 1000 + 10 * k) for k in range(1000)], pa.timestamp("ms", zone))
+    table = pa.table({"timestamp": stamps, **{f"gyro_{a}_dps": ROWS[:, 1 + k] for k, a in enumerate("xyz")}})
+    pq.write_table(table, tmp_path / "log.parquet")
+    recording = log_with_map(tmp_path / "log.parquet", None, {}, None).recording
+    assert f"{recording.info.measured_at:%Y-%m-%dT%H:%M:%S}" == DATED
+    np.testing.assert_allclose(np.asarray(recording.columns["t_s"], dtype=np.float64), ROWS[:, 0], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("order", [("commanded rate", "table rate"), ("table rate", "rate_cmd")])
+def test_a_measured_rate_goes_before_the_commanded_one(order: tuple[str, str], tmp_path: Path) -> None:
+    rates = np.repeat([0.0, 20.0, -20.0, 40.0], 250)
+    both = {"table rate": 1.001 * rates, "commanded rate": rates, "rate_cmd": rates}
+    columns = np.column_stack([ROWS[:, 0], *(both[each] for each in order), ROWS[:, 3] + rates, ROWS[:, 4]])
+    header = ["t [s]", *(f"{each} [deg/s]" for each in order), "gyro_z [deg/s]", "temp [degC]"]
+    path = text(lines([header], columns.round(6).tolist()))(tmp_path)
+    taken = np.asarray(log_with_map(path, None, {}, None).recording.columns["table_rate_dps"], dtype=np.float64)
+    assert taken == pytest.approx(1.001 * rates, abs=1e-6)
+
+
+def test_only_the_calling_thread_reads_a_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    readers = set()
+    read = TextStream.read
+
+    def seen(stream: TextStream, size: int = -1) -> bytes:
+        readers.add(threading.current_thread())
+        return read(stream, size)
+
+    monkeypatch.setattr(TextStream, "read", seen)
+    assert log_with_map(text(PLAIN)(tmp_path), None, {}, None).recording
+    assert readers == {threading.main_thread()}  # a thread that takes the interpreter's lock as it ends aborts it
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_rows_are_whole_and_counted_across_pieces(end: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("labctl.recording.logs.text.BLOCK_BYTES", 1000)
+    content = PLAIN.replace("\n", end)
+    recording = log_with_map(text(content)(tmp_path), None, {}, None).recording
+    np.testing.assert_allclose(recording.gyro_dps("x"), ROWS[:, 1], rtol=0, atol=1e-6)
+    rows = content.split(end)
+    rows[700] += ",7"
+    rows[900] += ",7"
+    with pytest.raises(LabctlError, match="rows 700, 900: 6 columns where the others have 5"):
+        assert log_with_map(text(end.join(rows))(tmp_path), None, {}, None).recording
 
 
 def test_what_the_map_states_is_not_guessed(tmp_path: Path) -> None:

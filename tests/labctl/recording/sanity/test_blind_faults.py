@@ -24,6 +24,11 @@ def test_a_fault_is_named_or_its_file_refused_with_its_name(kind: str, tmp_path:
     assert outcome(kind, *said_of(kind, 0, SEED, tmp_path)) in ("named", "refused")
 
 
+@pytest.mark.parametrize("index", [3, 5])  # within a slow swing of a fast log; two swings within half a second
+def test_a_nudge_is_a_motion_and_no_second_device(index: int, tmp_path: Path) -> None:
+    assert outcome("nudged", *said_of("nudged", index, 97, tmp_path)) in ("named", "refused")
+
+
 @pytest.mark.parametrize("kind", ["plain", "rate_steps", "long_soak", "coarse", "jitter", "through_zero", "hot"])
 def test_awkward_but_clean_files_get_no_finding(kind: str, tmp_path: Path) -> None:
     for index in range(2):
