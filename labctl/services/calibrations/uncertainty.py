@@ -34,7 +34,7 @@ from labctl.fitting.uncertainty import (
     rate_uncertainty,
     rate_vector_uncertainty,
 )
-from labctl.fitting.uncertainty.combination import LEVEL
+from labctl.fitting.numeric.freedom import LEVEL
 from labctl.fitting.uncertainty.document import Covered
 from labctl.fitting.uncertainty.largest_error import widening
 from labctl.fitting.uncertainty.vector_bound import PLACES
