@@ -106,8 +106,9 @@ def align_field(
     freedom = _freedom(jacobian, total, by_place, (place, extra), estimated)
     to_dip = np.diag([1.0, 1.0, 1.0, -1 / np.sqrt(max(1 - dip**2, 1e-12))])
     result = FieldAlignment(
-        _vector(turn), float(-np.arcsin(np.clip(dip, -1, 1))), to_dip @ covariance @ to_dip.T, freedom, float(np.sqrt(place)),
-        int(np.count_nonzero(solved.accelerometer.used)), int(np.count_nonzero(solved.gyro.used)),
+        _vector(turn), float(-np.arcsin(np.clip(dip, -1, 1))), to_dip @ covariance @ to_dip.T, freedom,
+        float(np.sqrt(place)), int(np.count_nonzero(solved.accelerometer.used)),
+        int(np.count_nonzero(solved.gyro.used)),
     )  # fmt: skip
     worst = int(np.argmax(result.u_rad[:3]))
     if result.u_rad[worst] > LARGEST_U:

@@ -100,8 +100,8 @@ class _Problem:
     def information(self, ratio: float) -> NDArray[np.float64]:
         """Return the information (2, 2) on both variances in units of the first one to the power -2.
 
-        tr(P D_i P D_j) / 2 with D_1 = 1 and D_2 = Z Z^T, Z (n, k) the rest of each reading; by V P V^-1 only products of
-        k and nine columns are needed.
+        tr(P D_i P D_j) / 2 with D_1 = 1 and D_2 = Z Z^T, Z (n, k) the rest of each reading; as P V P = P, products
+        of k rests and nine columns are enough.
         """
         count, sums = self.count, self.sums[:, :-1]
         inverse = np.linalg.inv(self._normal(ratio)[:-1, :-1])

@@ -49,11 +49,13 @@ def freedom_of_bounded(freedom: float, known_share: float) -> float:
     return float(np.clip(2 * first**2 / max(second - first**2, 1e-12), MIN_FREEDOM, MAX_FREEDOM))
 
 
-def combined_freedom(variance: Array, parts: Sequence[tuple[Array, Array | float]], scatter: Array | float = 0.0) -> Array:
+def combined_freedom(
+    variance: Array, parts: Sequence[tuple[Array, Array | float]], scatter: Array | float = 0.0
+) -> Array:
     """Return the degrees of freedom (p,) of variances (p,) by Welch and Satterthwaite (GUM eq. G.2b).
 
-    `parts` are the shares of the variances (p,) that are estimated, each with its own degrees of freedom; `scatter` (p,)
-    is the variance of `variance` by estimates that are not independent of each other. What is left is known.
+    `parts` are the shares of the variances (p,) that are estimated, each with its own degrees of freedom; `scatter`
+    (p,) is the variance of `variance` by estimates that are not independent of each other. What is left is known.
     """
     uncertain = np.zeros(len(variance)) + scatter
     for part, freedom in parts:
