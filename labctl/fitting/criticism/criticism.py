@@ -245,7 +245,7 @@ def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
     family = found.family
     others = [group for group in verdict.groups if family is None or group[0] != LAG]
     leaders = [term for group in others if (term := _to_check(comparison, verdict, group)) is not None]
-    beside = () if family is None else (family.response.term,)
+    beside = () if family is None else (family.response.term,)  # what is named beside it is checked itself
     advice = advice_for(found.fit_data, forward, leaders, beside) if full or slow is not None else ()
     advice = advice if family is None else (family.advice, *advice)
     verdict = with_hypothesis(without_harm(verdict, advice, slow, comparison), comparison, slow)
@@ -292,7 +292,7 @@ def _with_time_constants(
     """Return the family with the uncertainties of its time constants, as the model with it has them."""
     if family is None:
         return None
-    after = fit_preset(data, changed(forward, (family.response.term,)))
+    after = fit_preset(data, changed(forward, family.terms))
     return family.with_shapes(after.shapes)
 
 
