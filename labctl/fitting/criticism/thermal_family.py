@@ -20,7 +20,7 @@ from labctl.fitting.criticism.verdict import Form, Verdict
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import CATALOGUE, Span, Term
 from labctl.fitting.estimation.thermal_flows import NONE, STRUCTURES, Axis, LeftOut, best_taus, left_out_by, pooled
-from labctl.fitting.estimation.thermal_response import ThermalResponse, stretches_of, thermal_response
+from labctl.fitting.estimation.thermal_response import SEEN, ThermalResponse, stretches_of, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
 
 LAG = "thermal_lag"
@@ -30,9 +30,8 @@ FAMILY = frozenset({LAG, *RIVALS})
 #: A response is there where it leaves less than this share of the chi2 of stretches left out, and may be there where it
 #: leaves less than the second.
 MAX_REMAINING, MAX_REMAINING_OF_HINT = 0.25, 0.75
-#: The member that is tried beside a lag, and the share of the chi2 of stretches left out which both together leave at
-#: most of what the better of them leaves alone: each has a shape of its own, and half may be the wrong shape of one.
-BESIDE, MAX_REMAINING_OF_ONE = "thermal_hysteresis", 0.5
+#: The member that is tried beside a lag.
+BESIDE = "thermal_hysteresis"
 
 
 @dataclass(frozen=True)
@@ -43,6 +42,7 @@ class ThermalFamily:
     rivals: Mapping[str, LeftOut] = field(default_factory=dict)  #: what each other member leaves alone
     shapes: dict[str, Coefficient] = field(default_factory=dict)  #: time constants with u, where they were asked for
     beside: Term | None = None  #: the member that is there beside the lag
+    alone: LeftOut | None = None  #: what the better one of both leaves alone
 
     @property
     def alike(self) -> tuple[str, ...]:
@@ -51,8 +51,8 @@ class ThermalFamily:
 
     @property
     def is_certain(self) -> bool:
-        """Whether it predicts so much that it is named; else it is a hint."""
-        return self.after.chi2 <= MAX_REMAINING * self.before.chi2
+        """Whether it predicts so much that it is named; else it is a hint. Two together are only there where they do."""
+        return self.beside is not None or self.after.chi2 <= MAX_REMAINING * self.before.chi2
 
     def with_shapes(self, shapes: Mapping[str, dict[str, Coefficient]]) -> ThermalFamily:
         """Return the same with the time constants of a fit with it, effect -> name -> value with u."""
@@ -74,6 +74,14 @@ class ThermalFamily:
         return Advice(
             effect=LAG, add=True, why="", before_dps=self.before.rms_dps, after_dps=self.after.rms_dps
         )  # fmt: skip
+
+    @property
+    def advice_beside(self) -> tuple[Advice, ...]:
+        """To add what is there beside the lag; empty where nothing is."""
+        if self.beside is None or self.alone is None:
+            return ()
+        name, before, after = self.beside.effect, self.alone.rms_dps, self.after.rms_dps
+        return (Advice(effect=name, add=True, why="", before_dps=before, after_dps=after),)
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -181,7 +189,9 @@ def thermal_family(data: FitData, model: ErrorModel, verdict: Verdict) -> Therma
 def _both(data: FitData, model: ErrorModel, lag: ThermalResponse, rival: LeftOut) -> ThermalFamily | None:
     """Return a lag and a hysteresis together, where they leave clearly less than the better of them alone.
 
-    The shape of the hysteresis is the one that leaves least of all data beside a lag of one time constant.
+    They then take most of what that one leaves beyond the noise, and enough chi2 of stretches left out for each
+    coefficient more. The shape of the hysteresis is the one that leaves least of all data beside a lag of one time
+    constant.
     """
     alone = min(lag.held_out[lag.structure.id], rival, key=lambda left: left.chi2)
     term = min(_options(BESIDE), key=lambda term: _left_beside(data, model, term))
@@ -190,9 +200,11 @@ def _both(data: FitData, model: ErrorModel, lag: ThermalResponse, rival: LeftOut
         return None
     # what the model leaves without either of them
     response = replace(response, held_out={**response.held_out, NONE.id: lag.held_out[NONE.id]})
-    family = ThermalFamily(response, beside=term)
-    certain = family.is_certain and family.after.is_below(alone)
-    return family if certain and family.after.chi2 <= MAX_REMAINING_OF_ONE * alone.chi2 else None
+    family = ThermalFamily(response, beside=term, alone=alone)
+    after, more = family.after, len(data.outputs) + 1  # its size on each axis, and its width
+    enough = alone.chi2 - after.chi2 > SEEN * more * max(after.chi2 / after.n, 1.0)
+    most = after.chi2 - after.n <= MAX_REMAINING * (alone.chi2 - alone.n)
+    return family if enough and most and after.is_below(alone) else None
 
 
 def _left_beside(data: FitData, model: ErrorModel, term: Term) -> float:
