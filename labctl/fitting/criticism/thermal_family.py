@@ -1,9 +1,10 @@
 """The thermal response of a unit at rest as one family: lag, rate of change and hysteresis are its members.
 
 Each member resembles the others on one course of the temperature, so that of two which are there one alone takes the
-place of both, and leaves much. A lag and a hysteresis together are therefore tried as one response too. Self-heating and warm-up go by the time since
-power-on and stay effects of their own, beside which the response is sought. What is certain is how well the response
-predicts stretches that it has not seen, and its time constants; which member it is may not be, and then is not claimed.
+place of both, and leaves much: a lag and a hysteresis together are tried as one response too. Self-heating and warm-up
+go by the time since power-on and stay effects of their own, beside which the response is sought. What is certain is how
+well the response predicts stretches that it has not seen, and its time constants; which member it is may not be, and
+then is not claimed.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class ThermalFamily:
 
     @property
     def is_certain(self) -> bool:
-        """Whether it predicts so much that it is named; else it is a hint. Two together are only there where they do."""
+        """Whether it predicts so much that it is named, as two members together always do; else it is a hint."""
         return self.beside is not None or self.after.chi2 <= MAX_REMAINING * self.before.chi2
 
     def with_shapes(self, shapes: Mapping[str, dict[str, Coefficient]]) -> ThermalFamily:
@@ -173,17 +174,17 @@ def thermal_family(data: FitData, model: ErrorModel, verdict: Verdict) -> Therma
     if response is None:
         return None
     rivals = {name: _rival(data, model, name) for name in RIVALS}
-    both = _both(data, model, response, rivals[BESIDE])
-    if both is not None and not (leaders and _of(data, named).is_below(both.after)):
-        return replace(both, rivals=rivals)
+    family = _both(data, model, response, rivals[BESIDE]) or _lag_alone(response, rivals)
+    if family is None or (leaders and _of(data, named).is_below(family.after)):
+        return None
+    return replace(family, rivals=rivals)
+
+
+def _lag_alone(response: ThermalResponse, rivals: Mapping[str, LeftOut]) -> ThermalFamily | None:
+    """Return the lag by itself; None where it predicts too little for a hint, or another member clearly better."""
     after = response.held_out[response.structure.id]
-    if after.chi2 > MAX_REMAINING_OF_HINT * response.held_out[NONE.id].chi2:
-        return None
-    if any(rival.is_below(after) for rival in rivals.values()):
-        return None
-    if leaders and _of(data, named).is_below(after):
-        return None
-    return ThermalFamily(response, rivals)
+    is_hint = after.chi2 <= MAX_REMAINING_OF_HINT * response.held_out[NONE.id].chi2
+    return ThermalFamily(response) if is_hint and not any(rival.is_below(after) for rival in rivals.values()) else None
 
 
 def _both(data: FitData, model: ErrorModel, lag: ThermalResponse, rival: LeftOut) -> ThermalFamily | None:
