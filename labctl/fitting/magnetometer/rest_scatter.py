@@ -57,8 +57,9 @@ def scatter_of(jacobian: NDArray[np.float64], distance: Array, rest: NDArray[np.
     ratio = float(np.exp(found.x))
     white = problem.white_var(ratio)
     inverse = np.linalg.inv(jacobian.T @ jacobian)
-    by_rest = problem.sums[:, :-1] @ inverse
-    return RestScatter(white, ratio * white, inverse, by_rest.T @ by_rest, problem.information(ratio) / white**2)
+    of_rests = problem.sums[:, :-1] @ inverse
+    by_reading, by_rest = (np.asarray(each, dtype=np.float64) for each in (inverse, of_rests.T @ of_rests))
+    return RestScatter(white, ratio * white, by_reading, by_rest, problem.information(ratio) / white**2)
 
 
 @dataclass(frozen=True)
