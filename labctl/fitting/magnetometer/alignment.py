@@ -187,9 +187,7 @@ def _equations(
     """
     solved, k = field.solved, len(field.direction)
     accelerometer, gyro, moves = solved.accelerometer, solved.gyro, solved.moves
-    body = field.direction @ turn.T
-    at_rest = np.flatnonzero(accelerometer.used)
-    up = accelerometer.up
+    body, up, at_rest = field.direction @ turn.T, accelerometer.up, np.flatnonzero(accelerometer.used)
     size = len(at_rest) + 2 * int(np.count_nonzero(gyro.used))
     residual, jacobian = np.zeros(size), np.zeros((size, 4))
     by_seen, by_tilt = np.zeros((size, k, 3)), np.zeros((size, k, 3))
@@ -201,9 +199,7 @@ def _equations(
     by_seen[here, at_rest] = up[at_rest] @ turn
     by_tilt[here, at_rest] = np.einsum("ka,kab->kb", body[at_rest], level_by_reading(accelerometer)[at_rest])
     by_force[here] = np.einsum("ka,kab->kb", body[at_rest], level_by_parameters(accelerometer)[at_rest])
-    own = np.zeros((size, size))
-    before = moves.before[gyro.used]
-    parts = gyro.equations.take(gyro.used).rotations
+    own, before, parts = np.zeros((size, size)), moves.before[gyro.used], gyro.equations.take(gyro.used).rotations
     start, end = body[before], body[before + 1]
     across, back = tangents(end), parts.matrix.transpose(0, 2, 1)
     turned = across @ change_of_direction(start, parts.matrix)

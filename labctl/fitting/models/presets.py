@@ -84,7 +84,8 @@ def _single_temperature(data: FitData) -> tuple[ErrorModel, Rows]:
 
 def _is_one_temperature(data: FitData) -> bool:
     """Return whether temperatures without discrete levels are too near each other for a parabola in temperature."""
-    return data.distinct_temperatures() < PARABOLA_TEMPERATURES or np.ptp(data.temperature_c) < PARABOLA_SPAN_C
+    span_c = float(np.ptp(data.temperature_c))
+    return data.distinct_temperatures() < PARABOLA_TEMPERATURES or span_c < PARABOLA_SPAN_C
 
 
 def _weiss1995(data: FitData) -> tuple[ErrorModel, Rows]:

@@ -161,14 +161,8 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
     serial = readings.info.serial
     require_poses(serial, rests)
     warm = rest_temperatures(readings, rests)
-    low, high = float(warm.min()), float(warm.max())
-    levels = different_temperatures(warm)
-    if levels < 2 or high - low < MIN_SPAN_K:
-        raise NotEnoughData(
-            f"{serial}: the rests are at {low:.1f} to {high:.1f} deg C; coefficients of temperature need poses at two "
-            f"and more temperatures that span {MIN_SPAN_K:g} K: lay the unit down in its poses again, warmer or "
-            "colder, or calibrate without a temperature"
-        )
+    low, high, levels = float(warm.min()), float(warm.max()), different_temperatures(warm)
+    _require_span(serial, low, high, levels)
     orders = (min(BIAS_ORDER, levels - 1), SCALE_ORDER)
     reference, half = round((low + high) / 2, 1), (high - low) / 2
     law = TemperatureLaw(rests.accel_g, (warm - reference) / half, orders)
@@ -204,6 +198,16 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
         in_kelvin[split:].reshape(-1, 3), np.asarray(covariance * np.outer(per_k, per_k)), worth,
         _constant_g(SizeLaw(kept.accel_g), gravity, white),
     )  # fmt: skip
+
+
+def _require_span(serial: str, low: float, high: float, levels: int) -> None:
+    """Raise NotEnoughData for rests at temperatures, deg C, that tell no coefficient of temperature."""
+    if levels < 2 or high - low < MIN_SPAN_K:
+        raise NotEnoughData(
+            f"{serial}: the rests are at {low:.1f} to {high:.1f} deg C; coefficients of temperature need poses at two "
+            f"and more temperatures that span {MIN_SPAN_K:g} K: lay the unit down in its poses again, warmer or "
+            "colder, or calibrate without a temperature"
+        )
 
 
 def different_temperatures(warm: Array) -> int:
