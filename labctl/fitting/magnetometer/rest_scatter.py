@@ -75,7 +75,7 @@ class _Problem:
     def of(jacobian: NDArray[np.float64], distance: Array, rest: NDArray[np.int64]) -> _Problem:
         columns = np.column_stack([jacobian, distance])
         _, place = np.unique(rest, return_inverse=True)
-        sums = np.array([np.bincount(place, column) for column in columns.T]).T
+        sums = np.array([np.bincount(place, column) for column in columns.T], dtype=np.float64).T
         kept = np.unique(rest) > 0
         return _Problem(len(columns), columns.T @ columns, sums[kept], np.bincount(place)[kept].astype(np.float64))
 
