@@ -31,8 +31,9 @@ FAMILY = frozenset({LAG, *RIVALS})
 #: A response is there where it leaves less than this share of the chi2 of stretches left out, and may be there where it
 #: leaves less than the second.
 MAX_REMAINING, MAX_REMAINING_OF_HINT = 0.25, 0.75
-#: The member that is tried beside a lag.
-BESIDE = "thermal_hysteresis"
+#: The member that is tried beside a lag, and chi2 over the noise that the better one of both leaves alone at least: what
+#: a member leaves whose true shape is another one, such as a hysteresis without corners, is less.
+BESIDE, MIN_LEFT_ALONE = "thermal_hysteresis", 1.5
 
 
 @dataclass(frozen=True)
@@ -195,6 +196,8 @@ def _both(data: FitData, model: ErrorModel, lag: ThermalResponse, rival: LeftOut
     constant.
     """
     alone = min(lag.held_out[lag.structure.id], rival, key=lambda left: left.chi2)
+    if alone.chi2 < MIN_LEFT_ALONE * alone.n:
+        return None
     term = min(_options(BESIDE), key=lambda term: _left_beside(data, model, term))
     response = thermal_response(data, model.with_added((term,)), lag.term)
     if response is None:
