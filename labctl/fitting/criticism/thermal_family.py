@@ -31,8 +31,8 @@ FAMILY = frozenset({LAG, *RIVALS})
 #: A response is there where it leaves less than this share of the chi2 of stretches left out, and may be there where it
 #: leaves less than the second.
 MAX_REMAINING, MAX_REMAINING_OF_HINT = 0.25, 0.75
-#: The member that is tried beside a lag, and chi2 over the noise that the better one of both leaves alone at least: what
-#: a member leaves whose true shape is another one, such as a hysteresis without corners, is less.
+#: The member that is tried beside a lag, and chi2 over the noise that the better one of both leaves alone at least: a
+#: member whose true shape is another one, such as a hysteresis without corners, leaves less.
 BESIDE, MIN_LEFT_ALONE = "thermal_hysteresis", 1.5
 
 
