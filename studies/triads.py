@@ -1,7 +1,7 @@
-"""Alignment of the gyro and magnetometer triads to the accelerometer's: coverage of U = 2 u at 12, 30 and 100 rests.
+"""Three triads by hand: coverage of U, of accelerometer and magnetometer and of the alignments, at 12 to 100 rests.
 
-Then over temperature, and with an earlier version of the accelerometer. `run()` gives each share with its standard
-uncertainty; truth is `studies.triads_simulation`, of NumPy alone.
+U = t(95.45 %, nu) u. Then over temperature, and with an earlier version of the accelerometer. `run()` gives each share
+with its standard uncertainty; truth is `studies.triads_simulation`, of NumPy alone.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ import numpy as np
 
 from labctl.fitting.magnetometer.alignment import align_field
 from labctl.fitting.magnetometer.calibrate import calibrate_magnetometer
+from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.poses.at_rest.accelerometer import calibrate_accelerometer
 from labctl.fitting.poses.at_rest.fewer_poses import Known, by_fewer_poses
-from labctl.fitting.poses.at_rest.rests import find_rests
+from labctl.fitting.poses.at_rest.rests import find_rests, rest_of_each
 from labctl.fitting.poses.fit import Solved, solve
 from labctl.fitting.poses.readings import AXES, PoseReadings, readings_of
 from labctl.fitting.poses.triad import UPPER
@@ -25,7 +26,7 @@ from studies.poses import turned_deg
 from studies.triads_simulation import DIP_DEG, TrueTriads, turned_by_hand, vector_of, warmed, warmed_k
 
 #: Rests of a session, and sessions.
-CELLS = {12: 100, 30: 80, 100: 20}
+CELLS = {12: 300, 22: 200, 30: 200, 100: 60}
 #: Sessions over temperature, and with an earlier version.
 OTHERS = 60
 #: Middle of the temperatures, deg C, and what a scale factor and a misalignment change from session to session.
@@ -47,12 +48,13 @@ def recording_of(t_s: np.ndarray, gyro_dps: np.ndarray, force_g: np.ndarray, fie
     return Recording(info, columns)
 
 
-Scores = tuple[np.ndarray, np.ndarray, np.ndarray]
+#: Kind -> (value - truth) / U of each of its numbers; `field u` is the magnetometer's angles' u, deg.
+Scores = dict[str, np.ndarray]
 Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def scores(seed: int, rests: int, place_ut: float = PLACE_UT) -> Scores:
-    """Return (value - truth) / u of the gyro's angles (3,), and of the magnetometer's with the dip (4,); its u, deg."""
+    """Return (value - truth) / U of a session, kind by kind."""
     unit = TrueTriads.drawn(np.random.default_rng(10**6 + seed))
     parts = turned_by_hand(seed, unit, rests, place_ut=place_ut)
     readings = readings_of(recording_of(*parts))
@@ -91,15 +93,31 @@ def scores_with_earlier(seed: int, rests: int) -> Scores:
 
 
 def _scores(unit: TrueTriads, readings: PoseReadings, solved: Solved, parts: Parts) -> Scores:
-    gyro = solved.alignment
-    field = align_field(readings, solved, parts[3], calibrate_magnetometer("study", parts[3][::EVERY]))
+    gyro, force = solved.alignment, solved.accelerometer
+    rest = rest_of_each(solved.rests, len(readings), readings.spacing_s)
+    iron = calibrate_magnetometer("study", parts[3][::EVERY], rest=rest[::EVERY])
+    field = align_field(readings, solved, parts[3], iron)
     true = np.radians(turned_deg(unit.gyro - np.eye(3), unit.force - np.eye(3)))
-    away = np.append(field.angles_rad - vector_of(unit.turned), field.dip_rad - np.radians(DIP_DEG))
-    return (gyro.angles_rad - true) / gyro.u_rad, away / field.u_rad, np.degrees(field.u_rad)
+    away = (
+        np.append(field.angles_rad - vector_of(unit.turned), field.dip_rad - np.radians(DIP_DEG)) / field.expanded_rad
+    )
+    of_force = np.concatenate([
+        force.bias_g - unit.force_bias_g, [(force.errors - unit.force + np.eye(3))[place] for place in UPPER]
+    ]) / force.expanded  # fmt: skip
+    soft = np.linalg.inv(unit.field @ unit.turned)
+    soft /= np.cbrt(np.linalg.det(soft))
+    of_iron = np.concatenate([
+        iron.hard_iron_ut - unit.hard_iron_ut, [(iron.soft_iron - soft)[place] for place in PLACES]
+    ]) / iron.expanded[:9]  # fmt: skip
+    return {
+        "gyro": (gyro.angles_rad - true) / gyro.expanded_rad, "magnetometer": away[:3], "dip": away[3:],
+        "bias": of_force[:3], "scale factor": of_force[3:6], "misalignment": of_force[6:],
+        "hard iron": of_iron[:3], "soft iron": of_iron[3:], "field u": np.degrees(field.u_rad[:3]),
+    }  # fmt: skip
 
 
 def run(cells: dict[int, int] | None = None, others: int = OTHERS) -> str:
-    """Return the table: by rests, the share of each kind within 2 u, and the root mean square of error over u.
+    """Return the table: by rests, the share of each kind within U, and the root mean square of error over U.
 
     `others` are the sessions over temperature, and those with an earlier version.
     """
@@ -113,10 +131,12 @@ def run(cells: dict[int, int] | None = None, others: int = OTHERS) -> str:
 
 
 def _rows(name: str, found: list[Scores]) -> list[str]:
-    gyro, field, u = (np.array(each) for each in zip(*found, strict=True))
-    rows = [f"   {name}, {len(found)} sessions, field u {np.median(u[:, :3]):.3f} deg:"]
-    for kind, z in (("gyro", gyro), ("magnetometer", field[:, :3]), ("dip", field[:, 3:])):
-        share = float(np.mean(np.abs(z) <= 2))
-        spread = np.mean(np.abs(z) <= 2, axis=1).std() / np.sqrt(len(z))
-        rows.append(f"      {kind:13} {100 * share:5.1f} % +- {100 * spread:.1f}; RMS {np.sqrt(np.mean(z**2)):.2f} u")
+    kinds = {kind: np.array([each[kind] for each in found]) for kind in found[0]}
+    rows = [f"   {name}, {len(found)} sessions, field u {np.median(kinds.pop('field u')):.3f} deg:"]
+    for kind, z in kinds.items():
+        within = np.abs(z) <= 1
+        spread = within.mean(axis=1).std() / np.sqrt(len(z))
+        rows.append(
+            f"      {kind:13} {100 * within.mean():5.1f} % +- {100 * spread:.1f}; RMS {np.sqrt(np.mean(z**2)):.2f} U"
+        )
     return rows

@@ -336,6 +336,8 @@ class ThermalFamilyJson(TypedDict):
     """RMS error of the stretches left out without the response, deg/s."""
     after_rms_dps: float
     """RMS error of the stretches left out with the response, deg/s."""
+    beside: NotRequired[list[str]]
+    """Ids of the effects that are there beside the lag, such as thermal_hysteresis; absent: an older version."""
 
 
 class ThermalHintJson(ThermalFamilyJson):

@@ -16,6 +16,10 @@ class Estimate(ResponseModel):
 
     value: float = Field(description="Value, in the unit that the field of this estimate states.")
     u: float | None = Field(description="Standard uncertainty; null: the value was given.")
+    degrees_of_freedom: float | None = Field(
+        default=None, gt=0,
+        description="Degrees of freedom nu of `u`: U = t(95.45 %, nu) u, t of Student; null: not stated, U = 2 u.",
+    )  # fmt: skip
 
 
 class MagnetometerResponse(ResponseModel):
@@ -38,7 +42,7 @@ class MagnetometerResponse(ResponseModel):
     noise_ut: float = Field(description="Noise of the distances from one reading to the next, uT.")
     repetition: float = Field(
         description="Readings that tell as much as one independent reading, by the autocorrelation of the distances; "
-        "the covariance includes it."
+        "where no rests are known, the covariance includes it."
     )
     heading_error_deg: float = Field(description="Angle to which the held-out error turns a field square to it, deg.")
     largest_gap_deg: float = Field(description="From any direction to the nearest that was measured, at most, deg.")

@@ -16,6 +16,8 @@ class AccelerometerCoefficient(TypedDict):
     """Standard uncertainty, in `unit`."""
     unit: str
     """Unit of the numbers; 1: a ratio."""
+    degrees_of_freedom: NotRequired[float]
+    """Degrees of freedom nu of `u`: U = t(95.45 %, nu) u, t of Student; absent: stored by an older version, U = 2 u."""
 
 
 class StaticNoiseJson(TypedDict):

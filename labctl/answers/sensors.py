@@ -64,6 +64,12 @@ class SensorCoefficientResponse(ResponseModel):
     unit: str = Field(description="Unit of the numbers; 1: a ratio.")
     value: float = Field(description="Value, in `unit`.")
     u: float | None = Field(description="Standard uncertainty, in `unit`; null: the value was given.")
+    degrees_of_freedom: float | None = Field(
+        default=None, description="Degrees of freedom of `u`; null: not stated, U = 2 u."
+    )
+    expanded: float | None = Field(
+        default=None, description="Expanded uncertainty U for 95.45 %, in `unit`; null: the value was given."
+    )
 
 
 class SensorVersionResponse(ResponseModel):

@@ -165,13 +165,12 @@ def _with_alignment(
 
 def _over_temperature(found: OverTemperature, rests: Rests) -> AccelerometerResponse:
     """Return a calibration over temperature as a response."""
-    u = np.sqrt(np.diag(found.covariance))
     begin = len(found.reference.covariance)
 
     def terms(values: NDArray[np.float64], first: int) -> dict[str, list[Estimate]]:
-        of = u[first : first + values.size].reshape(values.shape)
+        places = first + np.arange(values.size).reshape(values.shape)
         return {
-            a: [Estimate(value=float(value), u=float(each)) for value, each in zip(values[:, i], of[:, i], strict=True)]
+            a: [_estimate(value, found, place) for value, place in zip(values[:, i], places[:, i], strict=True)]
             for i, a in enumerate(AXES)
         }
 
@@ -192,15 +191,16 @@ def _over_temperature(found: OverTemperature, rests: Rests) -> AccelerometerResp
     })  # fmt: skip
 
 
+def _estimate(value: float, found: Accelerometer | OverTemperature, place: int) -> Estimate:
+    """Return a value with the standard uncertainty that stands at a place of the covariance."""
+    return Estimate(value=float(value), u=float(found.u[place]), degrees_of_freedom=float(found.u_freedom[place]))
+
+
 def _response(found: Accelerometer, rests: Rests, worth: Adequacy) -> AccelerometerResponse:
-    u = np.sqrt(np.diag(found.covariance))
-    errors = {
-        f"{AXES[i]}{AXES[j]}": Estimate(value=float(found.errors[i, j]), u=float(u[3 + k]))
-        for k, (i, j) in enumerate(UPPER)
-    }
+    errors = {f"{AXES[i]}{AXES[j]}": _estimate(found.errors[i, j], found, 3 + k) for k, (i, j) in enumerate(UPPER)}
     return AccelerometerResponse(
         verdict=worth.verdict,
-        bias_g={a: Estimate(value=float(found.bias_g[i]), u=float(u[i])) for i, a in enumerate(AXES)},
+        bias_g={a: _estimate(found.bias_g[i], found, i) for i, a in enumerate(AXES)},
         scale_factor={a: errors[a + a] for a in AXES},
         misalignment={name: each for name, each in errors.items() if name[0] != name[1]},
         covariance=found.covariance.tolist(), gravity_g=found.gravity_g,

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.answers.magnetometer import Estimate, MagnetometerResponse
-from labctl.answers.poses import FieldAlignmentJson
+from labctl.answers.poses import AccelerometerCoefficient, FieldAlignmentJson
 from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.fitting.magnetometer.alignment import FieldAlignment, align_field
 from labctl.fitting.magnetometer.calibrate import AXES, MAX_LEFT_OUT, Magnetometer, calibrate_magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
-from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.at_rest.rests import find_rests, rest_of_each
 from labctl.fitting.poses.readings import PoseReadings, readings_of
 from labctl.recording.data_files import read_table
 from labctl.recording.files import read_recording
@@ -109,8 +109,16 @@ def _of_recording(path: Path, source: Source, serial: str | None) -> Magnetomete
         raise BadRecording(
             f"{path}: the field at t_s = {readings.t_s[row]:.6g} is not a number; mark such readings with valid = 0"
         )
-    found = calibrate_magnetometer(recording.info.serial, field, source.field_ut)
+    found = calibrate_magnetometer(recording.info.serial, field, source.field_ut, _rests(readings))
     return _with_alignment(_response(found, given=source.field_ut is not None), readings, field, found, source)
+
+
+def _rests(readings: PoseReadings) -> NDArray[np.int64] | None:
+    """Return the number of the rest of each reading; None where nothing rests."""
+    try:
+        return rest_of_each(find_rests(readings), len(readings), readings.spacing_s)
+    except NotEnoughData:
+        return None
 
 
 def _with_alignment(
@@ -124,11 +132,11 @@ def _with_alignment(
         said = f"Alignment of the magnetometer: unknown: {error}"
         return answer.model_copy(update={"text": [said, *answer.text]})
     angles = ", ".join(
-        f"{value:.2f} +- {2 * u:.2f}"
-        for value, u in zip(np.degrees(aligned.angles_rad), np.degrees(aligned.u_rad[:3]), strict=True)
+        f"{value:.2f} +- {expanded:.2f}"
+        for value, expanded in zip(np.degrees(aligned.angles_rad), np.degrees(aligned.expanded_rad[:3]), strict=True)
     )
     said = (
-        f"Magnetometer turned from the accelerometer's axes about x, y, z by {angles} deg (U, k = 2{source.levels}); "
+        f"Magnetometer turned from the accelerometer's axes about x, y, z by {angles} deg (U, 95.45 %{source.levels}); "
         f"the field dips by {np.degrees(aligned.dip_rad):.1f} deg."
     )
     # the last sentence is that of the verdict, which a refusal of an export cites
@@ -136,11 +144,15 @@ def _with_alignment(
 
 
 def _alignment(found: FieldAlignment) -> FieldAlignmentJson:
-    angles: Array = np.degrees(found.angles_rad)
+    values = np.degrees(np.append(found.angles_rad, found.dip_rad))
     u = np.degrees(found.u_rad)
+    each: list[AccelerometerCoefficient] = [
+        {"value": float(values[i]), "u": float(u[i]), "unit": "deg", "degrees_of_freedom": float(found.u_freedom[i])}
+        for i in range(len(values))
+    ]
     return {
-        "axes": {axis: {"value": float(angles[i]), "u": float(u[i]), "unit": "deg"} for i, axis in enumerate(AXES)},
-        "dip": {"value": float(np.degrees(found.dip_rad)), "u": float(u[3]), "unit": "deg"},
+        "axes": dict(zip(AXES, each, strict=False)),
+        "dip": each[-1],
         "covariance_deg2": (found.covariance * np.degrees(1.0) ** 2).tolist(),
         "place_deg": float(np.degrees(found.place_rad)), "rests": found.rests, "moves": found.moves,
         "definition": ALIGNMENT,
@@ -148,16 +160,17 @@ def _alignment(found: FieldAlignment) -> FieldAlignmentJson:
 
 
 def _response(result: Magnetometer, *, given: bool) -> MagnetometerResponse:
-    u = result.u
-    hard = {axis: Estimate(value=float(value), u=float(u[i])) for i, (axis, value) in
-            enumerate(zip(AXES, result.hard_iron_ut, strict=True))}  # fmt: skip
-    soft = {
-        f"{AXES[i]}{AXES[j]}": Estimate(value=float(result.soft_iron[i, j]), u=float(u[3 + k]))
-        for k, (i, j) in enumerate(PLACES)
-    }
+
+    def estimate(value: float, place: int) -> Estimate:
+        freedom = float(result.u_freedom[place])
+        return Estimate(value=float(value), u=float(result.u[place]), degrees_of_freedom=freedom)
+
+    hard = {axis: estimate(result.hard_iron_ut[i], i) for i, axis in enumerate(AXES)}
+    soft = {f"{AXES[i]}{AXES[j]}": estimate(result.soft_iron[i, j], 3 + k) for k, (i, j) in enumerate(PLACES)}
+    field = Estimate(value=result.field_ut, u=None) if given else estimate(result.field_ut, 9)
     return MagnetometerResponse(
         verdict=result.verdict, hard_iron_ut=hard, soft_iron=soft,
-        field_ut=Estimate(value=result.field_ut, u=None if given else float(u[9])),
+        field_ut=field,
         covariance=result.covariance.tolist(), readings=len(result.used), left_out=int((~result.used).sum()),
         before_ut=result.before_ut, residual_ut=result.residual_ut, heldout_ut=result.heldout_ut,
         noise_ut=result.noise_ut, repetition=result.repetition, heading_error_deg=result.heading_error_deg,

@@ -8,6 +8,7 @@ from labctl.answers.accelerometer import AccelerometerResponse, AccelerometerTem
 from labctl.answers.magnetometer import Estimate, MagnetometerResponse
 from labctl.answers.poses import AccelerometerCoefficient
 from labctl.answers.sensors import SensorCoefficientResponse
+from labctl.fitting.numeric.freedom import student_factor
 
 
 def coefficients_of(answer: AccelerometerResponse | MagnetometerResponse) -> list[SensorCoefficientResponse]:
@@ -29,7 +30,7 @@ def _of_force(answer: AccelerometerResponse) -> Iterator[SensorCoefficientRespon
 def _of_field(answer: MagnetometerResponse) -> Iterator[SensorCoefficientResponse]:
     yield from _named("hard iron", "uT", answer.hard_iron_ut)
     yield from _named("soft iron", "1", answer.soft_iron)
-    yield SensorCoefficientResponse(name="field", unit="uT", value=answer.field_ut.value, u=answer.field_ut.u)
+    yield _estimated("field", "uT", answer.field_ut)
     if answer.alignment is not None:
         yield from _turned("magnetometer", answer.alignment["axes"])
         yield _of("dip of the field", answer.alignment["dip"])
@@ -43,15 +44,12 @@ def _over_temperature(warm: AccelerometerTemperature) -> Iterator[SensorCoeffici
         for axis in sorted(by_axis):
             for power, each in enumerate(by_axis[axis], start=1):
                 per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
-                yield SensorCoefficientResponse(
-                    name=f"{name} {axis}, power {power} of temperature", unit=per, value=each.value, u=each.u
-                )
+                yield _estimated(f"{name} {axis}, power {power} of temperature", per, each)
 
 
 def _named(name: str, unit: str, values: Mapping[str, Estimate]) -> Iterator[SensorCoefficientResponse]:
     for place in sorted(values, key=lambda name: (len(set(name)), name)):  # xx, yy, zz, xy: also of a stored result
-        each = values[place]
-        yield SensorCoefficientResponse(name=f"{name} {place}", unit=unit, value=each.value, u=each.u)
+        yield _estimated(f"{name} {place}", unit, values[place])
 
 
 def _turned(what: str, axes: Mapping[str, AccelerometerCoefficient]) -> Iterator[SensorCoefficientResponse]:
@@ -60,4 +58,15 @@ def _turned(what: str, axes: Mapping[str, AccelerometerCoefficient]) -> Iterator
 
 
 def _of(name: str, each: AccelerometerCoefficient) -> SensorCoefficientResponse:
-    return SensorCoefficientResponse(name=name, unit=each["unit"], value=each["value"], u=each["u"])
+    return _stated(name, each["unit"], each["value"], each["u"], each.get("degrees_of_freedom"))
+
+
+def _estimated(name: str, unit: str, each: Estimate) -> SensorCoefficientResponse:
+    return _stated(name, unit, each.value, each.u, each.degrees_of_freedom)
+
+
+def _stated(name: str, unit: str, value: float, u: float | None, freedom: float | None) -> SensorCoefficientResponse:
+    return SensorCoefficientResponse(
+        name=name, unit=unit, value=value, u=u, degrees_of_freedom=freedom,
+        expanded=None if u is None else student_factor(freedom) * u,
+    )  # fmt: skip

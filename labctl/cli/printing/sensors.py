@@ -12,9 +12,6 @@ if TYPE_CHECKING:
     from labctl.answers.magnetometer import MagnetometerResponse
     from labctl.answers.sensors import AccelerometerVersion, MagnetometerVersion, SensorVersionResponse
 
-#: Of the expanded uncertainty.
-COVERAGE = 2
-
 
 def print_sensor(answer: AccelerometerResponse | MagnetometerResponse) -> None:
     """Print the parameters with their uncertainty, the verdict and what it stands on."""
@@ -22,12 +19,10 @@ def print_sensor(answer: AccelerometerResponse | MagnetometerResponse) -> None:
     from labctl.services.sensor_coefficients import coefficients_of
 
     name = "accelerometer" if isinstance(answer, AccelerometerResponse) else "magnetometer"
-    rows = table(name, "coefficient", "unit", "value", "u", "U, k = 2", numbers=2)
+    rows = table(name, "coefficient", "unit", "value", "u", "U, 95.45 %", numbers=2)
     for each in coefficients_of(answer):
-        expanded = None if each.u is None else COVERAGE * each.u
-        rows.add_row(
-            each.name, each.unit, format_number(each.value, 5), format_number(each.u, 2), format_number(expanded, 2)
-        )
+        numbers = format_number(each.value, 5), format_number(each.u, 2), format_number(each.expanded, 2)
+        rows.add_row(each.name, each.unit, *numbers)
     console.print(rows)
     _print_verdict(answer)
     _print_extent(answer)

@@ -243,13 +243,15 @@ def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
     verdict = with_quantization(verdict, found.data, found.residuals)
     slow = slow_process(comparison, found.residuals)
     family = found.family
-    others = [group for group in verdict.groups if family is None or group[0] != LAG]
+    members = () if family is None else family.terms
+    others = [group for group in verdict.groups if group[0] not in {term.effect for term in members}]
     leaders = [term for group in others if (term := _to_check(comparison, verdict, group)) is not None]
-    beside = () if family is None else (family.response.term,)
-    advice = advice_for(found.fit_data, forward, leaders, beside) if full or slow is not None else ()
+    advice = advice_for(found.fit_data, forward, leaders, members) if full or slow is not None else ()
     advice = advice if family is None else (family.advice, *advice)
     verdict = with_hypothesis(without_harm(verdict, advice, slow, comparison), comparison, slow)
     advice = (*advice, NO_CORRECTION) if verdict.named == (QUANTIZATION,) else advice
+    # two members were tried as one response, by stretches left out: the second is not the wrong shape of the first
+    advice = advice if family is None else (*advice, *family.advice_beside)
     kept = tuple(each for each in advice if each["effect"] in verdict.named)
     return replace(found, verdict=verdict, advice=kept, slow=slow, family=family if LAG in verdict.named else None)
 
@@ -292,7 +294,7 @@ def _with_time_constants(
     """Return the family with the uncertainties of its time constants, as the model with it has them."""
     if family is None:
         return None
-    after = fit_preset(data, changed(forward, (family.response.term,)))
+    after = fit_preset(data, changed(forward, family.terms))
     return family.with_shapes(after.shapes)
 
 

@@ -1,8 +1,10 @@
 """The thermal response of a unit at rest as one family: lag, rate of change and hysteresis are its members.
 
-Each member resembles the others on one course of the temperature. Self-heating and warm-up go by the time since
-power-on and stay effects of their own, beside which the response is sought. What is certain is how well the response
-predicts stretches that it has not seen, and its time constants; which member it is may not be, and then is not claimed.
+Each member resembles the others on one course of the temperature, so that of two which are there one alone takes the
+place of both, and leaves much: a lag and a hysteresis together are tried as one response too. Self-heating and warm-up
+go by the time since power-on and stay effects of their own, beside which the response is sought. What is certain is how
+well the response predicts stretches that it has not seen, and its time constants; which member it is may not be, and
+then is not claimed.
 """
 
 from __future__ import annotations
@@ -18,8 +20,8 @@ from labctl.answers.fitted_model import Coefficient, ThermalFamilyJson, ThermalH
 from labctl.fitting.criticism.verdict import Form, Verdict
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import CATALOGUE, Span, Term
-from labctl.fitting.estimation.thermal_flows import NONE, Axis, LeftOut, left_out_by, pooled
-from labctl.fitting.estimation.thermal_response import ThermalResponse, stretches_of, thermal_response
+from labctl.fitting.estimation.thermal_flows import NONE, STRUCTURES, Axis, LeftOut, best_taus, left_out_by, pooled
+from labctl.fitting.estimation.thermal_response import SEEN, ThermalResponse, stretches_of, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
 
 LAG = "thermal_lag"
@@ -29,6 +31,9 @@ FAMILY = frozenset({LAG, *RIVALS})
 #: A response is there where it leaves less than this share of the chi2 of stretches left out, and may be there where it
 #: leaves less than the second.
 MAX_REMAINING, MAX_REMAINING_OF_HINT = 0.25, 0.75
+#: The member that is tried beside a lag, and chi2 over the noise that the better one of both leaves alone at least: a
+#: member whose true shape is another one, such as a hysteresis without corners, leaves less.
+BESIDE, MIN_LEFT_ALONE = "thermal_hysteresis", 1.5
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,8 @@ class ThermalFamily:
     response: ThermalResponse
     rivals: Mapping[str, LeftOut] = field(default_factory=dict)  #: what each other member leaves alone
     shapes: dict[str, Coefficient] = field(default_factory=dict)  #: time constants with u, where they were asked for
+    beside: Term | None = None  #: the member that is there beside the lag
+    alone: LeftOut | None = None  #: what the better one of both leaves alone
 
     @property
     def alike(self) -> tuple[str, ...]:
@@ -46,8 +53,8 @@ class ThermalFamily:
 
     @property
     def is_certain(self) -> bool:
-        """Whether it predicts so much that it is named; else it is a hint."""
-        return self.after.chi2 <= MAX_REMAINING * self.before.chi2
+        """Whether it predicts so much that it is named, as two members together always do; else it is a hint."""
+        return self.beside is not None or self.after.chi2 <= MAX_REMAINING * self.before.chi2
 
     def with_shapes(self, shapes: Mapping[str, dict[str, Coefficient]]) -> ThermalFamily:
         """Return the same with the time constants of a fit with it, effect -> name -> value with u."""
@@ -70,11 +77,25 @@ class ThermalFamily:
             effect=LAG, add=True, why="", before_dps=self.before.rms_dps, after_dps=self.after.rms_dps
         )  # fmt: skip
 
+    @property
+    def advice_beside(self) -> tuple[Advice, ...]:
+        """To add what is there beside the lag; empty where nothing is."""
+        if self.beside is None or self.alone is None:
+            return ()
+        name, before, after = self.beside.effect, self.alone.rms_dps, self.after.rms_dps
+        return (Advice(effect=name, add=True, why="", before_dps=before, after_dps=after),)
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The lag, and what is there beside it."""
+        return (self.response.term, *(() if self.beside is None else (self.beside,)))
+
     def to_json(self) -> ThermalFamilyJson:
         """Return this as JSON."""
         return {
             "structure": self.response.structure.id, "time_constants": self.shapes, "alike": list(self.alike),
             "before_rms_dps": self.before.rms_dps, "after_rms_dps": self.after.rms_dps,
+            "beside": [term.effect for term in self.terms[1:]],
         }  # fmt: skip
 
     def hint_json(self) -> ThermalHintJson:
@@ -108,7 +129,8 @@ class ThermalFamily:
         low, high = (f"{end(values, default=0.0):.0f}" for end in (min, max))
         span = f" of {low} s" if values and low == high else f" of {low} to {high} s" if values else ""
         sure = f" (U at most {max(u_values):.0f} s, k = 2)" if u_values else ""
-        return f"a lag{span}{sure}, {self.response.structure.sentence}"
+        beside = f", and {self.beside.effect} beside it" if self.beside is not None else ""
+        return f"a lag{span}{sure}, {self.response.structure.sentence}{beside}"
 
     @property
     def hint(self) -> str:
@@ -152,15 +174,55 @@ def thermal_family(data: FitData, model: ErrorModel, verdict: Verdict) -> Therma
     response = thermal_response(data, model, Term(LAG, None, {}, "", True))
     if response is None:
         return None
-    after = response.held_out[response.structure.id]
-    if after.chi2 > MAX_REMAINING_OF_HINT * response.held_out[NONE.id].chi2:
-        return None
     rivals = {name: _rival(data, model, name) for name in RIVALS}
-    if any(rival.is_below(after) for rival in rivals.values()):
+    family = _both(data, model, response, rivals[BESIDE]) or _lag_alone(response, rivals)
+    if family is None or (leaders and _of(data, named).is_below(family.after)):
         return None
-    if leaders and _of(data, named).is_below(after):
+    return replace(family, rivals=rivals)
+
+
+def _lag_alone(response: ThermalResponse, rivals: Mapping[str, LeftOut]) -> ThermalFamily | None:
+    """Return the lag by itself; None where it predicts too little for a hint, or another member clearly better."""
+    after = response.held_out[response.structure.id]
+    is_hint = after.chi2 <= MAX_REMAINING_OF_HINT * response.held_out[NONE.id].chi2
+    return ThermalFamily(response) if is_hint and not any(rival.is_below(after) for rival in rivals.values()) else None
+
+
+def _both(data: FitData, model: ErrorModel, lag: ThermalResponse, rival: LeftOut) -> ThermalFamily | None:
+    """Return a lag and a hysteresis together, where they leave clearly less than the better of them alone.
+
+    They then take most of what that one leaves beyond the noise, and enough chi2 of stretches left out for each
+    coefficient more. The shape of the hysteresis is the one that leaves least of all data beside a lag of one time
+    constant.
+    """
+    alone = min(lag.held_out[lag.structure.id], rival, key=lambda left: left.chi2)
+    if alone.chi2 < MIN_LEFT_ALONE * alone.n:
         return None
-    return ThermalFamily(response, rivals)
+    term = min(_options(BESIDE), key=lambda term: _left_beside(data, model, term))
+    response = thermal_response(data, model.with_added((term,)), lag.term)
+    if response is None:
+        return None
+    # what the model leaves without either of them
+    response = replace(response, held_out={**response.held_out, NONE.id: lag.held_out[NONE.id]})
+    family = ThermalFamily(response, beside=term, alone=alone)
+    after, more = family.after, len(data.outputs) + 1  # its size on each axis, and its width
+    enough = alone.chi2 - after.chi2 > SEEN * more * max(after.chi2 / after.n, 1.0)
+    most = after.chi2 - after.n <= MAX_REMAINING * (alone.chi2 - alone.n)
+    return family if enough and most and after.is_below(alone) else None
+
+
+def _left_beside(data: FitData, model: ErrorModel, term: Term) -> float:
+    """Return the chi2 that a term and a lag of one time constant leave of all data."""
+    beside, every = model.with_added((term,)), np.ones(len(data), dtype=bool)
+    axes = [Axis(data, beside, axis) for axis in data.outputs]
+    taus = best_taus(axes, STRUCTURES[0], every)
+    left = [axis.left_over_noise(axis.columns(STRUCTURES[0], taus[axis.name]), every) for axis in axes]
+    return float(sum(np.sum(each**2) for each in left))
+
+
+def _options(effect: str) -> list[Term]:
+    """Return the shapes in which a member is tried."""
+    return CATALOGUE[effect].options(Span(1.0, 0.1, (0.0,), frozenset({"t_s", "temperature_c"})))
 
 
 def hint_of_added(data: FitData, model: ErrorModel, effects: Collection[str]) -> ThermalFamily | None:
@@ -183,10 +245,11 @@ def with_family(verdict: Verdict, family: ThermalFamily | None) -> Verdict:
     if family is None or not family.is_certain:
         return verdict
     others = tuple(group for group in verdict.groups if not set(group) & FAMILY)
-    groups = ((LAG, *family.alike), *others)
+    beside = tuple((term.effect,) for term in family.terms[1:])
+    groups = ((LAG, *family.alike), *beside, *others)
     form: Form = "missing" if all(len(group) == 1 for group in groups) else "ambiguous"
     return replace(
-        verdict, form=form, groups=groups, terms={**verdict.terms, LAG: family.response.term},
+        verdict, form=form, groups=groups, terms={**verdict.terms, **{term.effect: term for term in family.terms}},
         depends_on=verdict.depends_on or ("t_s",), confounded=(), remainder=None,
     )  # fmt: skip
 
@@ -198,8 +261,7 @@ def _of(data: FitData, model: ErrorModel) -> LeftOut:
 
 def _rival(data: FitData, model: ErrorModel, effect: str) -> LeftOut:
     """Return what a single other member leaves, in the shape that fits the rest best in each case."""
-    kind = CATALOGUE[effect]
-    terms = kind.options(Span(1.0, 0.1, (0.0,), frozenset({"t_s", "temperature_c"})))
+    kind, terms = CATALOGUE[effect], _options(effect)
     axes = [Axis(data, model, axis) for axis in data.outputs]
     options = [
         [np.column_stack([c.values for c in kind.columns(data.channels, axis.name, term, model.reference)])

@@ -7,6 +7,7 @@ turn the field goes against the rate of the gyro, dm/dt = -rate x m, integrated 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +18,9 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.magnetometer.calibrate import Magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.freedom import combined_freedom, expanded_u, information_of, scatter_by_variances
 from labctl.fitting.poses.at_rest.rests import density_in_rests
-from labctl.fitting.poses.between import components, gls
+from labctl.fitting.poses.between import components, gls, gls_weights
 from labctl.fitting.poses.covariance import level_by_parameters, level_by_reading, of_each_move, of_readings
 from labctl.fitting.poses.fit import Solved
 from labctl.fitting.poses.readings import AXES, PoseReadings
@@ -33,6 +35,10 @@ SETTLED = 1e-5
 LARGEST_U = 0.02
 
 
+#: Parts of the noise of r equations, (r, r), each with the degrees of freedom that it is known by.
+_Estimated = list[tuple[NDArray[np.float64], float]]
+
+
 @dataclass(frozen=True)
 class FieldAlignment:
     """Rotation of the corrected field's axes from those of the corrected force and rate, and the dip of the field."""
@@ -40,6 +46,7 @@ class FieldAlignment:
     angles_rad: Array  #: (3,) rotation vector, about the accelerometer's axes, from those axes to the magnetometer's
     dip_rad: float  #: of the field below the horizontal
     covariance: NDArray[np.float64]  #: (4, 4) of angles and dip, rad^2
+    u_freedom: Array  #: (4,) degrees of freedom of their standard uncertainties
     place_rad: float  #: standard deviation of a component of the direction from rest to rest, beyond the noise
     rests: int
     moves: int
@@ -48,6 +55,11 @@ class FieldAlignment:
     def u_rad(self) -> Array:
         """Standard uncertainty of each angle and of the dip, (4,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def expanded_rad(self) -> Array:
+        """U of each angle and of the dip for 95.45 %, (4,)."""
+        return expanded_u(self.u_rad, self.u_freedom)
 
 
 @dataclass(frozen=True)
@@ -59,6 +71,7 @@ class _Seen:
     noise: NDArray[np.float64]  #: (k, 3, 3) covariance by the noise of the readings
     by_parameters: NDArray[np.float64]  #: (k, 3, 9) by hard and soft iron
     parameters: NDArray[np.float64]  #: (9, 9) their covariance
+    freedom: float  #: its degrees of freedom
     readings_u: Array  #: (m,) what spacing and jitter of the readings leave of the used moves' angles, rad
 
     @property
@@ -79,7 +92,7 @@ def align_field(
     dip = float(np.mean(np.sum(solved.accelerometer.up * (field_seen.direction @ turn.T), axis=1)))
     change, place, extra = np.inf, 0.0, 0.0
     for _ in range(STEPS):
-        residual, jacobian, noise, by_place = _equations(field_seen, turn, dip)
+        residual, jacobian, noise, by_place, estimated = _equations(field_seen, turn, dip)
         if change > SETTLED:
             place, extra = components(
                 jacobian, residual, noise, by_place, lambda _: 0.0, float(np.mean(np.diag(noise)))
@@ -90,12 +103,12 @@ def align_field(
         change = float(np.abs(step).max())
         if change < SMALL:
             break
-    freedom = len(residual) - 4
-    covariance = covariance * freedom / (freedom - 2)
+    freedom = _freedom(jacobian, total, by_place, (place, extra), estimated)
     to_dip = np.diag([1.0, 1.0, 1.0, -1 / np.sqrt(max(1 - dip**2, 1e-12))])
     result = FieldAlignment(
-        _vector(turn), float(-np.arcsin(np.clip(dip, -1, 1))), to_dip @ covariance @ to_dip.T, float(np.sqrt(place)),
-        int(np.count_nonzero(solved.accelerometer.used)), int(np.count_nonzero(solved.gyro.used)),
+        _vector(turn), float(-np.arcsin(np.clip(dip, -1, 1))), to_dip @ covariance @ to_dip.T, freedom,
+        float(np.sqrt(place)), int(np.count_nonzero(solved.accelerometer.used)),
+        int(np.count_nonzero(solved.gyro.used)),
     )  # fmt: skip
     worst = int(np.argmax(result.u_rad[:3]))
     if result.u_rad[worst] > LARGEST_U:
@@ -105,6 +118,25 @@ def align_field(
             "in more poses in the same place, away from iron"
         )
     return result
+
+
+def _freedom(
+    jacobian: NDArray[np.float64], total: NDArray[np.float64], by_place: NDArray[np.float64],
+    variances: tuple[float, float], estimated: Sequence[tuple[NDArray[np.float64], float]],
+) -> Array:  # fmt: skip
+    """Return the degrees of freedom (4,) of the solution's standard uncertainties.
+
+    What these equations tell of the scatter of the places, and of what is beyond it where that is not 0, and what the
+    calibrations before them tell of theirs: `estimated` are those parts of the noise with their degrees of freedom.
+    """
+    weights = gls_weights(jacobian, total)
+
+    def part(noise: NDArray[np.float64]) -> Array:
+        return np.asarray(np.einsum("pi,ij,pj->p", weights, noise, weights))
+
+    found = [by_place, *([np.eye(len(total))] if variances[1] > 0 else [])]
+    scatter = scatter_by_variances(np.array([part(each) for each in found]), information_of(jacobian, total, found))
+    return combined_freedom(part(total), [(part(noise), freedom) for noise, freedom in estimated], scatter)
 
 
 def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], magnetometer: Magnetometer) -> _Seen:
@@ -126,6 +158,7 @@ def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64],
     noise = np.einsum("kai,ki,kbi->kab", by_reading, variance, by_reading)
     return _Seen(
         solved, direction, noise, np.concatenate(columns, axis=2), magnetometer.covariance[:9, :9],
+        float(magnetometer.u_freedom[:9].min()),
         of_readings(solved.moves.take(solved.gyro.used), solved.bias),
     )  # fmt: skip
 
@@ -146,16 +179,15 @@ def _start(parts: _Seen) -> NDArray[np.float64]:
 
 def _equations(
     field: _Seen, turn: NDArray[np.float64], dip: float
-) -> tuple[Array, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], _Estimated]:
     """Return residuals (r,), derivatives (r, 4) by turn and dip, known noise (r, r), and that by 1 rad^2 per rest.
 
-    One residual of each used rest, two of each used move.
+    One residual of each used rest, two of each used move. Last come the parts of the noise that are estimated, each
+    with its degrees of freedom.
     """
     solved, k = field.solved, len(field.direction)
     accelerometer, gyro, moves = solved.accelerometer, solved.gyro, solved.moves
-    body = field.direction @ turn.T
-    at_rest = np.flatnonzero(accelerometer.used)
-    up = accelerometer.up
+    body, up, at_rest = field.direction @ turn.T, accelerometer.up, np.flatnonzero(accelerometer.used)
     size = len(at_rest) + 2 * int(np.count_nonzero(gyro.used))
     residual, jacobian = np.zeros(size), np.zeros((size, 4))
     by_seen, by_tilt = np.zeros((size, k, 3)), np.zeros((size, k, 3))
@@ -188,12 +220,13 @@ def _equations(
     tilt = (by_tilt * accelerometer.u_rest_g[:, None]).reshape(size, -1)
     drift = (by_bias * np.radians(solved.bias.u_rest_dps)).reshape(size, -1)
     iron = np.einsum("rka,kab->rb", by_seen, field.by_parameters)
-    noise = (
-        by_move + flat @ block_diag(*field.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
-        + iron @ field.parameters @ iron.T + by_gyro @ gyro.covariance @ by_gyro.T
-        + by_force @ accelerometer.covariance @ by_force.T
-    )  # fmt: skip
-    return residual, jacobian, noise, flat @ block_diag(*field.across) @ flat.T
+    estimated: _Estimated = [
+        (iron @ field.parameters @ iron.T, field.freedom),
+        (by_gyro @ gyro.covariance @ by_gyro.T, gyro.freedom),
+        (tilt @ tilt.T + by_force @ accelerometer.covariance @ by_force.T, float(accelerometer.u_freedom.min())),
+    ]  # fmt: skip
+    noise = by_move + flat @ block_diag(*field.noise) @ flat.T + drift @ drift.T + sum(part for part, _ in estimated)
+    return residual, jacobian, noise, flat @ block_diag(*field.across) @ flat.T, estimated
 
 
 def _rotation(vector: Array) -> NDArray[np.float64]:

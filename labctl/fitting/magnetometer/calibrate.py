@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.magnetometer.ellipsoid import PARAMETERS, PLACES, Ellipsoid, at, nearest_ellipsoid, quadric
+from labctl.fitting.magnetometer.rest_scatter import scatter_of
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.freedom import combined_freedom, expanded_u
 
 AXES = ("x", "y", "z")
 MIN_READINGS = 60
@@ -43,6 +45,7 @@ class Magnetometer:
         float  #: size of the field in the unit of the readings, where it was not given: soft iron of determinant 1
     )
     covariance: NDArray[np.float64]  #: (10, 10) of hard iron, soft iron in the order of PLACES, and field
+    u_freedom: Array  #: (10,) degrees of freedom of the standard uncertainties
     used: NDArray[np.bool_]  #: (n,)
     noise_ut: float  #: of a reading from one to the next
     residual_ut: float  #: root mean square of the distances from the ellipsoid
@@ -56,6 +59,11 @@ class Magnetometer:
     def u(self) -> Array:
         """Standard uncertainties of hard iron, soft iron and field, (10,)."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def expanded(self) -> Array:
+        """U for 95.45 %, (10,)."""
+        return expanded_u(self.u, self.u_freedom)
 
     @property
     def heading_error_deg(self) -> float:
@@ -74,11 +82,13 @@ class Magnetometer:
 
 
 def calibrate_magnetometer(
-    subject: str, readings_ut: NDArray[np.float64], field_ut: float | None = None
+    subject: str, readings_ut: NDArray[np.float64], field_ut: float | None = None, rest: NDArray[np.int64] | None = None
 ) -> Magnetometer:
     """Fit hard and soft iron to readings (n, 3), uT, in order of time, of turns in a constant field.
 
-    `field_ut` is its size; without it the matrix has the determinant 1. Raises NotEnoughData, naming what to do.
+    `field_ut` is its size; without it the matrix has the determinant 1. `rest` (n,) numbers the rests from 1, 0 between
+    them, where they are known: the field of a place is one error of all readings of a rest. Raises NotEnoughData,
+    naming what to do.
     """
     if len(readings_ut) < MIN_READINGS:
         raise NotEnoughData(
@@ -87,13 +97,14 @@ def calibrate_magnetometer(
             "turn it slowly through all directions"
         )
     ellipsoid, used = _robust(subject, readings_ut)
-    n, repetition = len(ellipsoid.distance), _repetition(ellipsoid.distance)
-    # as few independent readings as there are have given nine of them to the parameters, and so look quieter
-    fewer = max(n - PARAMETERS, 1) / max(n - PARAMETERS * repetition, n / 10)
-    normal = np.linalg.inv(ellipsoid.jacobian.T @ ellipsoid.jacobian)
-    covariance = ellipsoid.noise**2 * repetition * fewer * normal
+    repetition = _repetition(ellipsoid.distance)
     values, by_parameter = _values(ellipsoid.parameters, field_ut)
-    total = by_parameter @ covariance @ by_parameter.T
+    normal = by_parameter @ np.linalg.inv(ellipsoid.jacobian.T @ ellipsoid.jacobian) @ by_parameter.T
+    if rest is None:
+        total, freedom = _by_repetition(ellipsoid, repetition, normal)
+    else:
+        scatter = scatter_of(ellipsoid.jacobian, ellipsoid.distance, rest[used])
+        total, freedom = scatter.covariance(by_parameter), scatter.freedom(by_parameter)
     soft = np.zeros((3, 3))
     for value, (i, j) in zip(values[3:9], PLACES, strict=True):
         soft[i, j] = soft[j, i] = value
@@ -101,12 +112,24 @@ def calibrate_magnetometer(
     gap, angle = largest_gap(field)
     size = np.linalg.norm(readings_ut[used], axis=1)
     result = Magnetometer(
-        values[:3], soft, float(values[9]), total, used,
+        values[:3], soft, float(values[9]), total, freedom, used,
         float(np.sqrt(np.mean(np.diff(ellipsoid.distance) ** 2) / 2)), float(np.sqrt(np.mean(ellipsoid.distance**2))),
         _held_out(readings_ut[used], ellipsoid), float(size.std()), repetition, angle, gap,
     )  # fmt: skip
-    _require_determined(subject, result)
+    _require_determined(subject, result, np.sqrt(np.maximum(np.diag(normal), 0.0)))
     return result
+
+
+def _by_repetition(
+    ellipsoid: Ellipsoid, repetition: float, normal: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], Array]:
+    """Return the covariance (10, 10) by as many independent readings as the autocorrelation leaves, and its freedom."""
+    n = len(ellipsoid.distance)
+    # as few independent readings as there are have given nine of them to the parameters, and so look quieter
+    fewer = max(n - PARAMETERS, 1) / max(n - PARAMETERS * repetition, n / 10)
+    total = ellipsoid.noise**2 * repetition * fewer * normal
+    variance = np.diag(total)
+    return total, combined_freedom(variance, [(variance, max(n / repetition - PARAMETERS, 1.0))])
 
 
 def _robust(subject: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDArray[np.bool_]]:
@@ -201,10 +224,11 @@ def in_words(direction: Array) -> str:
     return " ".join(named)
 
 
-def _require_determined(subject: str, result: Magnetometer) -> None:
+def _require_determined(subject: str, result: Magnetometer, by_noise: Array) -> None:
+    """Raise NotEnoughData where a parameter is uncertain; `by_noise` (10,) is u by a noise of 1 uT."""
     # by the noise alone: what a disturbed field makes uncertain is no want of directions
-    alone = min(result.noise_ut / max(result.residual_ut, 1e-300), 1.0) / np.sqrt(result.repetition)
-    u = alone * np.concatenate([result.u[:3] / result.field_ut, result.u[3:9]])
+    alone = min(result.noise_ut, result.residual_ut) * by_noise
+    u = np.concatenate([alone[:3] / result.field_ut, alone[3:9]])
     worst = int(np.argmax(u))
     if np.isfinite(u[worst]) and u[worst] <= LARGEST_U:
         return

@@ -54,6 +54,8 @@ def _nodes(data: FitData, points: int, name: str) -> tuple[float, ...]:
     return tuple(float(t) for t in means)
 
 
+#: Temperatures that a parabola in temperature needs, and their span, deg C.
+PARABOLA_TEMPERATURES, PARABOLA_SPAN_C = 3, 2.0
 ALIGNED = (Term("bias"), Term("scale_factor"), Term("misalignment"))
 
 
@@ -69,6 +71,8 @@ def _yang2018(data: FitData) -> tuple[ErrorModel, Rows]:
 
 def _single_temperature(data: FitData) -> tuple[ErrorModel, Rows]:
     levels, terms = data.levels, ALIGNED if len(data.info.axes) > 1 else ALIGNED[:2]
+    if levels is None and _is_one_temperature(data):
+        levels = np.zeros(len(data), dtype=np.int64)
     if levels is None:
         raise NotEnoughData(
             f"{data.info.serial}: model single_temperature needs discrete temperature levels; fit `--effects "
@@ -76,6 +80,12 @@ def _single_temperature(data: FitData) -> tuple[ErrorModel, Rows]:
         )
     nearest = int(np.argmin(np.abs(level_means(data.temperature_c, levels) - 25.0)))
     return ErrorModel("single_temperature", terms, "rate", reference=Reference(25.0)), levels == nearest
+
+
+def _is_one_temperature(data: FitData) -> bool:
+    """Return whether temperatures without discrete levels are too near each other for a parabola in temperature."""
+    span_c = float(np.ptp(data.temperature_c))
+    return data.distinct_temperatures() < PARABOLA_TEMPERATURES or span_c < PARABOLA_SPAN_C
 
 
 def _weiss1995(data: FitData) -> tuple[ErrorModel, Rows]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.freedom import combined_freedom, expanded_u
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
 from labctl.fitting.poses.between import gls_weights
 from labctl.fitting.poses.covariance import by_accelerometer
@@ -30,11 +31,17 @@ class Alignment:
 
     angles_rad: Array  #: (3,) rotation vector about the accelerometer's axes, from its frame to the gyro's
     covariance: NDArray[np.float64]  #: (3, 3) of it, rad^2
+    u_freedom: Array  #: (3,) degrees of freedom of the standard uncertainties
 
     @property
     def u_rad(self) -> Array:
         """Standard uncertainty of each angle, (3,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def expanded_rad(self) -> Array:
+        """U of each angle for 95.45 %, (3,)."""
+        return expanded_u(self.u_rad, self.u_freedom)
 
 
 def frame_of(errors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -59,10 +66,18 @@ def alignment_of(moves: Moves, accelerometer: Accelerometer, gyro: Gyroscope) ->
     """
     rows = np.repeat(gyro.used, 2)
     weights = gls_weights(gyro.equations.jacobian[rows], gyro.total_of_used)
-    shared = -weights @ by_accelerometer(moves, accelerometer, gyro.equations)[rows] @ accelerometer.covariance
+    by_force = -weights @ by_accelerometer(moves, accelerometer, gyro.equations)[rows]
+    shared = by_force @ accelerometer.covariance
     joint = np.block([[gyro.covariance, shared[:, 3:]], [shared[:, 3:].T, accelerometer.covariance[3:, 3:]]])
     jacobian = _jacobian(gyro.errors, accelerometer.errors)
-    return Alignment(rotation_between(gyro.errors, accelerometer.errors), jacobian @ joint @ jacobian.T)
+    covariance = jacobian @ joint @ jacobian.T
+    of_force = jacobian @ np.vstack([by_force, np.eye(9)[3:]])
+    by_rests = np.einsum("ai,ij,aj->a", of_force, accelerometer.covariance, of_force)
+    by_moves = np.maximum(np.diag(covariance) - by_rests, 0.0)
+    freedom = combined_freedom(
+        np.diag(covariance), [(by_rests, float(accelerometer.u_freedom.min())), (by_moves, gyro.freedom)]
+    )
+    return Alignment(rotation_between(gyro.errors, accelerometer.errors), covariance, freedom)
 
 
 def _jacobian(gyro: NDArray[np.float64], accelerometer: NDArray[np.float64]) -> NDArray[np.float64]:

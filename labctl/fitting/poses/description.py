@@ -14,6 +14,7 @@ from labctl.answers.poses import (
     PosesJson,
     RestsJson,
 )
+from labctl.fitting.numeric.freedom import student_factor
 from labctl.fitting.poses.alignment import Alignment
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, different_poses
 from labctl.fitting.poses.at_rest.bias import Bias
@@ -73,15 +74,13 @@ def _rests(rests: Rests, accelerometer: Accelerometer, bias: Bias) -> RestsJson:
 
 def accelerometer_json(accelerometer: Accelerometer, *, known: bool) -> AccelerometerJson:
     """Return an accelerometer's coefficients by axis; `known`: whether the latitude gave the local gravity."""
-    u = np.sqrt(np.diag(accelerometer.covariance))
     axes: dict[str, dict[str, AccelerometerCoefficient]] = {
-        str(axis): {"bias": {"value": float(accelerometer.bias_g[i]), "u": float(u[i]), "unit": "g"}}
+        str(axis): {"bias": _of_force(accelerometer, i, float(accelerometer.bias_g[i]), "g")}
         for i, axis in enumerate(AXES)
     }
     for place, (i, j) in enumerate(UPPER):
         name = "scale_factor" if i == j else f"misalignment_{AXES[j]}"
-        value = float(accelerometer.errors[i, j])
-        axes[AXES[i]][name] = {"value": value, "u": float(u[3 + place]), "unit": "1"}
+        axes[AXES[i]][name] = _of_force(accelerometer, 3 + place, float(accelerometer.errors[i, j]), "1")
     return {
         "axes": axes,
         "gravity_g": accelerometer.gravity_g,
@@ -91,12 +90,23 @@ def accelerometer_json(accelerometer: Accelerometer, *, known: bool) -> Accelero
     }
 
 
+def _of_force(accelerometer: Accelerometer, place: int, value: float, unit: str) -> AccelerometerCoefficient:
+    freedom = float(accelerometer.u_freedom[place])
+    return {"value": value, "u": float(accelerometer.u[place]), "unit": unit, "degrees_of_freedom": freedom}
+
+
 def alignment_json(alignment: Alignment) -> AlignmentJson:
     """Return the alignment by axis, in deg."""
     angles, u = np.degrees(alignment.angles_rad), np.degrees(alignment.u_rad)
     return {
         "axes": {
-            str(axis): {"value": float(angles[i]), "u": float(u[i]), "unit": "deg"} for i, axis in enumerate(AXES)
+            str(axis): {
+                "value": float(angles[i]),
+                "u": float(u[i]),
+                "unit": "deg",
+                "degrees_of_freedom": float(alignment.u_freedom[i]),
+            }
+            for i, axis in enumerate(AXES)
         },
         "covariance_deg2": (alignment.covariance * np.degrees(1.0) ** 2).tolist(),
         "definition": ALIGNMENT,
@@ -104,9 +114,12 @@ def alignment_json(alignment: Alignment) -> AlignmentJson:
 
 
 def alignment_text(alignment: AlignmentJson) -> str:
-    """Return an alignment in one sentence, with U = 2 u."""
-    angles = ", ".join(f"{each['value']:.3f} +- {2 * each['u']:.3f}" for each in alignment["axes"].values())
-    return f"Gyro triad turned from the accelerometer triad about x, y, z by {angles} deg (U, k = 2)."
+    """Return an alignment in one sentence, with U."""
+    angles = ", ".join(
+        f"{each['value']:.3f} +- {student_factor(each.get('degrees_of_freedom')) * each['u']:.3f}"
+        for each in alignment["axes"].values()
+    )
+    return f"Gyro triad turned from the accelerometer triad about x, y, z by {angles} deg (U, 95.45 %)."
 
 
 def _moves(all_moves: Moves, moves: Moves, gyro: Gyroscope, applied_rms_dps: float) -> MovesJson:

@@ -138,7 +138,7 @@ def _axes(bias: Bias, gyro: Gyroscope) -> dict[str, AxisFit]:
         solution, order = bias.solutions[i], [0, 1 + i, *(1 + j for j in other_axes)]
         row, places = gyro.errors[i], [3 * i + i, *(3 * i + j for j in other_axes)]
         covariance = solution.covariance[np.ix_(order, order)]
-        matrix = gyro.covariance[np.ix_(places, places)]
+        matrix = gyro.covariance_of_t[np.ix_(places, places)]
         values = _between(solution.values[order], row[[i, *other_axes]])
         whole = block_diag(covariance[:1, :1], matrix, covariance[1:, 1:])
         whole[0, 4:] = whole[4:, 0] = covariance[0, 1:]

@@ -36,11 +36,17 @@ class Gyroscope:
 
     errors: NDArray[np.float64]  #: (3, 3) E of output = bias + (I + E) rate
     covariance: NDArray[np.float64]  #: (9, 9) of E, row after row
+    freedom: int  #: degrees of freedom of its scale
     equations: Equations  #: of all m moves at the solution
     noise: NDArray[np.float64]  #: (2m, 2m) covariance of the residuals by what is known, rad^2
     extra_rad: float  #: standard deviation of a component beyond that
     used: NDArray[np.bool_]  #: (m,) moves that agree with the others
     held_out: HeldOut  #: of all m moves, each by the used ones without it
+
+    @property
+    def covariance_of_t(self) -> NDArray[np.float64]:
+        """Covariance (9, 9) of the t distribution: the scale is itself estimated (JCGM 101:2008, 6.4.9.4)."""
+        return self.covariance * (self.freedom / (self.freedom - 2))
 
     @property
     def total_of_used(self) -> NDArray[np.float64]:
@@ -74,10 +80,8 @@ def fit_gyroscope(
     _, covariance = gls(
         equations.jacobian[rows], equations.residual[rows], (noise + extra * np.eye(len(noise)))[np.ix_(rows, rows)]
     )
-    # the scale of the noise is itself estimated: u of a t distribution (JCGM 101:2008, 6.4.9.4)
-    freedom = accelerometer.freedom + np.count_nonzero(rows) - equations.jacobian.shape[1]
-    covariance *= freedom / (freedom - 2)
-    return Gyroscope(errors, covariance, equations, noise, float(np.sqrt(extra)), used, held_out)
+    freedom = accelerometer.freedom + int(np.count_nonzero(rows)) - equations.jacobian.shape[1]
+    return Gyroscope(errors, covariance, freedom, equations, noise, float(np.sqrt(extra)), used, held_out)
 
 
 @dataclass(frozen=True)

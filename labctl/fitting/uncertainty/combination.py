@@ -6,14 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import j0, ndtr, ndtri, stdtrit
+from scipy.special import j0, ndtr
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.freedom import LEVEL, student_factor
 
-#: Probability of an interval of two standard uncertainties of a normal distribution.
-LEVEL = 0.9545
-#: Degrees of freedom beyond which a t-distribution is a normal one, and below which its factor has no meaning.
-MAX_FREEDOM, MIN_FREEDOM = 1e6, 1.0
 #: Share of the variance that is not normal below which the factor is that of a normal distribution.
 MIN_SHARE = 0.1
 #: A standard uncertainty of this share of the whole is added to what is not normal, so that its integral converges.
@@ -44,13 +41,6 @@ def effective_freedom(contributions: Sequence[float], freedom: Sequence[float | 
         contribution**4 / nu for contribution, nu in zip(contributions, freedom, strict=True) if nu is not None
     )
     return total / estimated if estimated > 0 and total > 0 else None
-
-
-def student_factor(freedom: float | None, level: float = LEVEL) -> float:
-    """Return the factor of Student's t for a coverage probability (GUM table G.2); of a normal one without freedom."""
-    if freedom is None:
-        return float(ndtri((1 + level) / 2))
-    return float(stdtrit(min(max(freedom, MIN_FREEDOM), MAX_FREEDOM), (1 + level) / 2))
 
 
 def coverage_factor(

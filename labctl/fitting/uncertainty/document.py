@@ -9,9 +9,9 @@ from labctl.answers.budget import AxisBoundJson, ExpandedJson, UncertaintyJson
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.freedom import LEVEL
 from labctl.fitting.uncertainty.budget import Budget
 from labctl.fitting.uncertainty.coefficient_budget import coefficient_budgets
-from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.grid import grid_rates, grid_temperatures
 from labctl.fitting.uncertainty.rate import RateUncertainty, rate_uncertainty

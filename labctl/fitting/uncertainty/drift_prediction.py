@@ -13,7 +13,8 @@ import numpy as np
 from scipy.special import stdtrit
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.uncertainty.combination import LEVEL, MAX_FREEDOM, half_width
+from labctl.fitting.numeric.freedom import LEVEL, MAX_FREEDOM
+from labctl.fitting.uncertainty.combination import half_width
 
 #: Units without which nothing is said of a population: two degrees of freedom, and k = 4.5.
 MIN_UNITS = 3

@@ -21,6 +21,7 @@ from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.freedom import LEVEL
 from labctl.fitting.numeric.json_numbers import none_for_nan
 from labctl.fitting.uncertainty import (
     COVERAGE,
@@ -34,7 +35,6 @@ from labctl.fitting.uncertainty import (
     rate_uncertainty,
     rate_vector_uncertainty,
 )
-from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.fitting.uncertainty.document import Covered
 from labctl.fitting.uncertainty.largest_error import widening
 from labctl.fitting.uncertainty.vector_bound import PLACES

@@ -23,8 +23,8 @@ from labctl.certificates.document import (
 )
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.numeric.freedom import LEVEL
 from labctl.fitting.uncertainty.budget import Budget
-from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.recording import Recording
 from labctl.services.calibrations.surface import errors_on_grid
 from labctl.services.calibrations.uncertainty import coefficients_at, over_any_axis, places_of, uncertainty_of

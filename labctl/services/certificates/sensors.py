@@ -117,7 +117,7 @@ def accelerometer_result(
     u = np.sqrt(np.diag(np.array(result.covariance)))
     found = [
         _coefficient(f"bias {axis}", STANDARD_GRAVITY * result.bias_g[axis].value, "m/s^2", (STANDARD_GRAVITY * u[i],
-                     freedom), 0.0)
+                     result.bias_g[axis].degrees_of_freedom or freedom), 0.0)
         for i, axis in enumerate(AXES)
     ]  # fmt: skip
     for place, (i, j) in enumerate(UPPER, start=len(AXES)):
@@ -125,7 +125,8 @@ def accelerometer_result(
         was = result.scale_factor[AXES[i]] if i == j else result.misalignment[name]
         value = ratio * (identity + was.value) - identity
         named = f"scale factor {AXES[i]}" if i == j else f"misalignment {name}"
-        found.append(_coefficient(named, value, "1", (ratio * u[place], freedom), (identity + value) * relative_u))
+        fit = ratio * u[place], was.degrees_of_freedom or freedom
+        found.append(_coefficient(named, value, "1", fit, (identity + value) * relative_u))
     found += [] if result.alignment is None else _aligned("gyro triad", result.alignment["axes"])
     found += [] if result.temperature is None else _over_temperature(result.temperature, ratio, freedom)
     reference = SensorReference(
@@ -151,10 +152,12 @@ def accelerometer_result(
 def _aligned(what: str, axes: Mapping[str, AccelerometerCoefficient]) -> list[SensorCoefficient]:
     """Return a rotation; the sizes of gravity and field have no part in it.
 
-    Its standard uncertainty is that of a t distribution already: U is twice as much, as the fit states it.
+    Without degrees of freedom its standard uncertainty is that of a t distribution already, and U is twice as much.
     """
     return [
-        _coefficient(f"{what} about {axis}", each["value"], each["unit"], (each["u"], None), 0.0)
+        _coefficient(
+            f"{what} about {axis}", each["value"], each["unit"], (each["u"], each.get("degrees_of_freedom")), 0.0
+        )
         for axis, each in axes.items()
     ]
 
@@ -169,8 +172,10 @@ def _over_temperature(warm: AccelerometerTemperature, ratio: float, freedom: flo
         for power in range(1, len(terms[AXES[0]]) + 1):
             per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
             for axis in AXES:
-                value, fit = factor * terms[axis][power - 1].value, (factor * next(u), freedom)
-                found.append(_coefficient(f"{name} {axis}, power {power} of temperature", value, per, fit, 0.0))
+                was = terms[axis][power - 1]
+                fit = factor * next(u), was.degrees_of_freedom or freedom
+                named = f"{name} {axis}, power {power} of temperature"
+                found.append(_coefficient(named, factor * was.value, per, fit, 0.0))
     return found
 
 
@@ -190,19 +195,24 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
     ratio = 1.0 if stated is None else stated / used
     freedom = max((result.readings - result.left_out) / result.repetition - PARAMETERS, 1.0)
     found = [
-        _coefficient(f"hard iron {axis}", result.hard_iron_ut[axis].value, "uT", (math.sqrt(covariance[i, i]), freedom),
-                     0.0)
+        _coefficient(f"hard iron {axis}", result.hard_iron_ut[axis].value, "uT", (math.sqrt(covariance[i, i]),
+                     result.hard_iron_ut[axis].degrees_of_freedom or freedom), 0.0)
         for i, axis in enumerate(AXES)
     ]  # fmt: skip
     for place, (i, j) in enumerate(PLACES, start=len(AXES)):
-        value = ratio * result.soft_iron[AXES[i] + AXES[j]].value
+        was = result.soft_iron[AXES[i] + AXES[j]]
+        value = ratio * was.value
         by = np.zeros(len(covariance))
         by[place] = ratio
         if stated is not None:  # the stated size replaces the one by the readings, with its uncertainty
             by[-1] = -value / used
         of_fit = math.sqrt(max(float(by @ covariance @ by), 0.0))
         of_field = 0.0 if stated is None or u_stated is None else value * u_stated / stated
-        found.append(_coefficient(f"soft iron {AXES[i]}{AXES[j]}", value, "1", (of_fit, freedom), of_field))
+        found.append(
+            _coefficient(
+                f"soft iron {AXES[i]}{AXES[j]}", value, "1", (of_fit, was.degrees_of_freedom or freedom), of_field
+            )
+        )
     found += [] if result.alignment is None else _aligned("magnetometer", result.alignment["axes"])
     reference = SensorReference(
         quantity="size of the local field", value=used if stated is None else stated, unit="uT",
@@ -218,7 +228,7 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
 
 
 def _freedom_of(result: AccelerometerResponse) -> float:
-    """Return the degrees of freedom of the fit: rests beyond what the parameters take."""
+    """Return the degrees of freedom of a fit that states none: rests beyond what the parameters take."""
     known = KNOWN_BEFORE if result.earlier is not None else 0
     warm = result.temperature
     parameters = ACCELEROMETER_PARAMETERS if warm is None else len(warm.covariance)

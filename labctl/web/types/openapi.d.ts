@@ -1992,6 +1992,11 @@ export interface components {
              * @description Unit of the numbers; 1: a ratio.
              */
             unit: string;
+            /**
+             * Degrees Of Freedom
+             * @description Degrees of freedom nu of `u`: U = t(95.45 %, nu) u, t of Student; absent: stored by an older version, U = 2 u.
+             */
+            degrees_of_freedom?: number;
         };
         /**
          * AccelerometerJson
@@ -2059,21 +2064,21 @@ export interface components {
              * @description For each axis: bias in units of 9.80665 m/s2, with its standard uncertainty.
              */
             bias_g: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Input"];
             };
             /**
              * Scale Factor
              * @description Relative errors of the scale factors, by axis.
              */
             scale_factor: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Input"];
             };
             /**
              * Misalignment
              * @description xy, xz, yz: of an axis by the force along another.
              */
             misalignment: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Input"];
             };
             /**
              * Covariance
@@ -2130,7 +2135,7 @@ export interface components {
             /** @description Earlier version that was used too; null: the poses alone. */
             earlier?: components["schemas"]["EarlierVersion"] | null;
             /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
-            temperature?: components["schemas"]["AccelerometerTemperature"] | null;
+            temperature?: components["schemas"]["AccelerometerTemperature-Input"] | null;
             /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, rests and turns that do not determine it, or rests that do not agree with the earlier version: `text` says which. */
             alignment?: components["schemas"]["AlignmentJson"] | null;
             /**
@@ -2155,21 +2160,21 @@ export interface components {
              * @description For each axis: bias in units of 9.80665 m/s2, with its standard uncertainty.
              */
             bias_g: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Output"];
             };
             /**
              * Scale Factor
              * @description Relative errors of the scale factors, by axis.
              */
             scale_factor: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Output"];
             };
             /**
              * Misalignment
              * @description xy, xz, yz: of an axis by the force along another.
              */
             misalignment: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Output"];
             };
             /**
              * Covariance
@@ -2226,7 +2231,7 @@ export interface components {
             /** @description Earlier version that was used too; null: the poses alone. */
             earlier: components["schemas"]["EarlierVersion"] | null;
             /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
-            temperature: components["schemas"]["AccelerometerTemperature"] | null;
+            temperature: components["schemas"]["AccelerometerTemperature-Output"] | null;
             /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, rests and turns that do not determine it, or rests that do not agree with the earlier version: `text` says which. */
             alignment: components["schemas"]["AlignmentJson"] | null;
             /**
@@ -2239,7 +2244,7 @@ export interface components {
          * AccelerometerTemperature
          * @description Bias and scale factors as polynomials of the temperature about a reference; misalignments are constant.
          */
-        AccelerometerTemperature: {
+        "AccelerometerTemperature-Input": {
             /**
              * Reference C
              * @description Temperature at which the other parameters of the result hold, deg C.
@@ -2263,14 +2268,62 @@ export interface components {
              * @description By axis, of T - reference to the power 1, 2, ...: g/K, ...
              */
             bias_g: {
-                [key: string]: components["schemas"]["Estimate"][];
+                [key: string]: components["schemas"]["Estimate-Input"][];
             };
             /**
              * Scale Factor
              * @description The same of the scale factor, 1/K.
              */
             scale_factor: {
-                [key: string]: components["schemas"]["Estimate"][];
+                [key: string]: components["schemas"]["Estimate-Input"][];
+            };
+            /**
+             * Covariance
+             * @description Of the nine parameters at the reference, bias by power and axis, scale factor by power and axis.
+             */
+            covariance: number[][];
+            /**
+             * Constant G
+             * @description What nine parameters without temperature leave of the used rests, RMS, g.
+             */
+            constant_g: number;
+        };
+        /**
+         * AccelerometerTemperature
+         * @description Bias and scale factors as polynomials of the temperature about a reference; misalignments are constant.
+         */
+        "AccelerometerTemperature-Output": {
+            /**
+             * Reference C
+             * @description Temperature at which the other parameters of the result hold, deg C.
+             */
+            reference_c: number;
+            /**
+             * Range C
+             * @description Lowest and highest temperature of the rests, deg C.
+             */
+            range_c: [
+                number,
+                number
+            ];
+            /**
+             * Temperatures
+             * @description Temperatures of the rests that are more than 2 K apart.
+             */
+            temperatures: number;
+            /**
+             * Bias G
+             * @description By axis, of T - reference to the power 1, 2, ...: g/K, ...
+             */
+            bias_g: {
+                [key: string]: components["schemas"]["Estimate-Output"][];
+            };
+            /**
+             * Scale Factor
+             * @description The same of the scale factor, 1/K.
+             */
+            scale_factor: {
+                [key: string]: components["schemas"]["Estimate-Output"][];
             };
             /**
              * Covariance
@@ -6631,7 +6684,7 @@ export interface components {
          * Estimate
          * @description A value with its standard uncertainty.
          */
-        Estimate: {
+        "Estimate-Input": {
             /**
              * Value
              * @description Value, in the unit that the field of this estimate states.
@@ -6642,6 +6695,32 @@ export interface components {
              * @description Standard uncertainty; null: the value was given.
              */
             u: number | null;
+            /**
+             * Degrees Of Freedom
+             * @description Degrees of freedom nu of `u`: U = t(95.45 %, nu) u, t of Student; null: not stated, U = 2 u.
+             */
+            degrees_of_freedom?: number | null;
+        };
+        /**
+         * Estimate
+         * @description A value with its standard uncertainty.
+         */
+        "Estimate-Output": {
+            /**
+             * Value
+             * @description Value, in the unit that the field of this estimate states.
+             */
+            value: number;
+            /**
+             * U
+             * @description Standard uncertainty; null: the value was given.
+             */
+            u: number | null;
+            /**
+             * Degrees Of Freedom
+             * @description Degrees of freedom nu of `u`: U = t(95.45 %, nu) u, t of Student; null: not stated, U = 2 u.
+             */
+            degrees_of_freedom: number | null;
         };
         /**
          * EventResponse
@@ -9039,17 +9118,17 @@ export interface components {
              * @description For each axis: hard iron, uT.
              */
             hard_iron_ut: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Input"];
             };
             /**
              * Soft Iron
              * @description Symmetric matrix: xx, yy, zz, xy, xz, yz.
              */
             soft_iron: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Input"];
             };
             /** @description Magnitude of the field, uT: given, or with a soft iron of determinant 1. */
-            field_ut: components["schemas"]["Estimate"];
+            field_ut: components["schemas"]["Estimate-Input"];
             /**
              * Covariance
              * @description Of hard iron x, y, z, soft iron xx, yy, zz, xy, xz, yz, and field.
@@ -9087,7 +9166,7 @@ export interface components {
             noise_ut: number;
             /**
              * Repetition
-             * @description Readings that tell as much as one independent reading, by the autocorrelation of the distances; the covariance includes it.
+             * @description Readings that tell as much as one independent reading, by the autocorrelation of the distances; where no rests are known, the covariance includes it.
              */
             repetition: number;
             /**
@@ -9124,17 +9203,17 @@ export interface components {
              * @description For each axis: hard iron, uT.
              */
             hard_iron_ut: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Output"];
             };
             /**
              * Soft Iron
              * @description Symmetric matrix: xx, yy, zz, xy, xz, yz.
              */
             soft_iron: {
-                [key: string]: components["schemas"]["Estimate"];
+                [key: string]: components["schemas"]["Estimate-Output"];
             };
             /** @description Magnitude of the field, uT: given, or with a soft iron of determinant 1. */
-            field_ut: components["schemas"]["Estimate"];
+            field_ut: components["schemas"]["Estimate-Output"];
             /**
              * Covariance
              * @description Of hard iron x, y, z, soft iron xx, yy, zz, xy, xz, yz, and field.
@@ -9172,7 +9251,7 @@ export interface components {
             noise_ut: number;
             /**
              * Repetition
-             * @description Readings that tell as much as one independent reading, by the autocorrelation of the distances; the covariance includes it.
+             * @description Readings that tell as much as one independent reading, by the autocorrelation of the distances; where no rests are known, the covariance includes it.
              */
             repetition: number;
             /**
@@ -11809,6 +11888,16 @@ export interface components {
              * @description Standard uncertainty, in `unit`; null: the value was given.
              */
             u: number | null;
+            /**
+             * Degrees Of Freedom
+             * @description Degrees of freedom of `u`; null: not stated, U = 2 u.
+             */
+            degrees_of_freedom: number | null;
+            /**
+             * Expanded
+             * @description Expanded uncertainty U for 95.45 %, in `unit`; null: the value was given.
+             */
+            expanded: number | null;
         };
         /**
          * SensorFormatResponse
@@ -12879,6 +12968,11 @@ export interface components {
              * @description RMS error of the stretches left out with the response, deg/s.
              */
             after_rms_dps: number;
+            /**
+             * Beside
+             * @description Ids of the effects that are there beside the lag, such as thermal_hysteresis; absent: an older version.
+             */
+            beside?: string[];
         };
         /**
          * ThermalHintJson
@@ -12912,6 +13006,11 @@ export interface components {
              * @description RMS error of the stretches left out with the response, deg/s.
              */
             after_rms_dps: number;
+            /**
+             * Beside
+             * @description Ids of the effects that are there beside the lag, such as thermal_hysteresis; absent: an older version.
+             */
+            beside?: string[];
             /**
              * Rivals Rms Dps
              * @description Effect -> RMS error of the stretches left out with that effect alone, deg/s.

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from labctl.fitting import fit
+from labctl.fitting.numeric.freedom import student_factor
 from labctl.fitting.uncertainty import BenchConditions, coefficient_budgets, evidence_of, rate_uncertainty
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.combination import (
     combined_u,
     coverage_factor,
     effective_freedom,
-    student_factor,
 )
 from labctl.recording import Recording, Standard
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from labctl.fitting.uncertainty.combination import LEVEL
+from labctl.fitting.numeric.freedom import LEVEL
 from labctl.fitting.uncertainty.drift_prediction import of_item, of_type, with_drift
 
 

@@ -37,11 +37,23 @@ def at(*temperatures_c: float, rates: tuple[float, ...] = RATES) -> Recording:
     [
         (at(25.0), "single_temperature"),
         (at(10.0, 25.0), "single_temperature"),
+        (means(24.0 + np.linspace(0.0, 1.4, 20), np.tile(RATES, 2)), "single_temperature"),
+        (means(24.0 + np.linspace(0.0, 1.9, 20), np.tile(RATES, 2)), "single_temperature"),
+        (means(24.0 + np.linspace(0.0, 12.0, 40), np.tile(RATES, 4)), "ojeda2000"),
         (at(0.0, 20.0, 40.0), "ojeda2000"),
         (at(25.0, rates=(50.0,)), "bias"),
         (at(25.0, rates=(0.0, 0.0, 0.0)), "bias"),
     ],
-    ids=["one temperature", "two temperatures", "three temperatures", "one data set", "at rest"],
+    ids=[
+        "one temperature",
+        "two temperatures",
+        "room",
+        "room, three degrees",
+        "no levels",
+        "three temperatures",
+        "one data set",
+        "at rest",
+    ],
 )
 def test_the_fullest_model_that_the_recording_determines_is_proposed(recording: Recording, expected: str) -> None:
     assert suggested_model(recording) == expected

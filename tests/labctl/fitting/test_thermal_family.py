@@ -22,6 +22,7 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording, to_points
 from labctl.services.criticism.report_text import sentences
+from studies.rest_units import Hidden, unit_at_rest
 from tests.helpers.rest import at_rest, flowing, follow
 
 UNEXPLAINED = Verdict("unexplained", depends_on=("t_s",))
@@ -128,3 +129,20 @@ def test_other_effects_stay_beside_the_family() -> None:
     found = with_family(verdict, family)
     assert found.groups == ((LAG,), ("supply_sensitivity",))
     assert found.form == "missing"
+
+
+def test_a_lag_and_a_hysteresis_that_are_there_together_are_both_named() -> None:
+    recording = unit_at_rest(2, Hidden(lag_s=600.0, width_k=5.0))  # with dwells: evenly, two lags look like both
+    found = criticise(recording, based(recording)[1], points=to_points(recording), full=False)
+    assert found.verdict.groups == ((LAG,), ("thermal_hysteresis",))
+    assert found.family is not None
+    assert found.family.to_json()["beside"] == ["thermal_hysteresis"]
+    assert "and thermal_hysteresis beside it" in found.family.sentence
+    assert [each["effect"] for each in found.advice] == [LAG, "thermal_hysteresis"]
+
+
+def test_a_lag_alone_has_no_hysteresis_beside_it() -> None:
+    family = family_of(at_rest(("z",), lag_s=400.0))
+    assert family is not None
+    assert family.beside is None
+    assert family.to_json()["beside"] == []

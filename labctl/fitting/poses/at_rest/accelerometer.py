@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.freedom import expanded_u, freedom_of_bounded
 from labctl.fitting.poses.at_rest.gravity import local_gravity_g
 from labctl.fitting.poses.at_rest.rests import Rests
 from labctl.fitting.poses.between import between_variance
@@ -48,6 +49,17 @@ class Accelerometer:
     residual_g: float  #: root mean square of what is left of the rests' sizes
     gravity_g: float
     freedom: int  #: used rests, and what was known before, beyond the parameters
+    u_freedom: Array  #: (9,) degrees of freedom of the standard uncertainties
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainties in the order of `covariance`, (9,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def expanded(self) -> Array:
+        """U for 95.45 %, (9,)."""
+        return expanded_u(self.u, self.u_freedom)
 
 
 def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Accelerometer:
@@ -55,15 +67,23 @@ def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Acceleromet
     require_poses(readings.info.serial, rests)
     gravity = local_gravity_g(readings.info)
     law = SizeLaw(rests.accel_g)
-    theta, sigma, used = fit_sizes(law, gravity, rests.accel_white_var.mean(axis=1), MIN_POSES)
+    white = rests.accel_white_var.mean(axis=1)
+    theta, sigma, used = fit_sizes(law, gravity, white, MIN_POSES)
     jacobian = _jacobian(theta, rests.accel_g[used]) / sigma[used][:, None]
     covariance = _covariance(readings.info.serial, jacobian, rests.accel_g[used])
     left = _sizes(theta, rests.accel_g[used]) - gravity
     errors, bias = matrices(theta)
+    freedom = int(np.count_nonzero(used)) - PARAMETERS
     return Accelerometer(
         errors, bias, covariance, unit(corrected(rests.accel_g, errors, bias)), sigma, used,
-        float(np.sqrt(np.mean(left**2))), gravity, int(np.count_nonzero(used)) - PARAMETERS,
+        float(np.sqrt(np.mean(left**2))), gravity, freedom,
+        np.full(PARAMETERS, freedom_of_sizes(freedom, white[used], sigma[used])),
     )  # fmt: skip
+
+
+def freedom_of_sizes(freedom: int, white: Array, sigma: Array) -> float:
+    """Return the degrees of freedom of the variance (k,) of sizes, sigma^2, which is `white` (k,) at least."""
+    return freedom_of_bounded(freedom, float(white.mean() / np.mean(sigma**2)))
 
 
 class Law(Protocol):

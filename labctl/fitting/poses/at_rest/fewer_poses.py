@@ -15,11 +15,13 @@ from scipy.special import chdtrc
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.freedom import combined_freedom
 from labctl.fitting.poses.at_rest.accelerometer import (
     LARGEST_U,
     PARAMETERS,
     Accelerometer,
     different_poses,
+    freedom_of_sizes,
     matrices,
     size_jacobian,
 )
@@ -94,9 +96,13 @@ def by_fewer_poses(readings: PoseReadings, rests: Rests, known: Known) -> ByFewe
     errors, bias = matrices(theta)
     force = corrected(rests.accel_g, errors, bias)
     left = np.linalg.norm(force, axis=1) - gravity
+    sigma, of_rests = np.sqrt(white + extra), jacobian[: len(rests)]
+    by_rests = np.sum((covariance @ of_rests.T) ** 2, axis=1)
+    of_sizes = freedom_of_sizes(freedom, white + known.between_var, sigma)
     found = Accelerometer(
-        errors, bias, np.asarray(covariance, dtype=np.float64), unit(force), np.sqrt(white + extra),
+        errors, bias, np.asarray(covariance, dtype=np.float64), unit(force), sigma,
         np.ones(len(rests), dtype=np.bool_), float(np.sqrt(np.mean(left**2))), gravity, freedom,
+        combined_freedom(np.diag(covariance), [(by_rests, of_sizes)]),
     )  # fmt: skip
     return ByFewer(found, float(chdtrc(freedom, first)))
 

@@ -125,6 +125,18 @@ def _density(
     return np.asarray(np.maximum(squares / freedom * size * spacing_s, white / 4))
 
 
+def rest_of_each(rests: Rests, n: int, spacing_s: float) -> NDArray[np.int64]:
+    """Return the number of the rest that each of n readings is in, from 1; 0 between rests.
+
+    The ends that `find_rests` has cut off count: the unit is still in its place there.
+    """
+    margin = round(MARGIN * max(round(WINDOW_S / spacing_s), MIN_IN_WINDOW))
+    number = np.zeros(n, dtype=np.int64)
+    for place, (begin, end) in enumerate(zip(rests.begin, rests.end, strict=True), start=1):
+        number[max(begin - margin, 0) : end + margin] = place
+    return number
+
+
 def density_in_rests(channels: NDArray[np.float64], rests: Rests, spacing_s: float) -> Array:
     """Return the variance of a mean over one second of other channels (n, c) in the same rests, (c,)."""
     size = max(round(WINDOW_S / spacing_s), MIN_IN_WINDOW)

@@ -19,6 +19,7 @@ from labctl.fitting.poses.at_rest.accelerometer import (
     Accelerometer,
     SizeLaw,
     fit_sizes,
+    freedom_of_sizes,
     matrices,
     require_poses,
 )
@@ -53,6 +54,16 @@ class OverTemperature:
     ]  #: (9 + 3n + 3m,) squared: of the nine, the bias by power and axis, the scale factor
     adequacy: Adequacy
     constant_g: float  #: what nine parameters without temperature leave of the used rests, g
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainties in the order of `covariance`."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def u_freedom(self) -> Array:
+        """Their degrees of freedom: those of one scatter of the rests."""
+        return np.full(len(self.covariance), self.reference.u_freedom[0])
 
     def at_reference_g(self, accel_g: NDArray[np.float64], warm_c: Array) -> NDArray[np.float64]:
         """Return what readings (n, 3), g, at temperatures (n,), deg C, would be at the reference temperature, g."""
@@ -150,14 +161,8 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
     serial = readings.info.serial
     require_poses(serial, rests)
     warm = rest_temperatures(readings, rests)
-    low, high = float(warm.min()), float(warm.max())
-    levels = different_temperatures(warm)
-    if levels < 2 or high - low < MIN_SPAN_K:
-        raise NotEnoughData(
-            f"{serial}: the rests are at {low:.1f} to {high:.1f} deg C; coefficients of temperature need poses at two "
-            f"and more temperatures that span {MIN_SPAN_K:g} K: lay the unit down in its poses again, warmer or "
-            "colder, or calibrate without a temperature"
-        )
+    low, high, levels = float(warm.min()), float(warm.max()), different_temperatures(warm)
+    _require_span(serial, low, high, levels)
     orders = (min(BIAS_ORDER, levels - 1), SCALE_ORDER)
     reference, half = round((low + high) / 2, 1), (high - low) / 2
     law = TemperatureLaw(rests.accel_g, (warm - reference) / half, orders)
@@ -167,19 +172,22 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
             f"{law.parameters + MIN_FREEDOM} rests: lay the unit down on more faces and edges at each temperature"
         )
     gravity = local_gravity_g(readings.info)
-    theta, sigma, used = fit_sizes(law, gravity, rests.accel_white_var.mean(axis=1), law.parameters + MIN_FREEDOM)
+    white = rests.accel_white_var.mean(axis=1)
+    theta, sigma, used = fit_sizes(law, gravity, white, law.parameters + MIN_FREEDOM)
     kept = law.take(used)
     jacobian = kept.jacobian(theta) / sigma[used][:, None]
     covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
     _require_determined(serial, jacobian, covariance, law)
-    white = rests.accel_white_var.mean(axis=1)[used]
+    white = white[used]
     left = kept.sizes(theta) - gravity
     before = np.linalg.norm(kept.accel_g, axis=1) - gravity
     worth = left_out_adequacy(left, jacobian, covariance, sigma[used], white, before)
     errors, bias = matrices(theta[:PARAMETERS])
+    freedom = int(np.count_nonzero(used)) - law.parameters
     at_reference = Accelerometer(
         errors, bias, covariance[:PARAMETERS, :PARAMETERS], unit(law.forces(theta)[0]), sigma, used,
-        float(np.sqrt(np.mean(left**2))), gravity, int(np.count_nonzero(used)) - law.parameters,
+        float(np.sqrt(np.mean(left**2))), gravity, freedom,
+        np.full(PARAMETERS, freedom_of_sizes(freedom, white, sigma[used])),
     )  # fmt: skip
     powers = np.concatenate([np.repeat(np.arange(1.0, order + 1), 3) for order in orders])
     per_k = np.concatenate([np.ones(PARAMETERS), half**-powers])
@@ -190,6 +198,16 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
         in_kelvin[split:].reshape(-1, 3), np.asarray(covariance * np.outer(per_k, per_k)), worth,
         _constant_g(SizeLaw(kept.accel_g), gravity, white),
     )  # fmt: skip
+
+
+def _require_span(serial: str, low: float, high: float, levels: int) -> None:
+    """Raise NotEnoughData for rests at temperatures, deg C, that tell no coefficient of temperature."""
+    if levels < 2 or high - low < MIN_SPAN_K:
+        raise NotEnoughData(
+            f"{serial}: the rests are at {low:.1f} to {high:.1f} deg C; coefficients of temperature need poses at two "
+            f"and more temperatures that span {MIN_SPAN_K:g} K: lay the unit down in its poses again, warmer or "
+            "colder, or calibrate without a temperature"
+        )
 
 
 def different_temperatures(warm: Array) -> int:

@@ -10,6 +10,8 @@ import pytest
 from labctl.errors import NotEnoughData
 from labctl.fitting.magnetometer.alignment import FieldAlignment, align_field
 from labctl.fitting.magnetometer.calibrate import Magnetometer, calibrate_magnetometer
+from labctl.fitting.numeric.freedom import student_factor
+from labctl.fitting.poses.at_rest.rests import rest_of_each
 from labctl.fitting.poses.fit import Solved, solve
 from labctl.fitting.poses.readings import PoseReadings, readings_of
 from studies.triads import recording_of, scores
@@ -31,9 +33,25 @@ def aligned(session: Session) -> FieldAlignment:
 
 
 def test_the_uncertainty_covers_known_turns() -> None:
-    z = np.array([scores(seed, 14)[1] for seed in range(40, 46)])
-    assert np.mean(np.abs(z) <= 2) > 0.8
-    assert 0.6 < np.sqrt(np.mean(z**2)) < 1.5
+    found = [scores(seed, 14) for seed in range(40, 46)]
+    for kind in ("magnetometer", "bias", "scale factor", "misalignment", "hard iron", "soft iron"):
+        ratio = np.array([each[kind] for each in found])
+        assert np.mean(np.abs(ratio) <= 1) > 0.8, kind
+        assert 0.2 < np.sqrt(np.mean(ratio**2)) < 0.75, kind
+
+
+def test_the_degrees_of_freedom_are_those_of_the_rests_and_not_of_the_readings(session: Session) -> None:
+    readings, solved, field, magnetometer, _ = session
+    rest = rest_of_each(solved.rests, len(readings), readings.spacing_s)
+    known = calibrate_magnetometer("m", field[::10], rest=rest[::10])
+    assert magnetometer.u_freedom.min() > 100  # as if the errors of readings of one rest were independent
+    assert 5 < known.u_freedom.min() < 40
+    assert np.all(known.u[:9] > magnetometer.u[:9])
+    found = align_field(readings, solved, field, known)
+    assert len(solved.rests) / 2 < found.u_freedom.min() < found.u_freedom.max() < 3 * len(solved.rests)
+    assert found.expanded_rad == pytest.approx(
+        [student_factor(n) * u for n, u in zip(found.u_freedom, found.u_rad, strict=True)]
+    )
 
 
 def test_it_is_the_turn_of_the_corrected_fields_axes_and_the_dip(session: Session) -> None:

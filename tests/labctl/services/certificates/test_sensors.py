@@ -17,6 +17,7 @@ from labctl.answers.sensors import AccelerometerRequest, MagnetometerRequest
 from labctl.certificates.document import Certificate, SensorResult
 from labctl.certificates.readable import readable_certificate
 from labctl.errors import BadInput, NotFound
+from labctl.fitting.numeric.freedom import student_factor
 from labctl.recording.files import write_recording
 from labctl.services.accelerometer import Source as ForceSource
 from labctl.services.accelerometer import accelerometer_of_files
@@ -198,7 +199,9 @@ def test_the_alignment_of_the_gyro_triad_is_stated_with_its_uncertainty(tmp_path
         assert (each.value, each.unit) == (found.alignment["axes"][axis]["value"], "deg")
         assert abs(each.value - true) < 2 * each.expanded
         assert 0 < each.expanded < 0.03
-        assert each.expanded == pytest.approx(2 * found.alignment["axes"][axis]["u"], rel=1e-4)
+        fitted = found.alignment["axes"][axis]
+        factor = student_factor(fitted["degrees_of_freedom"])
+        assert each.expanded == pytest.approx(factor * fitted["u"], rel=1e-4)
 
 
 def test_the_alignment_of_the_magnetometer_is_in_all_three_forms(tmp_path: Path) -> None:
@@ -218,7 +221,7 @@ def test_the_alignment_of_the_magnetometer_is_in_all_three_forms(tmp_path: Path)
     for axis, true in zip("xyz", np.degrees(vector_of(unit.turned)), strict=True):
         each, fitted = by_name[f"magnetometer about {axis}"], found.alignment["axes"][axis]
         assert (each.value, each.unit) == (fitted["value"], "deg")
-        assert each.expanded == pytest.approx(2 * fitted["u"], rel=1e-4)
+        assert each.expanded == pytest.approx(student_factor(fitted["degrees_of_freedom"]) * fitted["u"], rel=1e-4)
         assert abs(each.value - true) < 2 * each.expanded
     assert "rotation vector from the axes of the corrected force" in stated.formula
     (page,) = json.loads(readable_certificate(given))["sensors"]

@@ -14,7 +14,8 @@ from scipy.stats import t as student
 
 from labctl.certificates.document import Certificate
 from labctl.errors import BadCalibrationFile
-from labctl.fitting.uncertainty.combination import LEVEL, half_width
+from labctl.fitting.numeric.freedom import LEVEL
+from labctl.fitting.uncertainty.combination import half_width
 from labctl.services.calibrations import type_drift
 from labctl.services.calibrations.stability import NO_HISTORY, Stability, stability_of
 from labctl.services.certificates.issue import issue

@@ -7,9 +7,6 @@ import { instant, withUncertainty } from "../core/format.js";
 
 /** @import { SensorVersion } from "../../../types/api.js" */
 
-/** Coverage factor: expanded uncertainty. */
-const K = 2;
-
 /**
  * A card of all versions; null for a unit without one.
  * @param {readonly SensorVersion[]} versions by sensor, newest first
@@ -50,10 +47,10 @@ function coefficients({ sensor, version, verdict, coefficients: rows }, newest) 
       [
         { title: "Coefficient", cell: (row) => row.name },
         {
-          title: "Value ± U, k = 2",
+          title: "Value ± U, 95.45 %",
           number: true,
           cell: (row) =>
-            withUncertainty(row.value, row.u === null ? null : K * row.u, row.unit === "1" ? "" : row.unit),
+            withUncertainty(row.value, row.expanded, row.unit === "1" ? "" : row.unit),
         },
       ],
       [...rows],

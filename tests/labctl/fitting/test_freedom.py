@@ -1,0 +1,59 @@
+"""Degrees of freedom of a standard uncertainty: against drawn variances, and against the GUM's formula."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from labctl.fitting.magnetometer.rest_scatter import scatter_of
+from labctl.fitting.numeric.freedom import (
+    MAX_FREEDOM,
+    combined_freedom,
+    expanded_u,
+    freedom_of_bounded,
+    information_of,
+    scatter_by_variances,
+    student_factor,
+)
+
+
+@pytest.mark.parametrize(("freedom", "share"), [(3, 0.0), (3, 0.3), (13, 0.5), (13, 1.0)])
+def test_a_variance_that_noise_bounds_has_the_freedom_of_its_scatter(freedom: int, share: float) -> None:
+    drawn = np.maximum(share, np.random.default_rng(1).chisquare(freedom, 200_000) / freedom)
+    assert freedom_of_bounded(freedom, share) == pytest.approx(2 * drawn.mean() ** 2 / drawn.var(), rel=0.03)
+
+
+def test_a_variance_without_known_noise_has_the_freedom_of_its_residuals() -> None:
+    assert freedom_of_bounded(7, 0.0) == pytest.approx(7)
+
+
+def test_parts_combine_by_welch_and_satterthwaite() -> None:
+    total = combined_freedom(np.array([10.0]), [(np.array([4.0]), 5), (np.array([3.0]), 12)])
+    assert total == pytest.approx([10.0**2 / (4.0**2 / 5 + 3.0**2 / 12)])
+    assert combined_freedom(np.array([1.0]), []) == pytest.approx([MAX_FREEDOM])
+    assert expanded_u(np.array([2.0]), np.array([3.0])) == pytest.approx([2 * student_factor(3)])
+
+
+def test_one_variance_of_independent_residuals_has_as_many_degrees_as_they_exceed_the_parameters() -> None:
+    jacobian = np.random.default_rng(2).normal(size=(20, 4))
+    information = information_of(jacobian, 3.0 * np.eye(20), [np.eye(20)])
+    variance = np.array([3.0])  # of anything that is proportional to it
+    freedom = combined_freedom(variance, [], scatter_by_variances(np.array([[1.0]]), information))
+    assert freedom == pytest.approx([16])
+
+
+def test_the_scatter_of_rests_is_what_the_dense_likelihood_says() -> None:
+    rng = np.random.default_rng(3)
+    rest = np.repeat(np.arange(10) % 2 * (1 + np.arange(10) // 2), 8)  # stretches in motion and at rest
+    place = np.concatenate([[0.0], rng.normal(0, 2.0, 5)])
+    jacobian = rng.normal(size=(80, 3))
+    found = scatter_of(jacobian, rng.normal(0, 1.0, 80) + place[rest], rest)
+    shared = (rest[:, None] == rest) & (rest[:, None] > 0)
+    parts = [np.eye(80), shared.astype(np.float64)]
+    total = found.white_var * parts[0] + found.place_var * parts[1]
+    assert found.information == pytest.approx(information_of(jacobian, total, parts), rel=1e-6)
+    weights = np.linalg.pinv(jacobian)
+    assert found.covariance(np.eye(3)) == pytest.approx(weights @ total @ weights.T, rel=1e-9)
+    assert 0.7 < np.sqrt(found.white_var) < 1.3
+    assert 0.8 < np.sqrt(found.place_var) < 5.0
+    assert np.all(found.freedom(np.eye(3)) < 77)
