@@ -7,7 +7,6 @@ import os
 import shutil
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Callable, Coroutine, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -147,11 +146,6 @@ def in_order(names: Iterable[str]) -> list[str]:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Have the tests that wait beside those that compute; leave out what this machine cannot do, and say so."""
-    if twice := [name for name, times in Counter(item.nodeid for item in items).items() if times > 1]:
-        raise pytest.UsageError(
-            f"tests of one name, of which pytest-xdist runs one: {', '.join(twice)}; give each a name of its own, as "
-            "pytest.mark.parametrize does"
-        )
     files = dict.fromkeys(item.nodeid.partition("::")[0] for item in items)
     place = {name: number for number, name in enumerate(in_order(files))}
     items.sort(key=lambda item: place[item.nodeid.partition("::")[0]])
