@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 
 import pytest
 
@@ -150,3 +151,10 @@ def test_every_test_asserts_something() -> None:
         helpers = asserting_helpers(file) if tests else frozenset()
         silent += [f"{file.name}:{node.lineno} {node.name}" for node in tests if not asserts(node, helpers)]
     assert not silent, lines("without an assertion", silent)
+
+
+def test_every_test_has_a_name_of_its_own(request: pytest.FixtureRequest) -> None:
+    """pytest-xdist runs one test of each name. The tests are those of this run; in `make test`, all."""
+    times = Counter(item.nodeid for item in request.session.items)
+    twice = [f"{name}: {count} tests" for name, count in times.items() if count > 1]
+    assert not twice, lines("parametrize them so that each has a name of its own", twice)

@@ -8,7 +8,7 @@ import re
 import tokenize
 from collections.abc import Iterator
 
-from labctl.api import create_app
+from tests.helpers.openapi import openapi_document
 from tests.helpers.paths import ROOT
 from tests.helpers.source_files import sources
 
@@ -55,7 +55,7 @@ def python_comments() -> Iterator[Written]:
 
 def field_descriptions() -> Iterator[Written]:
     """Yield the description of every field of the OpenAPI document, in one line as readers see it."""
-    for name, schema in create_app(None).openapi()["components"]["schemas"].items():
+    for name, schema in openapi_document()["components"]["schemas"].items():
         for field, found in schema.get("properties", {}).items():
             yield f"{name}.{field}", " ".join(found.get("description", "").split())
 

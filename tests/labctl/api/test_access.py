@@ -21,15 +21,10 @@ from labctl.services.admin.api_keys import create_key, digest_of, require_an_api
 from labctl.services.lab_service import LabService
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
+from tests.helpers.openapi import operations
 
 CLOCK = SystemClock()
 OPEN = {("get", "/health"), ("get", "/health/heartbeat")}
-
-
-def operations() -> list[tuple[str, str]]:
-    """Every operation of the API, from its own description: a new path is tested as soon as it is there."""
-    document = create_app(None).openapi()  # type: ignore[arg-type]  # the description needs no service
-    return sorted((method, path) for path, item in document["paths"].items() for method in item)
 
 
 def needs(method: str, path: str) -> Role:

@@ -17,8 +17,8 @@ import labctl.answers
 from instruments.laboratory import Contact, Laboratory
 from labctl.answers.certificates import Customer
 from labctl.answers.recording_head import LeftOut, OutputUnit
-from labctl.api import create_app
 from labctl.api.descriptions import typed_dictionaries
+from tests.helpers.openapi import openapi_document
 
 #: Models of other packages that requests and responses contain.
 ELSEWHERE: tuple[type[BaseModel], ...] = (Contact, Customer, Laboratory, LeftOut, OutputUnit)
@@ -87,7 +87,7 @@ def test_each_field_of_a_typed_dictionary_has_a_docstring_with_its_unit(kind: ty
 @cache
 def properties() -> dict[tuple[str, str], dict[str, Any]]:
     """Return (schema, field) -> property of the OpenAPI document."""
-    schemas = create_app(None).openapi()["components"]["schemas"]
+    schemas = openapi_document()["components"]["schemas"]
     return {
         (name, key): value
         for name, schema in schemas.items()

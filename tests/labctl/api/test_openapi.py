@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, settings
+from schemathesis.generation.feedback import FeedbackSources
+from schemathesis.pytest._test_builder import build_operation_test
+from schemathesis.python import asgi
+from schemathesis.python._constants.orchestrator import make_constants_value_source
 
 from instruments.clock import VirtualClock
 from labctl.answers.calibrations import FitRequest
 from labctl.answers.certification import CertifyRequest
 from labctl.api import create_app
+from labctl.api.dependencies import CONTROL_THREADS, ControlPool
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.commands.registry import CERTIFY, FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
@@ -22,6 +31,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.certifying import REASON
+from tests.helpers.openapi import openapi_document, operations
 from tests.helpers.paths import EXAMPLES
 
 UNIT = "OSU-FOG-2024"
@@ -41,25 +51,59 @@ def application(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     lab_service.execute(FIT, ToUnit(UNIT, FitRequest(effects=["bias", "scale_factor"])))
     lab_service.execute(CERTIFY, ToVersion(UNIT, 1, CertifyRequest(by="A", reason=REASON, override=True)))
     made = create_app(lab_service)
-    assert schema["/health"]["GET"].Case().call(app=made).status_code == 200  # begins the event loop that all share
-    yield made
-    schemathesis.python.asgi.shutdown_lifespans()
+    health = schema_of(openapi_document())["/health"]["GET"]
+    end_services = asgi.shutdown_lifespans
+    with patch.object(asgi, "shutdown_lifespans"):  # schemathesis would end the service after the first test
+        assert health.Case().call(app=made).status_code == 200  # begins the event loop that all share
+        begin_threads(made.state.control_pool)
+        yield made
+    end_services()
 
 
-#: The description needs no service. The application that is asked is made later, and given with every call.
-schema = schemathesis.openapi.from_dict(create_app(None).openapi(), config=schemathesis.Config(seed=SEED))
-schema.app = create_app
+def begin_threads(pool: ControlPool) -> None:
+    """Begin all threads of a pool, which belong to the service and not to the test of the first who needs one."""
+    together = Barrier(CONTROL_THREADS)
+
+    async def begin() -> None:
+        await asyncio.gather(*(pool.run(together.wait) for _ in range(CONTROL_THREADS)))
+
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, begin()).result()
 
 
-@schema.parametrize()
+def schema_of(document: dict[str, Any]) -> Any:
+    """Return what makes requests of a document. The application that is asked is given with every call."""
+    schema = schemathesis.openapi.from_dict(document, config=schemathesis.Config(seed=SEED))
+    schema.app = create_app
+    return schema
+
+
 @settings(max_examples=EXAMPLES_EACH, suppress_health_check=list(HealthCheck))
-def test_nothing_that_is_sent_is_a_server_error(case: Any, application: Any) -> None:
+def ask(case: Any, application: Any, statuses: set[int]) -> None:
     for name, there in THERE.items():  # half of what is asked is asked of what is there
         dear = 16 if name == "version" and case.path.endswith(COSTLY) else 2
         if name in case.path_parameters and zlib.crc32(str(case.path_parameters[name]).encode()) % dear == 0:
             case.path_parameters[name] = there
     answer = case.call(app=application)
+    statuses.add(answer.status_code)
     assert answer.status_code < 500, f"{case.as_curl_command()}\n{answer.text}"
     if answer.status_code >= 400:
         assert answer.headers["content-type"][0] == "application/problem+json"
         assert answer.json()["detail"]
+
+
+@pytest.mark.parametrize(("method", "path"), operations())
+def test_nothing_that_is_sent_is_a_server_error(method: str, path: str, application: Any) -> None:
+    """Build the requests of an operation when it is tested.
+
+    `parametrize` of the whole description builds those of all operations in every worker while it collects, and with
+    pytest 9 gives all its tests the same name, of which pytest-xdist then runs one.
+    """
+    schema = schema_of(openapi_document() | {"paths": {path: {method: openapi_document()["paths"][path][method]}}})
+    asked = build_operation_test(
+        config=schema.config, operation=schema[path][method.upper()], test_func=ask, given_kwargs={},
+        feedback=FeedbackSources(constants_value_source=make_constants_value_source(schema)),
+    )  # fmt: skip
+    statuses: set[int] = set()
+    asked(application=application, statuses=statuses)
+    assert statuses

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from labctl.api import create_app
+from tests.helpers.openapi import openapi_document
 
 #: Routes whose answer is no JSON: what it is.
 FILES = {
@@ -30,7 +30,7 @@ FREE = {
 
 @pytest.fixture(scope="module")
 def document() -> dict[str, Any]:
-    return create_app(None).openapi()
+    return openapi_document()
 
 
 def answers(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any] | None]]:

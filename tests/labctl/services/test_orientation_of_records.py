@@ -13,7 +13,6 @@ import pytest
 from fastapi.testclient import TestClient
 
 from labctl.answers.orientation import OrientationOptions, OrientationQuery
-from labctl.api import create_app
 from labctl.calibration import Calibration
 from labctl.cli.commands import noise
 from labctl.compensator import Compensator
@@ -23,6 +22,7 @@ from labctl.recording import Recording, RecordingInfo
 from labctl.recording.data_files import read_table
 from labctl.services.calibrations.orientation import orientation_of_file
 from tests.helpers.lab import Lab
+from tests.helpers.openapi import openapi_document
 from tests.helpers.service import add_recording, open_client, service_of
 
 BIAS = 0.4
@@ -147,6 +147,6 @@ def test_a_recording_is_followed_over_http_as_on_the_command_line(
 def test_http_and_the_command_line_take_the_same_options() -> None:
     taken = set(inspect.signature(noise.orientation).parameters)
     assert set(OrientationQuery.model_fields) <= taken
-    described: Any = create_app(None).openapi()["paths"]  # type: ignore[arg-type]  # the description needs no service
+    described: Any = openapi_document()["paths"]
     parameters = described["/api/recordings/{recording}/orientation"]["get"]["parameters"]
     assert {each["name"] for each in parameters} == {"recording", *OrientationQuery.model_fields}

@@ -7,9 +7,9 @@ import ast
 import pytest
 
 from labctl.answers.campaigns import CampaignResponse
-from labctl.api import create_app
 from labctl.services.campaigns.status import mark_abandoned
 from procedures.contracts.campaign_state import ACTIVE, ENDED, NEXT, STOPPED_EARLY, UNDER_WAY, UNFINISHED, CampaignState
+from tests.helpers.openapi import openapi_document
 from tests.helpers.source_files import sources
 
 #: Words that only a campaign's state has; a step is also done, failed or interrupted.
@@ -44,7 +44,7 @@ def test_a_campaign_that_no_process_runs_is_not_in_hand() -> None:
 
 
 def test_the_description_of_the_api_lists_the_states() -> None:
-    schemas = create_app(None).openapi()["components"]["schemas"]
+    schemas = openapi_document()["components"]["schemas"]
     assert schemas["CampaignState"]["enum"] == [state.value for state in CampaignState]
     assert schemas["CampaignResponse"]["properties"]["state"]["$ref"] == "#/components/schemas/CampaignState"
     assert {"ended", "active"} <= set(schemas["CampaignResponse"]["properties"])
