@@ -102,7 +102,7 @@ def by_fewer_poses(readings: PoseReadings, rests: Rests, known: Known) -> ByFewe
     found = Accelerometer(
         errors, bias, np.asarray(covariance, dtype=np.float64), unit(force), sigma,
         np.ones(len(rests), dtype=np.bool_), float(np.sqrt(np.mean(left**2))), gravity, freedom,
-        combined_freedom(np.diag(covariance), [(by_rests, of_sizes)]),
+        combined_freedom(np.diag(covariance).astype(np.float64), [(by_rests, of_sizes)]),
     )  # fmt: skip
     return ByFewer(found, float(chdtrc(freedom, first)))
 
