@@ -10,6 +10,7 @@ from instruments.errors import LinkError, NoReply, RequestRejected
 from instruments.protocols import arrick_c4_lines as lines
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
 from instruments.transport.factory import Ports
+from instruments.transport.port_failures import silence_remedy
 from instruments.transport.serial import BROKEN, SerialPort
 from instruments.transport.serial_stream import line_of
 
@@ -86,7 +87,8 @@ class C4Link:
                     return letter.decode("latin-1")
                 skipped += len(letter)
                 if self._clock.now_s() >= deadline_s - 1e-9 and (not letter or skipped > MAX_LATE_LETTERS):
-                    advice = LINE_IS_BUSY if skipped > MAX_LATE_LETTERS else "check power, cable and baud rate"
+                    silent = f"check {silence_remedy(self._settings.port)} and baud rate"
+                    advice = LINE_IS_BUSY if skipped > MAX_LATE_LETTERS else silent
                     raise NoReply(self._device, f"{self._settings.port} gave no answer in {timeout_s:.1f} s; {advice}")
         except BROKEN as error:
             self._fail(error)

@@ -14,6 +14,7 @@ from instruments.clock import Clock
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected
 from instruments.protocols.text_lines.line_syntax import LineSyntax
 from instruments.transport.factory import Ports
+from instruments.transport.port_failures import silence_remedy
 from instruments.transport.rtu import RtuLine
 from instruments.transport.serial import BROKEN, EIGHT_N_1, Line, SerialPort
 
@@ -184,7 +185,8 @@ class LineLink:
                 self.device, f"sent {text!r} without a line end when asked to {purpose}; check baud rate and cable"
             )
         return NoReply(
-            self.device, f"no answer to the request to {purpose} on {self.url}; check power, cable and line settings"
+            self.device,
+            f"no answer to the request to {purpose} on {self.url}; check {silence_remedy(self.url)} and line settings",
         )
 
     def _broken(self, purpose: str, error: Exception) -> InstrumentError:

@@ -12,6 +12,8 @@ from instruments.transport import can_port
 #: Folders in which Linux names serial ports by their USB adapters, and by the sockets that these are plugged into.
 BY_ID, BY_PATH = Path("/dev/serial/by-id"), Path("/dev/serial/by-path")
 PROCESSES = Path("/proc")
+#: Where Linux keeps the ends of pseudo-terminals that others open.
+PSEUDO_TERMINALS = "/dev/pts/"
 #: The end of a pseudo-terminal that its maker keeps.
 MASTERS = frozenset({"/dev/ptmx", "/dev/pts/ptmx"})
 
@@ -38,6 +40,17 @@ def remedy(url: str, error: Exception) -> str:
         found_text = f"; the ports are {', '.join(ports)}" if ports else f"; `ls {BY_ID}` lists all ports"
         return f"the cable and the port's name{found_text}"
     return "the cable, the name of the port, and which other process uses the port"
+
+
+def silence_remedy(url: str) -> str:
+    """Return what to check where nothing comes from a port that is open: "power, cable", or the program behind it.
+
+    A pseudo-terminal has neither power nor cable: at its other end is a program of this computer, as a simulator or one
+    that hands on a port of another computer. It is late where the computer is busy.
+    """
+    if os.path.realpath(url).startswith(PSEUDO_TERMINALS):
+        return "that the program at the other end of this pseudo-terminal runs and is not held up by other programs,"
+    return "power, cable"
 
 
 def permission_command(url: str) -> str:

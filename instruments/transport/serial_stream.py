@@ -11,6 +11,7 @@ from instruments.clock import Clock, sleep_until
 from instruments.errors import LinkError
 from instruments.protocols.serial_options import SerialOptions
 from instruments.transport.factory import Ports
+from instruments.transport.port_failures import silence_remedy
 from instruments.transport.serial import BROKEN, EIGHT_N_1, Line, SerialPort
 from instruments.transport.stream_reader import Received, StreamReader
 
@@ -134,7 +135,7 @@ class SerialStream:
                 f"nothing else has to trigger it, and {sent_as}"
             )
         if not strange:
-            return f"no bytes arrived; check power, cable and {sent_as}"
+            return f"no bytes arrived; check {silence_remedy(self._url)} and {sent_as}"
         return f"{strange} bytes arrived that are not readings; check {sent_as}, and what else sends on this line"
 
     def read_for(self, duration_s: float, every_s: float) -> bytes:

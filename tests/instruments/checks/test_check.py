@@ -36,8 +36,9 @@ EXPECTED = {
     "adapters may be exchanged: "
     "give the "
     "path of the port in /dev/serial/by-id",
-    "mute": "no intact datagram on {0} within 1.5 s: no bytes arrived; check power, cable and bit rate 460800, "
-    "datagram 0x94 and crlf",
+    "mute": "no intact datagram on {0} within 1.5 s: no bytes arrived; check that the program at the "
+    "other end of this pseudo-terminal runs and is not held up by other programs, and bit rate 460800, datagram 0x94 "
+    "and crlf",
     "fast": "sends 110 readings/s on {0}, but the bench file says 100, limit +-4 %; set sample_rate_hz = 110 or "
     "configure "
     "the unit",

@@ -20,7 +20,7 @@ from instruments.errors import LinkError
 from instruments.protocols.serial_options import Rs485Options
 from instruments.transport.factory import Ports
 from instruments.transport.opened_port import EchoFreePort
-from instruments.transport.port_failures import users_of
+from instruments.transport.port_failures import silence_remedy, users_of
 from instruments.transport.serial import Line
 
 BY_RTS = Line(rs485=Rs485Options(by="rts", send_level=False))
@@ -151,3 +151,17 @@ def test_a_port_in_use_is_named_with_the_process_that_has_it(far: Terminal, othe
 def test_the_maker_of_a_terminal_is_not_its_user(far: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.getpid", lambda: 0)  # seen as by another process, this one is the device at the far end
     assert users_of(far.path) == []
+
+
+def test_a_pseudo_terminal_has_no_cable(tmp_path: Path) -> None:
+    master, terminal = os.openpty()
+    try:
+        link = tmp_path / "gyro"
+        link.symlink_to(os.ttyname(terminal))  # as socat makes it
+        assert "the program at the other end" in silence_remedy(os.ttyname(terminal))
+        assert silence_remedy(str(link)) == silence_remedy(os.ttyname(terminal))
+    finally:
+        os.close(master)
+        os.close(terminal)
+    assert silence_remedy("/dev/ttyUSB0") == "power, cable"
+    assert silence_remedy("sim://stim300") == "power, cable"
