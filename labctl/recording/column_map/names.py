@@ -67,6 +67,11 @@ _RULES: tuple[tuple[str, str], ...] = (
     (r"(?:position|orientation|up|up axis)", "position"),
     (r"valid", "valid"),
 )
+_MEASURED_RATE = re.compile(
+    r"^(?:(?:rate|speed|omega|velocity)[\s_.-]*(?:measured|meas|actual|act|feedback|fbk|fb|encoder|enc)"
+    r"|(?:measured|meas|actual|act|feedback|fbk|fb|encoder|enc)[\s_.-]*(?:rate|speed|omega|velocity))(?![a-z])",
+    re.IGNORECASE,
+)
 #: Names of clocks that are names of their unit.
 _CLOCKS = {"millis": "ms", "micros": "us", "nanos": "ns", "seconds": "s"}
 _COMPILED = tuple((re.compile(pattern), target) for pattern, target in _RULES)
@@ -121,6 +126,15 @@ def name_says(name: str) -> NameSays:
 def is_commanded(name: str) -> bool:
     """Whether a name is of what an instrument was asked for, and not of what was measured."""
     return re.search(r"\b(?:command|commanded|cmd|demand|demanded|setpoint|set|target)\b", folded(name)) is not None
+
+
+def as_measured_rate(name: str) -> str:
+    """Return `rate_meas [deg/s]` or `speed feedback` as the name of a table's rate; empty for other names.
+
+    Beside a rate that was asked for it is what the table did; alone it may be the gyro's.
+    """
+    renamed, n = _MEASURED_RATE.subn("table rate", name.strip(), count=1)
+    return renamed if n else ""
 
 
 def is_second_choice(name: str) -> bool:

@@ -22,7 +22,16 @@ from labctl.recording.column_map.model import (
     UnitKeys,
 )
 from labctl.recording.column_map.movement import Movement, movement
-from labctl.recording.column_map.names import COUNTERS, PARTS, NameSays, folded, in_unit, is_second_choice, name_says
+from labctl.recording.column_map.names import (
+    COUNTERS,
+    PARTS,
+    NameSays,
+    as_measured_rate,
+    folded,
+    in_unit,
+    is_second_choice,
+    name_says,
+)
 from labctl.recording.column_map.units import find_unit, is_lsb, unit_of_target
 from labctl.recording.columns import holds_flags
 from labctl.recording.raw_table import RawColumn, RawTable
@@ -131,10 +140,16 @@ def _name_says(table: RawTable, name: str) -> NameSays:
     """Return what a name says: a `T` beside a column of time is a temperature."""
     unit = table.columns[name].unit
     says = in_unit(name, unit) if unit else name_says(name)
-    others = (name_says(other).target for other in table.columns if other != name)
+    others = {name_says(other).target for other in table.columns if other != name}
     if says.target == "t_s" and name.strip() == "T" and "t_s" in others:
         return NameSays("temperature_c", unit)
+    if not says.target and "table_rate_dps" in others and any(map(_is_gyro, others)) and as_measured_rate(name):
+        return in_unit(as_measured_rate(name), unit)
     return says
+
+
+def _is_gyro(target: str) -> bool:
+    return target.startswith("gyro_")
 
 
 def _celsius(table: RawTable, mapped: MappedColumn | None) -> Array | None:

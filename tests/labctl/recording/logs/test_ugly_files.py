@@ -313,10 +313,14 @@ def test_time_stamps_of_parquet(zone: str | None, tmp_path: Path) -> None:
     np.testing.assert_allclose(np.asarray(recording.columns["t_s"], dtype=np.float64), ROWS[:, 0], rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("order", [("commanded rate", "table rate"), ("table rate", "rate_cmd")])
+@pytest.mark.parametrize(
+    "order",
+    [("commanded rate", "table rate"), ("table rate", "rate_cmd"), ("rate_cmd", "rate_meas"), ("SpeedFbk", "rate_cmd")],
+)
 def test_a_measured_rate_goes_before_the_commanded_one(order: tuple[str, str], tmp_path: Path) -> None:
     rates = np.repeat([0.0, 20.0, -20.0, 40.0], 250)
-    both = {"table rate": 1.001 * rates, "commanded rate": rates, "rate_cmd": rates}
+    asked, measured = ("commanded rate", "rate_cmd"), ("table rate", "rate_meas", "SpeedFbk")
+    both = dict.fromkeys(asked, rates) | dict.fromkeys(measured, 1.001 * rates)
     columns = np.column_stack([ROWS[:, 0], *(both[each] for each in order), ROWS[:, 3] + rates, ROWS[:, 4]])
     header = ["t [s]", *(f"{each} [deg/s]" for each in order), "gyro_z [deg/s]", "temp [degC]"]
     path = text(lines([header], columns.round(6).tolist()))(tmp_path)
