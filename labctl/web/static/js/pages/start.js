@@ -7,27 +7,29 @@ import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
 import { isRunning } from "../campaigns/states.js";
+import { newsCard } from "../start/news_card.js";
 import { realGyroPicture } from "../start/real_gyro.js";
 import { DUE_WITHIN, dueNotice } from "../unit/due.js";
 
-/** @import { Bench, Campaign, Unit } from "../../../types/api.js" */
+/** @import { Unit } from "../../../types/api.js" */
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
 /** Units that are listed. */
 const SHOWN = 6;
-/** Campaigns among which the running one is: a bench runs one at a time. */
-const NEWEST = 20;
+/** Campaigns that are looked through: the one that runs, and those of the last days. */
+const NEWEST = 50;
 
 /** @param {PageContext} context */
 export async function page({ signal }) {
-  const [units, due, campaigns, benches] = await Promise.all([
+  const [units, due, campaigns, benches, schedule] = await Promise.all([
     get("/api/units", { query: { limit: SHOWN }, signal }),
     get("/api/units", { query: { due_within: DUE_WITHIN }, signal }),
     get("/api/campaigns", { query: { limit: NEWEST }, signal }),
     get("/api/benches", { signal }),
+    get("/api/schedule", { signal }),
   ]);
-  if (units.length || campaigns.length) return overview(units, due, campaigns, benches);
+  if (units.length || campaigns.length) return overview(units, { due, campaigns, benches, schedule });
   return h(
     "div",
     { class: "page" },
@@ -107,11 +109,10 @@ async function openExplore(serial, recording, model, tour = null) {
 
 /**
  * @param {readonly Unit[]} units
- * @param {readonly Unit[]} due
- * @param {readonly Campaign[]} campaigns
- * @param {readonly Bench[]} benches
+ * @param {Parameters<typeof newsCard>[0] & { due: readonly Unit[] }} found
  */
-function overview(units, due, campaigns, benches) {
+function overview(units, found) {
+  const { due, campaigns, benches } = found;
   const running = campaigns.find(isRunning);
   return h(
     "div",
@@ -121,6 +122,7 @@ function overview(units, due, campaigns, benches) {
       "Compare the model with the measurements: where it fails, which effects are missing, and how the error falls when they are added.",
     ),
     dueNotice(due, benches),
+    newsCard(found),
     h(
       "div",
       { class: "columns", style: "--column-min: 17rem" },

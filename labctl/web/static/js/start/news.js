@@ -1,0 +1,194 @@
+// What has happened since the evening before, and what waits for a person: one row for each, the most urgent first. Units
+// that are due have a list of their own.
+
+import { number } from "../core/format.js";
+import { stateText } from "../campaigns/states.js";
+
+/** @import { Bench, Campaign, Scheduled } from "../../../types/api.js" */
+
+/** @typedef {"bad" | "warn" | "good" | "accent"} Kind */
+/**
+ * A row: what it is about, one sentence, and the page of its button. `share` is how far a campaign came, `over_floor` the
+ * error of a draft over the noise floor, each null where it is neither.
+ * @typedef {object} News
+ * @property {Kind} kind
+ * @property {string} about
+ * @property {string} text
+ * @property {string} href
+ * @property {string} act
+ * @property {string | null} at
+ * @property {number | null} share
+ * @property {number | null} over_floor
+ */
+
+/** How far back the list goes, by name. */
+export const SPANS = { evening: "Since yesterday 18:00", week: "Last 7 days", all: "All that is open" };
+/** @typedef {keyof typeof SPANS} Span */
+const EVENING_H = 18;
+/** @type {Record<Kind, number>} */
+const URGENCY = { bad: 0, warn: 1, accent: 2, good: 3 };
+
+/**
+ * The begin of a span, ms since 1970.
+ * @param {Span} span
+ * @param {Date} now
+ */
+export function beginOf(span, now) {
+  if (span === "all") return -Infinity;
+  const begin = new Date(now);
+  if (span === "week") begin.setDate(begin.getDate() - 7);
+  else {
+    begin.setDate(begin.getDate() - 1);
+    begin.setHours(EVENING_H, 0, 0, 0);
+  }
+  return begin.getTime();
+}
+
+/**
+ * @param {object} found
+ * @param {readonly Campaign[]} found.campaigns
+ * @param {readonly Bench[]} found.benches
+ * @param {readonly Scheduled[]} found.schedule
+ * @param {Span} span
+ * @param {Date} now
+ * @returns {News[]}
+ */
+export function newsOf({ campaigns, benches, schedule }, span, now) {
+  const begin = beginOf(span, now);
+  /** @param {string | null | undefined} at */
+  const isNew = (at) => !at || Date.parse(at) >= begin;
+  const news = [
+    ...benches.flatMap(benchNews),
+    ...campaigns.filter((each) => !each.ended || isNew(each.ended_at)).flatMap(campaignNews),
+    ...campaigns.filter((each) => each.ended && isNew(each.ended_at)).flatMap(draftNews),
+    ...schedule.flatMap((start) => missedNews(start, isNew)),
+  ];
+  return news.sort((a, b) => URGENCY[a.kind] - URGENCY[b.kind] || Date.parse(b.at ?? "0") - Date.parse(a.at ?? "0"));
+}
+
+/** @param {string} serial */
+const unitPage = (serial) => `/units/${encodeURIComponent(serial)}`;
+
+/** What a row has that is about neither a campaign nor a draft. */
+const PLAIN = { at: null, share: null, over_floor: null };
+
+/**
+ * @param {Bench} bench
+ * @returns {News[]}
+ */
+const benchNews = (bench) =>
+  bench.unconfirmed
+    ? [
+        {
+          ...PLAIN,
+          kind: "bad",
+          about: bench.name,
+          text: "was not confirmed safe; inspect the bench.",
+          href: "/bench",
+          act: "To the bench",
+        },
+      ]
+    : [];
+
+/**
+ * @param {Campaign} campaign
+ * @returns {News[]}
+ */
+function campaignNews(campaign) {
+  const base = {
+    about: `Campaign ${campaign.id}`,
+    href: `/campaigns/${campaign.id}`,
+    act: "Open",
+    at: campaign.ended_at ?? campaign.started_at,
+    share: campaign.progress,
+    over_floor: null,
+  };
+  const name = `${campaign.recipe} on ${campaign.bench}`;
+  if (campaign.prompt)
+    return [
+      { ...base, kind: "warn", text: `waits for a person: ${campaign.prompt.text}`, href: "/bench", act: "Answer" },
+    ];
+  const state = stateText(campaign);
+  if (campaign.active) {
+    const late = campaign.state === "running" ? "" : `, ${state}`;
+    return [
+      { ...base, kind: late ? "warn" : "accent", text: `${name}: ${percentOf(campaign)} done${late}.`, href: "/bench" },
+    ];
+  }
+  if (campaign.state === "done") {
+    const repeated = campaign.repeated ? `; ${campaign.repeated} data sets were taken again` : "";
+    return [{ ...base, kind: "good", text: `${name} is done${repeated}.` }];
+  }
+  return [{ ...base, kind: "bad", text: `${name}: ${state}${campaign.reason ? `: ${campaign.reason}` : "."}` }];
+}
+
+/** @param {Campaign} campaign */
+const percentOf = ({ progress }) => `${Math.round(100 * progress)} %`;
+
+/**
+ * The calibrations that a campaign ended in, and what a person decides of each.
+ * @param {Campaign} campaign
+ * @returns {News[]}
+ */
+function draftNews(campaign) {
+  return campaign.drafts.flatMap((draft) => {
+    const base = { about: draft.serial, at: draft.at, share: null, over_floor: null };
+    if (draft.state === "failed")
+      return [
+        {
+          ...base,
+          kind: /** @type {Kind} */ ("bad"),
+          text: `was not fitted: ${draft.reason}`,
+          href: `/campaigns/${draft.campaign}`,
+          act: "Open",
+        },
+      ];
+    const report = draft.report;
+    if (!report || draft.version === null || draft.certified) return [];
+    const { rms_dps, noise_floor_dps } = report.error;
+    const over_floor = rms_dps && noise_floor_dps ? rms_dps / noise_floor_dps : null;
+    const error = over_floor === null ? "" : ` The error is ${number(over_floor, 2)} times the noise floor.`;
+    const explore = `/explore?unit=${encodeURIComponent(draft.serial)}&version=${draft.version}`;
+    if (report.verdict === "adequate" && !report.objections.length)
+      return [
+        {
+          ...base,
+          over_floor,
+          kind: /** @type {Kind} */ ("good"),
+          text: `version ${draft.version} can be certified.${error}`,
+          href: `${unitPage(draft.serial)}?version=${draft.version}`,
+          act: "Certify",
+        },
+      ];
+    const why = report.verdict_text || report.objections[0]?.text || "was not judged.";
+    return [
+      {
+        ...base,
+        over_floor,
+        kind: /** @type {Kind} */ ("warn"),
+        text: `version ${draft.version}: ${why}${error}`,
+        href: explore,
+        act: "Explore",
+      },
+    ];
+  });
+}
+
+/**
+ * Starts that were missed or refused.
+ * @param {Scheduled} start
+ * @param {(at: string | null) => boolean} isNew
+ * @returns {News[]}
+ */
+const missedNews = (start, isNew) =>
+  start.history
+    .filter((event) => (event.outcome === "missed" || event.outcome === "refused") && isNew(event.at))
+    .map((event) => ({
+      ...PLAIN,
+      kind: /** @type {Kind} */ ("bad"),
+      about: start.recipe,
+      text: `did not begin: ${event.message}`,
+      href: "/campaigns",
+      act: "Open the schedule",
+      at: event.at,
+    }));

@@ -1,0 +1,133 @@
+// The list of what is new: what is in it, in which order, and from when.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { beginOf, newsOf } from "../../labctl/web/static/js/start/news.js";
+
+/** @import { Bench, Campaign, Scheduled } from "../../labctl/web/types/api.js" */
+
+const NOW = new Date(2026, 10, 26, 8, 30);
+const TONIGHT = new Date(2026, 10, 26, 3, 0).toISOString();
+const LAST_WEEK = new Date(2026, 10, 20, 3, 0).toISOString();
+
+/**
+ * A campaign that is done, with some fields changed.
+ * @param {Partial<Campaign>} changed
+ */
+const campaign = (changed) =>
+  /** @type {Campaign} */ (
+    /** @type {unknown} */ ({
+      id: 1,
+      recipe: "short",
+      bench: "triaxial",
+      state: "done",
+      reason: "",
+      progress: 1,
+      repeated: 0,
+      prompt: null,
+      started_at: LAST_WEEK,
+      ended_at: TONIGHT,
+      ended: true,
+      active: false,
+      abandoned: false,
+      drafts: [],
+      ...changed,
+    })
+  );
+
+/**
+ * @param {readonly Campaign[]} campaigns
+ * @param {"evening" | "week" | "all"} [span]
+ * @param {{ benches?: readonly Bench[], schedule?: readonly Scheduled[] }} [more]
+ */
+const news = (campaigns, span = "evening", { benches = [], schedule = [] } = {}) =>
+  newsOf({ campaigns, benches, schedule }, span, NOW);
+
+test("the evening before begins at 18:00 of the day before", () => {
+  assert.equal(beginOf("evening", NOW), new Date(2026, 10, 25, 18).getTime());
+  assert.equal(beginOf("week", NOW), new Date(2026, 10, 19, 8, 30).getTime());
+});
+
+test("a campaign that ended before is not new; one that still runs or waits is", () => {
+  const old = campaign({ id: 2, ended_at: LAST_WEEK });
+  const runs = campaign({ id: 3, state: "running", active: true, ended: false, ended_at: null, progress: 0.4 });
+  const about = news([old, runs]).map((row) => row.about);
+  assert.deepEqual(about, ["Campaign 3"]);
+  assert.equal(news([old], "week").length, 1);
+  assert.match(news([runs])[0].text, /40 % done\.$/);
+});
+
+test("what failed is first, then what a person decides, then what runs, then what is done", () => {
+  const prompt = {
+    id: "7",
+    kind: "mounting",
+    text: "Turn the unit to y up",
+    position: "y",
+    turn_deg: null,
+    within_s: null,
+  };
+  const rows = news([
+    campaign({ id: 1 }),
+    campaign({ id: 2, state: "running", active: true, ended: false, ended_at: null, progress: 0.2 }),
+    campaign({ id: 3, state: "waiting", active: true, ended: false, ended_at: null, prompt }),
+    campaign({ id: 4, state: "failed", reason: "chamber: no answer" }),
+  ]);
+  assert.deepEqual(
+    rows.map((row) => [row.kind, row.about]),
+    [
+      ["bad", "Campaign 4"],
+      ["warn", "Campaign 3"],
+      ["accent", "Campaign 2"],
+      ["good", "Campaign 1"],
+    ],
+  );
+  assert.match(rows[0].text, /chamber: no answer/);
+  assert.match(rows[1].text, /Turn the unit to y up/);
+  assert.equal(rows[1].href, "/bench");
+});
+
+/**
+ * @param {string} verdict
+ * @param {boolean} [certified]
+ */
+const draft = (verdict, certified = false) =>
+  /** @type {Campaign["drafts"][number]} */ (
+    /** @type {unknown} */ ({
+      serial: "A/1",
+      campaign: 1,
+      recording: 1,
+      state: "made",
+      version: 2,
+      certified,
+      at: TONIGHT,
+      reason: "",
+      report: {
+        verdict,
+        verdict_text: `verdict ${verdict}.`,
+        objections: [],
+        error: { raw_rms_dps: 1, rms_dps: 0.02, heldout_rms_dps: 0.02, noise_floor_dps: 0.01 },
+      },
+    })
+  );
+
+test("a draft that is adequate leads to its certificate, another one to where it fails, a certified one nowhere", () => {
+  const adequate = news([campaign({ drafts: [draft("adequate")] })]).find((row) => row.about === "A/1");
+  assert.equal(adequate?.href, "/units/A%2F1?version=2");
+  assert.equal(adequate?.over_floor, 2);
+  const ambiguous = news([campaign({ drafts: [draft("ambiguous")] })]).find((row) => row.about === "A/1");
+  assert.equal(ambiguous?.kind, "warn");
+  assert.equal(ambiguous?.href, "/explore?unit=A%2F1&version=2");
+  assert.match(ambiguous?.text ?? "", /verdict ambiguous\. The error is 2\.0 times the noise floor/);
+  assert.ok(!news([campaign({ drafts: [draft("adequate", true)] })]).some((row) => row.about === "A/1"));
+});
+
+test("a start that was missed, and a bench that is not confirmed safe, are new until they are dealt with", () => {
+  const bench = /** @type {Bench} */ (/** @type {unknown} */ ({ name: "triaxial", unconfirmed: "table" }));
+  const missed = { at: TONIGHT, due_at: TONIGHT, outcome: "missed", message: "the service was off", campaign: null };
+  const old = { ...missed, at: LAST_WEEK };
+  const start = /** @type {Scheduled} */ (/** @type {unknown} */ ({ recipe: "short", history: [missed, old] }));
+  const rows = news([], "evening", { benches: [bench], schedule: [start] });
+  assert.deepEqual(rows.map((row) => row.about).sort(), ["short", "triaxial"]);
+  assert.ok(rows.every((row) => row.kind === "bad"));
+});
