@@ -44,7 +44,7 @@ export async function page({ params, query, signal }) {
   const level = LEVELS.find(([each]) => each === query.level)?.[0] ?? "info";
   const events = eventList(MAX_EVENTS, level, now);
   const [about, reason, connection] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
-  const drafts = h("div", {});
+  const [drafts, recordings] = [h("div", {}), h("div", {})];
   const picture = planChart(
     `Campaign ${now.id} plan`,
     () => ({ timeline: plan.timeline, now_s: isRunning(now) ? now.t_s : null, live: true }),
@@ -63,6 +63,7 @@ export async function page({ params, query, signal }) {
     setChildren(about, summary(now, plan));
     setChildren(reason, reasonNotices(now));
     setChildren(drafts, draftsCard(now.drafts ?? []));
+    setChildren(recordings, recordingsCard(now, setStates(plan).includes("done")));
     if (ended) showAgain();
     else if (Date.now() - asked > PLAN_REFRESH_MS) again();
   }
@@ -112,7 +113,7 @@ export async function page({ params, query, signal }) {
     about,
     drafts,
     cardWithHeader("Plan", h("span", { class: "muted small" }, "Click a data set to open its readings."), picture),
-    recordingsCard(now),
+    recordings,
     Object.assign(
       cardWithHeader(
         "Events",
@@ -143,13 +144,18 @@ function endedActions(now, plan, here) {
 }
 
 /**
+ * The states of the data sets of a plan.
+ * @param {CampaignPlan} plan
+ */
+const setStates = (plan) =>
+  plan.timeline.dataset.map((dataset, k) => (dataset === null ? null : plan.timeline.state?.[k])).filter(Boolean);
+
+/**
  * @param {Campaign} now
  * @param {CampaignPlan} plan
  */
 function summary(now, plan) {
-  const states = plan.timeline.dataset
-    .map((dataset, k) => (dataset === null ? null : plan.timeline.state?.[k]))
-    .filter(Boolean);
+  const states = setStates(plan);
   const done = states.filter((state) => state === "done").length;
   return h(
     "div",
@@ -193,8 +199,11 @@ function reasonNotices(now) {
   ].filter(Boolean);
 }
 
-/** @param {Campaign} now */
-function recordingsCard(now) {
+/**
+ * @param {Campaign} now
+ * @param {boolean} hasData whether a data set is done, so that there is something to fit
+ */
+function recordingsCard(now, hasData) {
   const rows = Object.entries(now.recordings);
   if (!rows.length) return card("Units and recordings", h("p", { class: "muted" }, "Nothing was recorded."));
   return card(
@@ -216,11 +225,13 @@ function recordingsCard(now) {
             "span",
             { class: "row" },
             linkButton(`Recording ${recording}`, `/recordings/${recording}`, "tiny"),
-            linkButton(
-              "Fit and explore",
-              `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`,
-              "tiny primary",
-            ),
+            hasData
+              ? linkButton(
+                  "Fit and explore",
+                  `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`,
+                  "tiny primary",
+                )
+              : h("span", { class: "muted small" }, "no data set is done yet"),
           ),
         ),
       ),
