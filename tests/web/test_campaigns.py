@@ -47,7 +47,7 @@ def test_a_plan_says_what_further_mountings_are_worth(tmp_path: Path, chromium: 
         page = chromium.new_page()
         page.goto(f"{serving.url}/campaigns/new?recipe=quick-triaxial")
         page.get_by_text("Misalignment: U").click()
-        rows = page.get_by_role("region", name="What further mountings of each position are worth").get_by_role("row")
+        rows = page.get_by_role("group", name="What further mountings of each position are worth").get_by_role("row")
         plan = describe_plan("quick-triaxial", "triaxial-sim", clip=False)
         assert plan.misalignment is not None
         expect(rows).to_have_count(1 + len(plan.misalignment.further))

@@ -119,7 +119,7 @@ def test_a_revocation_names_certificates_and_who_fetched_the_version(
     page = visit(f"/units/{SERIAL}")
     calibrations = page.get_by_role("region", name="Calibrations", exact=True).get_by_role("table")
     calibrations.get_by_text("Fetched by").click()
-    expect(calibrations.get_by_role("region", name="Who fetched it")).to_contain_text("anonymous")
+    expect(calibrations.get_by_role("group", name="Who fetched it")).to_contain_text("anonymous")
     calibrations.get_by_role("button", name="Revoke").click()
     dialog = page.get_by_role("dialog")
     dialog.get_by_label("Who").fill("Rita")

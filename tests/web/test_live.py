@@ -99,7 +99,7 @@ def test_begun_followed_and_ended_with_a_version(service: Service, visit: Callab
     while person.go_on(2)["moment"]["fits"] < 2:
         pass
     moment = service.get("/api/live")["moment"]
-    cells = page.get_by_role("region", name="Coefficients").locator("[data-u]")
+    cells = page.get_by_role("group", name="Coefficients").locator("[data-u]")
     expect(cells.first).to_have_attribute("data-u", str(moment["coefficients"][0]["expanded"]))
     shown = [float(each.get_attribute("data-u") or "nan") for each in cells.all()]
     assert shown == [each["expanded"] for each in moment["coefficients"]]

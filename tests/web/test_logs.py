@@ -39,7 +39,7 @@ def test_a_csv_is_dropped_its_map_corrected_and_imported(service: Service, visit
     expect(page.get_by_role("alert")).to_contain_text("column 'gyro_x'")
     expect(page.get_by_role("alert")).to_contain_text("no unit is given")
     expect(page.get_by_role("button", name="Import", exact=True)).to_be_disabled()
-    expect(page.get_by_role("region", name="First rows")).to_contain_text("25.000000")
+    expect(page.get_by_role("group", name="First rows")).to_contain_text("25.000000")
     assert service.get("/api/recordings") == []
     for axis in "xyz":
         page.get_by_label(f"Unit of gyro_{axis}").select_option("deg/s")

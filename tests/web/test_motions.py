@@ -69,7 +69,7 @@ def test_at_rest_both_legs_are_drawn_and_the_map_is_not(service: Service, visit:
     explained = named(figure(page, "Residual against a channel"))["explained"]
     assert np.std(explained["y"]) > 0.5 * np.std(drawn["data"][0]["y"])  # the lag is nearly all of the residual
     unit = visit("/units/REST-1")
-    legs = unit.get_by_role("region", name="Held out by leg")
+    legs = unit.get_by_role("group", name="Held out by leg")
     expect(legs.get_by_role("row")).to_have_count(4)
 
 
@@ -84,7 +84,7 @@ def test_turns_profiles_and_poses_are_drawn_as_they_are(service: Service, visit:
         assert traces[f"output {axis}"]["y"] == pytest.approx([turns["residual_deg"][k] for k in own])
         bars = traces[f"output {axis}"]["error_y"]["array"]
         assert bars == pytest.approx([2 * turns["u_deg"][k] for k in own])
-    expect(page.get_by_role("region", name="Turns", exact=True).get_by_role("row")).to_have_count(10)
+    expect(page.get_by_role("group", name="Turns", exact=True).get_by_role("row")).to_have_count(10)
     recording = profile_recording(sweep(20.0, 0.5, 10.0, 100.0, 50.0), 50.0, delay_s=0.005, bandwidth_hz=20.0)
     path, found = fitted(service, recording, effects=["bias", "scale_factor", "time_delay", "bandwidth"])
     page, rows = visit(path), found["profile"]

@@ -42,7 +42,7 @@ def parsed(cell: str) -> tuple[float, float, float, str]:
 
 def rows_of(page: Page, name: str) -> dict[str, tuple[float, float, float, str]]:
     """Return the coefficients that the page shows of a version."""
-    rows = page.get_by_role("region", name=name, exact=True).locator("tbody tr")
+    rows = page.get_by_role("group", name=name, exact=True).locator("tbody tr")
     rows.first.wait_for()
     cells = [rows.nth(place).locator("td").all_inner_texts() for place in range(rows.count())]
     return {first: parsed(second) for first, second in cells}
@@ -85,7 +85,7 @@ def test_a_version_is_on_the_page_of_its_unit(service: Service, visit: Callable[
     body = {"data": data, "result": result.model_dump(mode="json"), "by": "Ada"}
     service.post("/api/units/IMU-7/sensors/accelerometer", body)
     page = visit("/units/IMU-7")
-    row = page.get_by_role("region", name="Versions of accelerometer and magnetometer").locator("tbody tr")
+    row = page.get_by_role("group", name="Versions of accelerometer and magnetometer").locator("tbody tr")
     text = row.inner_text()
     for said in ("accelerometer", "adequate", "Ada", "march.csv"):
         assert said in text

@@ -54,9 +54,9 @@ def cells(region: Locator) -> list[list[str]]:
 def card_of(page: Page) -> tuple[Locator, Locator, Locator]:
     """Return the card, its table over what was calibrated, and the parts at a place."""
     card = page.get_by_role("region", name=CARD, exact=True)
-    parts = card.get_by_role("region", name="Parts of the uncertainty")
+    parts = card.get_by_role("group", name="Parts of the uncertainty")
     parts.wait_for()
-    return card, card.get_by_role("region", name="Uncertainty in use", exact=True), parts
+    return card, card.get_by_role("group", name="Uncertainty in use", exact=True), parts
 
 
 def asked(service: Service, serial: str, rate_dps: float, temperature_c: float, version: int = 1) -> Any:
@@ -93,7 +93,7 @@ def test_the_figures_of_the_page_are_those_of_the_service(
     assert [float(row[1]) for row in cells(parts)] == [two_digits(one[name]) for name in names]
     assert cells(parts)[2][2] == one["repeatability_source"] == "data sheet"
     expect(parts).not_to_contain_text("nknown")
-    any_axis = card.get_by_role("region", name="Uncertainty about any axis")
+    any_axis = card.get_by_role("group", name="Uncertainty about any axis")
     assert [row[1:] for row in cells(any_axis)] == [["unknown", "unknown", "unknown"]]  # it was turned about z alone
     expect(card).to_contain_text("the unit was not turned about")
     expect(card).not_to_contain_text("outside")
@@ -118,7 +118,7 @@ def test_the_lines_of_the_budget_and_the_pictures_are_those_of_the_service(
     card, _, _ = card_of(page)
     here = asked(service, fog, 50, 40)
     card.get_by_text("Budget, line by line").click()
-    lines = cells(card.get_by_role("region", name="Budget of axis z"))
+    lines = cells(card.get_by_role("group", name="Budget of axis z"))
     budget = here["budget"]["z"]
     assert [shown_number(row[5]) for row in lines] == [two_digits(line["contribution"]) for line in budget["lines"]]
     assert [row[1] for row in lines] == [line["type"] for line in budget["lines"]]
@@ -157,6 +157,6 @@ def test_a_model_that_asks_for_more_is_unknown_with_its_reason(
     card = page.get_by_role("region", name=CARD, exact=True)
     expect(card).to_contain_text("Unknown: FOG-0001 version 2: its model also needs humidity_pct")
     card.get_by_label("of").select_option("1")
-    expect(card.get_by_role("region", name="Parts of the uncertainty")).to_contain_text("data sheet")
+    expect(card.get_by_role("group", name="Parts of the uncertainty")).to_contain_text("data sheet")
     expect(page.get_by_role("region", name="Coefficients").first.get_by_label("of")).to_have_value("1")
     faults.clear()  # the browser itself logs the refusal

@@ -11,8 +11,8 @@ export const TEMPERATURE_SCALE = [
   [0, "#2f60be"],
   [0.25, "#59aab8"],
   [0.5, "#c3af65"],
-  [0.75, "#cf702d"],
-  [1, "#b31222"],
+  [0.75, "#cb7034"],
+  [1, "#bd1018"],
 ];
 /**
  * Rate: violet is negative, grey is rest, green is positive. Neither is cold or hot.
