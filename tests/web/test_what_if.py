@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import parse_qs
 
 import numpy as np
 import pytest
 
+from labctl.services.planning.plan_answer import describe_plan
 from tests.helpers.browser import Service, figure, settled
 
 if TYPE_CHECKING:
@@ -60,7 +64,9 @@ def test_the_slider_moves_between_the_fits_without_and_with_the_effect(
     assert rms_shown(panel) == float(f"{np.sqrt(np.mean(middle**2)):.3g}")
 
 
-def test_a_second_effect_lies_over_it_and_their_parting_rates_become_a_plan(opened: tuple[Page, Locator]) -> None:
+def test_a_second_effect_lies_over_it_and_their_parting_rates_become_a_plan(
+    opened: tuple[Page, Locator], tmp_path: Path
+) -> None:
     from playwright.sync_api import expect
 
     page, panel = opened
@@ -69,6 +75,13 @@ def test_a_second_effect_lies_over_it_and_their_parting_rates_become_a_plan(open
     expect(note).to_contain_text("sine response and saturation part at table rate, deg/s")
     names = [trace.get("name") for trace in figure(page, "What the effect would explain")["data"]]
     assert "saturation" in names
-    note.get_by_role("link", name="Plan these rates").click()
-    expect(page.get_by_role("heading", level=1, name="Plan a campaign")).to_be_visible()
-    expect(page.get_by_role("region", name="Steps")).to_contain_text("data sets")
+    address = note.get_by_role("link", name="Plan these rates").get_attribute("href") or ""
+    path, _, query = address.partition("?")
+    recipe = tmp_path / "parting.toml"
+    recipe.write_text(parse_qs(query)["toml"][0], encoding="utf-8")
+    plan = describe_plan(str(recipe), "triaxial-sim", clip=False)
+    marked = [shape["x0"] for shape in figure(page, "What the effect would explain")["layout"]["shapes"]]
+    rates = tomllib.loads(recipe.read_text(encoding="utf-8"))["rates_dps"]
+    assert path == "/campaigns/new"
+    assert plan.datasets == 3 * len(rates)
+    assert {min(rates), max(rates)} == {pytest.approx(min(marked), rel=1e-3), pytest.approx(max(marked), rel=1e-3)}

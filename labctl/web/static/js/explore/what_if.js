@@ -3,7 +3,7 @@
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { faded } from "../core/colour_scales.js";
-import { idText, number, percent, withUncertainty } from "../core/format.js";
+import { idText, isNumber, number, percent, withUncertainty } from "../core/format.js";
 import { notice } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { channelTitle, scaled } from "./dataset_rows.js";
@@ -316,13 +316,14 @@ function partingNotice(state, suspect, other, channel, parts) {
   const rows = selectedRows(state);
   const listed = parts.map((value) => number(value, 2)).join(", ");
   const temperatures = levelMeans(rows.channels.temperature_c, rows.channels.temperature_c, Math.round);
-  const middle = temperatures[Math.floor(temperatures.length / 2)]?.x;
+  const at = [0, Math.floor(temperatures.length / 2), temperatures.length - 1].map((k) => temperatures[k]?.x);
+  const temperatures_c = [...new Set(at)].filter(isNumber); // the ends and the middle: what models of temperature need
   const plan =
-    channel === "table_rate_dps" && middle !== undefined
+    channel === "table_rate_dps" && temperatures_c.length
       ? partingRecipe({
           name: `${suspect.effect}-or-${other}`,
           rates_dps: parts,
-          temperatures_c: [middle],
+          temperatures_c,
           positions: [...new Set(rows.position)].filter(Boolean),
         })
       : null;
