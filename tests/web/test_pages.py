@@ -51,7 +51,7 @@ PAGES = {
     "/recordings/3": "Recording 3",
     "/noise?recordings=1": "Noise",
     "/live": "Live",
-    "/certificates": "Certificate",
+    "/certificates": "State of a certificate",
     "/nosuch": "No such page",
     "/effects": "Effects",
     "/effects/scale_factor_asymmetry": "Scale factor asymmetry",
