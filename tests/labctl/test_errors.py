@@ -30,6 +30,7 @@ ARGUMENTS: dict[type[Exception], tuple[Any, ...]] = {
     RefusedRegister: ("device", "text", 2),
     of_procedures.PlanRefused: ("recipe", ["one", "two"], "do this"),
     of_procedures.BadData: ("gyro", "text"),
+    of_procedures.NoReadings: ("gyro", "text"),
     of_procedures.GuardTripped: ("kind", "action", "text", "device"),
     of_procedures.StepFailed: ("text", {"far": 1.0}),
 }

@@ -53,9 +53,9 @@ test("rows stand under the titles of the axes, and helper traces are none of the
 });
 
 test("a scale gives its own colours at its stops, and is clipped at its ends", () => {
-  assert.equal(colourAt(TEMPERATURE_SCALE, 0), "rgb(45,95,190)");
-  assert.equal(colourAt(TEMPERATURE_SCALE, 1), "rgb(191,26,32)");
-  assert.equal(colourAt(TEMPERATURE_SCALE, 7), "rgb(191,26,32)");
+  assert.equal(colourAt(TEMPERATURE_SCALE, 0), "rgb(47,96,190)");
+  assert.equal(colourAt(TEMPERATURE_SCALE, 1), "rgb(189,16,24)");
+  assert.equal(colourAt(TEMPERATURE_SCALE, 7), "rgb(189,16,24)");
   assert.equal(colourAt(RATE_SCALE, 0.5), "rgb(143,151,159)");
 });
 

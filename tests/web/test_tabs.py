@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
+from labctl.services.campaigns import preparation
 from tests.helpers.browser import Service, settled
+from tests.helpers.paced_hand import PacedClock, PacedPerson
+from tests.helpers.paths import RECIPES
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -21,12 +25,24 @@ HIDDEN = """hidden => {
 }"""
 
 
+@pytest.fixture
+def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+    """A bench whose campaign waits for a person, until it is stopped."""
+    monkeypatch.setattr(preparation, "operator_of", lambda _: PacedPerson())
+    serving = Service(tmp_path, clock=PacedClock)
+    serving.start()
+    yield serving
+    serving.stop()
+
+
 def test_a_stop_in_the_ninth_tab_of_a_running_campaign_is_carried_out(
     service: Service, visit: Callable[..., Page]
 ) -> None:
     from playwright.sync_api import expect
 
-    service.post("/api/campaigns", {"recipe": "ojeda2000-121"})
+    recipe = (RECIPES / "short.toml").read_text(encoding="utf-8")
+    service.post("/api/campaigns", {"recipe": recipe})
+    service.until("/api/campaigns/1", lambda answer: answer["prompt"] is not None)
     first = visit("/bench")
     settled(first)
     tabs = [first]
@@ -36,10 +52,8 @@ def test_a_stop_in_the_ninth_tab_of_a_running_campaign_is_carried_out(
         tabs[-1].goto(f"{service.url}/bench")
         settled(tabs[-1])
     last = tabs[-1]
-    last.get_by_role("button", name="Abort").first.click()
-    confirm = last.get_by_role("dialog").get_by_role("button", name="Abort")
-    if confirm.count():
-        confirm.first.click()
+    last.get_by_role("button", name="Safe stop").click()
+    last.get_by_role("dialog").get_by_role("button", name="Stop now").click()
     service.until("/api/campaigns/1", lambda answer: answer["ended"])
     last.evaluate(HIDDEN, True)
     first.evaluate(HIDDEN, False)
