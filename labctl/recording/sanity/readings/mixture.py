@@ -103,7 +103,7 @@ def _gains_agree(series: Series, names: list[str], rows: Rows, *, off: float) ->
             return False  # a filter lowers the noise, and leaves the level
         return len(names) > 1 or _levels_agree(series.outputs[names[0]], rows) or off < VERY_NEAR
     low, high = (_gain_along(series, names, part) for part in (rows, ~rows))
-    return low > 0 and abs(np.log(high / low / DEG_PER_RAD)) < GAIN_NEAR
+    return min(low, high) > 0 and abs(np.log(high / low / DEG_PER_RAD)) < GAIN_NEAR
 
 
 def _gain_along(series: Series, names: list[str], rows: Rows) -> float:
