@@ -196,7 +196,7 @@ def _equations(
     residual[rest_rows] = np.sum(up[at_rest] * body[at_rest], axis=1) - dip
     jacobian[rest_rows, :3] = -np.einsum("ka,kab->kb", up[at_rest], cross_matrix(body[at_rest]))
     jacobian[rest_rows, 3] = -1.0
-    by_seen[rest_rows, at_rest] = up[at_rest] @ turn
+    by_seen[rest_rows, at_rest] = _across(up[at_rest], body[at_rest], dip) @ turn
     by_tilt[rest_rows, at_rest] = np.einsum("ka,kab->kb", body[at_rest], level_by_reading(accelerometer)[at_rest])
     by_force[rest_rows] = np.einsum("ka,kab->kb", body[at_rest], level_by_parameters(accelerometer)[at_rest])
     by_move = np.zeros((size, size))
@@ -227,6 +227,17 @@ def _equations(
     ]  # fmt: skip
     noise = by_move + flat @ block_diag(*field.noise) @ flat.T + drift @ drift.T + sum(part for part, _ in estimated)
     return residual, jacobian, noise, flat @ block_diag(*field.across) @ flat.T, estimated
+
+
+def _across(up: NDArray[np.float64], body: NDArray[np.float64], dip: float) -> NDArray[np.float64]:
+    """Return the part of up (k, 3) across the field (k, 3), as long as the fitted dip makes it.
+
+    As long as each rest shows it, it would give a rest whose error makes the field steeper less noise, and more weight:
+    a dip that is too large.
+    """
+    part = up - np.sum(up * body, axis=1)[:, None] * body
+    length = np.linalg.norm(part, axis=1)[:, None]
+    return np.asarray(part * np.sqrt(max(1 - dip**2, 1e-12)) / np.maximum(length, 1e-12))
 
 
 def _rotation(vector: Array) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.magnetometer.alignment import FieldAlignment, align_field
@@ -85,3 +86,19 @@ def test_a_field_that_changes_from_rest_to_rest_is_refused_with_what_to_do(sessi
         NotEnoughData, match=r"uncertain by u = .* record rests in more poses in the same place, away from iron"
     ):
         align_field(replace(readings), solved, moved, magnetometer)
+
+
+def test_a_rest_whose_error_makes_the_field_steeper_has_no_more_weight() -> None:
+    """The dip is that of the plain mean over the rests, within half its u; it was 3 u larger."""
+    unit = TrueTriads.drawn(np.random.default_rng(10**6 + 80004))
+    parts = turned_by_hand(80004, unit, 60, place_ut=0.6)
+    readings = readings_of(recording_of(*parts))
+    solved, field = solve(readings), parts[3]
+    rest = rest_of_each(solved.rests, len(readings), readings.spacing_s)
+    magnetometer = calibrate_magnetometer("m", field[::10], rest=rest[::10])
+    found = align_field(readings, solved, field, magnetometer)
+    means = np.array([field[a:b].mean(axis=0) for a, b in zip(solved.rests.begin, solved.rests.end, strict=True)])
+    seen = (means - magnetometer.hard_iron_ut) @ magnetometer.soft_iron
+    body = seen / np.linalg.norm(seen, axis=1)[:, None] @ Rotation.from_rotvec(found.angles_rad).as_matrix().T
+    of_mean = -np.arcsin(np.mean(np.sum(solved.accelerometer.up * body, axis=1)))
+    assert found.dip_rad == pytest.approx(of_mean, abs=float(found.u_rad[3]) / 2)
