@@ -18,6 +18,7 @@ from labctl.stop.latch import StopRequest
 from labctl.stop.wire import StopServer, Word, ask, phases
 from tests.helpers.fake_stopping import FakeStopping
 
+pytestmark = pytest.mark.timeout(5)  # what never ends is a failure soon
 REQUEST = StopRequest("1", "2026-11-26T12:00:00+00:00", "Ada", "key", "smoke")
 LINE = json.dumps(REQUEST.__dict__).encode()
 
