@@ -251,3 +251,24 @@ def test_of_two_units_one_that_is_silent_after_a_power_cut_is_asked_about_before
     assert outcome.state == CampaignState.DONE
     assert rig.journal.dropped == []
     assert "units_off" in rig.journal.kinds()
+
+
+@pytest.mark.parametrize(("is_silent", "soaks"), [(False, False), (True, True)])
+def test_air_that_no_poll_could_read_is_soaked(rig: Any, is_silent: bool, soaks: bool) -> None:
+    """The chamber answers once, is silent at the polls after that, and answers again with the soak."""
+    rig.chamber.make_safe = lambda: rig.chamber.safe_c
+    at_temperature(rig)
+    reads = 0
+
+    def settled() -> bool:
+        return any(event.kind in {"soak_holds", "lead_in_done"} for event in rig.journal.events) or soaked_again(rig)
+
+    def silent() -> None:
+        nonlocal reads
+        reads += 1
+        if is_silent and reads > 1 and not settled():
+            raise NoReply("chamber", "silent")
+
+    rig.chamber.faults["read"] = silent
+    rig.run(start_at=at(rig, "acquire", 1), restart=Restart(gap_s=1.0))
+    assert soaked_again(rig) == soaks
