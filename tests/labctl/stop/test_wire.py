@@ -59,7 +59,12 @@ def server(path: Path, asked: list[StopRequest]) -> Iterator[StopServer]:
     stopping = FakeStopping()
     stopping.heard.set()
     stopping.over.set()
-    server = StopServer(path, lambda request: asked.append(request) or stopping)
+
+    def respond(request: StopRequest) -> FakeStopping:
+        asked.append(request)
+        return stopping
+
+    server = StopServer(path, respond)
     server.start()
     yield server
     server.close()
