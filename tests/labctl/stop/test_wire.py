@@ -192,3 +192,19 @@ def test_silence_ends_the_wait_for_the_first_word_and_for_each_later_one(
 def test_a_process_that_ends_before_it_has_answered_is_an_error(path: Path) -> None:
     with answered(path, b'{"phase": "asked"}\n'), pytest.raises(ConnectionResetError, match="ended before"):
         list(ask(str(path), REQUEST, silent_s=3.0, first_s=3.0))
+
+
+def test_an_asker_does_not_wait_at_a_socket_that_takes_no_caller(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as listener, socket.socket(socket.AF_UNIX) as earlier:
+        listener.bind(str(path))
+        listener.listen(0)
+        earlier.connect(str(path))
+        with pytest.raises(OSError, match="unavailable|timed out"):
+            list(ask(str(path), REQUEST, silent_s=3.0, first_s=0.05))
+
+
+def test_a_line_of_64_kib_without_an_end_is_refused_at_once(
+    path: Path, server: StopServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wire, "SAID_WITHIN_S", 30.0)
+    assert sent(path, b"x" * 65536) == b""
