@@ -199,7 +199,7 @@ def test_an_asker_does_not_wait_at_a_socket_that_takes_no_caller(path: Path) -> 
         listener.bind(str(path))
         listener.listen(0)
         earlier.connect(str(path))
-        with pytest.raises(OSError, match="unavailable|timed out"):
+        with pytest.raises(OSError, match=r"unavailable|timed out"):
             list(ask(str(path), REQUEST, silent_s=3.0, first_s=0.05))
 
 
