@@ -163,7 +163,7 @@ def answered(path: Path, *parts: bytes, pause_s: float = 0.0, ends: bool = True)
         with caller:
             caller.recv(4096)
             for part in parts:
-                time.sleep(pause_s)
+                threading.Event().wait(pause_s)
                 caller.sendall(part)
             if not ends:
                 caller.recv(4096)  # until the asker has gone
