@@ -80,15 +80,19 @@ def _make_safe_first(context: ExecutionContext) -> None:
 
 
 class _ChamberDeviation:
-    """The largest deviation of the air from the temperature that is to be held, over the polls so far, in deg C."""
+    """The largest deviation of the air from the temperature that is to be held, over the polls so far, in deg C.
+
+    Infinite while no poll had an answer: what was not measured is not known to hold.
+    """
 
     def __init__(self, plan: Plan, start_at: int) -> None:
         self._soak = next((step for step in plan.lead_in(start_at) if isinstance(step, Soak)), None)
-        self.max_c = 0.0
+        self.max_c = math.inf
 
     def add(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
         if self._soak is not None:
-            self.max_c = max(self.max_c, abs(chamber_c - self._soak.temperature_c))
+            deviation_c = abs(chamber_c - self._soak.temperature_c)
+            self.max_c = deviation_c if math.isinf(self.max_c) else max(self.max_c, deviation_c)
 
 
 def _switch_on(context: ExecutionContext, run: int, restart: Restart) -> None:

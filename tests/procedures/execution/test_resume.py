@@ -226,3 +226,49 @@ def test_no_temperature_is_taken_before_a_step_that_sets_another(rig: Any) -> No
     assert [step.kind for step in plan.lead_in(move)] == ["home"]
     assert plan.lead_in(len(plan.steps)) == ()
     assert plan.lead_in(len(plan.steps) - 1) == ()
+
+
+def test_a_chamber_that_does_not_answer_at_once_is_not_gone_on_with(rig: Any) -> None:
+    """During a campaign a short silence is waited out; at its beginning it is an error."""
+    rig.chamber.fail("read", NoReply("chamber", "silent"), times=1)
+    outcome = rig.run(start_at=at(rig, "acquire", 1), restart=Restart(gap_s=5.0))
+    assert outcome.state == CampaignState.FAILED
+    assert "chamber: silent" in outcome.reason
+    assert rig.trace.count("table.home") == 0
+
+
+def test_of_two_units_one_that_is_silent_after_a_power_cut_is_asked_about_before_it_drops_out(two_units: Any) -> None:
+    rig = two_units
+    rig.operator = HumanOperator()
+
+    def answer(progress: Any) -> None:
+        if rig.operator.pending and progress.state == "waiting":
+            rig.operator.confirm(rig.operator.pending.id, by="Ada")
+
+    rig.imu.fail("identify", NoReply("imu", "off"), times=4)
+    restart = Restart(power_lost=True, added_runs=1)
+    outcome = rig.run(start_at=at(rig, "acquire", 1), restart=restart, observer=answer)
+    assert outcome.state == CampaignState.DONE
+    assert rig.journal.dropped == []
+    assert "units_off" in rig.journal.kinds()
+
+
+@pytest.mark.parametrize(("is_silent", "soaks"), [(False, False), (True, True)])
+def test_air_that_no_poll_could_read_is_soaked(rig: Any, is_silent: bool, soaks: bool) -> None:
+    """The chamber answers once, is silent at the polls after that, and answers again with the soak."""
+    rig.chamber.make_safe = lambda: rig.chamber.safe_c
+    at_temperature(rig)
+    reads = 0
+
+    def settled() -> bool:
+        return any(event.kind in {"soak_holds", "lead_in_done"} for event in rig.journal.events) or soaked_again(rig)
+
+    def silent() -> None:
+        nonlocal reads
+        reads += 1
+        if is_silent and reads > 1 and not settled():
+            raise NoReply("chamber", "silent")
+
+    rig.chamber.faults["read"] = silent
+    rig.run(start_at=at(rig, "acquire", 1), restart=Restart(gap_s=1.0))
+    assert soaked_again(rig) == soaks

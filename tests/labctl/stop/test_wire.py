@@ -1,0 +1,210 @@
+"""What goes over a stop socket: the phases in their order, what a caller may send, and how long an asker waits."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+
+from labctl.stop import client, wire
+from labctl.stop.latch import StopRequest
+from labctl.stop.wire import StopServer, Word, ask, phases
+from tests.helpers.fake_stopping import FakeStopping
+
+pytestmark = pytest.mark.timeout(5)  # what never ends is a failure soon
+REQUEST = StopRequest("1", "2026-11-26T12:00:00+00:00", "Ada", "key", "smoke")
+LINE = json.dumps(REQUEST.__dict__).encode()
+
+
+@dataclass
+class Scripted:
+    """A stop whose answers are given in advance; notes how long each was waited for."""
+
+    heard: list[bool]
+    over: list[bool]
+    stands: bool = True
+    text: str = "on its way"
+    campaign: int | None = 7
+    waits_s: list[tuple[str, float]] = field(default_factory=list)
+
+    def is_heard(self, within_s: float) -> bool:
+        self.waits_s.append(("heard", within_s))
+        return self.heard.pop(0)
+
+    def is_over(self, within_s: float) -> bool:
+        self.waits_s.append(("over", within_s))
+        return self.over.pop(0)
+
+
+@pytest.fixture
+def path() -> Iterator[Path]:
+    with TemporaryDirectory(prefix="labctl-") as name:
+        yield Path(name) / "stop"
+
+
+@pytest.fixture
+def asked() -> list[StopRequest]:
+    return []
+
+
+@pytest.fixture
+def server(path: Path, asked: list[StopRequest]) -> Iterator[StopServer]:
+    stopping = FakeStopping()
+    stopping.heard.set()
+    stopping.over.set()
+
+    def respond(request: StopRequest) -> FakeStopping:
+        asked.append(request)
+        return stopping
+
+    server = StopServer(path, respond)
+    server.start()
+    yield server
+    server.close()
+
+
+def sent(path: Path, content: bytes, *, ends: bool = False) -> bytes:
+    """Send bytes to a server and return all that it answers."""
+    with socket.socket(socket.AF_UNIX) as line:
+        line.settimeout(3.0)
+        line.connect(str(path))
+        line.sendall(content)
+        if ends:
+            line.shutdown(socket.SHUT_WR)
+        try:
+            return b"".join(iter(lambda: line.recv(4096), b""))
+        except ConnectionResetError:
+            return b""
+
+
+@pytest.mark.parametrize(("stands", "last"), [(True, "stands"), (False, "failed")])
+def test_a_stop_is_asked_for_then_heard_then_over(stands: bool, last: str) -> None:
+    over = [False, False, False, False, False, False, True, True]
+    stopping = Scripted([False, True], over, stands)
+    found = list(phases(stopping))
+    assert [word.phase for word in found] == ["asked", "waiting", "heard", "waiting", last]
+    assert {(word.text, word.campaign) for word in found} == {("on its way", 7)}
+    beat, now = wire.BEAT_S, 0.0
+    assert stopping.waits_s == [
+        ("over", now), ("heard", beat), ("over", now),  # not heard in this beat
+        ("over", now), ("heard", beat),
+        ("over", now), ("over", beat),
+        ("over", now), ("over", beat),
+        ("over", now),
+    ]  # fmt: skip
+
+
+def test_a_stop_that_is_over_at_once_is_not_waited_for() -> None:
+    stopping = Scripted([], [True])
+    assert [word.phase for word in phases(stopping)] == ["asked", "stands"]
+
+
+def test_a_beat_and_a_silent_caller_take_less_than_an_asker_waits() -> None:
+    assert 0.0 < wire.BEAT_S <= client.SILENT_S / 3
+    assert wire.SAID_WITHIN_S < client.HEARD_WITHIN_S  # a caller that says nothing does not keep another one waiting
+
+
+@pytest.mark.parametrize("ends", [False, True])
+def test_a_request_is_answered_with_or_without_the_end_of_its_line(
+    path: Path, server: StopServer, asked: list[StopRequest], ends: bool
+) -> None:
+    answer = sent(path, LINE if ends else LINE + b"\n", ends=ends)
+    assert [json.loads(line)["phase"] for line in answer.splitlines()] == ["asked", "stands"]
+    assert answer.endswith(b"\n")
+    assert asked == [REQUEST]
+
+
+@pytest.mark.parametrize("content", [b"no JSON\n", b'{"id": "1"}\n', b"[]\n", b"x" * wire.LINE_BYTES])
+def test_what_is_no_request_is_refused_and_the_next_one_is_answered(
+    path: Path, server: StopServer, asked: list[StopRequest], content: bytes
+) -> None:
+    assert sent(path, content) == b""
+    assert asked == []
+    assert b"stands" in sent(path, LINE + b"\n")
+
+
+def test_a_caller_that_says_nothing_is_closed_and_the_next_one_is_answered(
+    path: Path, server: StopServer, asked: list[StopRequest], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wire, "SAID_WITHIN_S", 0.05)
+    assert sent(path, b"") == b""
+    assert b"stands" in sent(path, LINE + b"\n")
+    assert asked == [REQUEST]
+
+
+def test_a_closed_server_answers_none_and_leaves_no_socket(path: Path, server: StopServer) -> None:
+    before = threading.active_count()
+    server.close()
+    assert threading.active_count() == before - 1
+    assert not path.exists()
+    server.close()
+
+
+def test_a_server_that_was_not_started_can_be_closed(path: Path) -> None:
+    StopServer(path, lambda _: FakeStopping()).close()
+    assert not path.exists()
+
+
+def answered(path: Path, *parts: bytes, pause_s: float = 0.0, ends: bool = True) -> socket.socket:
+    """Answer the next caller with these bytes, each after a pause, and end the line unless it is to stay open."""
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind(str(path))
+    listener.listen()
+
+    def answer() -> None:
+        caller, _ = listener.accept()
+        with caller:
+            caller.recv(4096)
+            for part in parts:
+                threading.Event().wait(pause_s)
+                caller.sendall(part)
+            if not ends:
+                caller.recv(4096)  # until the asker has gone
+
+    threading.Thread(target=answer, daemon=True).start()
+    return listener
+
+
+def test_words_are_read_however_they_are_cut_until_the_last(path: Path) -> None:
+    parts = (b'{"phase": "asked"}\n{"pha', b'se": "heard", "text": "soon"}\n', b'{"phase": "stands", "campaign": 3}\n')
+    with answered(path, *parts, pause_s=0.02, ends=False):
+        found = list(ask(str(path), REQUEST, silent_s=3.0, first_s=3.0))
+    assert found == [Word("asked"), Word("heard", "soon"), Word("stands", campaign=3)]
+
+
+@pytest.mark.parametrize(("parts", "silent_s", "first_s"), [((), 60.0, 0.05), ((b'{"phase": "asked"}\n',), 0.05, 3.0)])
+def test_silence_ends_the_wait_for_the_first_word_and_for_each_later_one(
+    path: Path, parts: tuple[bytes, ...], silent_s: float, first_s: float
+) -> None:
+    began_s = time.monotonic()
+    with answered(path, *parts, ends=False), pytest.raises(TimeoutError):
+        list(ask(str(path), REQUEST, silent_s, first_s))
+    assert time.monotonic() - began_s < 2.0
+
+
+def test_a_process_that_ends_before_it_has_answered_is_an_error(path: Path) -> None:
+    with answered(path, b'{"phase": "asked"}\n'), pytest.raises(ConnectionResetError, match="ended before"):
+        list(ask(str(path), REQUEST, silent_s=3.0, first_s=3.0))
+
+
+def test_an_asker_does_not_wait_at_a_socket_that_takes_no_caller(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as listener, socket.socket(socket.AF_UNIX) as earlier:
+        listener.bind(str(path))
+        listener.listen(0)
+        earlier.connect(str(path))
+        with pytest.raises(OSError, match=r"unavailable|timed out"):
+            list(ask(str(path), REQUEST, silent_s=3.0, first_s=0.05))
+
+
+def test_a_line_of_64_kib_without_an_end_is_refused_at_once(
+    path: Path, server: StopServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wire, "SAID_WITHIN_S", 30.0)
+    assert sent(path, b"x" * 65536) == b""
