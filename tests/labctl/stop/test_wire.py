@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import socket
 import threading
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +17,7 @@ from labctl.stop.latch import StopRequest
 from labctl.stop.wire import StopServer, Word, ask, phases
 from tests.helpers.fake_stopping import FakeStopping
 
-pytestmark = pytest.mark.timeout(5)  # what never ends is a failure soon
+pytestmark = pytest.mark.timeout(30)  # what never ends, or waits for longer than it was given, is a failure
 REQUEST = StopRequest("1", "2026-11-26T12:00:00+00:00", "Ada", "key", "smoke")
 LINE = json.dumps(REQUEST.__dict__).encode()
 
@@ -133,7 +132,7 @@ def test_what_is_no_request_is_refused_and_the_next_one_is_answered(
 def test_a_caller_that_says_nothing_is_closed_and_the_next_one_is_answered(
     path: Path, server: StopServer, asked: list[StopRequest], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(wire, "SAID_WITHIN_S", 0.05)
+    monkeypatch.setattr(wire, "SAID_WITHIN_S", 0.5)
     assert sent(path, b"") == b""
     assert b"stands" in sent(path, LINE + b"\n")
     assert asked == [REQUEST]
@@ -152,8 +151,8 @@ def test_a_server_that_was_not_started_can_be_closed(path: Path) -> None:
     assert not path.exists()
 
 
-def answered(path: Path, *parts: bytes, pause_s: float = 0.0, ends: bool = True) -> socket.socket:
-    """Answer the next caller with these bytes, each after a pause, and end the line unless it is to stay open."""
+def answered(path: Path, *parts: bytes, ends: bool = True) -> socket.socket:
+    """Answer the next caller with these bytes, one by one, and end the line unless it is to stay open."""
     listener = socket.socket(socket.AF_UNIX)
     listener.bind(str(path))
     listener.listen()
@@ -163,7 +162,6 @@ def answered(path: Path, *parts: bytes, pause_s: float = 0.0, ends: bool = True)
         with caller:
             caller.recv(4096)
             for part in parts:
-                threading.Event().wait(pause_s)
                 caller.sendall(part)
             if not ends:
                 caller.recv(4096)  # until the asker has gone
@@ -174,19 +172,17 @@ def answered(path: Path, *parts: bytes, pause_s: float = 0.0, ends: bool = True)
 
 def test_words_are_read_however_they_are_cut_until_the_last(path: Path) -> None:
     parts = (b'{"phase": "asked"}\n{"pha', b'se": "heard", "text": "soon"}\n', b'{"phase": "stands", "campaign": 3}\n')
-    with answered(path, *parts, pause_s=0.02, ends=False):
+    with answered(path, *parts, ends=False):
         found = list(ask(str(path), REQUEST, silent_s=3.0, first_s=3.0))
     assert found == [Word("asked"), Word("heard", "soon"), Word("stands", campaign=3)]
 
 
-@pytest.mark.parametrize(("parts", "silent_s", "first_s"), [((), 60.0, 0.05), ((b'{"phase": "asked"}\n',), 0.05, 3.0)])
+@pytest.mark.parametrize(("parts", "silent_s", "first_s"), [((), 90.0, 0.05), ((b'{"phase": "asked"}\n',), 0.05, 90.0)])
 def test_silence_ends_the_wait_for_the_first_word_and_for_each_later_one(
     path: Path, parts: tuple[bytes, ...], silent_s: float, first_s: float
 ) -> None:
-    began_s = time.monotonic()
     with answered(path, *parts, ends=False), pytest.raises(TimeoutError):
         list(ask(str(path), REQUEST, silent_s, first_s))
-    assert time.monotonic() - began_s < 2.0
 
 
 def test_a_process_that_ends_before_it_has_answered_is_an_error(path: Path) -> None:
