@@ -92,7 +92,7 @@ def test_a_stop_is_asked_for_then_heard_then_over(stands: bool, last: str) -> No
     assert {(word.text, word.campaign) for word in found} == {("on its way", 7)}
     beat, now = wire.BEAT_S, 0.0
     assert stopping.waits_s == [
-        ("over", now), ("heard", beat), ("over", now),  # not heard in this beat
+        ("over", now), ("heard", beat), ("over", now),  # the beat passes before the table is stopped
         ("over", now), ("heard", beat),
         ("over", now), ("over", beat),
         ("over", now), ("over", beat),
