@@ -15,23 +15,16 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.timeout(300)
 
 
-def test_a_campaign_that_is_done_and_its_draft_are_rows_with_a_button(
-    service: Service, visit: Callable[..., Page]
-) -> None:
+def test_a_campaign_that_is_done_is_a_row_with_a_button(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 
     service.post("/api/campaigns", {"recipe": "short"})
     service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")
-    drafted = service.until(
-        "/api/campaigns/1", lambda answer: answer["drafts"] and answer["drafts"][0]["state"] in {"made", "failed"}
-    )["drafts"][0]
     page = visit("/")
     rows = page.get_by_role("region", name="What is new").get_by_role("listitem")
     done = rows.filter(has_text="Campaign 1")
     expect(done).to_contain_text("short on single-axis-sim is done")
     expect(done.get_by_role("img", name="100 % done")).to_be_visible()
-    row = rows.filter(has_text=drafted["serial"])
-    expect(row).to_contain_text(f"version {drafted['version']}" if drafted["state"] == "made" else "was not fitted")
     page.get_by_label("Show").select_option("week")
     page.reload()
     expect(page.get_by_label("Show")).to_have_value("week")
