@@ -10,9 +10,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 #: New objects after which garbage is collected; Python's own default is 700.
 COLLECTED_AFTER = 50_000
 
-#: Commands that read or stand for instruments in this process: late bytes are lost bytes, or look like it.
-AT_INSTRUMENTS = (["simulator"], ["live"], ["campaign", "start"], ["campaign", "resume"])
-
 __all__ = ["main"]
 
 
@@ -30,10 +27,6 @@ def main() -> None:
 
         first_of_all()
         keep_memory()
-    if any(sys.argv[1 : 1 + len(words)] == words for words in AT_INSTRUMENTS):
-        from labctl.stop.priority import of_instruments
-
-        of_instruments()
     # imports make some hundred thousand objects that stay; to look through them again and again is a sixth of a start
     gc.set_threshold(COLLECTED_AFTER)
     try:

@@ -44,11 +44,6 @@ def of_the_bench() -> None:
     keep_memory()
 
 
-def of_instruments() -> None:
-    """Run this process, which reads instruments or stands for them, before those that answer requests."""
-    _set(BENCH)
-
-
 def of_the_pages() -> None:
     """Give processes that drive a bench priority over this one.
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from labctl.cli import main
 from labctl.stop.priority import keep_memory
 
 RAISED = """
@@ -30,19 +29,6 @@ more = bytearray(64 * 2**20)
 status = dict(line.split(":", 1) for line in open("/proc/self/status"))
 print(int(kept), status["VmLck"].split()[0])
 """
-
-
-@pytest.mark.parametrize(
-    ("words", "raised"),
-    [("simulator", True), ("campaign resume 7", True), ("campaign show 7", False), ("live", True), ("units", False)],
-)
-def test_commands_at_instruments_run_before_others(monkeypatch: pytest.MonkeyPatch, words: str, raised: bool) -> None:
-    asked: list[int] = []
-    monkeypatch.setattr(sys, "argv", ["labctl", *words.split()])
-    monkeypatch.setattr("labctl.stop.priority.of_instruments", lambda: asked.append(1))
-    monkeypatch.setattr("labctl.cli.app.main", lambda: None)
-    main()
-    assert bool(asked) == raised
 
 
 def test_all_that_is_used_is_kept_where_there_is_no_limit() -> None:

@@ -25,6 +25,8 @@ import { stateText } from "../campaigns/states.js";
 export const SPANS = { evening: "Since yesterday 18:00", week: "Last 7 days", all: "All that is open" };
 /** @typedef {keyof typeof SPANS} Span */
 const EVENING_H = 18;
+/** Campaigns of simulated benches that are listed. */
+const SIMULATED = 5;
 /** @type {Record<Kind, number>} */
 const URGENCY = { bad: 0, warn: 1, accent: 2, good: 3 };
 
@@ -57,10 +59,15 @@ export function newsOf({ campaigns, benches, schedule }, span, now) {
   const begin = beginOf(span, now);
   /** @param {string | null | undefined} at */
   const isNew = (at) => !at || Date.parse(at) >= begin;
+  // the clock of a simulated bench is its own: of its campaigns the newest ones are new
+  const simulated = campaigns.filter((each) => each.simulated_time).slice(0, SIMULATED);
+  const recent = campaigns.filter((each) =>
+    each.simulated_time ? simulated.includes(each) || !each.ended : !each.ended || isNew(each.ended_at),
+  );
   const news = [
     ...benches.flatMap(benchNews),
-    ...campaigns.filter((each) => !each.ended || isNew(each.ended_at)).flatMap(campaignNews),
-    ...campaigns.filter((each) => each.ended && isNew(each.ended_at)).flatMap(draftNews),
+    ...recent.flatMap(campaignNews),
+    ...recent.filter((each) => each.ended).flatMap(draftNews),
     ...schedule.flatMap((start) => missedNews(start, isNew)),
   ];
   return news.sort((a, b) => URGENCY[a.kind] - URGENCY[b.kind] || Date.parse(b.at ?? "0") - Date.parse(a.at ?? "0"));
