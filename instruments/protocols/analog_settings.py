@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from instruments.bench_config import GyroSettings, Strict, is_simulated_address
 from instruments.protocols.nidaqmx.service import SERVER_PORT
-from instruments.protocols.uldaq.library import DISCOVERY_PORT
+from instruments.protocols.uldaq_library import DISCOVERY_PORT
 
 #: Rates of the inputs, scans per second.
 DEFAULT_SCANS_PER_S = 1000.0

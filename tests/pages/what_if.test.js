@@ -4,7 +4,6 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import {
-  bestShare,
   leftWith,
   levelMeans,
   partingLevels,
@@ -28,6 +27,14 @@ function residual(y) {
   const offset = (sy - slope * sx) / n;
   return y.map((value, k) => value - offset - slope * X[k]);
 }
+
+/**
+ * The share of one list that leaves least of another.
+ * @param {readonly number[]} before
+ * @param {readonly number[]} part
+ */
+const bestShare = (before, part) =>
+  before.reduce((sum, value, k) => sum + value * part[k], 0) / part.reduce((sum, value) => sum + value * value, 0);
 
 test("a share of a linear effect leaves what a fit of all else with that size leaves", () => {
   const before = residual(Y);

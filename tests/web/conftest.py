@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from labctl.services.campaigns import preparation
 from tests.helpers.browser import PATIENCE_MS, WIDE, Faults, Service
+from tests.helpers.paced_hand import PacedClock, PacedPerson
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
@@ -30,6 +32,16 @@ def answers(shared_answers: Path) -> Path:
 @pytest.fixture
 def service(tmp_path: Path) -> Iterator[Service]:
     serving = Service(tmp_path)
+    serving.start()
+    yield serving
+    serving.stop()
+
+
+@pytest.fixture
+def waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+    """A bench whose campaign waits for a person, until it is stopped."""
+    monkeypatch.setattr(preparation, "operator_of", lambda _: PacedPerson())
+    serving = Service(tmp_path, clock=PacedClock)
     serving.start()
     yield serving
     serving.stop()

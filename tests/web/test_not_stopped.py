@@ -48,13 +48,8 @@ PLAIN = """() => {
 
 
 @pytest.fixture
-def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
-    """A bench whose campaign waits for a person, until it is stopped."""
-    monkeypatch.setattr(preparation, "operator_of", lambda _: PacedPerson())
-    serving = Service(tmp_path, clock=PacedClock)
-    serving.start()
-    yield serving
-    serving.stop()
+def service(waiting: Service) -> Service:
+    return waiting
 
 
 def begin(service: Service) -> None:

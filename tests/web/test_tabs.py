@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import pytest
 
-from labctl.services.campaigns import preparation
 from tests.helpers.browser import Service, settled
-from tests.helpers.paced_hand import PacedClock, PacedPerson
 from tests.helpers.paths import RECIPES
 
 if TYPE_CHECKING:
@@ -26,13 +23,8 @@ HIDDEN = """hidden => {
 
 
 @pytest.fixture
-def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
-    """A bench whose campaign waits for a person, until it is stopped."""
-    monkeypatch.setattr(preparation, "operator_of", lambda _: PacedPerson())
-    serving = Service(tmp_path, clock=PacedClock)
-    serving.start()
-    yield serving
-    serving.stop()
+def service(waiting: Service) -> Service:
+    return waiting
 
 
 def test_a_stop_in_the_ninth_tab_of_a_running_campaign_is_carried_out(

@@ -26,8 +26,8 @@ from instruments.drivers.analog.mcc_devices import (
 from instruments.drivers.driver import GyroDriver, Trial
 from instruments.errors import InstrumentError, LimitError, LinkError, NoReply, WrongInstrument, one_line
 from instruments.protocols.analog_settings import MccSettings
-from instruments.protocols.uldaq.calls import Scan
-from instruments.protocols.uldaq.library import BIPOLAR_RANGES, InputMode, UlError
+from instruments.protocols.uldaq_calls import Scan
+from instruments.protocols.uldaq_library import BIPOLAR_RANGES, InputMode, UlError
 from instruments.transport.factory import Ports
 from instruments.transport.scan_means import Counts
 

@@ -15,10 +15,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.protocols import uldaq_calls as calls
 from instruments.protocols.analog_settings import MccSettings
-from instruments.protocols.uldaq import calls
-from instruments.protocols.uldaq.calls import CallFailed, Scan
-from instruments.protocols.uldaq.library import (
+from instruments.protocols.uldaq_calls import CallFailed, Scan
+from instruments.protocols.uldaq_library import (
     CONTINUOUS,
     INSTALL,
     INSTALL_LIBRARY,

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.bench_config import part_of
+from instruments.protocols import uldaq_calls as calls
 from instruments.protocols.analog_settings import MccSettings
 from instruments.protocols.nidaqmx.rpc_status import RpcStatus
-from instruments.protocols.uldaq import calls
-from instruments.protocols.uldaq.calls import Scan
-from instruments.protocols.uldaq.library import BIPOLAR_RANGES, TEXTS, InputMode, ScanStatus, UlError
+from instruments.protocols.uldaq_calls import Scan
+from instruments.protocols.uldaq_library import BIPOLAR_RANGES, TEXTS, InputMode, ScanStatus, UlError
 from instruments.simulators.links.rpc_blocks import Call, Reply
 from instruments.simulators.links.rpc_device import RpcDevice
 from instruments.simulators.setup import InstrumentSetup

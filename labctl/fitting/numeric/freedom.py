@@ -74,8 +74,8 @@ def information_of(
     inverse = np.linalg.inv(covariance)
     weighted = inverse @ jacobian
     projected = inverse - weighted @ np.linalg.solve(jacobian.T @ weighted, weighted.T)
-    turned = [projected @ each for each in derivatives]
-    return np.array([[float(np.sum(a * b.T)) / 2 for b in turned] for a in turned])
+    products = [projected @ each for each in derivatives]
+    return np.array([[float(np.sum(a * b.T)) / 2 for b in products] for a in products])
 
 
 def scatter_by_variances(slopes: NDArray[np.float64], information: NDArray[np.float64]) -> Array:

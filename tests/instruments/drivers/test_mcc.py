@@ -10,7 +10,7 @@ import pytest
 
 from instruments.errors import LimitError, LinkError, NoReply, WrongInstrument
 from instruments.protocols.nidaqmx.rpc_status import RpcStatus
-from instruments.protocols.uldaq.library import BIPOLAR_RANGES, TEXTS, UlError
+from instruments.protocols.uldaq_library import BIPOLAR_RANGES, TEXTS, UlError
 from instruments.simulators.links.rpc_blocks import Call
 
 HOST = "sim://mcc-daq/fog"

@@ -21,7 +21,7 @@ from instruments.bench import open_bench
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
 from instruments.errors import InstrumentError, LimitError, LinkError, NoReply, WrongInstrument
-from instruments.protocols.uldaq.library import (
+from instruments.protocols.uldaq_library import (
     BIPOLAR_RANGES,
     CONTINUOUS,
     SCALED,

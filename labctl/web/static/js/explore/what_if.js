@@ -6,7 +6,7 @@ import { faded } from "../core/colour_scales.js";
 import { idText, isNumber, number, percent, withUncertainty } from "../core/format.js";
 import { notice } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
-import { channelTitle, scaled } from "./dataset_rows.js";
+import { channelTitle, scaled, shownText } from "./dataset_rows.js";
 import { channelOf } from "./preview_result.js";
 import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap, selectedRows } from "./residual_map.js";
@@ -115,7 +115,8 @@ function sizeWords(suspect, state, share, left) {
     coefficients.length > 1 ? null : `${idText(name)} ${withUncertainty(share * value, null, unit)}`,
   );
   const size = [`${percent(share)} of the fitted size`, ...sizes].filter(Boolean).join(", ");
-  return `${size}: ${number(rmsOf(left))} deg/s RMS left on axis ${state.axis}, over ${left.length} data sets.`;
+  const of = shownText(state.criticism) ?? `${left.length} data sets`;
+  return `${size}: ${number(rmsOf(left))} deg/s RMS left on axis ${state.axis}, over ${of}. The shape stays that of the fit.`;
 }
 
 /**

@@ -27,22 +27,6 @@ export function rmsOf(values) {
 }
 
 /**
- * The share at which the least is left, that of a least squares fit of the explained part to the residual.
- * @param {Values} before
- * @param {Values} explained
- */
-export function bestShare(before, explained) {
-  let [product, square] = [0, 0];
-  before.forEach((value, k) => {
-    const part = explained[k];
-    if (value === null || part === null) return;
-    product += value * part;
-    square += part * part;
-  });
-  return square ? product / square : 0;
-}
-
-/**
  * Means over the data sets of each level of a channel, in rising order.
  * @param {Values} x
  * @param {Values} values

@@ -7,7 +7,7 @@ import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
 import { isRunning } from "../campaigns/states.js";
-import { newsCard } from "../start/news_card.js";
+import { NEWEST, newsCard } from "../start/news_card.js";
 import { realGyroPicture } from "../start/real_gyro.js";
 import { DUE_WITHIN, dueNotice } from "../unit/due.js";
 
@@ -17,8 +17,6 @@ import { DUE_WITHIN, dueNotice } from "../unit/due.js";
 
 /** Units that are listed. */
 const SHOWN = 6;
-/** Campaigns that are looked through: the one that runs, and those of the last days. */
-const NEWEST = 50;
 
 /** @param {PageContext} context */
 export async function page({ signal }) {

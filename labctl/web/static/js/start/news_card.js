@@ -9,6 +9,8 @@ import { newsOf, SPANS } from "./news.js";
 /** @import { News, Span } from "./news.js" */
 
 const KEPT = "labctl.news.span";
+/** Campaigns that are looked through: those of the last days, the running one among them. */
+export const NEWEST = 50;
 /** Rows that are shown at first. */
 const SHOWN = 12;
 /** The error over the noise floor at which its bar is full; its length is the logarithm. */
@@ -30,9 +32,12 @@ export function newsCard(found) {
     const shown = all ? rows : rows.slice(0, SHOWN);
     setChildren(
       list,
+      found.campaigns.length >= NEWEST
+        ? h("p", { class: "muted small" }, `Of the newest ${NEWEST} campaigns; the others are on the page Campaigns.`)
+        : null,
       rows.length
         ? h("ul", { class: "news plain", "aria-label": SPANS[span] }, shown.map(newsRow))
-        : h("p", { class: "muted" }, "Nothing has failed, nothing is due, and nothing waits for you."),
+        : h("p", { class: "muted" }, "No campaign has ended, failed or waits for a person, and no start was missed."),
       shown.length < rows.length
         ? h(
             "button",
