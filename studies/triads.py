@@ -17,13 +17,14 @@ from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.poses.at_rest.accelerometer import calibrate_accelerometer
 from labctl.fitting.poses.at_rest.fewer_poses import Known, by_fewer_poses
 from labctl.fitting.poses.at_rest.rests import find_rests, rest_of_each
+from labctl.fitting.poses.at_rest.temperature import calibrate_over_temperature
 from labctl.fitting.poses.fit import Solved, solve
 from labctl.fitting.poses.readings import AXES, PoseReadings, readings_of
 from labctl.fitting.poses.triad import UPPER
 from labctl.recording import Recording, RecordingInfo
-from labctl.services.pose_triads import solved_of
+from labctl.services.pose_triads import solve_even
 from studies.poses import turned_deg
-from studies.triads_simulation import DIP_DEG, TrueTriads, turned_by_hand, vector_of, warmed, warmed_k
+from studies.triads_simulation import DIP_DEG, TrueTriads, Warming, turned_by_hand, vector_of, warmed_k
 
 #: Rests of a session, and sessions.
 CELLS = {12: 300, 22: 200, 30: 200, 100: 60}
@@ -62,14 +63,21 @@ def scores(seed: int, rests: int, place_ut: float = PLACE_UT) -> Scores:
 
 
 def scores_over_temperature(seed: int, rests: int) -> Scores:
-    """Return the same of a session at four temperatures, over which bias and scale factors of the forces change."""
+    """Return the same of a session at four temperatures, over which bias and scale factors of the forces change.
+
+    The truth is that of the temperature to which the calibration refers.
+    """
     rng = np.random.default_rng(2 * 10**6 + seed)
     unit = TrueTriads.drawn(np.random.default_rng(10**6 + seed))
     parts = turned_by_hand(seed, unit, rests, place_ut=PLACE_UT)
     away_k = warmed_k(len(parts[0]))
-    changed = (parts[0], parts[1], warmed(rng, unit, parts[2], away_k), parts[3])
+    warming = Warming.drawn(rng)
+    changed = (parts[0], parts[1], warming.readings(unit, parts[2], away_k), parts[3])
     readings = replace(readings_of(recording_of(*changed)), temperature_c=ABOUT_C + away_k)
-    return _scores(unit, readings, solved_of(readings, None, over_temperature=True), changed)
+    rests_found = find_rests(readings)
+    found = calibrate_over_temperature(readings, rests_found)
+    at_reference = warming.unit_at(unit, found.reference_c - ABOUT_C)
+    return _scores(at_reference, readings, solve_even(readings, rests_found, found), changed)
 
 
 def scores_with_earlier(seed: int, rests: int) -> Scores:
