@@ -14,9 +14,9 @@ import numpy as np
 from labctl.fitting.magnetometer.alignment import align_field
 from labctl.fitting.magnetometer.calibrate import calibrate_magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
-from labctl.fitting.poses.at_rest.accelerometer import calibrate_accelerometer
-from labctl.fitting.poses.at_rest.fewer_poses import Known, by_fewer_poses
-from labctl.fitting.poses.at_rest.rests import find_rests, rest_of_each
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer
+from labctl.fitting.poses.at_rest.fewer_poses import Known, Scatter, by_fewer_poses
+from labctl.fitting.poses.at_rest.rests import Rests, find_rests, rest_of_each
 from labctl.fitting.poses.at_rest.temperature import calibrate_over_temperature
 from labctl.fitting.poses.fit import Solved, solve
 from labctl.fitting.poses.readings import AXES, PoseReadings, readings_of
@@ -95,9 +95,16 @@ def scores_with_earlier(seed: int, rests: int) -> Scores:
     found = find_rests(readings)
     of_change = np.diag(np.repeat(CHANGES, 3) ** 2)
     errors = np.array([was.errors[place] for place in UPPER])
-    known = Known(errors, was.covariance[3:, 3:] + of_change, was.bias_g, 0.0)
+    known = Known(errors, was.covariance[3:, 3:] + of_change, was.bias_g, scatter_then(was, rests_then))
     fewer = by_fewer_poses(readings, found, known)
     return _scores(now, readings, solve(readings, (found, fewer.found)), parts)
+
+
+def scatter_then(was: Accelerometer, rests: Rests) -> Scatter:
+    """Return how the sizes scattered in the rests of an earlier session."""
+    used = int(np.count_nonzero(was.used))
+    noise = float(rests.accel_white_var[was.used].mean())
+    return Scatter(was.residual_g**2 * used / was.freedom, noise, was.freedom)
 
 
 def _scores(unit: TrueTriads, readings: PoseReadings, solved: Solved, parts: Parts) -> Scores:
