@@ -97,6 +97,7 @@ from labctl.answers.campaign_parts import (
     OutputResponse as OutputResponse,
     PromptResponse as PromptResponse,
     TurnResponse as TurnResponse,
+    WatchedLimitResponse as WatchedLimitResponse,
 )
 from labctl.answers.campaigns import (
     BenchCheck as BenchCheck,

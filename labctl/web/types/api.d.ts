@@ -54,6 +54,7 @@ export type Output = Schema<"OutputResponse">;
 export type Plan = Schema<"PlannedResponse">;
 export type Prompt = Schema<"PromptResponse">;
 export type Turn = Schema<"TurnResponse">;
+export type WatchedLimit = Schema<"WatchedLimitResponse">;
 export type PublicCertificate = Schema<"PublicCertificate">;
 export type Recipe = Schema<"RecipeResponse">;
 export type RecordingRow = Schema<"RecordingResponse">;

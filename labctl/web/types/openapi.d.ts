@@ -4068,6 +4068,11 @@ export interface components {
                 [key: string]: string;
             };
             /**
+             * Limits
+             * @description What the guards watched at the last poll; some are watched during data sets only. Empty: this process does not run the campaign.
+             */
+            limits: components["schemas"]["WatchedLimitResponse"][];
+            /**
              * Dropped
              * @description Units excluded from the rest of the campaign: name -> reason.
              */
@@ -13986,6 +13991,62 @@ export interface components {
              * @default
              */
             experiment: string;
+        };
+        /**
+         * WatchedLimitResponse
+         * @description A value that a guard watches now, with its limits.
+         */
+        WatchedLimitResponse: {
+            /**
+             * Kind
+             * @description Guard, as in [guards] of a recipe.
+             */
+            kind: string;
+            /**
+             * Device
+             * @description Instrument or unit that the value is of.
+             */
+            device: string;
+            /**
+             * Title
+             * @description What is watched, in words.
+             */
+            title: string;
+            /**
+             * Value
+             * @description Value at the last poll, in `unit`.
+             */
+            value: number;
+            /**
+             * Low
+             * @description Lowest value that is allowed, in `unit`; null: none.
+             */
+            low: number | null;
+            /**
+             * High
+             * @description Highest value that is allowed, in `unit`.
+             */
+            high: number;
+            /**
+             * Unit
+             * @description Unit of value and limits; empty: a number of things.
+             */
+            unit: string;
+            /**
+             * Action
+             * @description What the recipe does when it is passed: warn, take_back, suspend or fail.
+             */
+            action: string;
+            /**
+             * Is Beyond
+             * @description The limit is passed. Of a share of readings, one more than the limit is needed: a single reading is no trend.
+             */
+            is_beyond: boolean;
+            /**
+             * Age S
+             * @description How long ago the device answered, s by the campaign's clock; null: it is not asked.
+             */
+            age_s: number | null;
         };
         /**
          * WithdrawFindingRequest
