@@ -177,6 +177,7 @@ from labctl.answers.datasheet import (
     DatasheetResponse as DatasheetResponse,
     MeasuredUnder as MeasuredUnder,
 )
+from labctl.answers.course import CourseResponse as CourseResponse
 from labctl.answers.drafts import (
     AppliedDraft as AppliedDraft,
     CoefficientChange as CoefficientChange,

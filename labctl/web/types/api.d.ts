@@ -35,6 +35,7 @@ export type Comparison = Schema<"ComparisonResponse">;
 export type ComparisonColumns = Schema<"ComparisonColumns">;
 export type ContributionLines = Schema<"ContributionLinesJson">;
 export type ContributionsOver = Schema<"ContributionsOverJson">;
+export type Course = Schema<"CourseResponse">;
 export type Datasheet = Schema<"DatasheetResponse">;
 export type DeviceCheck = Schema<"DeviceCheck">;
 export type DataSets = Schema<"DataSetsResponse">;

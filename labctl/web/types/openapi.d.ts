@@ -956,6 +956,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/campaigns/{campaign}/course": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Its temperatures
+         * @description Temperatures of chamber and units while the campaign ran, also while it runs.
+         */
+        get: operations["course_api_campaigns__campaign__course_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/campaigns/{campaign}/abort": {
         parameters: {
             query?: never;
@@ -5582,6 +5602,44 @@ export interface components {
              * @description Number of bins.
              */
             bins: number;
+        };
+        /**
+         * CourseResponse
+         * @description Temperatures of a campaign over its time, as lists of equal length.
+         */
+        CourseResponse: {
+            /**
+             * Campaign
+             * @description Number of the campaign.
+             */
+            campaign: number;
+            /**
+             * Samples
+             * @description Number of times at which the environment was logged.
+             */
+            samples: number;
+            /**
+             * T S
+             * @description Times, s since the start of the campaign; fewer than `samples` where those are too many to show: the first and last and, of each span between, the ones at which the temperature was lowest and highest.
+             */
+            t_s: number[];
+            /**
+             * Chamber C
+             * @description Air of the chamber, deg C; null: not logged.
+             */
+            chamber_c: (number | null)[];
+            /**
+             * Setpoint C
+             * @description Set point of the chamber, deg C; null: none, or not logged.
+             */
+            setpoint_c: (number | null)[];
+            /**
+             * Units C
+             * @description By serial number: temperature of the unit by its own thermometer or the one that stands for it, deg C; null: not logged at this time.
+             */
+            units_c: {
+                [key: string]: (number | null)[];
+            };
         };
         /**
          * CriticisedErrors
@@ -15680,6 +15738,40 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CampaignPlanResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    course_api_campaigns__campaign__course_get: {
+        parameters: {
+            query?: {
+                /** @description About as many times at most. */
+                points?: number;
+            };
+            header?: never;
+            path: {
+                campaign: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CourseResponse"];
                 };
             };
             /** @description Validation Error */
