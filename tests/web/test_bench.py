@@ -207,5 +207,5 @@ def test_a_strip_for_each_limit_says_what_the_service_watches(service: Service, 
     expect(page.get_by_role("status").filter(has_text="a question waits for an answer")).to_be_visible()
     page.get_by_role("button", name="Sound is off").click()
     expect(page.get_by_role("button", name="Sound is on")).to_be_visible()
-    page.get_by_role("link", name="Leave the wall view").click()
+    page.get_by_role("link", name="Leave this view").click()
     expect(page.get_by_role("navigation", name="Pages")).to_be_visible()

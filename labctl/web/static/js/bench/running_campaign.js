@@ -149,7 +149,7 @@ export function runningCampaign(status, plan, { signal, over, wall }) {
     signal,
   );
   if (wall) {
-    const leave = h("div", { class: "row wall-actions" }, sound, linkButton("Leave the wall view", "/bench", "tiny"));
+    const leave = h("div", { class: "row wall-actions" }, sound, linkButton("Leave this view", "/bench", "tiny"));
     return [bar, connection, leave, warningList, dials, strips, prompt, turn];
   }
   return [
