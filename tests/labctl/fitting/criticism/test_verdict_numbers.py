@@ -59,7 +59,7 @@ def test_of_no_signal_nothing_is_reproduced() -> None:
 
 
 def test_coefficients_have_value_uncertainty_and_unit_on_each_axis_and_what_is_derived_of_them() -> None:
-    """In units of the noise: a column of size s, with the data d along it, has the value d/s and the uncertainty 1/s."""
+    """In units of the noise: a column of size s, with data d along it, has the value d/s and the uncertainty 1/s."""
     found = coefficients_of(compared(x=[3.0, 0, 0, 0], z=[0, 0, 1.5, 6.0]), candidate(x=0, z=2))
     assert list(found) == ["x", "z"]
     assert found["x"] == {"a": {"value": pytest.approx(1.5), "u": pytest.approx(0.5), "unit": "deg/s"}}
