@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from instruments.clock import SystemClock
 from labctl.stop import client, instruments_stop
 from labctl.stop.client import (
     AttemptedStop,
@@ -302,7 +303,9 @@ def test_not_stopped_is_said_after_4_s_with_those_before_the_command_began_and_h
     assert waits == ([waits_s, None] if late else [waits_s])
     text = "NOT STOPPED yet: bench b: it turns. Use the stop switch of the bench."
     assert said == ([text] if late else [])
+    waits.clear()
     assert stop_bench(place, STOP) == end  # it need not be said
+    assert waits[0] == 4.0
 
 
 def test_the_process_that_drives_a_bench_is_ended_before_its_instruments_are_stopped(world: World) -> None:
@@ -328,6 +331,30 @@ def test_an_attempt_is_a_stop_that_is_under_way(world: World) -> None:
     failed = attempt(driven(left="it turns"))
     failed._work()
     assert AttemptedStop(failed).stands is False
+
+
+def test_whether_a_table_stands_is_answered_at_once() -> None:
+    """The answers to a stop do not wait for one another."""
+    waits: list[float] = []
+    under_way: Any = SimpleNamespace(result=lambda within_s: waits.append(within_s))
+    assert AttemptedStop(under_way).stands is False
+    assert waits == [0.0]
+
+
+def test_the_end_of_a_stop_is_waited_for_and_no_longer() -> None:
+    goes_on, clock = threading.Event(), SystemClock()
+
+    def note() -> DriverNote:
+        goes_on.wait(20.0)
+        return driven(left="it is safe", left_safe=True)
+
+    place: Any = SimpleNamespace(name="b", latch=Latch(), note=note)
+    found = StopAttempt(place, STOP)
+    assert found.result(0.0) is None
+    goes_on.set()
+    begun_s = clock.now_s()
+    assert found.result(20.0) == StopResult("b", True, "it is safe")
+    assert clock.now_s() - begun_s < 10.0
 
 
 @dataclass
