@@ -336,7 +336,7 @@ def test_an_attempt_is_a_stop_that_is_under_way(world: World) -> None:
 def test_whether_a_table_stands_is_answered_at_once() -> None:
     """The answers to a stop do not wait for one another."""
     waits: list[float] = []
-    under_way: Any = SimpleNamespace(result=lambda within_s: waits.append(within_s))
+    under_way: Any = SimpleNamespace(result=waits.append)
     assert AttemptedStop(under_way).stands is False
     assert waits == [0.0]
 

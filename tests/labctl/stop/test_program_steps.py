@@ -1,4 +1,4 @@
-"""`labctl stop` step by step: which benches are meant, what is asked of each, and what is printed. Nothing is stopped."""
+"""`labctl stop` step by step: which benches are meant, what is asked of each, what is printed. Nothing is stopped."""
 
 from __future__ import annotations
 
