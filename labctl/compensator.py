@@ -224,7 +224,7 @@ class Compensator:
         rate, outside = np.empty_like(raw), np.empty(n, dtype=bool)
         for first in range(0, n, at_once):
             rows = slice(first, first + at_once)
-            of_rows = {name: values[rows] if values.shape[:1] == (n,) else values for name, values in channels.items()}
+            of_rows = {name: values[rows] if values.shape == (n,) else values for name, values in channels.items()}
             warm_rows = temperature_c[rows] if temperature_c.ndim else temperature_c
             one_c = warm_rows.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(warm_rows, t_s[rows].shape)
             beside = running.errors(t_s[rows], one_c)
@@ -288,8 +288,9 @@ class Compensator:
         self, raw: Array, temperature_c: Array, channels: Mapping[str, Array], correct: Correct, first: int
     ) -> Compensated:
         """Correct outputs (n, axes) by what does not remember, at the edge of the range where they are outside."""
+        # what is no number is neither above nor below, so that a sample with it is judged
         is_warm = np.min(temperature_c) >= self._low_c and np.max(temperature_c) <= self._high_c
-        if is_warm and np.min(raw) >= self._slow and np.max(raw) <= self._fast:  # false when there is a NaN
+        if is_warm and np.min(raw) >= self._slow and np.max(raw) <= self._fast:
             return Compensated(correct(raw, temperature_c, channels), np.zeros(len(raw), dtype=bool))
         flags = self._judge(raw, temperature_c, first)
         return Compensated(self._at_edge(raw, temperature_c, channels, correct), flags)

@@ -84,6 +84,7 @@ CALIBRATIONS: dict[str, Callable[[], Calibration]] = {
     "direct, lag": lambda: _of_output(LAG),
     "direct, lags": lambda: _of_output(LAG, SCALE_LAG),
     "supply": lambda: _issued(one_axis(), "supply_sensitivity"),
+    "supply, lag": lambda: _issued(one_axis(), "supply_sensitivity", LAG),
     "two axes": lambda: _issued(two_axes(), "misalignment"),
     "two axes, lags": lambda: _issued(two_axes(), "misalignment", LAG, SCALE_LAG),
 }

@@ -134,6 +134,29 @@ def test_a_refusal_names_the_sample_of_the_whole_array(monkeypatch: pytest.Monke
         assert Compensator(small(name)).step(500.0, 30.0, 0.0)[1] is True
 
 
+def test_a_channel_beside_the_time_is_that_of_its_sample_or_one_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    calibration, supply = small("supply, lag"), 5.0 + 0.1 * np.cos(T_S)
+    raw = raws(calibration)
+    whole = Compensator(calibration).compensate(raw, WARM_C, {"t_s": T_S, "supply_v": supply}).rate_dps
+    each = [
+        Compensator(calibration).compensate(raw, WARM_C, {"t_s": T_S, "supply_v": np.full(7, volts)}).rate_dps[k]
+        for k, volts in enumerate(supply)
+    ]
+    assert whole == pytest.approx(np.array(each), abs=1e-12)
+    assert np.ptp(whole - each[0]) > 1e-3
+    monkeypatch.setattr(module, "BLOCK", 3)
+    blocks = Compensator(calibration).compensate(raw, WARM_C, {"t_s": T_S, "supply_v": supply}).rate_dps
+    assert blocks == pytest.approx(whole, abs=1e-12)
+    one: Any = supply[0]
+    found = Compensator(calibration).compensate(raw, WARM_C, {"t_s": T_S, "supply_v": one}).rate_dps
+    assert found[0] == pytest.approx(whole[0], abs=1e-12)
+    for warm in (30.0, np.array([30.0])):
+        still = Compensator(calibration).compensate(raw, warm, {"t_s": T_S, "supply_v": one}).rate_dps
+        assert still[6] == pytest.approx(Compensator(calibration).compensate(
+            raw[6:], 30.0, {"t_s": T_S[6:], "supply_v": one}
+        ).rate_dps[0], abs=1e-12)  # fmt: skip
+
+
 def test_one_temperature_or_that_of_each_axis_is_followed_by_its_mean() -> None:
     calibration = small("two axes, lags")
     raw, columns = raws(calibration), {"t_s": T_S}
@@ -162,6 +185,9 @@ def test_with_the_history_of_its_recording_a_lag_is_that_of_the_fit() -> None:
         compensator = Compensator(calibration)
         found = compensator.compensate(raw, warm, known, history=data.channels.history)
         assert found.rate_dps == pytest.approx(np.column_stack([expected[a] for a in calibration.axes])[some], abs=1e-6)
+        by_axis = np.column_stack([warm] * len(calibration.axes))
+        again = compensator.compensate(raw, by_axis, known, history=data.channels.history)
+        assert again.rate_dps == pytest.approx(found.rate_dps, abs=1e-9)
         without = compensator.compensate(raw, warm, {"t_s": columns["t_s"]}).rate_dps
         assert np.abs(without - found.rate_dps).max() > 1e-4
         assert compensator.state is None
@@ -190,6 +216,13 @@ def test_what_a_specific_force_adds_is_taken_off_first(name: str) -> None:
         raw, WARM_C, {"t_s": T_S}, specific_force_g=force[0]
     )
     assert one.rate_dps[0] == pytest.approx(expected[0], abs=1e-9)
+
+
+def test_a_step_has_one_specific_force() -> None:
+    for name in ("plain", "lags"):
+        compensator = Compensator(with_force(small(name), PER_G, PER_G2))
+        with pytest.raises(BadInput, match=r"specific_force_g of shape \(2, 3\) given"):
+            compensator.step(1.0, 30.0, 0.0, specific_force_g=np.ones((2, 3)))
 
 
 def test_with_a_history_a_force_is_taken_off_as_well() -> None:

@@ -84,6 +84,14 @@ def test_outside_its_range_a_sample_is_flagged_and_the_error_at_the_edge_taken_o
     assert str(refused.value).startswith(f"sample 2: {what} (the range calibrated for ONE version 1)")
 
 
+def test_a_sample_at_its_limit_is_inside_also_beside_one_that_is_not() -> None:
+    compensator = Compensator(small("plain"))
+    raw = np.array([EDGE_DPS[0], EDGE_DPS[1], 500.0])
+    assert compensator.compensate(raw, 30.0).outside.tolist() == [False, False, True]
+    with pytest.raises(BadInput, match=r"^sample 1: temperature \[80\.0\] deg C outside"):
+        Compensator(small("plain"), "refuse").compensate(raw, 80.0)
+
+
 @pytest.mark.parametrize("name", ["plain", "direct", "lags", "direct, lags"])
 def test_what_is_no_number_gives_none_flagged(name: str) -> None:
     raw, warm = np.array([1.0, np.nan, 1.0, 1.0]), np.array([30.0, 30.0, np.nan, 30.0])

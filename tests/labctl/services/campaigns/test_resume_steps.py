@@ -133,6 +133,8 @@ def test_the_time_of_a_campaign_never_goes_back(world: World, begun: bool, after
     world.row = replace(world.row, started_at=BEGUN if begun else None)
     prepared = resumed(world, after_s=after_s)
     assert (prepared.time.now_s(), prepared.restart.gap_s) == (t_s, t_s - 100.0)
+    world.row, world.point = replace(world.row, started_at=None), replace(POINT, last_t_s=0.0)
+    assert resumed(world).time.now_s() == 0.0
 
 
 @pytest.mark.parametrize(
@@ -236,7 +238,7 @@ def test_a_simulation_goes_on_as_it_was_begun() -> None:
     assert resume.with_original_simulation(begun, SIMULATED) == SIMULATED
     del document["simulation"]
     assert resume.with_original_simulation(begun, SIMULATED) == SIMULATED
-    document["simulation"] = {"units": {"fog": 3}}
+    document["simulation"] = {"units": {"fog": 3}, "not_known": 1}  # the first of two errors is named
     said = r"campaign 7 was simulated by another version of labctl, .*: simulation\.units\.fog: Input should be a valid"
     with pytest.raises(Conflict, match=said):
         resume.with_original_simulation(begun, SIMULATED)
