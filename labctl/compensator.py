@@ -200,8 +200,7 @@ class Compensator:
         correct = self._correct if cross_rates_dps is None else self._correct_across(cross_rates_dps, len(raw))
         if self._memory is None or history is not None:
             if self._memory is not None and history is not None:
-                one_c = warm.mean(axis=1) if warm.ndim == 2 else np.broadcast_to(warm, (len(raw),))
-                remembered = self._memory.of_history(history, {"temperature_c": one_c, **known})
+                remembered = self._memory.of_history(history, {"temperature_c": _one_c(warm, len(raw)), **known})
                 beside = remembered if beside is None else remembered.with_bias(beside.bias_dps)
             compensated = self._beside(beside, raw, warm, known, correct)
         else:
@@ -226,8 +225,7 @@ class Compensator:
             rows = slice(first, first + at_once)
             of_rows = {name: values[rows] if values.shape == (n,) else values for name, values in channels.items()}
             warm_rows = temperature_c[rows] if temperature_c.ndim else temperature_c
-            one_c = warm_rows.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(warm_rows, t_s[rows].shape)
-            beside = running.errors(t_s[rows], one_c)
+            beside = running.errors(t_s[rows], _one_c(warm_rows, len(t_s[rows])))
             if by_force is not None:
                 beside = beside.with_bias(by_force.bias_dps[rows])
             block = self._beside(beside, raw[rows], warm_rows, of_rows, correct, first)
@@ -389,3 +387,8 @@ class Compensator:
             {"t_s": np.array([t_s])}, self._correct,
         )  # fmt: skip
         return compensated.rate_dps[0], bool(compensated.outside[0])
+
+
+def _one_c(temperature_c: Array, n: int) -> Array:
+    """Return the temperature of each of n samples, (n,) deg C: the mean where each axis has one."""
+    return temperature_c.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(temperature_c, (n,))
