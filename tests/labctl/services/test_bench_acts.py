@@ -86,10 +86,8 @@ def test_a_declared_act_has_a_route_whose_request_is_validated_and_an_entry_in_t
     add_act_route(router, LINGER)
     service.include_router(router)
     with TestClient(service) as client:
-        assert (
         described = service.openapi()["paths"]["/api/campaigns/{campaign}/linger"]["post"]
         assert described["summary"] == "Hold the temperature"
-        )
         answer = client.post(f"/api/campaigns/{campaign}/linger", json={"reason": "the door is open", "by": "Ada"})
         assert (answer.status_code, answer.json()["id"]) == (200, campaign)
         assert client.post(f"/api/campaigns/{campaign}/linger", json={"by": "Ada"}).status_code == 422
