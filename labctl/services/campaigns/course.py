@@ -17,7 +17,8 @@ def campaign_course(store: Store, campaign: int, points: int) -> CourseResponse:
     row = store.campaigns.get(campaign)
     units = {serial: store.recordings.environment(recording) for serial, recording in sorted(row.recordings.items())}
     logged = {serial: columns for serial, columns in units.items() if columns}
-    t_s = np.unique(np.concatenate([np.zeros(0), *(columns["t_s"] for columns in logged.values())]))
+    times = [np.asarray(columns["t_s"], dtype=np.float64) for columns in logged.values()]
+    t_s = np.unique(np.concatenate([np.zeros(0), *times]))
     # units that are switched on are logged together: the air of any of them is that of all
     air = {name: _merged(t_s, logged, name) for name in ("chamber_c", "chamber_setpoint_c")}
     own = {serial: _merged(t_s, {serial: columns}, "temperature_c") for serial, columns in logged.items()}
