@@ -3,7 +3,8 @@
 Runs go through the driver and the bytes of a simulated controller. Its replies are late by a random part of the
 period of an adapter's timer, or by the rest to its next tick, and by what the computer's scheduler adds. The clock
 drifts in proportion to time, as it does when a controller warms up, or as a random walk. A campaign has one block of
-runs before its data sets and one every two hours. `LABCTL_STUDY_CAMPAIGNS` is how many of each kind,
+runs before its data sets and one every two hours. Each controller's clock is off by its own amount, so that ticks
+fall otherwise in each campaign. `LABCTL_STUDY_CAMPAIGNS` is how many of each kind,
 `LABCTL_STUDY_SEED` the first seed.
 """
 
@@ -29,7 +30,7 @@ CAMPAIGNS = int(os.environ.get("LABCTL_STUDY_CAMPAIGNS", "200"))
 FIRST_SEED = int(os.environ.get("LABCTL_STUDY_SEED", "32001"))
 LATENCIES_S = (0.0, 0.001, 0.004, 0.016)
 BLOCKS = 4
-OFF_PPM, SCHEDULER_S, RATE_DPS = 350.0, 1e-4, 90.0
+MAX_OFF_PPM, SCHEDULER_S, RATE_DPS = 500.0, 1e-4, 90.0
 #: Rates are compared at so many times between two blocks.
 TIMES = 8
 
@@ -107,6 +108,7 @@ class TimedTable:
         device: Any = self._opened.simulation.device("sim://arrick")  # type: ignore[union-attr]
         self._device = device._device  # noqa: SLF001
         self._kind, self._latency_s, self._rng = kind, latency_s, rng
+        self._off_ppm = float(rng.uniform(-MAX_OFF_PPM, MAX_OFF_PPM))
         self._ppm = kind.ppm(rng)
         self.runs: list[ClockRun] = []
         self.connect()
@@ -118,7 +120,7 @@ class TimedTable:
 
     def ratio(self, t_s: float) -> float:
         """Return the true step rate over the nominal one at a time, s."""
-        return 1.0 + 1e-6 * (self._ppm(t_s) - OFF_PPM)
+        return 1.0 + 1e-6 * (self._ppm(t_s) + self._off_ppm)
 
     def time_block(self, number: int, session: int, block: int) -> MeasuredClock | None:
         """Time some runs; returns the clock by all so far."""

@@ -47,7 +47,7 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     attempt = stalled = 0
     while True:
         attempt += 1
-        stalled_s = context.monitor.stalls.total_s()
+        stalled_s, began_s = context.monitor.stalls.total_s(), context.clock.now_s()
         try:
             learn_periods(context)
             return _take(context, step) if step.course is None else take_course(context, step)
@@ -57,7 +57,7 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
                 raise
             why = str(error)
             stalled_s = context.monitor.stalls.total_s() - stalled_s
-            if is_by_stalls(context, unit, error, stalled_s):
+            if is_by_stalls(context, unit, error, began_s):
                 why = f"{not_run(stalled_s)} while it was taken, and readings of {unit} are missing"
                 stalled += 1
                 attempt -= stalled <= STALLED_ATTEMPTS  # no fault of the unit

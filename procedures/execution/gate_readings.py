@@ -98,6 +98,7 @@ def _write_lost(
     """Write down, count and say that `missing` readings of a gate, or of its beginning, did not arrive."""
     gyro = context.bench.gyros[name]
     lost = late_readings.lost_readings(gyro, missing)
+    count.gaps += late_readings.gaps_at_edges(gyro, gate, count, missing)
     count.add(lost)
     context.recorder.journal.readings(number, name, lost, context.monitor.air_c)
     expected = round(late_readings.promise_of(gyro, gate[1] - gate[0]).readings)
@@ -126,6 +127,8 @@ def _keep(
         if count.newest_s < gate[0] or readings.t_s[-1] >= gate[1]:  # some may be lost outside the gate
             room = late_readings.room(gyro, readings, gate, count)
             kept = replace(kept, lost=min(kept.lost, max(room - len(kept), 0)))
+        if missing := kept.lost + kept.damaged:
+            count.locate(readings.t_s, gate[0], missing, 1.0 / gyro.sample_rate_hz)
         count.note(readings.t_s, gate[0])
     if len(kept) or kept.lost or kept.damaged:
         count.add(kept)
