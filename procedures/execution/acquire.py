@@ -8,7 +8,7 @@ from instruments.clock import latency_s
 from instruments.errors import LinkError
 from instruments.interfaces.table import Spin
 from instruments.positions import Position
-from procedures.contracts.errors import BadData, GuardTripped, StepFailed
+from procedures.contracts.errors import BadData, GuardTripped, NotFollowing, StepFailed
 from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
 from procedures.execution import late_readings
@@ -62,6 +62,8 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
                 stalled += 1
                 attempt -= stalled <= STALLED_ATTEMPTS  # no fault of the unit
             if attempt >= context.recipe.on_failure.acquire_attempts:
+                if isinstance(error, NotFollowing):
+                    _withdraw_unconfirmed(context, unit, why)
                 if not context.can_drop(unit):
                     raise
                 context.drop(unit, str(error))
@@ -71,6 +73,14 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             tracker.update(repeated=tracker.progress.repeated + 1)
             context.bench.table.stop()
             reopen(context)
+
+
+def _withdraw_unconfirmed(context: ExecutionContext, unit: str, why: str) -> None:
+    """Withdraw what a unit sent in this mounting before: nothing shows that it followed the table then."""
+    for number in context.response.unconfirmed(unit):
+        context.recorder.journal.dataset_withdrawn(number, unit, why)
+        text = f"data set {number} of {unit} does not count: {why}"
+        context.recorder.event(warning("data_set_withdrawn", text, unit))
 
 
 def reopen(context: ExecutionContext) -> None:
@@ -119,16 +129,17 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             raise
     context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
     context.unchecked.append(number)
+    context.response.keep(counts, number)
     reading_counts = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
     return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **rates, **reading_counts}
 
 
 def _demand_answer(context: ExecutionContext, step: Acquire, spin: Spin) -> None:
-    """Raise BadData for a unit whose output does not follow the rate of the table."""
+    """Raise NotFollowing for a unit whose output does not follow the rate of the table."""
     position = Position.of(step.position)
     for name, gyro in context.bench.gyros.items():
         if complaint := context.response.complaint(name, spin.rate_dps, position, gyro.limits.max_rate_dps):
-            raise BadData(name, complaint)
+            raise NotFollowing(name, complaint)
 
 
 def _note_angles(
