@@ -24,6 +24,13 @@ class StreamPeriod:
     nominal_s: float  #: of the bench file
     measured_s: float | None  #: None where it is not known to half a per cent
     u_share: float  #: standard uncertainty as a share of the period
+    used_s: float | None = None  #: by which readings have their times; None: the nominal one
+
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether the arrivals suggest another period than the one in use, beyond two standard uncertainties."""
+        used_s = self.used_s or self.nominal_s
+        return self.measured_s is not None and abs(self.measured_s / used_s - 1.0) > 2.0 * self.u_share
 
 
 @runtime_checkable

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from instruments.errors import LinkError
@@ -18,6 +19,9 @@ from procedures.monitoring.event_recorder import warning
 #: Before a data set a stream of unknown period is read for at most so long, s of the clock, in slices of so long: that
 #: is enough behind an adapter that holds bytes back for 16 ms.
 LEARN_S, SLICE_S = 4.0, 0.25
+#: One whose arrivals suggest another period than that of the bench file is read further, for at most so long, s, until
+#: they exclude it or agree: the times of the first data set would bend.
+DOUBT_S = 20.0
 
 
 def learn_periods(context: ExecutionContext) -> None:
@@ -25,13 +29,19 @@ def learn_periods(context: ExecutionContext) -> None:
 
     Raises InstrumentError, Aborted.
     """
-    until_s = context.clock.now_s() + LEARN_S
+    _read_while(context, _is_period_unknown, LEARN_S, SLICE_S)
+    _read_while(context, _is_period_in_doubt, DOUBT_S, 0.0)  # as often as possible: then arrivals say most
+
+
+def _read_while(context: ExecutionContext, is_open: Callable[[Gyro], bool], limit_s: float, slice_s: float) -> None:
+    """Read the units for which something is open in turn, for `slice_s` in all, for at most `limit_s` of the clock."""
+    until_s = context.clock.now_s() + limit_s
     while context.clock.now_s() < until_s:
-        unknown = {name: gyro for name, gyro in context.bench.gyros.items() if _is_period_unknown(gyro)}
-        if not unknown:
+        open_ones = {name: gyro for name, gyro in context.bench.gyros.items() if is_open(gyro)}
+        if not open_ones:
             return
-        for name, gyro in unknown.items():
-            readings = gyro.read(max(SLICE_S / len(unknown), 1.5 / gyro.sample_rate_hz))
+        for name, gyro in open_ones.items():
+            readings = gyro.read(max(slice_s / len(open_ones), 1.5 / gyro.sample_rate_hz))
             if len(readings):
                 context.monitor.add_readings(name, gyro, readings)
         checkpoint(context)
@@ -39,6 +49,10 @@ def learn_periods(context: ExecutionContext) -> None:
 
 def _is_period_unknown(gyro: Gyro) -> bool:
     return isinstance(gyro, StreamingGyro) and gyro.period.measured_s is None
+
+
+def _is_period_in_doubt(gyro: Gyro) -> bool:
+    return isinstance(gyro, StreamingGyro) and gyro.period.is_in_doubt
 
 
 def read_late(
