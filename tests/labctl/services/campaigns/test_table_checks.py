@@ -25,7 +25,7 @@ from labctl.services.campaigns.resume import prepare_resume
 from labctl.store import open_store
 from procedures.contracts.control import Control
 from procedures.monitoring.step_clock import fitted
-from studies.table_clock import KINDS, Kind, resumed_campaign
+from studies.table_clock import KINDS, Kind, campaign, resumed_campaign
 
 RECIPE = """format = "labctl-recipe/1"
 name = "checked"
@@ -171,6 +171,14 @@ def test_what_a_resumed_campaign_states_of_its_clock_holds_at_least_as_often_as_
     error_ppm, u_ppm = np.array([resumed_campaign(kind, 0.001, (32, n)) for n in range(200)]).T
     assert np.mean(np.abs(error_ppm) <= u_ppm) >= 0.92  # two standard deviations of 200 draws below 95 %
     assert np.median(u_ppm) < 5 * np.sqrt(np.mean(error_ppm**2))  # and not because U is too large
+
+
+def test_replies_at_ticks_are_late_otherwise_in_each_campaign_of_the_study() -> None:
+    """Each controller's clock is off by its own amount: else the ticks fall alike, and many campaigns are one."""
+    ticks = KINDS[4]
+    errors = np.array([campaign(ticks, 0.016, (33, n))[2] for n in range(12)])  # in U
+    assert errors.std() > 0.3  # 0.16 where all clocks are off by the same
+    assert np.abs(errors).max() < 1.0
 
 
 def test_runs_that_disagree_are_refused_before_the_first_data_set(tmp_path: Path) -> None:
