@@ -177,9 +177,9 @@ def resumed_campaign(kind: Kind, latency_s: float, seed: tuple[int, ...]) -> tup
 
 def run(campaigns: int = CAMPAIGNS) -> str:
     """Return the share of rates inside U by latency and drift, with its 95 % interval over campaigns (Wilson)."""
+    inside = f"rates inside U, % of {campaigns} campaigns | mean inside U, %"
     lines = [
-        f"| drift | latency, ms | U, ppm | RMS error of the mean, ppm | rates inside U, % of {campaigns} campaigns | "
-        "mean inside U, % |",
+        f"| drift | latency, ms | U, ppm | RMS error of the mean, ppm | {inside} |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for k, kind in enumerate(KINDS):
