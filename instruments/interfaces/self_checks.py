@@ -17,6 +17,10 @@ class SelfChecking(Protocol):
         ...
 
 
+#: A period that is off by less than this share, as any crystal is, is not in doubt.
+NO_DOUBT_SHARE = 2e-4
+
+
 @dataclass(frozen=True)
 class StreamPeriod:
     """Period of a stream by the clock of the computer, from the arrivals of its readings."""
@@ -28,9 +32,13 @@ class StreamPeriod:
 
     @property
     def is_in_doubt(self) -> bool:
-        """Whether the arrivals suggest another period than the one in use, beyond two standard uncertainties."""
+        """Whether the arrivals suggest another period than the one in use, beyond two standard uncertainties.
+
+        Less than `NO_DOUBT_SHARE` is no doubt: in a data set the times do not bend by it.
+        """
         used_s = self.used_s or self.nominal_s
-        return self.measured_s is not None and abs(self.measured_s / used_s - 1.0) > 2.0 * self.u_share
+        limit = max(2.0 * self.u_share, NO_DOUBT_SHARE)
+        return self.measured_s is not None and abs(self.measured_s / used_s - 1.0) > limit
 
 
 @runtime_checkable

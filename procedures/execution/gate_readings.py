@@ -29,8 +29,10 @@ def learn_periods(context: ExecutionContext) -> None:
 
     Raises InstrumentError, Aborted.
     """
+    new = [gyro.name for gyro in context.bench.gyros.values() if _is_period_unknown(gyro)]
     _read_while(context, _is_period_unknown, LEARN_S, SLICE_S)
-    _read_while(context, _is_period_in_doubt, DOUBT_S, 0.0)  # as often as possible: then arrivals say most
+    # once after each start, and as often as possible: then arrivals say most
+    _read_while(context, lambda gyro: gyro.name in new and _is_period_in_doubt(gyro), DOUBT_S, 0.0)
 
 
 def _read_while(context: ExecutionContext, is_open: Callable[[Gyro], bool], limit_s: float, slice_s: float) -> None:
