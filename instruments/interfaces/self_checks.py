@@ -17,8 +17,8 @@ class SelfChecking(Protocol):
         ...
 
 
-#: A period that is off by less than this share, as any crystal is, is not in doubt.
-NO_DOUBT_SHARE = 2e-4
+#: A period that is off by less than this share, as any crystal is, needs no confirmation.
+NEGLIGIBLE_SHARE = 2e-4
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class StreamPeriod:
     used_s: float | None = None  #: by which readings have their times; None: the nominal one
 
     @property
-    def is_in_doubt(self) -> bool:
+    def is_unconfirmed(self) -> bool:
         """Whether the arrivals suggest another period than the one in use, beyond two standard uncertainties.
 
-        Less than `NO_DOUBT_SHARE` is no doubt: in a data set the times do not bend by it.
+        Less than `NEGLIGIBLE_SHARE` does not count: in a data set the times do not bend by it.
         """
         used_s = self.used_s or self.nominal_s
-        limit = max(2.0 * self.u_share, NO_DOUBT_SHARE)
+        limit = max(2.0 * self.u_share, NEGLIGIBLE_SHARE)
         return self.measured_s is not None and abs(self.measured_s / used_s - 1.0) > limit
 
 

@@ -32,7 +32,7 @@ def learn_periods(context: ExecutionContext) -> None:
     new = [gyro.name for gyro in context.bench.gyros.values() if _is_period_unknown(gyro)]
     _read_while(context, _is_period_unknown, LEARN_S, SLICE_S)
     # once after each start, and as often as possible: then arrivals say most
-    _read_while(context, lambda gyro: gyro.name in new and _is_period_in_doubt(gyro), DOUBT_S, 0.0)
+    _read_while(context, lambda gyro: gyro.name in new and _is_period_unconfirmed(gyro), DOUBT_S, 0.0)
 
 
 def _read_while(context: ExecutionContext, is_open: Callable[[Gyro], bool], limit_s: float, slice_s: float) -> None:
@@ -53,8 +53,8 @@ def _is_period_unknown(gyro: Gyro) -> bool:
     return isinstance(gyro, StreamingGyro) and gyro.period.measured_s is None
 
 
-def _is_period_in_doubt(gyro: Gyro) -> bool:
-    return isinstance(gyro, StreamingGyro) and gyro.period.is_in_doubt
+def _is_period_unconfirmed(gyro: Gyro) -> bool:
+    return isinstance(gyro, StreamingGyro) and gyro.period.is_unconfirmed
 
 
 def read_late(

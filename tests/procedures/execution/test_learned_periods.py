@@ -33,7 +33,7 @@ class Doubtful(FakeGyro):
 
 
 @pytest.mark.parametrize(("decided_s", "expected_s"), [(0.0, 1.0), (5.0, 5.0), (1e9, 1.0 + DOUBT_S)])
-def test_a_unit_whose_period_is_in_doubt_is_read_until_it_is_not(decided_s: float, expected_s: float) -> None:
+def test_a_unit_whose_period_is_unconfirmed_is_read_until_it_is_not(decided_s: float, expected_s: float) -> None:
     rig = Rig()
     unit = Doubtful(rig.clock, rig.trace, "imu")
     unit.bench, unit.decided_s = rig, decided_s
@@ -62,8 +62,8 @@ def test_arrivals_decide_between_the_nominal_period_and_another_in_a_few_seconds
     while stream.known.measured_s is None:
         listen(now_s := now_s + 0.25)
     assert now_s < LEARN_S
-    assert stream.known.is_in_doubt == (off_share == 2e-3)  # the largest is excluded by now
-    while stream.known.is_in_doubt:
+    assert stream.known.is_unconfirmed == (off_share == 2e-3)  # the largest is excluded by now
+    while stream.known.is_unconfirmed:
         listen(now_s := now_s + 1.5 / HZ)
     assert now_s < 8.0
     used_s = stream.known.used_s
