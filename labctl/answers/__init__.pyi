@@ -191,8 +191,13 @@ from labctl.answers.drafts import (
 from labctl.answers.effects import (
     CataloguedEffect as CataloguedEffect,
     EffectJson as EffectJson,
+    EquationJson as EquationJson,
+    Gives as Gives,
     ParameterJson as ParameterJson,
     PresetJson as PresetJson,
+    SourceJson as SourceJson,
+    SymbolJson as SymbolJson,
+    SymbolKind as SymbolKind,
 )
 from labctl.answers.fitted_model import (
     AxisCoefficients as AxisCoefficients,

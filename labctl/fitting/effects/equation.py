@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
-#: What a source contains: this equation, or the definition of the effect, whose shape is then labctl's own.
-Gives = Literal["equation", "definition"]
+from labctl.answers.effects import Gives
 
 
 @dataclass(frozen=True)

@@ -76,8 +76,9 @@ class TimeDelay(_Responding):
     )
     draws = ("time",)
     equation: ClassVar = Equation(
-        "omega[a](t - delta) - omega[a](t)",
+        "omega_a(t - delta) - omega_a(t)",
         (Symbol("delta", "delay of the output", "s", "delay"),),
+        others=(Symbol("omega_a", "rate about the axis as a function of the time", "deg/s"),),
     )
     sources: ClassVar = (
         Source(

@@ -209,7 +209,7 @@ class SineResponse(Effect):
     )
     sources: ClassVar = (
         Source(
-            "H. C. Lefevre, The Fiber-Optic Gyroscope, 2nd ed., Artech House 2014",
+            "H. C. Lefèvre, The Fiber-Optic Gyroscope, 2nd ed., 2014",
             "interferometer with biasing modulation: a signal proportional to the sine of the Sagnac phase",
         ),
     )

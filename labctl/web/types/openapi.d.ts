@@ -4227,6 +4227,13 @@ export interface components {
              * @description Nonlinear parameters.
              */
             parameters: components["schemas"]["ParameterJson"][];
+            /** @description The equation of the effect; null: an effect of another package does not state it. */
+            equation: components["schemas"]["EquationJson"] | null;
+            /**
+             * Sources
+             * @description Publications of the equation, or of the definition of the effect.
+             */
+            sources: components["schemas"]["SourceJson"][];
             /**
              * Plausible
              * @description Technology -> least and largest plausible first coefficient, in the unit of the coefficient.
@@ -6642,6 +6649,27 @@ export interface components {
              * @description Whether they agree, at a probability of 1 % over all effects.
              */
             agree: boolean;
+        };
+        /**
+         * EquationJson
+         * @description The error of an output, deg/s, output minus rate, by an effect.
+         */
+        EquationJson: {
+            /**
+             * Text
+             * @description The equation as an expression of Python, then the lines that define what stands in it, after semicolons.
+             */
+            text: string;
+            /**
+             * Mathml
+             * @description The same as one element `math` of MathML.
+             */
+            mathml: string;
+            /**
+             * Symbols
+             * @description Every symbol of the equation, with its meaning and unit.
+             */
+            symbols: components["schemas"]["SymbolJson"][];
         };
         /**
          * ErrorFigures
@@ -10146,6 +10174,21 @@ export interface components {
              * @description Largest value that is tried, in `unit`.
              */
             high: number;
+            /**
+             * Symbol
+             * @description Symbol in the equation of the effect; empty: a switch, which chooses a case of the equation.
+             */
+            symbol: string;
+            /**
+             * Symbol Mathml
+             * @description The symbol as MathML; empty for a switch.
+             */
+            symbol_mathml: string;
+            /**
+             * Meaning
+             * @description What the parameter is; empty: an effect of another package does not say.
+             */
+            meaning: string;
         };
         /**
          * PictureResponse
@@ -12175,6 +12218,28 @@ export interface components {
             common: number | null;
         };
         /**
+         * SourceJson
+         * @description A publication that an effect is from.
+         */
+        SourceJson: {
+            /**
+             * Work
+             * @description Author, title and place of the publication, or the standard.
+             */
+            work: string;
+            /**
+             * Place
+             * @description Where in it, or what it says there.
+             */
+            place: string;
+            /**
+             * Gives
+             * @description What it contains: this equation, or the definition of the effect only; the shape is then labctl's own.
+             * @enum {string}
+             */
+            gives: "equation" | "definition";
+        };
+        /**
          * StageResponse
          * @description The stage of a followed criticism that begins now.
          */
@@ -12880,6 +12945,43 @@ export interface components {
              * @description What would distinguish it from similar effects.
              */
             experiment: string;
+        };
+        /**
+         * SymbolJson
+         * @description A symbol of an equation.
+         */
+        SymbolJson: {
+            /**
+             * Symbol
+             * @description The symbol as it stands in `text` of the equation.
+             */
+            symbol: string;
+            /**
+             * Mathml
+             * @description The symbol as MathML.
+             */
+            mathml: string;
+            /**
+             * Kind
+             * @description What it is: a coefficient, which a fit estimates; a parameter of the shape; a channel of a recording; other.
+             * @enum {string}
+             */
+            kind: "coefficient" | "parameter" | "channel" | "other";
+            /**
+             * Meaning
+             * @description What it stands for.
+             */
+            meaning: string;
+            /**
+             * Unit
+             * @description Its unit; 1: of no dimension; empty: an index.
+             */
+            unit: string;
+            /**
+             * Name
+             * @description Name of the coefficient, the parameter or the column that it stands for; empty: it has none.
+             */
+            name: string;
         };
         /**
          * TemperatureBasisJson

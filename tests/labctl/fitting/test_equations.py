@@ -283,7 +283,7 @@ def test_the_equation_of_a_response_is_what_is_computed(effect_id: str) -> None:
     swing = SimpleNamespace(z=lambda t_s: 100.0 * np.cos(wave.RAD_S * t_s))
     assert effect.equation is not None
     if effect_id == "time_delay":
-        names = {"omega": vars(swing), "a": "z", "t": wave.t_s, "delta": amount}
+        names = {"omega_a": swing.z, "a": "z", "t": wave.t_s, "delta": amount}
         written = value(effect.equation.error, names)
     else:  # the swing behind the filter, put into the line that defines it
         lag = np.arctan(wave.RAD_S * amount)
