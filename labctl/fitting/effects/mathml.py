@@ -31,7 +31,7 @@ def equation_mathml(equation: Equation) -> str:
         for left, right in lines
     )
     text = "; ".join(f"{left} = {right}" for left, right in lines)
-    return f'<math xmlns="{NAMESPACE}" display="block" alttext="{_quoted(text)}"><mtable>{rows}</mtable></math>'
+    return f'<math xmlns="{NAMESPACE}" display="block" alttext="{_quoted(text)}"><mtable displaystyle="true">{rows}</mtable></math>'
 
 
 def symbol_mathml(symbol: str) -> str:
@@ -159,10 +159,10 @@ def _sum(node: ast.Call) -> str:
 
 def _cases(node: ast.IfExp) -> str:
     rows = (
-        f"<mtr><mtd>{_drawn(node.body)}</mtd><mtd><mtext>if&#xA0;</mtext>{_condition(node.test)}</mtd></mtr>"
-        f"<mtr><mtd>{_drawn(node.orelse)}</mtd><mtd><mtext>otherwise</mtext></mtd></mtr>"
+        f"<mtr><mtd style="text-align: left">{_drawn(node.body)}</mtd><mtd style="text-align: left"><mtext>if&#xA0;</mtext>{_condition(node.test)}</mtd></mtr>"
+        f"<mtr><mtd style="text-align: left">{_drawn(node.orelse)}</mtd><mtd style="text-align: left"><mtext>otherwise</mtext></mtd></mtr>"
     )
-    return f'<mrow><mo stretchy="true">{{</mo><mtable>{rows}</mtable></mrow>'
+    return f'<mrow><mo stretchy="true">{{</mo><mtable displaystyle="true">{rows}</mtable></mrow>'
 
 
 def _condition(node: ast.expr) -> str:

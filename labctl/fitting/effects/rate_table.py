@@ -155,6 +155,7 @@ class TableTilt(_OncePerTurn):
             ),
             Symbol("s[k]", "amplitude of the sine of k cycles per turn", "deg/s", "tilt_sin{k}"),
         ),
+        others=(Symbol("k", "cycles per turn", ""),),
     )
     sources: ClassVar = (term_528("acceleration-sensitive drift rate"),)
 

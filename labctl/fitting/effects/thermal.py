@@ -61,6 +61,7 @@ class TemperatureRate(Effect):
         ),
         others=(
             Symbol("Tdot", "slope of the line through the thermometer over the last and the next readings", "K/min"),
+            Symbol("k", "place of a temperature, before or after", ""),
             Symbol("h", "spacing of the temperatures", "s"),
             Symbol("m", "number of temperatures on either side", "1"),
         ),
