@@ -31,7 +31,8 @@ def equation_mathml(equation: Equation) -> str:
         for left, right in lines
     )
     text = "; ".join(f"{left} = {right}" for left, right in lines)
-    return f'<math xmlns="{NAMESPACE}" display="block" alttext="{_quoted(text)}"><mtable displaystyle="true">{rows}</mtable></math>'
+    table = f'<mtable displaystyle="true">{rows}</mtable>'
+    return f'<math xmlns="{NAMESPACE}" display="block" alttext="{_quoted(text)}">{table}</math>'
 
 
 def symbol_mathml(symbol: str) -> str:
@@ -158,9 +159,10 @@ def _sum(node: ast.Call) -> str:
 
 
 def _cases(node: ast.IfExp) -> str:
+    cell = '<mtd style="text-align: left">'
     rows = (
-        f"<mtr><mtd style="text-align: left">{_drawn(node.body)}</mtd><mtd style="text-align: left"><mtext>if&#xA0;</mtext>{_condition(node.test)}</mtd></mtr>"
-        f"<mtr><mtd style="text-align: left">{_drawn(node.orelse)}</mtd><mtd style="text-align: left"><mtext>otherwise</mtext></mtd></mtr>"
+        f"<mtr>{cell}{_drawn(node.body)}</mtd>{cell}<mtext>if&#xA0;</mtext>{_condition(node.test)}</mtd></mtr>"
+        f"<mtr>{cell}{_drawn(node.orelse)}</mtd>{cell}<mtext>otherwise</mtext></mtd></mtr>"
     )
     return f'<mrow><mo stretchy="true">{{</mo><mtable displaystyle="true">{rows}</mtable></mrow>'
 
