@@ -309,6 +309,11 @@ from labctl.answers.plans import (
     TimelineColumns as TimelineColumns,
     Visibility as Visibility,
 )
+from labctl.answers.points import (
+    PointFigure as PointFigure,
+    PointNumbers as PointNumbers,
+    PointResponse as PointResponse,
+)
 from labctl.answers.poses import (
     AccelerometerCoefficient as AccelerometerCoefficient,
     AccelerometerJson as AccelerometerJson,

@@ -1564,6 +1564,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/calibrations/{version}/point": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A point of a figure, computed again from its readings
+         * @description The readings of one data set, mean, rate, error and residual, and the same computed now from the raw readings.
+         */
+        get: operations["point_api_units__serial__calibrations__version__point_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/units/{serial}/sensors": {
         parameters: {
             query?: never;
@@ -10334,6 +10354,123 @@ export interface components {
             timeline: components["schemas"]["TimelineColumns"];
         };
         /**
+         * PointNumbers
+         * @description The numbers of a point: residual = output - rate - modelled error.
+         */
+        PointNumbers: {
+            /**
+             * Output Dps
+             * @description Mean output of the data set's valid readings, deg/s.
+             */
+            output_dps: number;
+            /**
+             * Own Rate Dps
+             * @description Rate along the output axis, deg/s; it includes the Earth's rate where that is known.
+             */
+            own_rate_dps: number;
+            /**
+             * Measured Error Dps
+             * @description Output minus rate, deg/s.
+             */
+            measured_error_dps: number;
+            /**
+             * Modelled Error Dps
+             * @description Error that the model states, deg/s.
+             */
+            modelled_error_dps: number;
+            /**
+             * Residual Dps
+             * @description Measured error minus modelled error, deg/s.
+             */
+            residual_dps: number;
+        };
+        /**
+         * PointResponse
+         * @description One data set of one axis in a figure, and the same computed again from its raw readings.
+         */
+        PointResponse: {
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
+            serial: string;
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
+            version: number;
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
+            recording: number;
+            /**
+             * Dataset
+             * @description Number of the data set.
+             */
+            dataset: number;
+            /**
+             * Axis
+             * @description Output axis: x, y or z.
+             */
+            axis: string;
+            /**
+             * Figure
+             * @description The figure whose point it is.
+             * @enum {string}
+             */
+            figure: "residual" | "comparison";
+            /** @description The numbers of the figure. */
+            shown: components["schemas"]["PointNumbers"];
+            /** @description The same computed now from the raw readings; of the figure `residual` the modelled error is that of the fit to all data sets. null: the recording has no readings. */
+            recomputed: components["schemas"]["PointNumbers"] | null;
+            /**
+             * Equal
+             * @description Whether both agree within the rounding of a mean, `rounding_dps`; null: there are no readings.
+             */
+            equal: boolean | null;
+            /**
+             * Largest Difference Dps
+             * @description Largest difference between `shown` and `recomputed`, deg/s; null: there are no readings.
+             */
+            largest_difference_dps: number | null;
+            /**
+             * Rounding Dps
+             * @description Difference up to which both are equal, deg/s.
+             */
+            rounding_dps: number;
+            /**
+             * Readings
+             * @description Number of valid readings; 0: the recording has none.
+             */
+            readings: number;
+            /**
+             * Invalid
+             * @description Number of readings that the instrument marked as invalid; none of them counts.
+             */
+            invalid: number;
+            /**
+             * Std Dps
+             * @description Standard deviation of the readings (n - 1), deg/s; null: fewer than two readings.
+             */
+            std_dps: number | null;
+            /**
+             * Readings Sha256
+             * @description SHA-256 of the valid readings of the output, each as 8 bytes (little-endian double), in order; null: there are no readings.
+             */
+            readings_sha256: string | null;
+            /**
+             * Formula
+             * @description The residual with its numbers.
+             */
+            formula: string;
+            /**
+             * Summary
+             * @description The result of the computation from the readings, in one sentence.
+             */
+            summary: string;
+        };
+        /**
          * PoseColumns
          * @description Turns by hand between rests: one row per move, as lists of equal length.
          */
@@ -16736,6 +16873,49 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MotionResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    point_api_units__serial__calibrations__version__point_get: {
+        parameters: {
+            query: {
+                /** @description Number of the recording. */
+                recording: number;
+                /** @description Number of the data set. */
+                dataset: number;
+                /** @description Output axis: x, y or z. */
+                axis: string;
+                /** @description The figure: residuals of the fitted model, or the version as it is. */
+                figure?: "residual" | "comparison";
+                /** @description All recordings that are drawn together; default: `recording` alone. */
+                recordings?: number[] | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PointResponse"];
                 };
             };
             /** @description Validation Error */
