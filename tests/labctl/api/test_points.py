@@ -12,19 +12,19 @@ from fastapi.testclient import TestClient
 from labctl.recording import Recording
 from labctl.services.criticism import point as service
 from tests.helpers.service import add_recording, open_client
-from tests.helpers.simulated_recordings import three_axes
+from tests.helpers.simulated_recordings import single_axis
 
 PATH = "/api/units/{}/calibrations/1"
 
 
 @pytest.fixture(scope="module")
 def unit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[TestClient, Recording, str]]:
-    """A service with a tri-axial unit and a first model of it; the tests only read."""
-    recording = three_axes(4, scale_factor_odd=3e-9)
+    """A service with a unit and a first model of it; the tests only read."""
+    recording = single_axis(3, scale_factor_odd=3e-7)
     with open_client(tmp_path_factory.mktemp("points") / "lab.sqlite") as client:
         add_recording(client, recording)
         path = PATH.format(recording.info.serial)
-        assert client.post(path.removesuffix("/1"), json={"model": "yang2018"}).status_code == 201
+        assert client.post(path.removesuffix("/1"), json={"effects": ["bias", "scale_factor"]}).status_code == 201
         yield client, recording, path
 
 
