@@ -28,7 +28,9 @@ def recording(service: Service) -> Recording:
     columns = {name: np.array(values) for name, values in made.columns.items()}
     columns["valid"] = np.ones(len(made), dtype=np.int64)
     columns["valid"][5::50] = 0
-    columns["gyro_z"][5::50] += 30.0
+    output = np.array(columns["gyro_z"], dtype=np.float64)
+    output[5::50] += 30.0
+    columns["gyro_z"] = output
     spoiled = Recording(made.info, columns, made.environment)
     service.lab_service.store.recordings.add_import(spoiled, spoiled.info.started_at)
     service.post(f"/api/units/{made.info.serial}/calibrations", {"effects": ["bias", "scale_factor"]})

@@ -33,7 +33,7 @@ class Misalignment(Effect):
             ),
         ),
     )
-    sources: ClassVar = (
+    sources: ClassVar[tuple[Source, ...]] = (
         Source(YANG, "error model, output = K rate + B: other entries of K"),
         term_528("input-axis misalignment"),
     )
@@ -69,7 +69,7 @@ class NonOrthogonality(Misalignment):
             ),
         ),
     )
-    sources: ClassVar = (
+    sources: ClassVar[tuple[Source, ...]] = (
         Source(YANG, "error model: the matrix of non-orthogonality is a factor of K, so that K contains it"),
     )
 

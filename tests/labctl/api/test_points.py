@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from labctl.recording import Recording
-from labctl.services.criticism import point as service
+from labctl.services.criticism.comparison import compare_version
 from tests.helpers.service import add_recording, open_client
 from tests.helpers.simulated_recordings import single_axis
 
@@ -60,14 +60,13 @@ def test_a_figure_that_is_not_of_these_readings_is_not_called_equal(
     unit: tuple[TestClient, Recording, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     client, _, path = unit
-    kept = service.compare_version
 
     def spoiled(*asked: object, **options: object) -> object:
-        answer = kept(*asked, **options)  # type: ignore[arg-type]
+        answer = compare_version(*asked, **options)  # type: ignore[arg-type]
         answer.columns.residual_dps[0] += 1e-9
         return answer
 
-    monkeypatch.setattr(service, "compare_version", spoiled)
+    monkeypatch.setattr("labctl.services.criticism.point.compare_version", spoiled)
     columns = client.get(f"{path}/comparison").json()["columns"]
     asked = {"recording": 1, "dataset": columns["dataset"][0], "axis": columns["axis"][0], "figure": "comparison"}
     point = client.get(f"{path}/point", params=asked).json()

@@ -107,7 +107,7 @@ def names_of(channels: Channels, axis: str, effect: Effect, term: Term) -> Names
     columns, history = channels.columns, channels.history
     force = {a: columns[f"accel_{a}_g"] if f"accel_{a}_g" in columns else channels.up(a) for a in BODY_AXES}
     temperatures = history.courses[1].temperature_c
-    at = ((np.asarray(columns["t_s"]) - 1000.0) / SPACING_S).astype(int)
+    at = ((np.asarray(columns["t_s"], dtype=np.float64) - 1000.0) / SPACING_S).astype(int)
     names: Names = {
         **FUNCTIONS, "a": axis, "omega": channels.rates, "omega_t": columns["table_rate_dps"], "f": force,
         "omega_b": columns["previous_rate_dps"], "omega_max": history.rate_dps, "T_ref": REFERENCE.temperature_c,
@@ -179,7 +179,14 @@ def played(width: float, state: str, follower: str, names: Names) -> Any:
     return np.array(states)[names["at"]]
 
 
-def coefficients_of(effect: Effect, columns: list[Column], axis: str, rng: np.random.Generator) -> tuple[Names, dict]:
+def _index(key: tuple[int | str, ...]) -> Any:
+    """Return one index alone, several as a tuple."""
+    return key if len(key) > 1 else next(iter(key))
+
+
+def coefficients_of(
+    effect: Effect, columns: list[Column], axis: str, rng: np.random.Generator
+) -> tuple[Names, dict[str, float]]:
     """Return random coefficients as the symbols of the equation and as name of the column -> value."""
     estimated = {
         column.name: float(rng.uniform(0.2, 1.5)) * (1 if column.law else rng.choice([-1, 1])) for column in columns
@@ -202,7 +209,7 @@ def coefficients_of(effect: Effect, columns: list[Column], axis: str, rng: np.ra
         elif index.startswith("a,"):
             symbols[stem] = {(axis, *key): amount for key, amount in found.items()}
         elif found:
-            symbols[stem] = ByRow({key if len(key) > 1 else key[0]: amount for key, amount in found.items()})
+            symbols[stem] = ByRow({_index(key): amount for key, amount in found.items()})
         explained |= {name for name in estimated if pattern.match(name)} | (
             {"k_squared"} if each.name == "k" else set()
         )
