@@ -239,7 +239,7 @@ class Client:
         """Return one data set of a figure, and its numbers computed again from the raw readings.
 
         `figure` is "residual" (of the model fitted to `recordings`, default: to `recording`) or "comparison" (the
-        version as it is).
+        version without refitting).
         """
         path = f"/api/units/{_part(serial)}/calibrations/{version}/point"
         query = {

@@ -9,7 +9,7 @@ from pydantic import Field
 from labctl.answers.base import ResponseModel
 from labctl.answers.common_fields import RecordingNumber, Serial, VersionNumber
 
-#: Whose point: of the residuals of the fitted model (Explore, Fails), or of the version as it is (Explore, Compare).
+#: Whose point: of the residuals of the fitted model (Explore, Fails), or of the version without refitting (Explore, Compare).
 PointFigure = Literal["residual", "comparison"]
 
 

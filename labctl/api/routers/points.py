@@ -24,7 +24,7 @@ async def point(
     dataset: Annotated[int, Query(description="Number of the data set.")],
     axis: Annotated[str, Query(description="Output axis: x, y or z.")],
     figure: Annotated[
-        PointFigure, Query(description="The figure: residuals of the fitted model, or the version as it is.")
+        PointFigure, Query(description="The figure: residuals of the fitted model, or the version without refitting.")
     ] = "residual",
     recordings: Annotated[
         list[int] | None, Query(description="All recordings that are drawn together; default: `recording` alone.")

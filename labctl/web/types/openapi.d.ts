@@ -16895,7 +16895,7 @@ export interface operations {
                 dataset: number;
                 /** @description Output axis: x, y or z. */
                 axis: string;
-                /** @description The figure: residuals of the fitted model, or the version as it is. */
+                /** @description The figure: residuals of the fitted model, or the version without refitting. */
                 figure?: "residual" | "comparison";
                 /** @description All recordings that are drawn together; default: `recording` alone. */
                 recordings?: number[] | null;
