@@ -9,7 +9,7 @@ from pydantic import Field
 from labctl.answers.base import ResponseModel
 from labctl.answers.common_fields import RecordingNumber, Serial, VersionNumber
 
-#: Whose point: of the residuals of the fitted model (Explore, Fails), or of the version without refitting (Explore, Compare).
+#: Whose point: the residuals of the fitted model (Explore, Fails), or the version without refitting (Explore, Compare).
 PointFigure = Literal["residual", "comparison"]
 
 
