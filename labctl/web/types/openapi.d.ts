@@ -1584,6 +1584,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/calibrations/{version}/point": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A point of a figure, computed again from its readings
+         * @description The readings of one data set, mean, rate, error and residual, and the same computed now from the raw readings.
+         */
+        get: operations["point_api_units__serial__calibrations__version__point_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/units/{serial}/sensors": {
         parameters: {
             query?: never;
@@ -4252,6 +4272,13 @@ export interface components {
              * @description Nonlinear parameters.
              */
             parameters: components["schemas"]["ParameterJson"][];
+            /** @description The equation of the effect; null: an effect of another package does not state it. */
+            equation: components["schemas"]["EquationJson"] | null;
+            /**
+             * Sources
+             * @description Publications of the equation, or of the definition of the effect.
+             */
+            sources: components["schemas"]["SourceJson"][];
             /**
              * Plausible
              * @description Technology -> least and largest plausible first coefficient, in the unit of the coefficient.
@@ -6705,6 +6732,27 @@ export interface components {
              * @description Whether they agree, at a probability of 1 % over all effects.
              */
             agree: boolean;
+        };
+        /**
+         * EquationJson
+         * @description The error of an output, deg/s, output minus rate, by an effect.
+         */
+        EquationJson: {
+            /**
+             * Text
+             * @description The equation as an expression of Python, then the lines that define what stands in it, after semicolons.
+             */
+            text: string;
+            /**
+             * Mathml
+             * @description The same as one element `math` of MathML.
+             */
+            mathml: string;
+            /**
+             * Symbols
+             * @description Every symbol of the equation, with its meaning and unit.
+             */
+            symbols: components["schemas"]["SymbolJson"][];
         };
         /**
          * ErrorFigures
@@ -10209,6 +10257,21 @@ export interface components {
              * @description Largest value that is tried, in `unit`.
              */
             high: number;
+            /**
+             * Symbol
+             * @description Symbol in the equation of the effect; empty: a switch, which chooses a case of the equation.
+             */
+            symbol: string;
+            /**
+             * Symbol Mathml
+             * @description The symbol as MathML; empty for a switch.
+             */
+            symbol_mathml: string;
+            /**
+             * Meaning
+             * @description What the parameter is; empty: an effect of another package does not say.
+             */
+            meaning: string;
         };
         /**
          * PictureResponse
@@ -10352,6 +10415,123 @@ export interface components {
             attendance: components["schemas"]["AttendanceResponse"] | null;
             /** @description The steps of the plan, with expected times. */
             timeline: components["schemas"]["TimelineColumns"];
+        };
+        /**
+         * PointNumbers
+         * @description The numbers of a point: residual = output - rate - modelled error.
+         */
+        PointNumbers: {
+            /**
+             * Output Dps
+             * @description Mean output of the data set's valid readings, deg/s.
+             */
+            output_dps: number;
+            /**
+             * Own Rate Dps
+             * @description Rate along the output axis, deg/s; it includes the Earth's rate where that is known.
+             */
+            own_rate_dps: number;
+            /**
+             * Measured Error Dps
+             * @description Output minus rate, deg/s.
+             */
+            measured_error_dps: number;
+            /**
+             * Modelled Error Dps
+             * @description Error that the model states, deg/s.
+             */
+            modelled_error_dps: number;
+            /**
+             * Residual Dps
+             * @description Measured error minus modelled error, deg/s.
+             */
+            residual_dps: number;
+        };
+        /**
+         * PointResponse
+         * @description One data set of one axis in a figure, and the same computed again from its raw readings.
+         */
+        PointResponse: {
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
+            serial: string;
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
+            version: number;
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
+            recording: number;
+            /**
+             * Dataset
+             * @description Number of the data set.
+             */
+            dataset: number;
+            /**
+             * Axis
+             * @description Output axis: x, y or z.
+             */
+            axis: string;
+            /**
+             * Figure
+             * @description The figure whose point it is.
+             * @enum {string}
+             */
+            figure: "residual" | "comparison";
+            /** @description The numbers of the figure. */
+            shown: components["schemas"]["PointNumbers"];
+            /** @description The same computed now from the raw readings; of the figure `residual` the modelled error is that of the fit to all data sets. null: the recording has no readings. */
+            recomputed: components["schemas"]["PointNumbers"] | null;
+            /**
+             * Equal
+             * @description Whether both agree within the rounding of a mean, `rounding_dps`; null: there are no readings.
+             */
+            equal: boolean | null;
+            /**
+             * Largest Difference Dps
+             * @description Largest difference between `shown` and `recomputed`, deg/s; null: there are no readings.
+             */
+            largest_difference_dps: number | null;
+            /**
+             * Rounding Dps
+             * @description Difference up to which both are equal, deg/s.
+             */
+            rounding_dps: number;
+            /**
+             * Readings
+             * @description Number of valid readings; 0: the recording has none.
+             */
+            readings: number;
+            /**
+             * Invalid
+             * @description Number of readings that the instrument marked as invalid; none of them counts.
+             */
+            invalid: number;
+            /**
+             * Std Dps
+             * @description Standard deviation of the readings (n - 1), deg/s; null: fewer than two readings.
+             */
+            std_dps: number | null;
+            /**
+             * Readings Sha256
+             * @description SHA-256 of the valid readings of the output, each as 8 bytes (little-endian double), in order; null: there are no readings.
+             */
+            readings_sha256: string | null;
+            /**
+             * Formula
+             * @description The residual with its numbers.
+             */
+            formula: string;
+            /**
+             * Summary
+             * @description The result of the computation from the readings, in one sentence.
+             */
+            summary: string;
         };
         /**
          * PoseColumns
@@ -12238,6 +12418,28 @@ export interface components {
             common: number | null;
         };
         /**
+         * SourceJson
+         * @description A publication that an effect is from.
+         */
+        SourceJson: {
+            /**
+             * Work
+             * @description Author, title and place of the publication, or the standard.
+             */
+            work: string;
+            /**
+             * Place
+             * @description Where in it, or what it says there.
+             */
+            place: string;
+            /**
+             * Gives
+             * @description What it contains: this equation, or the definition of the effect only; the shape is then labctl's own.
+             * @enum {string}
+             */
+            gives: "equation" | "definition";
+        };
+        /**
          * StageResponse
          * @description The stage of a followed criticism that begins now.
          */
@@ -12943,6 +13145,43 @@ export interface components {
              * @description What would distinguish it from similar effects.
              */
             experiment: string;
+        };
+        /**
+         * SymbolJson
+         * @description A symbol of an equation.
+         */
+        SymbolJson: {
+            /**
+             * Symbol
+             * @description The symbol as it stands in `text` of the equation.
+             */
+            symbol: string;
+            /**
+             * Mathml
+             * @description The symbol as MathML.
+             */
+            mathml: string;
+            /**
+             * Kind
+             * @description What it is: a coefficient, which a fit estimates; a parameter of the shape; a channel of a recording; other.
+             * @enum {string}
+             */
+            kind: "coefficient" | "parameter" | "channel" | "other";
+            /**
+             * Meaning
+             * @description What it stands for.
+             */
+            meaning: string;
+            /**
+             * Unit
+             * @description Its unit; 1: of no dimension; empty: an index.
+             */
+            unit: string;
+            /**
+             * Name
+             * @description Name of the coefficient, the parameter or the column that it stands for; empty: it has none.
+             */
+            name: string;
         };
         /**
          * TemperatureBasisJson
@@ -16787,6 +17026,49 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MotionResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    point_api_units__serial__calibrations__version__point_get: {
+        parameters: {
+            query: {
+                /** @description Number of the recording. */
+                recording: number;
+                /** @description Number of the data set. */
+                dataset: number;
+                /** @description Output axis: x, y or z. */
+                axis: string;
+                /** @description The figure: residuals of the fitted model, or the version without refitting. */
+                figure?: "residual" | "comparison";
+                /** @description All recordings that are drawn together; default: `recording` alone. */
+                recordings?: number[] | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PointResponse"];
                 };
             };
             /** @description Validation Error */
