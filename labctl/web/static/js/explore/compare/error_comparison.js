@@ -19,7 +19,7 @@ import { fullTurn } from "./full_turn.js";
 const AT_REST = new Set(["warm", "rest"]);
 /** Views in which the data sets of several recordings have marks of their own. */
 const SEVERAL = new Set(["lines", "warm", "panels", "rest"]);
-/** @type {[id: string, text: string, draw: (comparison: Comparison, state: ExploreState) => HTMLElement][]} */
+/** @type {[id: string, text: string, draw: (comparison: Comparison, state: ExploreState, signal: AbortSignal) => HTMLElement][]} */
 const VIEWS = [
   ["lines", "Error over rate", overRate],
   ["warm", "Error over temperature", overTemperature],
@@ -51,7 +51,7 @@ export function errorComparison(state, signal) {
         signal,
       });
       source.textContent = sourceText(comparison);
-      return view[2](comparison, state);
+      return view[2](comparison, state, signal);
     });
   shown();
   state.onchange((what) => what === "axis" && shown());
