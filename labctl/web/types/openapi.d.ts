@@ -5490,6 +5490,11 @@ export interface components {
              */
             least_turn_rate_dps: number;
             /**
+             * Earth Turning Dps
+             * @description Size of the horizontal part of the Earth's rate, deg/s, which goes round with the table: it is in the errors here, as nothing is fitted; a fit takes it off. null: the latitude is not known.
+             */
+            earth_turning_dps: number | null;
+            /**
              * At Rest Dps
              * @description A data set counts as at rest if the magnitude of its table rate is below this, deg/s.
              */

@@ -4,6 +4,7 @@ import { get } from "../../core/http/api.js";
 import { h } from "../../core/elements.js";
 import { cardWithHeader, loadInto } from "../../core/components.js";
 import { toggleGroup } from "../../core/fields.js";
+import { number } from "../../core/format.js";
 import { query, updateQuery } from "../../core/router.js";
 import { allPanels, overRate, overTemperature } from "./model_lines.js";
 import { asked } from "../chosen_recordings.js";
@@ -68,7 +69,7 @@ export function errorComparison(state, signal) {
 }
 
 /** @param {Comparison} comparison */
-function sourceText({ source, held, left_out: leftOut }) {
+function sourceText({ source, held, left_out: leftOut, earth_turning_dps: turning }) {
   const at = Object.entries(held).map(([name, value]) => `${name} ${Number(value.toPrecision(4))}`);
-  return `Error model from ${source}.${at.length ? ` Lines are at ${at.join(", ")}.` : ""}${leftOut.length ? ` Without ${leftOut.map((line) => line.effect.replaceAll("_", " ")).join(", ")}, which ${leftOut.length > 1 ? "do" : "does"} not leave with the calibration.` : ""}`;
+  return `Error model from ${source}.${at.length ? ` Lines are at ${at.join(", ")}.` : ""}${leftOut.length ? ` Without ${leftOut.map((line) => line.effect.replaceAll("_", " ")).join(", ")}, which ${leftOut.length > 1 ? "do" : "does"} not leave with the calibration.` : ""}${turning ? ` The part of the Earth's rate that goes round with the table, ${number(turning, 2)} deg/s, is in these errors; a fit takes it off.` : ""}`;
 }
