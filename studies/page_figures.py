@@ -80,16 +80,18 @@ def compared(client: TestClient, database: Path, serial: str, recording: int) ->
     columns = client.get(f"{path}/{version}/comparison").json()["columns"]
     place = {int(number): k for k, number in enumerate(sets.number)}
     for name, which in (("measured_error_dps", 0), ("residual_dps", 1)):
-        own = [residuals[axis][which][place[n]] for axis, n in zip(columns["axis"], columns["dataset"], strict=True)]
-        yield figure(name.replace("_dps", "").replace("_", " "), columns[name], own)
+        recomputed = [
+            residuals[axis][which][place[n]] for axis, n in zip(columns["axis"], columns["dataset"], strict=True)
+        ]
+        yield figure(name.replace("_dps", "").replace("_", " "), columns[name], recomputed)
 
     fitted = client.get(f"{path}/{version}").json()
     error = fitted["error"]
     # what a fit takes off as the Earth's rate that goes round with the table is no part of the model
     names = [("raw_rms_dps", 0)] + [("rms_dps", 1)] * ("once_per_turn_dps" not in fitted["environment"])
     for name, which in names:
-        own = np.sqrt(np.mean(np.concatenate([each[which] for each in residuals.values()]) ** 2))
-        yield figure(name.replace("_dps", "").replace("_", " "), [error[name]], [own])
+        rms = np.sqrt(np.mean(np.concatenate([each[which] for each in residuals.values()]) ** 2))
+        yield figure(name.replace("_dps", "").replace("_", " "), [error[name]], [rms])
     criticism = client.get(f"{path}/{version}/criticism").json()
     yield from where(criticism["where"], sets, residuals)
 
