@@ -736,7 +736,7 @@ export interface paths {
         /**
          * The catalogue of physical effects
          * @description Every effect that a model can contain: its standard term, description, origin, channels, coefficients and
-         *     ranges.
+         *     ranges. 304 when the caller has it already.
          */
         get: operations["effects_api_effects_get"];
         put?: never;
@@ -15614,7 +15614,9 @@ export interface operations {
     effects_api_effects_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                "if-none-match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -15627,6 +15629,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CatalogueResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };
