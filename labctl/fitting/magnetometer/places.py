@@ -18,7 +18,7 @@ from labctl.fitting.numeric.arrays import Array
 
 #: Places into which a record is divided, unless it has more rests and turns than that: the likelihood takes the cube
 #: of their number.
-MOST_PLACES = 400
+MAX_PLACES = 400
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Places:
         length = np.bincount(stretch)
         is_turn = rest[begins] == 0
         within = np.arange(len(rest)) - np.flatnonzero(begins)[stretch]
-        piece = -(-int(length[is_turn].sum()) // max(MOST_PLACES - len(length), 1))  # readings
+        piece = -(-int(length[is_turn].sum()) // max(MAX_PLACES - len(length), 1))  # readings
         begins |= (rest == 0) & (within % max(piece, 1) == 0)
         number = np.cumsum(begins) - 1
         share = (np.bincount(number, within) / np.bincount(number) + 0.5) / length[stretch[begins]]

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from labctl.fitting.magnetometer.places import MOST_PLACES, Places, Weights
+from labctl.fitting.magnetometer.places import MAX_PLACES, Places, Weights
 from labctl.fitting.magnetometer.rest_scatter import scatter_of
 from labctl.fitting.numeric.freedom import information_of
 from labctl.fitting.poses.between import gls, restricted_likelihood
@@ -48,7 +48,7 @@ def test_what_a_way_adds_is_a_bridge_between_rests_and_a_walk_from_one() -> None
 def test_a_long_record_has_a_bounded_number_of_places() -> None:
     rest = np.repeat(np.arange(60) % 2 * (1 + np.arange(60) // 2), 500)
     places = Places.of(rest)
-    assert 300 < len(places.of_rests) <= MOST_PLACES + 60
+    assert 300 < len(places.of_rests) <= MAX_PLACES + 60
     for number in (1, 2, 30):
         assert len(np.unique(places.number[rest == number])) == 1
 
