@@ -1,4 +1,4 @@
-"""Long lists: 10,000 units, 200 versions of one of them, 20,000 recordings, 2,000 campaigns with 200 events each."""
+"""Long lists: 10,000 certified units, 200 versions of one, 20,000 recordings, 2,000 campaigns with 200 events each."""
 
 from __future__ import annotations
 
@@ -26,11 +26,16 @@ REPEATS = 5
 #: A limit that the project has set itself, of one part of a list.
 LIMIT_MS = 100.0
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+#: When versions in force are due: after the time of the requests, and before it.
+DUE = (datetime(2096, 1, 5, tzinfo=UTC), datetime(2020, 1, 5, tzinfo=UTC))
 #: What pages and people ask for: the first part, a part in the middle, a search that finds one row, and few.
 REQUESTS = {
     "units_first": "/api/units?limit=100",
     "units_middle": "/api/units?limit=100&after=G05000",
     "units_search": "/api/units?limit=100&search=g0777",
+    "units_without_calibration": "/api/units?limit=100&calibration=none",
+    "units_overdue": "/api/units?limit=100&calibration=overdue",
+    "units_by_verdict": "/api/units?limit=100&verdict=missing",
     "unit_with_200_versions": "/api/units/G00000",
     "recordings_first": "/api/recordings?limit=100",
     "recordings_search": "/api/recordings?limit=100&search=G07777",
@@ -85,4 +90,14 @@ def fill(store: Store, database: Database) -> None:
             {"serial": "G00000", "version": k + 1, "model": "cubic", "hash": f"{k:064x}", **made}
             for k in range(VERSIONS)
         ]
+        certified = [serial for k, serial in enumerate(serials) if k % 10]
+        versions += [
+            {"serial": serial, "version": 1, "model": "cubic", "hash": serial.zfill(64), **made} for serial in certified
+        ]
         connection.execute(sa.insert(tables.calibrations), versions)
+        act = {"version": 1, "act": "certify", "by": "Ada", "reason": "", "at": AT, "override": False}
+        acts = [
+            {**act, "serial": serial, "verdict": ("adequate", "missing")[k % 7 == 0], "due_at": DUE[k % 5 == 0]}
+            for k, serial in enumerate(certified)
+        ]
+        connection.execute(sa.insert(tables.certifications), acts)

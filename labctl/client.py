@@ -36,7 +36,7 @@ from labctl.answers.points import PointFigure, PointResponse
 from labctl.answers.recordings import ImportResponse, RecordingResponse
 from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.schedule import ScheduledResponse
-from labctl.answers.units import UnitResponse
+from labctl.answers.units import UnitResponse, UnitState, UnitVerdict
 from labctl.calibration import Calibration, read_calibration
 from labctl.calibration.certification import warn
 from labctl.errors import CalibrationWithdrawn
@@ -125,13 +125,22 @@ class Client:
         """Close the connection."""
         self._connection.close()
 
-    def units(self, *, due_within: str | None = None, search: str = "", limit: int | None = None) -> list[UnitResponse]:
+    def units(
+        self,
+        *,
+        due_within: str | None = None,
+        calibration: UnitState | None = None,
+        verdict: UnitVerdict | None = None,
+        search: str = "",
+        limit: int | None = None,
+    ) -> list[UnitResponse]:
         """Return every unit that was measured or imported, by serial number; at most `limit`.
 
         With `due_within`, such as "30d", those that are due within that span or overdue, the earliest date first; with
+        `calibration` those whose version in force is such, with `verdict` those that were certified with it, with
         `search` those whose serial number, model or technology holds it.
         """
-        query = _query(due_within=due_within, search=search, limit=limit)
+        query = _query(due_within=due_within, calibration=calibration, verdict=verdict, search=search, limit=limit)
         return self._connection.get_list(f"/api/units{query}", UnitResponse)
 
     def unit(self, serial: str) -> UnitResponse:

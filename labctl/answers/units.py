@@ -43,6 +43,11 @@ class RecalibrationResponse(ResponseModel):
     bench: BenchName
 
 
+UnitState = Literal["in_force", "overdue", "none"]
+#: Which verdicts of a criticism a version can be certified with.
+UnitVerdict = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
+
+
 class UnitResponse(ResponseModel):
     """A unit, its recordings and its calibrations."""
 
@@ -52,6 +57,11 @@ class UnitResponse(ResponseModel):
     recordings: list[int] = Field(description="Numbers of the unit's recordings.")
     calibrations: list[int] = Field(description="Numbers of the unit's calibration versions.")
     certified_version: int | None = Field(description="Number of the version in force; null: none.")
+    certified_verdict: str | None = Field(
+        default=None,
+        description="Verdict with which the version in force was certified; null: no version is in force, or it was "
+        "certified without a verdict.",
+    )
     due: datetime | None = Field(
         default=None,
         description="Time until which the version in force is valid; null: no due date, or no version is in force.",

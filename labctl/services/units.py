@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from functools import cache
+from typing import get_args
 
-from labctl.answers.units import ExportFormatResponse, RecalibrationResponse, UnitResponse
+from labctl.answers.units import ExportFormatResponse, RecalibrationResponse, UnitResponse, UnitState, UnitVerdict
+from labctl.errors import BadInput
 from labctl.exports import export_formats
 from labctl.services.calibrations.due import campaign_of
 from labctl.services.drafts.answers import newest_draft
@@ -14,23 +17,33 @@ from labctl.services.standards.usage import Notices
 from labctl.store import CertificationRow, Store, Unit
 from labctl.store.paging import Page, PageRequest
 from labctl.store.records import UnitHoldings
+from labctl.store.repositories.units import UnitFilter
 
 #: Every unit, in one part.
 ANY_UNIT: PageRequest[str] = PageRequest()
 
 
-def page_of_units(store: Store, now: datetime, request: PageRequest[str]) -> Page[UnitResponse, str]:
-    """Return units by serial number, as many as are asked for."""
-    page = store.units.page(request)
-    serials = [unit.serial for unit in page.rows]
-    held, in_force, notices = store.units.holdings(serials), store.certifications.in_force(serials), Notices.of(store)
-    answers = [
-        _answer(
-            unit, held[unit.serial], in_force.get(unit.serial), now, _notices(store, notices, in_force.get(unit.serial))
-        )
-        for unit in page.rows
-    ]
-    return Page(answers, page.total, page.next_after)
+def list_units(
+    store: Store,
+    now: datetime,
+    request: PageRequest[str],
+    within: timedelta | None = None,
+    calibration: str | None = None,
+    verdict: str | None = None,
+) -> Page[UnitResponse, str]:
+    """Return units by serial number, as many as are asked for: all, those in a state, or those with a verdict.
+
+    `within` a span those that are due (`units_due`). Raises BadInput for a state or a verdict that there is not.
+    """
+    if within is not None:
+        if calibration or verdict:
+            raise BadInput("due_within is given together with calibration or verdict; give one of them")
+        return units_due(store, now, within, request)
+    for name, value, choices in (("calibration", calibration, UnitState), ("verdict", verdict, UnitVerdict)):
+        if value is not None and value not in get_args(choices):
+            raise BadInput(f"{name} {value!r}: choose one of {', '.join(get_args(choices))}")
+    page = store.units.page(request, UnitFilter(now, calibration, verdict))
+    return Page(_answers(store, now, page.rows), page.total, page.next_after)
 
 
 def units_due(
@@ -57,9 +70,8 @@ def units_due(
 
 def unit(store: Store, serial: str, now: datetime) -> UnitResponse:
     """Return one unit; raises NotFound."""
-    found = store.units.get(serial)
-    held, act = store.units.holdings([serial])[serial], store.certifications.in_force([serial]).get(serial)
-    answer = _answer(found, held, act, now, _notices(store, Notices.of(store), act))
+    (answer,) = _answers(store, now, [store.units.get(serial)])
+    act = store.certifications.in_force([serial]).get(serial)
     return answer.model_copy(
         update={"recalibration": _recalibration(store, act) if act else None, "draft": newest_draft(store, serial)}
     )
@@ -69,6 +81,18 @@ def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]
     """Return how many units are overdue, and how many are or will be within a span."""
     dates = [act.due_at for act in store.certifications.in_force().values() if act.due_at is not None]
     return sum(date <= now for date in dates), sum(date <= now + within for date in dates)
+
+
+def _answers(store: Store, now: datetime, units: Sequence[Unit]) -> list[UnitResponse]:
+    serials = [unit.serial for unit in units]
+    held, notices = store.units.holdings(serials), Notices.of(store)
+    in_force, verdicts = store.certifications.in_force(serials), store.certifications.verdicts(serials)
+    answers = []
+    for unit in units:
+        act = in_force.get(unit.serial)
+        answer = _answer(unit, held[unit.serial], act, now, _notices(store, notices, act))
+        answers.append(answer.model_copy(update={"certified_verdict": verdicts.get(unit.serial)}))
+    return answers
 
 
 def _answer(

@@ -91,6 +91,26 @@ def test_a_search_is_in_the_address_and_finds_what_was_not_shown(visit: Callable
 
 
 @pytest.mark.usefixtures("many")
+def test_a_choice_is_in_the_address_and_goes_with_a_search(visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/units?calibration=none&search=g22")
+    rows = page.get_by_role("main").locator("tbody tr")
+    expect(rows).to_have_count(10)
+    expect(page.get_by_label("Calibration")).to_have_value("none")
+    page.get_by_label("Search units").fill("")
+    expect(page.get_by_text(f"100 of {ROWS} units found")).to_be_visible()
+    page.get_by_role("button", name="Show 100 more").click()
+    expect(rows).to_have_count(200)
+    page.get_by_label("Calibration").select_option("in_force")
+    expect(page.get_by_text("No units are as chosen.")).to_be_visible()
+    assert page.url.endswith("/units?calibration=in_force")
+    page.get_by_label("Calibration").select_option("")
+    expect(page.get_by_text(f"100 of {ROWS} units")).to_be_visible()
+    assert page.url.endswith("/units")
+
+
+@pytest.mark.usefixtures("many")
 @pytest.mark.parametrize(
     ("address", "said"),
     [

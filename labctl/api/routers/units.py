@@ -7,14 +7,14 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from labctl.answers.datasheet import DatasheetResponse
-from labctl.answers.units import TrendResponse, UnitResponse
+from labctl.answers.units import TrendResponse, UnitResponse, UnitState, UnitVerdict
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.api.paging import AfterSerial, Limit, Search, in_parts
 from labctl.services.calibrations.due import span
 from labctl.services.criticism.trend import trend_unit
 from labctl.services.datasheet.sheet import datasheet
-from labctl.services.units import page_of_units, unit, units_due
+from labctl.services.units import list_units, unit
 from labctl.store.paging import PageRequest
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
@@ -28,19 +28,26 @@ def units(
     due_within: Annotated[
         str | None, Query(max_length=20, description="Only units that are due within this span: 30d, 12h, 2w.")
     ] = None,
+    calibration: Annotated[
+        UnitState | None,
+        Query(description="Only units with a version in force, with one that is overdue, or with none in force."),
+    ] = None,
+    verdict: Annotated[
+        UnitVerdict | None, Query(description="Only units whose version in force was certified with this verdict.")
+    ] = None,
     search: Search = "",
     limit: Limit = None,
     after: AfterSerial = None,
 ) -> list[UnitResponse]:
     """Every unit that was measured or imported, by serial number; `search` in serial number, model and technology.
 
-    With `due_within` those whose certification ends within that span or has ended, the earliest date first.
+    With `due_within`, which takes neither `calibration` nor `verdict`, those whose certification ends within that span
+    or has ended, the earliest date first.
     `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
     """
     now, wanted = service.clock.utc(), PageRequest(search, limit, after)
-    if due_within is None:
-        return in_parts(request, response, page_of_units(service.store, now, wanted))
-    return in_parts(request, response, units_due(service.store, now, span(due_within), wanted))
+    within = None if due_within is None else span(due_within)
+    return in_parts(request, response, list_units(service.store, now, wanted, within, calibration, verdict))
 
 
 @router.get("/units/{serial}", summary="One unit")

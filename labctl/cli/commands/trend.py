@@ -12,13 +12,29 @@ from labctl.cli.options import Database, Json, Limit, Search, Serial
 from labctl.cli.output import console, format_number, print_heading, print_json, print_part, table
 
 if TYPE_CHECKING:
-    from labctl.answers.units import AppliedVersion, TrendResponse
+    from labctl.answers.units import AppliedVersion, TrendResponse, UnitResponse
 
 
 def units(
     due_within: Annotated[
         str | None,
         typer.Option("--due-within", metavar="SPAN", help="Only units that are due within 30d, 12h, 2w, or overdue."),
+    ] = None,
+    calibration: Annotated[
+        str | None,
+        typer.Option(
+            "--calibration",
+            metavar="STATE",
+            help="Only units with a version in force (in_force), with one that is overdue, or with none (none).",
+        ),
+    ] = None,
+    verdict: Annotated[
+        str | None,
+        typer.Option(
+            "--verdict",
+            metavar="VERDICT",
+            help="Only units whose version in force was certified with this verdict, such as adequate.",
+        ),
     ] = None,
     search: Search = "",
     limit: Limit = None,
@@ -29,30 +45,34 @@ def units(
     from instruments.clock import SystemClock
     from labctl.services.calibrations.due import span
     from labctl.services.read_access import open_readonly
-    from labctl.services.units import page_of_units, units_due
+    from labctl.services.units import list_units
     from labctl.store.paging import PageRequest
 
     with one_clear_line():
         within = None if due_within is None else span(due_within)
         now = SystemClock().utc()
         with open_readonly(database) as store:
-            wanted: PageRequest[str] = PageRequest(search, limit)
-            page = page_of_units(store, now, wanted) if within is None else units_due(store, now, within, wanted)
+            page = list_units(store, now, PageRequest(search, limit), within, calibration, verdict)
     found = page.rows
     if as_json:
         print_json(found)
         return
     if not found:
-        nothing = "no unit has been measured or imported yet" if not (due_within or search) else "no such unit is there"
+        chosen = due_within or calibration or verdict or search
+        nothing = "no such unit is there" if chosen else "no unit has been measured or imported yet"
         console.print("no unit is due" if due_within else nothing)
         return
+    _print_units(found, page.total)
+
+
+def _print_units(units: list[UnitResponse], total: int) -> None:
     rows = table("", "unit", "model", "in force", "due", "")
-    for each in found:
+    for each in units:
         version = "none" if each.certified_version is None else f"version {each.certified_version}"
         due = "–" if each.due is None else f"{each.due:%Y-%m-%d}"
         rows.add_row(each.serial, each.model or "–", version, due, Text("overdue" if each.overdue else "", "bold red"))
     console.print(rows)
-    print_part(len(found), page.total, "units")
+    print_part(len(units), total, "units")
 
 
 def trend(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from itertools import zip_longest
 from typing import Any
@@ -57,6 +58,31 @@ def remember_unit(connection: sa.Connection, serial: str, model: str, technology
         )
 
 
+@dataclass(frozen=True)
+class UnitFilter:
+    """Which units of a list: by their calibration at a time, and by the verdict on the version in force."""
+
+    now: datetime
+    calibration: str | None = None  #: in_force, overdue or none
+    verdict: str | None = None
+
+    @property
+    def condition(self) -> sa.ColumnElement[bool]:
+        """The condition on rows of the table of units."""
+        of_unit = sa.select(sa.func.max(_X.id)).where(_X.serial == tables.units.c.serial)
+        newest = of_unit.correlate(tables.units).scalar_subquery()
+        act = tables.certifications.alias()
+        in_force = sa.exists().where(act.c.id == newest, act.c.act == "certify")
+        conditions = []
+        if self.calibration is not None:
+            overdue = in_force.where(act.c.due_at <= self.now)
+            by_state = {"in_force": in_force, "overdue": overdue, "none": sa.not_(in_force)}
+            conditions.append(by_state[self.calibration])
+        if self.verdict is not None:
+            conditions.append(in_force.where(act.c.verdict == self.verdict))
+        return sa.and_(sa.true(), *conditions)
+
+
 class Units:
     """Gyros by serial number."""
 
@@ -103,10 +129,11 @@ class Units:
             rows = connection.execute(sa.select(tables.units).where(SEEN).order_by(tables.units.c.serial))
             return records_of(Unit, rows)
 
-    def page(self, request: PageRequest[str]) -> Page[Unit, str]:
+    def page(self, request: PageRequest[str], wanted: UnitFilter | None = None) -> Page[Unit, str]:
         """Return units by serial number; searched are serial number, model and technology."""
         c = tables.units.c
-        matching = sa.and_(SEEN, request.matching((c.serial, c.model, c.technology)))
+        filtered = sa.true() if wanted is None else wanted.condition
+        matching = sa.and_(SEEN, request.matching((c.serial, c.model, c.technology)), filtered)
         query = sa.select(tables.units).where(matching).order_by(c.serial).limit(rows_to_read(request))
         if request.after is not None:
             query = query.where(c.serial > request.after)
@@ -221,6 +248,17 @@ class Certifications:
             else:
                 rows = [row for some in parts_of(serials) for row in connection.execute(some_of, {"serials": some})]
         return {row.serial: _act(row.serial, row) for row in rows}
+
+    def verdicts(self, serials: Sequence[str]) -> dict[str, str | None]:
+        """Return serial number -> the verdict with which its version in force was certified, where one is in force."""
+        last = sa.select(sa.func.max(_X.id)).where(_X.serial.in_(sa.bindparam("serials", expanding=True)))
+        query = sa.select(_X.serial, _X.verdict).where(_X.id.in_(last.group_by(_X.serial)), _X.act == "certify")
+        with self._database.reading() as connection:
+            return {
+                row.serial: row.verdict
+                for some in parts_of(serials)
+                for row in connection.execute(query, {"serials": some})
+            }
 
 
 def _act(serial: str, row: sa.Row[*tuple[Any, ...]]) -> CertificationRow:

@@ -551,7 +551,8 @@ export interface paths {
          * All units
          * @description Every unit that was measured or imported, by serial number; `search` in serial number, model and technology.
          *
-         *     With `due_within` those whose certification ends within that span or has ended, the earliest date first.
+         *     With `due_within`, which takes neither `calibration` nor `verdict`, those whose certification ends within that span
+         *     or has ended, the earliest date first.
          *     `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
          */
         get: operations["units_api_units_get"];
@@ -13846,6 +13847,11 @@ export interface components {
              */
             certified_version: number | null;
             /**
+             * Certified Verdict
+             * @description Verdict with which the version in force was certified; null: no version is in force, or it was certified without a verdict.
+             */
+            certified_verdict: string | null;
+            /**
              * Due
              * @description Time until which the version in force is valid; null: no due date, or no version is in force.
              */
@@ -15337,6 +15343,10 @@ export interface operations {
             query?: {
                 /** @description Only units that are due within this span: 30d, 12h, 2w. */
                 due_within?: string | null;
+                /** @description Only units with a version in force, with one that is overdue, or with none in force. */
+                calibration?: ("in_force" | "overdue" | "none") | null;
+                /** @description Only units whose version in force was certified with this verdict. */
+                verdict?: ("adequate" | "missing" | "ambiguous" | "unexplained" | "insufficient_data") | null;
                 /** @description Only rows that hold this text, in any case; empty: all rows. */
                 search?: string;
                 /** @description Largest number of rows; default: all. The header Link names the next part. */

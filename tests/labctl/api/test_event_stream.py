@@ -58,6 +58,6 @@ def test_a_client_that_leaves_ends_its_stream() -> None:
                 begun.set()
 
         await EventStream(watched())({"type": "http"}, receive, send)
-        await asyncio.wait_for(ended.wait(), 10.0)
+        assert ended.is_set()
 
     asyncio.run(leave())

@@ -6,15 +6,20 @@ import json
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
+import sqlalchemy as sa
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
+from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
 from labctl.answers.calibrations import FitRequest as ServiceFit
 from labctl.answers.certification import CertifyRequest, RevokeRequest
+from labctl.api import create_app
 from labctl.calibration import CalibrationWarning, hash_of, read_calibration
+from labctl.cli.app import app
 from labctl.client import Client, FitRequest
 from labctl.compensator import Compensator
 from labctl.errors import BadCalibrationFile, BadInput, NotCertified, NotEnoughData
@@ -24,9 +29,12 @@ from labctl.services.calibrations.certification import certify, revoke
 from labctl.services.calibrations.due import interval_days, span
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.served import calibration_file
+from labctl.services.lab_service import LabService
 from labctl.services.recordings.transfer import import_folder
-from labctl.services.units import units_due
+from labctl.services.units import list_units, units_due
 from labctl.store import Store, copy_database, open_store
+from labctl.store.paging import PageRequest
+from labctl.store.schema import tables
 from tests.helpers.certifying import OVERRIDE
 from tests.helpers.lab import Lab
 from tests.helpers.paths import EXAMPLES
@@ -83,6 +91,79 @@ def test_a_date_is_never_invented(store: Store) -> None:
     assert "Warning" not in headers(store, START + 40_000 * DAY)
     assert read_calibration(calibration_file(store, FOG, None, "json").content).certification.due is None  # type: ignore[union-attr]
     assert units_due(store, START, 36_500 * DAY).rows == []
+
+
+@pytest.fixture
+def three_units(store: Store) -> Store:
+    """Return a store with a unit of two versions, of which one can be put in force, and two that have none."""
+    with store._database.writing() as connection:
+        for serial in ("A-1", "Z-1"):
+            unit = {"serial": serial, "model": "VG", "technology": "fog"}
+            connection.execute(sa.insert(tables.units).values(**unit, first_seen_at=START))
+            recording = {"serial": serial, "kind": "points", "info": {}, "channels": []}
+            connection.execute(sa.insert(tables.recordings).values(**recording, created_at=START))
+    return store
+
+
+def chosen(store: Store, now: datetime, **wanted: str) -> list[str]:
+    return [unit.serial for unit in list_units(store, now, PageRequest(), **wanted).rows]  # type: ignore[arg-type]
+
+
+def test_units_are_chosen_by_their_calibration(three_units: Store) -> None:
+    assert chosen(three_units, START, calibration="none") == ["A-1", FOG, "Z-1"]
+    put_in_force(three_units, due_days=10)
+    assert chosen(three_units, START) == ["A-1", FOG, "Z-1"]
+    assert chosen(three_units, START, calibration="none") == ["A-1", "Z-1"]
+    assert chosen(three_units, START, calibration="in_force") == [FOG]
+    assert chosen(three_units, START + 9 * DAY, calibration="overdue") == []
+    assert chosen(three_units, START + 10 * DAY, calibration="overdue") == [FOG]
+    page = list_units(three_units, START, PageRequest(limit=1), calibration="none")
+    assert (page.total, [unit.serial for unit in page.rows], page.next_after) == (2, ["A-1"], "A-1")
+    revoke(three_units, FOG, 1, RevokeRequest(by="Ada", reason="dropped"), START + 11 * DAY)
+    assert chosen(three_units, START + 12 * DAY, calibration="overdue") == []
+    assert chosen(three_units, START + 12 * DAY, calibration="none") == ["A-1", FOG, "Z-1"]
+
+
+def test_units_are_chosen_by_the_verdict_on_the_version_in_force(three_units: Store) -> None:
+    put_in_force(three_units, 1)
+    with three_units._database.writing() as connection:
+        connection.execute(sa.update(tables.certifications).values(verdict="missing"))
+    (unit,) = list_units(three_units, START, PageRequest(), verdict="missing").rows
+    assert (unit.serial, unit.certified_verdict) == (FOG, "missing")
+    assert chosen(three_units, START, verdict="adequate") == []
+    assert chosen(three_units, START, verdict="missing", calibration="overdue") == []
+    put_in_force(three_units, 2)  # without a verdict, here
+    assert chosen(three_units, START, verdict="missing") == []
+    assert list_units(three_units, START, PageRequest(), calibration="in_force").rows[0].certified_verdict is None
+
+
+@pytest.mark.parametrize(
+    ("wanted", "reason"),
+    [
+        ({"calibration": "late"}, "calibration 'late': choose one of in_force, overdue, none"),
+        ({"verdict": "good"}, "verdict 'good': choose one of adequate, missing"),
+        ({"verdict": "missing", "within": DAY}, "due_within is given together with calibration or verdict"),
+    ],
+)
+def test_what_there_is_no_unit_of_is_refused(store: Store, wanted: dict[str, Any], reason: str) -> None:
+    with pytest.raises(BadInput, match=reason):
+        list_units(store, START, PageRequest(), **wanted)
+
+
+def test_the_service_the_client_and_the_command_choose_alike(three_units: Store, tmp_path: Path) -> None:
+    put_in_force(three_units)
+    with TestClient(create_app(LabService(three_units, VirtualClock()))) as inside:
+        client = Client("http://testserver", transport=transport_to(inside))
+        assert [unit.serial for unit in client.units(calibration="none")] == ["A-1", "Z-1"]
+        assert [unit.serial for unit in client.units(calibration="in_force", search="osu")] == [FOG]
+        assert client.units(verdict="adequate") == []
+        assert inside.get("/api/units?calibration=late").status_code == 422
+        assert inside.get("/api/units?calibration=none&due_within=1d").status_code == 400
+        client.close()
+    listed = ["units", "--json", "--database", str(tmp_path / "lab.sqlite")]
+    found = CliRunner().invoke(app, [*listed, "--calibration", "none"])
+    assert [unit["serial"] for unit in json.loads(found.stdout)] == ["A-1", "Z-1"]
+    assert CliRunner().invoke(app, [*listed, "--verdict", "good"]).exit_code == 2
 
 
 def test_the_users_interval_goes_before_the_recipes_and_that_before_the_configured(

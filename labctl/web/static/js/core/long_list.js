@@ -1,9 +1,10 @@
-// A list that is read in parts: a search over all of it, a table of what was read so far, a button for the next part.
+// A list that is read in parts: a search over all of it and filters, a table of what was read so far, a button for the
+// next part.
 
 import { setChildren, h } from "./elements.js";
 import { count } from "./format.js";
 import { button, emptyState } from "./components.js";
-import { labelledField } from "./fields.js";
+import { labelledField, option, selectField } from "./fields.js";
 import { updateQuery } from "./router.js";
 
 /** @import { Child } from "../../../types/pages.js" */
@@ -21,11 +22,21 @@ const TYPING_MS = 250;
  */
 
 /**
+ * A choice that the list is read with: `name` is that of the query, in the request and in the address of the page.
+ * @typedef {object} Filter
+ * @property {string} name
+ * @property {string} label
+ * @property {readonly (readonly [string, string])[]} options [value, text], without the one for all rows
+ * @property {string | undefined} value the one at first
+ */
+
+/**
  * @template Row
  * @typedef {object} ListOptions
  * @property {string} what the rows in the plural: "units"
  * @property {string} hint what is searched
  * @property {string} [search] what is searched for at first
+ * @property {readonly Filter[]} [filters]
  * @property {(query: Record<string, string | number>) => Promise<Part<Row>>} read
  * @property {(rows: readonly Row[]) => Child} draw
  * @property {Child} empty what stands there while there is nothing at all
@@ -36,53 +47,72 @@ const TYPING_MS = 250;
  * @template Row
  * @param {ListOptions<Row>} options
  */
-export async function longList({ what, hint, search = "", read, draw, empty }) {
+export async function longList({ what, hint, search = "", filters = [], read, draw, empty }) {
+  /** @type {Record<string, string>} */
+  let wanted = { search };
+  for (const { name, value, options } of filters)
+    if (options.some(([each]) => each === value)) wanted[name] = value ?? "";
   /** @type {Part<Row>} */
-  let shown = await read({ search, limit: PART });
-  let wanted = search;
+  let shown = await read({ ...wanted, limit: PART });
   const table = h("div", {});
   const status = h("p", { class: "muted small", role: "status" });
   const more = button(`Show ${PART} more`, async () => {
-    const part = await read({ ...shown.next, search: wanted, limit: PART });
+    const part = await read({ ...shown.next, ...wanted, limit: PART });
     shown = { ...part, rows: [...shown.rows, ...part.rows] };
     show();
   });
   /** @type {HTMLInputElement} */
   const input = h("input", { type: "search", value: search, maxlength: "200", oninput: () => typed() });
-  const field = labelledField(`Search ${what}`, input, hint);
+  const field = h(
+    "div",
+    { class: "row" },
+    labelledField(`Search ${what}`, input, hint),
+    filters.map(({ name, label, options }) =>
+      selectField(label, [option("", `All ${what}`), ...options], wanted[name], (value) => choose(name, value)),
+    ),
+  );
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   let typing;
 
   function typed() {
     clearTimeout(typing);
-    typing = setTimeout(async () => {
-      wanted = input.value.trim();
-      updateQuery({ search: wanted || null });
-      const asked = wanted;
-      const part = await read({ search: asked, limit: PART });
-      if (asked !== wanted) return; // typed on meanwhile
-      shown = part;
-      show();
-    }, TYPING_MS);
+    typing = setTimeout(() => choose("search", input.value.trim()), TYPING_MS);
+  }
+
+  /**
+   * Read the list anew with one choice changed; empty: no longer chosen.
+   * @param {string} name
+   * @param {string} value
+   */
+  async function choose(name, value) {
+    const { [name]: _, ...others } = wanted;
+    const asked = value || name === "search" ? { ...others, [name]: value } : others;
+    wanted = asked;
+    updateQuery({ [name]: value || null });
+    await readPart(PART);
+  }
+
+  /** @param {number} limit */
+  async function readPart(limit) {
+    const asked = wanted;
+    const part = await read({ ...asked, limit });
+    if (asked !== wanted) return; // chosen anew meanwhile
+    shown = part;
+    show();
   }
 
   function show() {
     const { rows, total, next } = shown;
-    field.hidden = !wanted && next === null && total < PART / 10;
+    const chosen = Object.values(wanted).some(Boolean);
+    field.hidden = !chosen && next === null && total < PART / 10;
     more.hidden = next === null;
-    if (!rows.length) setChildren(table, wanted ? emptyState(h("p", {}, `No ${what} hold “${wanted}”.`)) : empty);
+    if (!rows.length) setChildren(table, chosen ? emptyState(h("p", {}, noneOf(what, wanted))) : empty);
     else setChildren(table, draw(rows));
     status.textContent =
-      next || wanted ? `${count(rows.length)} of ${count(total)} ${what}${wanted ? " found" : ""}` : "";
+      next || chosen ? `${count(rows.length)} of ${count(total)} ${what}${chosen ? " found" : ""}` : "";
   }
 
-  async function refresh() {
-    const asked = wanted;
-    const part = await read({ search: asked, limit: Math.max(PART, shown.rows.length) });
-    if (asked !== wanted) return;
-    shown = part;
-    show();
-  }
+  const refresh = () => readPart(Math.max(PART, shown.rows.length));
 
   show();
   return {
@@ -92,3 +122,10 @@ export async function longList({ what, hint, search = "", read, draw, empty }) {
     total: () => shown.total,
   };
 }
+
+/**
+ * @param {string} what
+ * @param {Record<string, string>} wanted
+ */
+const noneOf = (what, { search, ...chosen }) =>
+  Object.keys(chosen).length ? `No ${what} are as chosen.` : `No ${what} hold “${search}”.`;

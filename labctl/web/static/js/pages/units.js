@@ -5,9 +5,17 @@ import { h } from "../core/elements.js";
 import { day } from "../core/format.js";
 import { chip, emptyState, pageHeader, table } from "../core/components.js";
 import { longList } from "../core/long_list.js";
+import { VERDICTS, verdictChip } from "../unit/certification.js";
 
 /** @import { Unit } from "../../../types/api.js" */
 /** @import { PageContext } from "../../../types/pages.js" */
+
+/** @type {readonly [string, string][]} */
+const CALIBRATIONS = [
+  ["in_force", "in force"],
+  ["overdue", "overdue"],
+  ["none", "none in force"],
+];
 
 /** @param {PageContext} context */
 export async function page({ query, signal }) {
@@ -15,6 +23,15 @@ export async function page({ query, signal }) {
     what: "units",
     hint: "Serial number, model or technology.",
     search: query.search,
+    filters: [
+      { name: "calibration", label: "Calibration", options: CALIBRATIONS, value: query.calibration },
+      {
+        name: "verdict",
+        label: "Verdict",
+        options: Object.entries(VERDICTS).map(([value, [text]]) => [value, text]),
+        value: query.verdict,
+      },
+    ],
     read: (part) => getPart("/api/units", { query: part, signal }),
     draw: unitTable,
     empty: noUnits(),
@@ -47,6 +64,10 @@ const unitTable = (units) =>
         title: "In force",
         cell: (unit) =>
           unit.certified_version ? chip(`version ${unit.certified_version}`, "good") : chip("none", "warn"),
+      },
+      {
+        title: "Verdict",
+        cell: (unit) => (unit.certified_version ? verdictChip({ verdict: unit.certified_verdict }) : "–"),
       },
       {
         title: "Due",

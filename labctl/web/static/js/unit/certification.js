@@ -11,7 +11,7 @@ import { show } from "../core/router.js";
 /** @import { Field } from "../../../types/pages.js" */
 
 /** @type {Record<string, [text: string, kind: string]>} */
-const VERDICTS = {
+export const VERDICTS = {
   adequate: ["adequate", "good"],
   missing: ["missing", "warn"],
   ambiguous: ["ambiguous", "warn"],
