@@ -13,6 +13,7 @@ from labctl.recording import RecordingInfo
 from labctl.store import NewCampaign
 from labctl.store.schema import tables
 from tests.helpers.browser import Service
+from tests.helpers.certifying import OVERRIDE
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -108,6 +109,28 @@ def test_a_choice_is_in_the_address_and_goes_with_a_search(visit: Callable[..., 
     page.get_by_label("Calibration").select_option("")
     expect(page.get_by_text(f"100 of {ROWS} units")).to_be_visible()
     assert page.url.endswith("/units")
+
+
+def test_the_version_in_force_stands_before_the_newest_ones(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    made = service.post("/api/recordings/simulated", {"serial": "FOG-0001", "recipe": "short"})
+    fit = {"recording": made["recording"], "effects": ["bias", "scale_factor"]}
+    for _ in range(13):
+        service.post("/api/units/FOG-0001/calibrations", fit)
+    service.post("/api/units/FOG-0001/calibrations/2/certify", {"by": "Ada", **OVERRIDE})
+    page = visit("/units/FOG-0001")
+    card = page.get_by_role("region", name="Calibrations", exact=True)
+    rows = card.locator("tbody tr")
+    expect(rows).to_have_count(10)
+    first = rows.locator("td:first-child a")
+    assert first.all_inner_texts() == [str(version) for version in (2, 13, 12, 11, 10, 9, 8, 7, 6, 5)]
+    expect(rows.first).to_contain_text("in force")
+    expect(card.get_by_role("status")).to_have_text("10 of 13 versions")
+    card.get_by_role("button", name="Show 3 earlier").click()
+    expect(rows).to_have_count(13)
+    assert first.all_inner_texts()[10:] == ["4", "3", "1"]
+    expect(card.get_by_role("status")).to_have_count(0)
 
 
 @pytest.mark.usefixtures("many")

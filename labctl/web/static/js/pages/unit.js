@@ -2,40 +2,22 @@
 
 import { get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { instant, number } from "../core/format.js";
-import {
-  button,
-  card,
-  chip,
-  emptyState,
-  pageHeader,
-  cardWithHeader,
-  loadInto,
-  modelName,
-  table,
-} from "../core/components.js";
+import { card, emptyState, pageHeader, cardWithHeader, loadInto } from "../core/components.js";
 import { draftsCard } from "../campaigns/drafts.js";
 import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
-import {
-  askCertification,
-  askRevocation,
-  certificationTable,
-  fetchTable,
-  waitingNotice,
-} from "../unit/certification.js";
+import { certificationTable, waitingNotice } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
-import { certificateFiles } from "../unit/certificate.js";
 import { certificateTable } from "../unit/certificate_state.js";
 import { datasheetCard } from "../unit/datasheet.js";
-import { exportFiles } from "../unit/export_files.js";
 import { inForce } from "../unit/in_force.js";
 import { sensorsCard } from "../unit/sensors.js";
 import { trendCard } from "../trend/card.js";
 import { uncertaintyInUse } from "../unit/uncertainty.js";
 import { versionFacts } from "../unit/version_facts.js";
+import { versionsCard } from "../unit/versions.js";
 
-/** @import { CalibrationRow, Certificate, Unit } from "../../../types/api.js" */
+/** @import { CalibrationRow } from "../../../types/api.js" */
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
@@ -66,7 +48,7 @@ export async function page({ params, signal }) {
     unit.draft && !unit.draft.certified ? draftsCard([unit.draft]) : null,
     rows.length
       ? [
-          versions(unit, rows, issued, explore),
+          versionsCard(unit, rows, issued, explore),
           ladder(unit.serial, signal),
           unit.recordings.length > 1 ? trendCard(unit.serial, rows, signal) : null,
           ...versionCards(unit.serial, rows, signal),
@@ -95,90 +77,6 @@ export async function page({ params, signal }) {
       ),
     ),
   );
-}
-
-/**
- * @param {Unit} unit
- * @param {readonly CalibrationRow[]} rows
- * @param {readonly Certificate[]} issued
- * @param {string} explore
- */
-function versions(unit, rows, issued, explore) {
-  /** @param {CalibrationRow} row */
-  const act = (row) =>
-    row.certified
-      ? button("Revoke", () => askRevocation(unit.serial, row.version), { kind: "tiny" })
-      : button("Certify", () => askCertification(unit.serial, row.version), { kind: "tiny" });
-  return cardWithHeader(
-    "Calibrations",
-    null,
-    table(
-      [
-        {
-          title: "Version",
-          cell: (row) =>
-            h(
-              "span",
-              { class: "row tight" },
-              h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`),
-              row.certified ? chip("in force", "good") : null,
-              row.notices?.length ? h("span", { title: row.notices.join("; ") }, chip("standard bad", "bad")) : null,
-            ),
-        },
-        {
-          title: "Model",
-          cell: (row) =>
-            h(
-              "span",
-              {},
-              modelName(row.model),
-              row.parent ? h("span", { class: "muted small" }, ` from ${row.parent}`) : null,
-            ),
-        },
-        {
-          title: "Made",
-          cell: (row) =>
-            h(
-              "div",
-              { class: "nowrap" },
-              instant(row.created_at),
-              h("div", { class: "muted small" }, h("code", { title: `hash ${row.hash}` }, row.hash.slice(0, 10))),
-            ),
-        },
-        { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
-        { title: "Left-out temperatures, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
-        {
-          title: "Action",
-          cell: (row) =>
-            h(
-              "div",
-              { class: "row tight", style: "gap: .2rem" },
-              act(row),
-              h("details", {}, h("summary", {}, "Files"), exportFiles(unit, row.version)),
-              fetchedBy(unit.serial, row.version),
-              certificateFiles(unit.serial, row.version, issued),
-            ),
-        },
-      ],
-      rows,
-      { label: "Calibrations", selected: (row) => row.certified },
-    ),
-  );
-}
-
-/**
- * Who fetched a version, read when it is opened.
- * @param {string} serial
- * @param {number} version
- */
-function fetchedBy(serial, version) {
-  const place = h("div");
-  const ontoggle = () =>
-    loadInto(place, "Reading who fetched it", async () => {
-      const rows = await get("/api/units/{serial}/calibrations/{version}/fetches", { path: { serial, version } });
-      return rows.length ? fetchTable(rows) : h("p", { class: "muted" }, "No fetch was recorded.");
-    });
-  return h("details", { ontoggle }, h("summary", {}, "Fetched by"), place);
 }
 
 /**
