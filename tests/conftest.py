@@ -16,6 +16,7 @@ import pytest
 from hypothesis import settings
 
 from tests.helpers import memory_folder
+from tests.helpers.built_command import build_once
 from tests.helpers.cortex_m import INSTALL_CORTEX_M, has_cortex_m
 from tests.helpers.leftovers import leftover_tasks, leftover_threads
 from tests.helpers.signal_defaults import default_signals
@@ -30,6 +31,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 IN_MEMORY = memory_folder.enter()
 # `labctl stop` finds benches by what is kept here: those of the tests are no benches of the user.
 os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / f"tests-of-labctl-state-{os.getuid()}-{os.getpid()}")
+build_once()
 # The processes that tests start would each compile all modules again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False

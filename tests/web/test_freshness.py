@@ -120,7 +120,7 @@ def test_a_service_that_answers_but_refuses_what_the_page_shows_is_stale(idle: P
 def test_a_page_asks_once_a_second_and_not_while_its_tab_is_hidden(visit: Callable[..., Page], faults: Faults) -> None:
     from playwright.sync_api import expect
 
-    page = visit("/units")
+    page = visit("/units", alone=True)
     page.clock.install()
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url) if request.url.endswith(HEARTBEAT) else None)
