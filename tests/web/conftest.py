@@ -140,7 +140,7 @@ def visit(
     ) -> Page:
         page = new_page(alone)
         page.set_default_timeout(PATIENCE_MS)
-        page.set_viewport_size(size)  # type: ignore[arg-type]
+        page.set_viewport_size({"width": size["width"], "height": size["height"]})
         page.emulate_media(color_scheme="dark" if dark else "light")
         if not idle:
             page.add_init_script("window.requestIdleCallback = () => 0")
