@@ -8,7 +8,7 @@ Every method sends one HTTP request and returns a typed answer. Three errors are
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -32,7 +32,9 @@ from labctl.answers.campaigns import (
 )
 from labctl.answers.certification import CalibrationStateResponse
 from labctl.answers.fixed_coefficients import FixedCoefficients
+from labctl.answers.points import PointFigure, PointResponse
 from labctl.answers.recordings import ImportResponse, RecordingResponse
+from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.schedule import ScheduledResponse
 from labctl.answers.units import UnitResponse
 from labctl.calibration import Calibration, read_calibration
@@ -55,7 +57,9 @@ __all__ = [
     "FitResponse",
     "FixedCoefficients",
     "ImportResponse",
+    "PointResponse",
     "RecordingResponse",
+    "ResidualsResponse",
     "ResumeRequest",
     "ScheduledResponse",
     "ServiceRefused",
@@ -214,6 +218,34 @@ class Client:
         """Fit a model to a recording of a unit; the result is the unit's next calibration version."""
         path = f"/api/units/{_part(serial)}/calibrations"
         return FitResponse.model_validate(json_of(self._post(path, request or FitRequest())))
+
+    def residuals(self, serial: str, version: int, *, recordings: Sequence[int]) -> ResidualsResponse:
+        """Return what the model of a version, fitted to recordings, leaves of each data set, deg/s."""
+        path = f"/api/units/{_part(serial)}/calibrations/{version}/residuals"
+        response = self._connection.request("GET", path, params={"recordings": list(recordings)})
+        return ResidualsResponse.model_validate(json_of(response))
+
+    def point(
+        self,
+        serial: str,
+        version: int,
+        *,
+        recording: int,
+        dataset: int,
+        axis: str,
+        figure: PointFigure = "residual",
+        recordings: Sequence[int] = (),
+    ) -> PointResponse:
+        """Return one data set of a figure, and its numbers computed again from the raw readings.
+
+        `figure` is "residual" (of the model fitted to `recordings`, default: to `recording`) or "comparison" (the
+        version without refitting).
+        """
+        path = f"/api/units/{_part(serial)}/calibrations/{version}/point"
+        query = {
+            "recording": recording, "dataset": dataset, "axis": axis, "figure": figure, "recordings": list(recordings),
+        }  # fmt: skip
+        return PointResponse.model_validate(json_of(self._connection.request("GET", path, params=query)))
 
     def start_campaign(self, request: CampaignRequest) -> CampaignResponse | ScheduledResponse:
         """Start a campaign now, or enter it into the schedule when the request has `at` or `cron`.

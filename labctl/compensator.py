@@ -85,7 +85,7 @@ class Compensator:
             raise BadInput(f"outside = {outside!r} is not known; give 'clamp' or 'refuse'")
         self.calibration = calibration
         #: That the calibration was overdue or revoked when it was loaded; empty where it was neither.
-        self.warning = calibration.warning((clock or SystemClock()).utc()) if calibration.certification else ""
+        self.warning = calibration.warning((clock or SystemClock()).utc())
         warn(self.warning)
         self.axes = calibration.axes
         self._outside = outside
@@ -174,13 +174,13 @@ class Compensator:
         """Correct rates, (n, axes) deg/s, or (n,) for one axis, at temperatures (n,), (n, axes) or one for all.
 
         None for the temperature where the calibration was made without a thermometer. `channels` hold what the model
-        `needs` besides, (n,) each; `history`, of a recording, what the temperatures were between the samples too;
-        `specific_force_g` is (3,) or (n, 3). `cross_rates_dps` are the rates about body axes for which the unit has no
-        output, axis -> (n,) or one for all, deg/s, where another instrument measures them; without them the unit is
-        corrected as if it did not turn about these axes. With `continued` a lag goes on from the sample before, of
-        `step` or of another continued array, and the next one goes on from here. Raises BadInput where a channel is
-        missing, for a shape that does not fit, for times that go back, or outside the calibrated range when that is
-        refused.
+        `needs` besides, (n,) each, or one for all that is no time; `history`, of a recording, what the temperatures
+        were between the samples too; `specific_force_g` is (3,) or (n, 3). `cross_rates_dps` are the rates about body
+        axes for which the unit has no output, axis -> (n,) or one for all, deg/s, where another instrument measures
+        them; without them the unit is corrected as if it did not turn about these axes. With `continued` a lag goes on
+        from the sample before, of `step` or of another continued array, and the next one goes on from here. Raises
+        BadInput where a channel is missing, for a shape that does not fit, for times that go back, or outside the
+        calibrated range when that is refused.
         """
         known = channels or {}
         for name in self.needs:
@@ -195,12 +195,12 @@ class Compensator:
                 f"rates of {raw.shape[1]} axes given; the calibration has axes {', '.join(self.axes)}; give one rate "
                 "for each"
             )
-        warm = np.asarray(self._known(temperature_c), dtype=np.float64)
+        warm = self._fitting(self._known(temperature_c), known, len(raw))
         beside = self._by_force(specific_force_g, len(raw))
         correct = self._correct if cross_rates_dps is None else self._correct_across(cross_rates_dps, len(raw))
         if self._memory is None or history is not None:
             if self._memory is not None and history is not None:
-                remembered = self._memory.of_history(history, known)
+                remembered = self._memory.of_history(history, {"temperature_c": _one_c(warm, len(raw)), **known})
                 beside = remembered if beside is None else remembered.with_bias(beside.bias_dps)
             compensated = self._beside(beside, raw, warm, known, correct)
         else:
@@ -223,10 +223,9 @@ class Compensator:
         rate, outside = np.empty_like(raw), np.empty(n, dtype=bool)
         for first in range(0, n, at_once):
             rows = slice(first, first + at_once)
-            of_rows = {name: values[rows] if values.shape[:1] == (n,) else values for name, values in channels.items()}
+            of_rows = {name: values[rows] if values.shape == (n,) else values for name, values in channels.items()}
             warm_rows = temperature_c[rows] if temperature_c.ndim else temperature_c
-            one_c = warm_rows.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(warm_rows, t_s[rows].shape)
-            beside = running.errors(t_s[rows], one_c)
+            beside = running.errors(t_s[rows], _one_c(warm_rows, len(t_s[rows])))
             if by_force is not None:
                 beside = beside.with_bias(by_force.bias_dps[rows])
             block = self._beside(beside, raw[rows], warm_rows, of_rows, correct, first)
@@ -287,19 +286,12 @@ class Compensator:
         self, raw: Array, temperature_c: Array, channels: Mapping[str, Array], correct: Correct, first: int
     ) -> Compensated:
         """Correct outputs (n, axes) by what does not remember, at the edge of the range where they are outside."""
-        lowest, highest = (
-            (float(np.min(temperature_c)), float(np.max(temperature_c)))
-            if temperature_c.size
-            else (self._low_c, self._high_c)
-        )
-        least, most = (float(np.min(raw)), float(np.max(raw))) if raw.size else (0.0, 0.0)
-        calm = lowest >= self._low_c and highest <= self._high_c and least >= self._slow and most <= self._fast
-        if calm:  # also false when there is a NaN
-            flags = np.zeros(len(raw), dtype=bool)
-        else:
-            flags = self._judge(raw, temperature_c, first)
-            return Compensated(self._at_edge(raw, temperature_c, channels, correct), flags)
-        return Compensated(correct(raw, temperature_c, channels), flags)
+        # what is no number is neither above nor below, so that a sample with it is judged
+        is_warm = np.min(temperature_c) >= self._low_c and np.max(temperature_c) <= self._high_c
+        if is_warm and np.min(raw) >= self._slow and np.max(raw) <= self._fast:
+            return Compensated(correct(raw, temperature_c, channels), np.zeros(len(raw), dtype=bool))
+        flags = self._judge(raw, temperature_c, first)
+        return Compensated(self._at_edge(raw, temperature_c, channels, correct), flags)
 
     def _at_edge(self, raw: Array, temperature_c: Array, channels: Mapping[str, Array], correct: Correct) -> Array:
         """Return corrected rates, (n, axes); of what is outside the range the error at its edge is taken off."""
@@ -320,6 +312,22 @@ class Compensator:
                 f"{self._high_c:g} deg C); give temperature_c for each sample"
             )
         return STAND_IN_C
+
+    def _fitting(self, temperature_c: Array | float, channels: Mapping[str, Array], n: int) -> Array:
+        """Return the temperatures of n samples; raises BadInput where their shape, or that of a channel, is another."""
+        warm, axes = np.asarray(temperature_c, dtype=np.float64), len(self.axes)
+        if warm.shape not in {(), (1,), (n,), (n, axes)}:
+            raise BadInput(
+                f"temperature_c has shape {warm.shape}; give one temperature, one for each of the {n} samples, or one "
+                f"for each sample and axis, ({n}, {axes}), deg C"
+            )
+        for name in self.needs:
+            one_for_all = {(), (1,)} if name != "t_s" else set()
+            if np.shape(channels[name]) not in {(n,), *one_for_all}:
+                raise BadInput(
+                    f"channel {name!r} has shape {np.shape(channels[name])}; give one value for each of the {n} samples"
+                )
+        return warm.reshape(()) if warm.shape == (1,) else warm
 
     def _judge(self, raw: Array, temperature_c: Array, first: int) -> NDArray[np.bool_]:
         """Return which samples are outside the range or no numbers, (n,); raises BadInput when that is refused."""
@@ -379,3 +387,8 @@ class Compensator:
             {"t_s": np.array([t_s])}, self._correct,
         )  # fmt: skip
         return compensated.rate_dps[0], bool(compensated.outside[0])
+
+
+def _one_c(temperature_c: Array, n: int) -> Array:
+    """Return the temperature of each of n samples, (n,) deg C: the mean where each axis has one."""
+    return temperature_c.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(temperature_c, (n,))

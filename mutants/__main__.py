@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from mutants.isolated import BESIDES_S, NOTHING_COLLECTED, PASSED, TIMES, Runner, copy_of
+from mutants.namespace import run_apart
 from mutants.operators import Mutant, mutants_of
 from mutants.targets import Target, targets
 
@@ -20,6 +21,8 @@ LEAST = 0.90
 def main() -> int:
     """Run the mutants of the modules that are named, or of all; returns 1 when the tests of one notice too few."""
     arguments = _arguments()
+    if (status := run_apart(sys.argv[1:])) is not None:
+        return status
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended by a signal"))  # the copy is removed
     wanted = [each for each in targets() if not arguments.modules or any(n in each.module for n in arguments.modules)]
     before = json.loads(arguments.survivors.read_text()) if arguments.again else {}

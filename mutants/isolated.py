@@ -139,9 +139,11 @@ class Runner:
             pid = os.fork()
             if pid == 0:
                 _become_a_test(self._loaded, output.fileno(), tests, limit_s)
-            status = _ended(pid, began_s + limit_s)
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(pid, signal.SIGKILL)  # what a test left behind
+            try:
+                status = _ended(pid, began_s + limit_s)
+            finally:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(pid, signal.SIGKILL)  # what a test left behind, or the test where this process is ended
             output.seek(0)
             text = output.read().decode(errors="replace")
         return Outcome(status, time.monotonic() - began_s, text)

@@ -154,7 +154,7 @@ def mutants_of(source: str) -> list[Mutant]:
 def _says_nothing(operator: str, node: Any) -> bool:
     """Return whether a change is none, or the same as that of another operator."""
     if operator == "AddNot":  # the opposite of a comparison, and a `not` that is left out, are there already
-        return node.children[1 if node.type in {"if_stmt", "while_stmt"} else 2].type in {"comparison", "not_test"}
+        return node.children[2 if node.type == "test" else 1].type in {"comparison", "not_test"}
     if node.parent is not None and node.parent.type == "argument":
         return node.parent.children[0].get_code().strip() in PROMISES
     return node.parent is not None and node.parent.type in MARKS
@@ -179,4 +179,4 @@ def _mutant(operator: str, source: str, code: str) -> Mutant:
 
 def _joined(lines: list[str]) -> str:
     """Return lines as one, without the space that cosmic-ray puts before what it changes."""
-    return re.sub(r"(?<=[(\[{])\s+|\s+(?=\s)", "", " ".join(line.strip() for line in lines))
+    return re.sub(r"(?<=[(\[{])\s+|\s+(?=\s)", "", " ".join(line.strip() for line in lines)).strip()

@@ -29,7 +29,7 @@ from studies.scores import (
 Z95 = 1.959963984540054
 
 
-def wilson(hits: int, n: int) -> tuple[float, float]:
+def wilson(hits: float, n: int) -> tuple[float, float]:
     """Return the 95 % interval (Wilson) of a share of which `hits` of `n` were seen."""
     if n == 0:
         return 0.0, 1.0

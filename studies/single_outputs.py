@@ -16,7 +16,7 @@ from labctl.fitting.criticism import criticise
 from labctl.fitting.criticism.criticism import MAX_OVER_FLOOR
 from labctl.fitting.estimation.fit import fit
 from labctl.recording import Recording
-from labctl.services.criticism.report_text import sentences
+from labctl.services.criticism.answer import sentences
 from studies.campaigns import MODELS, campaign
 from studies.effect_sizes import sizes
 

@@ -3,7 +3,8 @@
 Runs go through the driver and the bytes of a simulated controller. Its replies are late by a random part of the
 period of an adapter's timer, or by the rest to its next tick, and by what the computer's scheduler adds. The clock
 drifts in proportion to time, as it does when a controller warms up, or as a random walk. A campaign has one block of
-runs before its data sets and one every two hours. `LABCTL_STUDY_CAMPAIGNS` is how many of each kind,
+runs before its data sets and one every two hours. Each controller's clock is off by its own amount, so that ticks
+fall otherwise in each campaign. `LABCTL_STUDY_CAMPAIGNS` is how many of each kind,
 `LABCTL_STUDY_SEED` the first seed.
 """
 
@@ -24,12 +25,13 @@ from instruments.drivers.resolution import resolve
 from procedures.contracts.journal import ClockRun
 from procedures.monitoring.step_clock import MeasuredClock, measured
 from procedures.planning.clock_runs import BLOCK_EVERY_S, FIRST_RUNS, LATER_RUNS, run_lengths_s
+from studies.report_tables import wilson
 
-CAMPAIGNS = int(os.environ.get("LABCTL_STUDY_CAMPAIGNS", "200"))
+CAMPAIGNS = int(os.environ.get("LABCTL_STUDY_CAMPAIGNS", "1000"))
 FIRST_SEED = int(os.environ.get("LABCTL_STUDY_SEED", "32001"))
 LATENCIES_S = (0.0, 0.001, 0.004, 0.016)
 BLOCKS = 4
-OFF_PPM, SCHEDULER_S, RATE_DPS = 350.0, 1e-4, 90.0
+MAX_OFF_PPM, SCHEDULER_S, RATE_DPS = 500.0, 1e-4, 90.0
 #: Rates are compared at so many times between two blocks.
 TIMES = 8
 
@@ -107,6 +109,7 @@ class TimedTable:
         device: Any = self._opened.simulation.device("sim://arrick")  # type: ignore[union-attr]
         self._device = device._device  # noqa: SLF001
         self._kind, self._latency_s, self._rng = kind, latency_s, rng
+        self._off_ppm = float(rng.uniform(-MAX_OFF_PPM, MAX_OFF_PPM))
         self._ppm = kind.ppm(rng)
         self.runs: list[ClockRun] = []
         self.connect()
@@ -118,7 +121,7 @@ class TimedTable:
 
     def ratio(self, t_s: float) -> float:
         """Return the true step rate over the nominal one at a time, s."""
-        return 1.0 + 1e-6 * (self._ppm(t_s) - OFF_PPM)
+        return 1.0 + 1e-6 * (self._ppm(t_s) + self._off_ppm)
 
     def time_block(self, number: int, session: int, block: int) -> MeasuredClock | None:
         """Time some runs; returns the clock by all so far."""
@@ -173,19 +176,21 @@ def resumed_campaign(kind: Kind, latency_s: float, seed: tuple[int, ...]) -> tup
 
 
 def run(campaigns: int = CAMPAIGNS) -> str:
-    """Return the share of rates inside U by latency and drift, with its 95 % interval over campaigns."""
+    """Return the share of rates inside U by latency and drift, with its 95 % interval over campaigns (Wilson)."""
+    inside = f"rates inside U, % of {campaigns} campaigns | mean inside U, %"
     lines = [
-        f"| drift | latency, ms | U, ppm | rates inside U, % of {campaigns} campaigns | mean inside U, % |",
-        "| --- | --- | --- | --- | --- |",
+        f"| drift | latency, ms | U, ppm | RMS error of the mean, ppm | {inside} |",
+        "| --- | --- | --- | --- | --- | --- |",
     ]
     for k, kind in enumerate(KINDS):
         for latency_s in LATENCIES_S:
             key = (FIRST_SEED, k, round(1e3 * latency_s))
             every = np.array([campaign(kind, latency_s, (*key, n)) for n in range(campaigns)])
-            share, half = 100 * every[:, 0].mean(), 196 * every[:, 0].std(ddof=1) / math.sqrt(campaigns)
-            means = 100 * float(np.mean(np.abs(every[:, 2]) <= 1))
+            low, high = wilson(float(every[:, 0].sum()), campaigns)  # the rates of a campaign have nearly one error
+            rms_ppm = math.sqrt(float(np.mean((every[:, 2] * every[:, 1]) ** 2)))
             lines.append(
-                f"| {kind.drift} | {1e3 * latency_s:g} | {np.median(every[:, 1]):.2g} | {share:.1f} "
-                f"({share - half:.1f} to {min(share + half, 100):.1f}) | {means:.1f} |"
+                f"| {kind.drift} | {1e3 * latency_s:g} | {np.median(every[:, 1]):.3g} | {rms_ppm:.2g} | "
+                f"{100 * every[:, 0].mean():.1f} ({100 * low:.1f} to {100 * high:.1f}) | "
+                f"{100 * float(np.mean(np.abs(every[:, 2]) <= 1)):.1f} |"
             )
     return "\n".join(lines)

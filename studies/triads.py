@@ -14,16 +14,17 @@ import numpy as np
 from labctl.fitting.magnetometer.alignment import align_field
 from labctl.fitting.magnetometer.calibrate import calibrate_magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
-from labctl.fitting.poses.at_rest.accelerometer import calibrate_accelerometer
-from labctl.fitting.poses.at_rest.fewer_poses import Known, by_fewer_poses
-from labctl.fitting.poses.at_rest.rests import find_rests, rest_of_each
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer
+from labctl.fitting.poses.at_rest.fewer_poses import Known, Scatter, by_fewer_poses
+from labctl.fitting.poses.at_rest.rests import Rests, find_rests, rest_of_each
+from labctl.fitting.poses.at_rest.temperature import calibrate_over_temperature
 from labctl.fitting.poses.fit import Solved, solve
 from labctl.fitting.poses.readings import AXES, PoseReadings, readings_of
 from labctl.fitting.poses.triad import UPPER
 from labctl.recording import Recording, RecordingInfo
-from labctl.services.pose_triads import solved_of
+from labctl.services.pose_triads import solve_even
 from studies.poses import turned_deg
-from studies.triads_simulation import DIP_DEG, TrueTriads, turned_by_hand, vector_of, warmed, warmed_k
+from studies.triads_simulation import DIP_DEG, TrueTriads, Warming, turned_by_hand, vector_of, warmed_k
 
 #: Rests of a session, and sessions.
 CELLS = {12: 300, 22: 200, 30: 200, 100: 60}
@@ -62,14 +63,21 @@ def scores(seed: int, rests: int, place_ut: float = PLACE_UT) -> Scores:
 
 
 def scores_over_temperature(seed: int, rests: int) -> Scores:
-    """Return the same of a session at four temperatures, over which bias and scale factors of the forces change."""
+    """Return the same of a session at four temperatures, over which bias and scale factors of the forces change.
+
+    The truth is that of the temperature to which the calibration refers.
+    """
     rng = np.random.default_rng(2 * 10**6 + seed)
     unit = TrueTriads.drawn(np.random.default_rng(10**6 + seed))
     parts = turned_by_hand(seed, unit, rests, place_ut=PLACE_UT)
     away_k = warmed_k(len(parts[0]))
-    changed = (parts[0], parts[1], warmed(rng, unit, parts[2], away_k), parts[3])
+    warming = Warming.drawn(rng)
+    changed = (parts[0], parts[1], warming.readings(unit, parts[2], away_k), parts[3])
     readings = replace(readings_of(recording_of(*changed)), temperature_c=ABOUT_C + away_k)
-    return _scores(unit, readings, solved_of(readings, None, over_temperature=True), changed)
+    rests_found = find_rests(readings)
+    found = calibrate_over_temperature(readings, rests_found)
+    at_reference = warming.unit_at(unit, found.reference_c - ABOUT_C)
+    return _scores(at_reference, readings, solve_even(readings, rests_found, found), changed)
 
 
 def scores_with_earlier(seed: int, rests: int) -> Scores:
@@ -87,9 +95,16 @@ def scores_with_earlier(seed: int, rests: int) -> Scores:
     found = find_rests(readings)
     of_change = np.diag(np.repeat(CHANGES, 3) ** 2)
     errors = np.array([was.errors[place] for place in UPPER])
-    known = Known(errors, was.covariance[3:, 3:] + of_change, was.bias_g, 0.0)
+    known = Known(errors, was.covariance[3:, 3:] + of_change, was.bias_g, scatter_then(was, rests_then))
     fewer = by_fewer_poses(readings, found, known)
     return _scores(now, readings, solve(readings, (found, fewer.found)), parts)
+
+
+def scatter_then(was: Accelerometer, rests: Rests) -> Scatter:
+    """Return how the sizes scattered in the rests of an earlier session."""
+    used = int(np.count_nonzero(was.used))
+    noise = float(rests.accel_white_var[was.used].mean())
+    return Scatter(was.residual_g**2 * used / was.freedom, noise, was.freedom)
 
 
 def _scores(unit: TrueTriads, readings: PoseReadings, solved: Solved, parts: Parts) -> Scores:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -107,14 +107,33 @@ def warmed_k(n: int) -> Array:
     return np.asarray(np.array([-30.0, -10.0, 10.0, 30.0])[(4 * share).astype(np.int64)] + 2 * share)
 
 
-def warmed(rng: np.random.Generator, unit: TrueTriads, force_g: Array, away_k: Array) -> Array:
-    """Return readings (n, 3) of the accelerometer, g, with bias and scale factors that change with temperature.
+@dataclass(frozen=True)
+class Warming:
+    """What bias and scale factors of an accelerometer change with the temperature, from that of the unit as drawn."""
 
-    `away_k` (n,) is the temperature from that at which the unit is as drawn.
-    """
-    force = np.linalg.solve(unit.force, (force_g - unit.force_bias_g).T).T
-    bias = sum(away_k[:, None] ** k * rng.normal(0, size, 3) for k, size in ((1, 5e-4), (2, 5e-6), (3, 1e-7)))
-    return np.asarray(force_g + bias + away_k[:, None] * rng.normal(0, 1e-4, 3) * force)
+    bias_g: Array  #: (3, 3) by power 1 to 3 and axis, g/K^k
+    scale_factor: Array  #: (3,) 1/K
+
+    @staticmethod
+    def drawn(rng: np.random.Generator) -> Warming:
+        """Return changes of the size that MEMS sensors have."""
+        bias = np.array([rng.normal(0, size, 3) for size in (5e-4, 5e-6, 1e-7)])
+        return Warming(bias, rng.normal(0, 1e-4, 3))
+
+    def readings(self, unit: TrueTriads, force_g: Array, away_k: Array) -> Array:
+        """Return readings (n, 3), g, at temperatures (n,) of a unit whose readings without a change are given."""
+        force = np.linalg.solve(unit.force, (force_g - unit.force_bias_g).T).T
+        return np.asarray(force_g + self._bias_g(away_k[:, None]) + away_k[:, None] * self.scale_factor * force)
+
+    def unit_at(self, unit: TrueTriads, away_k: float) -> TrueTriads:
+        """Return the unit at one temperature."""
+        return replace(
+            unit, force=unit.force + away_k * np.diag(self.scale_factor),
+            force_bias_g=unit.force_bias_g + self._bias_g(np.full(1, away_k)),
+        )  # fmt: skip
+
+    def _bias_g(self, away_k: Array) -> Array:
+        return np.asarray(sum(away_k**k * per for k, per in enumerate(self.bias_g, start=1)))
 
 
 #: Directions up of twelve poses that no five degrees are between: the corners of an icosahedron.

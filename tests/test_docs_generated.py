@@ -5,7 +5,10 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
@@ -19,6 +22,17 @@ def test_the_reference_of_the_command_line_is_that_of_the_program() -> None:
     command = [sys.executable, "-m", "typer", "labctl.cli.app", "utils", "docs", "--name", "labctl"]
     reported = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert reported.strip() == PAGE.read_text(encoding="utf-8").strip(), f"write it again: python -m {WRITE}"
+
+
+def test_the_page_of_the_effects_is_that_of_the_catalogue() -> None:
+    script = ROOT / "scripts" / "effects-page"
+    loader = SourceFileLoader("effects_page", str(script))
+    generator = module_from_spec(spec_from_loader("effects_page", loader))  # type: ignore[arg-type]
+    with patch.object(sys, "dont_write_bytecode", new=True):
+        loader.exec_module(generator)
+    assert generator.page() == (ROOT / "docs" / "reference" / "effects.md").read_text(encoding="utf-8"), (
+        "write it again: scripts/effects-page"
+    )
 
 
 def build(docs: Path, out: Path) -> str:

@@ -17,6 +17,10 @@ class SelfChecking(Protocol):
         ...
 
 
+#: A period that is off by less than this share, as any crystal is, needs no confirmation.
+NEGLIGIBLE_SHARE = 2e-4
+
+
 @dataclass(frozen=True)
 class StreamPeriod:
     """Period of a stream by the clock of the computer, from the arrivals of its readings."""
@@ -24,6 +28,17 @@ class StreamPeriod:
     nominal_s: float  #: of the bench file
     measured_s: float | None  #: None where it is not known to half a per cent
     u_share: float  #: standard uncertainty as a share of the period
+    used_s: float | None = None  #: by which readings have their times; None: the nominal one
+
+    @property
+    def is_unconfirmed(self) -> bool:
+        """Whether the arrivals suggest another period than the one in use, beyond two standard uncertainties.
+
+        Less than `NEGLIGIBLE_SHARE` does not count: in a data set the times do not bend by it.
+        """
+        used_s = self.used_s or self.nominal_s
+        limit = max(2.0 * self.u_share, NEGLIGIBLE_SHARE)
+        return self.measured_s is not None and abs(self.measured_s / used_s - 1.0) > limit
 
 
 @runtime_checkable

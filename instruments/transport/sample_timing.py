@@ -68,7 +68,7 @@ class StreamTime:
     def known(self) -> StreamPeriod:
         """What is known of the period, with its standard uncertainty."""
         line = self._line
-        return StreamPeriod(line.nominal_s, line.measured_s, line.u_share / COVERAGE)
+        return StreamPeriod(line.nominal_s, line.measured_s, line.u_share / COVERAGE, line.period_s)
 
     def drop(self) -> None:
         """Expect any number of missing readings before the next ones, which must be passed on as soon as they come.

@@ -97,6 +97,7 @@ from labctl.answers.campaign_parts import (
     OutputResponse as OutputResponse,
     PromptResponse as PromptResponse,
     TurnResponse as TurnResponse,
+    WatchedLimitResponse as WatchedLimitResponse,
 )
 from labctl.answers.campaigns import (
     BenchCheck as BenchCheck,
@@ -176,6 +177,7 @@ from labctl.answers.datasheet import (
     DatasheetResponse as DatasheetResponse,
     MeasuredUnder as MeasuredUnder,
 )
+from labctl.answers.course import CourseResponse as CourseResponse
 from labctl.answers.drafts import (
     AppliedDraft as AppliedDraft,
     CoefficientChange as CoefficientChange,
@@ -191,8 +193,13 @@ from labctl.answers.drafts import (
 from labctl.answers.effects import (
     CataloguedEffect as CataloguedEffect,
     EffectJson as EffectJson,
+    EquationJson as EquationJson,
+    Gives as Gives,
     ParameterJson as ParameterJson,
     PresetJson as PresetJson,
+    SourceJson as SourceJson,
+    SymbolJson as SymbolJson,
+    SymbolKind as SymbolKind,
 )
 from labctl.answers.fitted_model import (
     AxisCoefficients as AxisCoefficients,
@@ -303,6 +310,11 @@ from labctl.answers.plans import (
     StepState as StepState,
     TimelineColumns as TimelineColumns,
     Visibility as Visibility,
+)
+from labctl.answers.points import (
+    PointFigure as PointFigure,
+    PointNumbers as PointNumbers,
+    PointResponse as PointResponse,
 )
 from labctl.answers.poses import (
     AccelerometerCoefficient as AccelerometerCoefficient,

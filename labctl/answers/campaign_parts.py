@@ -33,6 +33,26 @@ class PromptResponse(ResponseModel):
     )
 
 
+class WatchedLimitResponse(ResponseModel):
+    """A value that a guard watches now, with its limits."""
+
+    kind: str = Field(description="Guard, as in [guards] of a recipe.")
+    device: str = Field(description="Instrument or unit that the value is of.")
+    title: str = Field(description="What is watched, in words.")
+    value: float = Field(description="Value at the last poll, in `unit`.")
+    low: float | None = Field(description="Lowest value that is allowed, in `unit`; null: none.")
+    high: float = Field(description="Highest value that is allowed, in `unit`.")
+    unit: str = Field(description="Unit of value and limits; empty: a number of things.")
+    action: str = Field(description="What the recipe does when it is passed: warn, take_back, suspend or fail.")
+    is_beyond: bool = Field(
+        description="The limit is passed. Of a share of readings, one more than the limit is needed: a single reading "
+        "is no trend."
+    )
+    age_s: float | None = Field(
+        description="How long ago the device answered, s by the campaign's clock; null: it is not asked."
+    )
+
+
 class TurnResponse(ResponseModel):
     """The turn by hand that is under way."""
 

@@ -8,7 +8,14 @@ from typing import Literal, get_args
 from pydantic import AwareDatetime, Field
 
 from labctl.answers.base import LongText, Request, ResponseModel
-from labctl.answers.campaign_parts import AdviceResponse, DriverResponse, OutputResponse, PromptResponse, TurnResponse
+from labctl.answers.campaign_parts import (
+    AdviceResponse,
+    DriverResponse,
+    OutputResponse,
+    PromptResponse,
+    TurnResponse,
+    WatchedLimitResponse,
+)
 from labctl.answers.common_fields import BenchName, CampaignNumber, Clip, Person, Reason, RecipeName, StepCount
 from labctl.answers.drafts import DraftResponse
 from labctl.answers.plans import RecipeSource
@@ -212,6 +219,11 @@ class CampaignResponse(ResponseModel):
     )
     links: dict[str, str] = Field(
         default_factory=dict, description="Instruments that answer late or not at all: name -> what is wrong."
+    )
+    limits: list[WatchedLimitResponse] = Field(
+        default_factory=list,
+        description="What the guards watched at the last poll; some are watched during data sets only. Empty: this "
+        "process does not run the campaign.",
     )
     dropped: dict[str, str] = Field(
         default_factory=dict, description="Units excluded from the rest of the campaign: name -> reason."

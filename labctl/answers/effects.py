@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from typing_extensions import TypedDict
 
 from labctl.answers.fitted_model import Origin
+
+#: What a symbol of an equation stands for.
+SymbolKind = Literal["coefficient", "parameter", "channel", "other"]
+#: What a source contains.
+Gives = Literal["equation", "definition"]
 
 
 class ParameterJson(TypedDict):
@@ -18,6 +25,51 @@ class ParameterJson(TypedDict):
     """Least value that is tried, in `unit`."""
     high: int | float
     """Largest value that is tried, in `unit`."""
+    symbol: str
+    """Symbol in the equation of the effect; empty: a switch, which chooses a case of the equation."""
+    symbol_mathml: str
+    """The symbol as MathML; empty for a switch."""
+    meaning: str
+    """What the parameter is; empty: an effect of another package does not say."""
+
+
+class SymbolJson(TypedDict):
+    """A symbol of an equation."""
+
+    symbol: str
+    """The symbol as it stands in `text` of the equation."""
+    mathml: str
+    """The symbol as MathML."""
+    kind: SymbolKind
+    """What it is: a coefficient, which a fit estimates; a parameter of the shape; a channel of a recording; other."""
+    meaning: str
+    """What it stands for."""
+    unit: str
+    """Its unit; 1: of no dimension; empty: an index."""
+    name: str
+    """Name of the coefficient, the parameter or the column that it stands for; empty: it has none."""
+
+
+class EquationJson(TypedDict):
+    """The error of an output, deg/s, output minus rate, by an effect."""
+
+    text: str
+    """The equation as an expression of Python, then the lines that define what stands in it, after semicolons."""
+    mathml: str
+    """The same as one element `math` of MathML."""
+    symbols: list[SymbolJson]
+    """Every symbol of the equation, with its meaning and unit."""
+
+
+class SourceJson(TypedDict):
+    """A publication that an effect is from."""
+
+    work: str
+    """Author, title and place of the publication, or the standard."""
+    place: str
+    """Where in it, or what it says there."""
+    gives: Gives
+    """What it contains: this equation, or the definition of the effect only; the shape is then labctl's own."""
 
 
 class EffectJson(TypedDict):
@@ -41,6 +93,10 @@ class EffectJson(TypedDict):
     """Largest polynomial order; null: there is no order to choose."""
     parameters: list[ParameterJson]
     """Nonlinear parameters."""
+    equation: EquationJson | None
+    """The equation of the effect; null: an effect of another package does not state it."""
+    sources: list[SourceJson]
+    """Publications of the equation, or of the definition of the effect."""
     plausible: dict[str, list[float]]
     """Technology -> least and largest plausible first coefficient, in the unit of the coefficient."""
     aliases: list[str]

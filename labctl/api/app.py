@@ -30,6 +30,7 @@ from labctl.api.routers import (
     live,
     motions,
     plans,
+    points,
     recordings,
     schedule,
     sensors,
@@ -60,7 +61,7 @@ certifying and keys for an approver's.
 #: In the order of the API's description, in which they are also asked: what is read most comes first.
 ROUTERS = (
     calibrations, certification, health, units, benches, effects, certificates, plans,
-    campaigns, schedule, live, recordings, motions, sensors, standards, validity, admin, swagger_ui,
+    campaigns, schedule, live, recordings, motions, points, sensors, standards, validity, admin, swagger_ui,
 )  # fmt: skip
 #: Which of their routes take a key; every route of the others does.
 SAY_THEMSELVES = (health, swagger_ui)

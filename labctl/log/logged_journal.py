@@ -135,6 +135,11 @@ class LoggedJournal:
         with self._entry("dataset.closed", level, dataset=dataset, state=state.value, reason=reason):
             self._journal.dataset_closed(dataset, state, reason)
 
+    def dataset_withdrawn(self, dataset: int, gyro: str, reason: str) -> None:
+        """Record and log that a unit's readings of a complete data set are wrong."""
+        with self._entry("dataset.withdrawn", "warning", dataset=dataset, **self._unit(gyro), reason=reason):
+            self._journal.dataset_withdrawn(dataset, gyro, reason)
+
     def environment(self, sample: EnvironmentSample) -> None:
         """Record the environment."""
         with self._refusals("environment"):

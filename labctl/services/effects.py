@@ -9,7 +9,7 @@ from labctl.answers.calibrations import CatalogueResponse
 from labctl.answers.effects import CataloguedEffect
 from labctl.errors import BadInput
 from labctl.fitting import describe_effects, describe_presets
-from labctl.fitting.effects import CATALOGUE, Effect, Formula, Term, checked_formulas, formulas
+from labctl.fitting.effects import CATALOGUE, Effect, Formula, Term, checked_formulas, effect, formulas
 from labctl.fitting.effects.trial import first_column
 from labctl.fitting.models.error_model import is_exported
 
@@ -17,8 +17,8 @@ from labctl.fitting.models.error_model import is_exported
 OTHER_UNITS = {"thermometer_error": "K"}
 
 
-def catalogue() -> CatalogueResponse:
-    """Return every effect and every model preset as JSON.
+def catalogue(only: str | None = None) -> CatalogueResponse:
+    """Return every effect and every model preset as JSON, or `only` one effect. Raises BadInput for an unknown one.
 
     `unit` is that of an effect's plausible sizes; `leaves` says whether a calibration exports it.
     """
@@ -26,6 +26,8 @@ def catalogue() -> CatalogueResponse:
     effects: list[CataloguedEffect] = [
         {**about, "unit": units[about["id"]], "leaves": is_exported(Term(about["id"]))} for about in describe_effects()
     ]
+    if only is not None:
+        return CatalogueResponse(effects=[each for each in effects if each["id"] == effect(only).id], models=[])
     return CatalogueResponse(effects=effects, models=describe_presets())
 
 

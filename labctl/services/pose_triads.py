@@ -8,8 +8,8 @@ import numpy as np
 
 from labctl.answers.accelerometer import AccelerometerResponse, EarlierVersion
 from labctl.errors import BadInput, NotEnoughData
-from labctl.fitting.poses.at_rest.accelerometer import MIN_POSES
-from labctl.fitting.poses.at_rest.fewer_poses import DISAGREE, ByFewer, Known, by_fewer_poses
+from labctl.fitting.poses.at_rest.accelerometer import MIN_POSES, PARAMETERS
+from labctl.fitting.poses.at_rest.fewer_poses import DISAGREE, FREE, ByFewer, Known, Scatter, by_fewer_poses
 from labctl.fitting.poses.at_rest.rests import Rests, find_rests
 from labctl.fitting.poses.at_rest.temperature import OverTemperature, at_reference, calibrate_over_temperature
 from labctl.fitting.poses.fit import Solved, solve
@@ -38,10 +38,9 @@ class Earlier:
         values = [was.scale_factor[a].value for a in AXES]
         values += [was.misalignment[AXES[i] + AXES[j]].value for i, j in UPPER[3:]]
         changes = np.repeat([self.scale_change, self.misalignment_change], 3)
-        more = max(was.heldout_g**2 - was.expected_g**2, 0.0) if was.verdict == "unexplained" else 0.0
         return Known(
             np.array(values), np.array(was.covariance)[3:, 3:] + np.diag(changes**2),
-            np.array([was.bias_g[a].value for a in AXES]), more,
+            np.array([was.bias_g[a].value for a in AXES]), scatter_of(was),
         )  # fmt: skip
 
     def answer(self, p_value: float) -> EarlierVersion:
@@ -63,6 +62,17 @@ class Earlier:
             f"{used}; the rests do NOT agree with it (p = {fewer.p_value:.1g}): the unit changed by more, or moved in "
             "its rests; lay it down in at least 12 poses and calibrate it without the earlier version."
         )
+
+
+def scatter_of(was: AccelerometerResponse) -> Scatter | None:
+    """Return how the sizes scattered in the rests of a calibration; None where no rest was more than its parameters."""
+    used = was.rests - was.left_out
+    of_temperature = 0 if was.temperature is None else len(was.temperature.covariance) - PARAMETERS
+    freedom = used - (FREE if was.earlier else PARAMETERS + of_temperature)
+    if freedom < 1:
+        return None
+    variance = was.residual_g**2 * used / freedom
+    return Scatter(variance, variance * min(was.expected_g / max(was.heldout_g, 1e-12), 1.0) ** 2, freedom)
 
 
 def require_one(temperature: str | None, earlier: Earlier | None) -> None:

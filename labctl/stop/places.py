@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
 
-from labctl.stop.latch import FILE, FOLDER, StopLatch
+from labctl.stop.latch import FOLDER, StopLatch
 
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 NOTE = "driver.json"
@@ -41,7 +41,7 @@ class ProcessId:
     @property
     def lives(self) -> bool:
         """Whether the process is there; one that has ended and was not waited for is not."""
-        return self.pid > 0 and self.boot == _boot() and _started(self.pid) == self.started
+        return self.boot == _boot() and _started(self.pid) == self.started
 
     @property
     def age_s(self) -> float:
@@ -170,11 +170,10 @@ def _short(text: str) -> str:
 
 
 def _write(path: Path, document: dict[str, Any]) -> None:
-    """Write a file as a whole, or not at all."""
+    """Write a file that only its owner reads, as a whole or not at all."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as made:
-            os.fchmod(made.fileno(), FILE)
             json.dump(document, made)
         Path(name).replace(path)
     except BaseException:
@@ -188,7 +187,7 @@ def _started(pid: int) -> int | None:
     fields = _fields(pid)
     try:
         return None if fields[0] in {"Z", "X"} else int(fields[19])
-    except (ValueError, IndexError):
+    except IndexError:
         return None
 
 
@@ -203,5 +202,5 @@ def _fields(pid: int) -> list[str]:
 def _boot() -> str:
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
-    except (OSError, UnicodeDecodeError):
+    except OSError:
         return ""

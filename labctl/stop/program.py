@@ -74,7 +74,6 @@ def run(request: Asked) -> int:
 
 def _say(text: str) -> None:
     sys.stderr.write(f"labctl: {text}\n")
-    sys.stderr.flush()
 
 
 def _print(result: StopResult, *, quiet: bool) -> None:

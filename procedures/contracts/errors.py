@@ -65,6 +65,10 @@ class NoReadings(BadData):
     """No reading of a unit arrived in a data set."""
 
 
+class NotFollowing(BadData):
+    """The output of a unit does not follow the rate of the table."""
+
+
 class GuardTripped(StepFailed):
     """A limit that is watched was passed; `kind` names the guard and `action` what the recipe wants done."""
 

@@ -166,6 +166,10 @@ class Journal(Protocol):
         """
         ...
 
+    def dataset_withdrawn(self, dataset: int, gyro: str, reason: str) -> None:
+        """Mark a complete data set as partial for one unit, whose readings turned out to be wrong: kept, not fitted."""
+        ...
+
     def environment(self, sample: EnvironmentSample) -> None:
         """Record the environment between and during data sets."""
         ...

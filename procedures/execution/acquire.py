@@ -8,7 +8,7 @@ from instruments.clock import latency_s
 from instruments.errors import LinkError
 from instruments.interfaces.table import Spin
 from instruments.positions import Position
-from procedures.contracts.errors import BadData, GuardTripped, StepFailed
+from procedures.contracts.errors import BadData, GuardTripped, NotFollowing, StepFailed
 from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
 from procedures.execution import late_readings
@@ -47,7 +47,7 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     attempt = stalled = 0
     while True:
         attempt += 1
-        stalled_s = context.monitor.stalls.total_s()
+        stalled_s, began_s = context.monitor.stalls.total_s(), context.clock.now_s()
         try:
             learn_periods(context)
             return _take(context, step) if step.course is None else take_course(context, step)
@@ -57,11 +57,13 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
                 raise
             why = str(error)
             stalled_s = context.monitor.stalls.total_s() - stalled_s
-            if is_by_stalls(context, unit, error, stalled_s):
+            if is_by_stalls(context, unit, error, began_s):
                 why = f"{not_run(stalled_s)} while it was taken, and readings of {unit} are missing"
                 stalled += 1
                 attempt -= stalled <= STALLED_ATTEMPTS  # no fault of the unit
             if attempt >= context.recipe.on_failure.acquire_attempts:
+                if isinstance(error, NotFollowing):
+                    _withdraw_unconfirmed(context, unit, why)
                 if not context.can_drop(unit):
                     raise
                 context.drop(unit, str(error))
@@ -71,6 +73,14 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             tracker.update(repeated=tracker.progress.repeated + 1)
             context.bench.table.stop()
             reopen(context)
+
+
+def _withdraw_unconfirmed(context: ExecutionContext, unit: str, why: str) -> None:
+    """Withdraw what a unit sent in this mounting before: nothing shows that it followed the table then."""
+    for number in context.response.unconfirmed(unit):
+        context.recorder.journal.dataset_withdrawn(number, unit, why)
+        text = f"data set {number} of {unit} does not count: {why}"
+        context.recorder.event(warning("data_set_withdrawn", text, unit))
 
 
 def reopen(context: ExecutionContext) -> None:
@@ -119,16 +129,17 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             raise
     context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
     context.unchecked.append(number)
+    context.response.keep(counts, number)
     reading_counts = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
     return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **rates, **reading_counts}
 
 
 def _demand_answer(context: ExecutionContext, step: Acquire, spin: Spin) -> None:
-    """Raise BadData for a unit whose output does not follow the rate of the table."""
+    """Raise NotFollowing for a unit whose output does not follow the rate of the table."""
     position = Position.of(step.position)
     for name, gyro in context.bench.gyros.items():
         if complaint := context.response.complaint(name, spin.rate_dps, position, gyro.limits.max_rate_dps):
-            raise BadData(name, complaint)
+            raise NotFollowing(name, complaint)
 
 
 def _note_angles(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from instruments.errors import LinkError
@@ -18,6 +19,9 @@ from procedures.monitoring.event_recorder import warning
 #: Before a data set a stream of unknown period is read for at most so long, s of the clock, in slices of so long: that
 #: is enough behind an adapter that holds bytes back for 16 ms.
 LEARN_S, SLICE_S = 4.0, 0.25
+#: One whose arrivals suggest another period than that of the bench file is read further, for at most so long, s, until
+#: they exclude it or agree: the times of the first data set would bend.
+DOUBT_S = 20.0
 
 
 def learn_periods(context: ExecutionContext) -> None:
@@ -25,13 +29,21 @@ def learn_periods(context: ExecutionContext) -> None:
 
     Raises InstrumentError, Aborted.
     """
-    until_s = context.clock.now_s() + LEARN_S
+    new = [gyro.name for gyro in context.bench.gyros.values() if _is_period_unknown(gyro)]
+    _read_while(context, _is_period_unknown, LEARN_S, SLICE_S)
+    # once after each start, and as often as possible: then arrivals say most
+    _read_while(context, lambda gyro: gyro.name in new and _is_period_unconfirmed(gyro), DOUBT_S, 0.0)
+
+
+def _read_while(context: ExecutionContext, is_open: Callable[[Gyro], bool], limit_s: float, slice_s: float) -> None:
+    """Read the units for which something is open in turn, for `slice_s` in all, for at most `limit_s` of the clock."""
+    until_s = context.clock.now_s() + limit_s
     while context.clock.now_s() < until_s:
-        unknown = {name: gyro for name, gyro in context.bench.gyros.items() if _is_period_unknown(gyro)}
-        if not unknown:
+        open_ones = {name: gyro for name, gyro in context.bench.gyros.items() if is_open(gyro)}
+        if not open_ones:
             return
-        for name, gyro in unknown.items():
-            readings = gyro.read(max(SLICE_S / len(unknown), 1.5 / gyro.sample_rate_hz))
+        for name, gyro in open_ones.items():
+            readings = gyro.read(max(slice_s / len(open_ones), 1.5 / gyro.sample_rate_hz))
             if len(readings):
                 context.monitor.add_readings(name, gyro, readings)
         checkpoint(context)
@@ -39,6 +51,10 @@ def learn_periods(context: ExecutionContext) -> None:
 
 def _is_period_unknown(gyro: Gyro) -> bool:
     return isinstance(gyro, StreamingGyro) and gyro.period.measured_s is None
+
+
+def _is_period_unconfirmed(gyro: Gyro) -> bool:
+    return isinstance(gyro, StreamingGyro) and gyro.period.is_unconfirmed
 
 
 def read_late(
@@ -98,6 +114,7 @@ def _write_lost(
     """Write down, count and say that `missing` readings of a gate, or of its beginning, did not arrive."""
     gyro = context.bench.gyros[name]
     lost = late_readings.lost_readings(gyro, missing)
+    count.gaps += late_readings.gaps_at_edges(gyro, gate, count, missing)
     count.add(lost)
     context.recorder.journal.readings(number, name, lost, context.monitor.air_c)
     expected = round(late_readings.promise_of(gyro, gate[1] - gate[0]).readings)
@@ -126,6 +143,8 @@ def _keep(
         if count.newest_s < gate[0] or readings.t_s[-1] >= gate[1]:  # some may be lost outside the gate
             room = late_readings.room(gyro, readings, gate, count)
             kept = replace(kept, lost=min(kept.lost, max(room - len(kept), 0)))
+        if missing := kept.lost + kept.damaged:
+            count.locate(readings.t_s, gate[0], missing, 1.0 / gyro.sample_rate_hz)
         count.note(readings.t_s, gate[0])
     if len(kept) or kept.lost or kept.damaged:
         count.add(kept)

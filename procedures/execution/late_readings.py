@@ -14,7 +14,7 @@ import numpy as np
 from instruments.interfaces.gyro import Gyro, Readings
 from instruments.interfaces.self_checks import LateTelling, StreamingGyro
 from instruments.transport.stream_period import COVERAGE, TOLERANCE
-from procedures.monitoring.bench_snapshot import ReadingCounts
+from procedures.monitoring.bench_snapshot import Gap, ReadingCounts
 
 #: Readings of a gate are waited for until this long after its end, s of the clock.
 WAIT_S = 2.0
@@ -90,6 +90,17 @@ def dropped(gyro: Gyro, gate: tuple[float, float], count: ReadingCounts) -> int:
         return 0
     periods = _periods(gyro, count.first_s - gate[0])
     return round(periods - 0.5) if periods > EDGES else 0
+
+
+def gaps_at_edges(gyro: Gyro, gate: tuple[float, float], count: ReadingCounts, missing: int) -> list[Gap]:
+    """Return where `missing` readings of a gate, clock time, are that no block shows: at its edges, else anywhere."""
+    first = min(dropped(gyro, gate, count), missing)
+    last = min(pending(gyro, gate, count), missing - first)
+    edges = (
+        Gap(gate[0], count.first_s, first), Gap(max(count.newest_s, gate[0]), gate[1], last),
+        Gap(*gate, missing - first - last),
+    )  # fmt: skip
+    return [gap for gap in edges if gap.readings]
 
 
 def is_late(gyro: Gyro) -> bool:

@@ -12,6 +12,15 @@ from numpy.typing import NDArray
 from instruments.interfaces.gyro import Gyro, Readings
 
 
+@dataclass(frozen=True)
+class Gap:
+    """Readings that are lost or damaged between two times of the bench's clock."""
+
+    from_s: float
+    until_s: float
+    readings: int
+
+
 @dataclass
 class ReadingCounts:
     """How the readings of one unit in one data set came in."""
@@ -22,6 +31,7 @@ class ReadingCounts:
     damaged: int = 0  #: lost, or not of the protocol
     first_s: float = math.inf  #: clock time of the first reading in the data set
     newest_s: float = -math.inf  #: clock time of the newest reading, also after the data set
+    gaps: list[Gap] = field(default_factory=list)  #: where the damaged ones are missing
 
     def note(self, t_s: NDArray[np.float64], from_s: float) -> None:
         """Note the clock times (n,) of readings of which those from `from_s` on may be of the data set."""
@@ -29,6 +39,23 @@ class ReadingCounts:
             self.newest_s = max(self.newest_s, float(t_s[-1]))
             if (inside := t_s[t_s >= from_s]).size:
                 self.first_s = min(self.first_s, float(inside[0]))
+
+    def locate(self, t_s: NDArray[np.float64], from_s: float, missing: int, period_s: float) -> None:
+        """Note where `missing` readings are, of a block at clock times (n,), n >= 1, that follows `from_s`.
+
+        Call it before `note`. What no gap of the times shows is somewhere between the block before and its end.
+        """
+        before_s = max(self.newest_s, from_s)
+        edges_s = np.concatenate(([min(before_s, float(t_s[0]))], t_s))
+        absent = np.rint(np.diff(edges_s) / period_s).astype(int) - 1
+        for k in np.argsort(-absent, kind="stable"):
+            if missing <= 0 or absent[k] < 1:
+                break
+            found = min(int(absent[k]), missing)
+            self.gaps.append(Gap(float(edges_s[k]), float(edges_s[k + 1]), found))
+            missing -= found
+        if missing > 0:
+            self.gaps.append(Gap(float(edges_s[0]), float(t_s[-1]), missing))
 
     def add(self, readings: Readings) -> None:
         """Count one block."""

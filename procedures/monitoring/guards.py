@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -42,17 +43,25 @@ class GuardViolation:
 
 
 @dataclass(frozen=True)
-class Excess:
-    """A value beyond its limit, before the recipe has said what that leads to."""
+class WatchedValue:
+    """A value that is watched now, and the limits that it has to keep, before the recipe has said what a trip does."""
 
     device: str
     value: float
-    limit: float
+    low: float  #: minus infinity: none
+    high: float
     unit: str
-    text: str
+    title: str  #: what is watched
+    text: str  #: what is wrong where it is beyond its limit
+    is_beyond: bool
+
+    @property
+    def limit(self) -> float:
+        """The limit that was passed, or that on the side of the value."""
+        return self.low if self.value < self.low else self.high
 
 
-Check = Callable[["Guards", BenchSnapshot], Iterator[Excess]]
+Check = Callable[["Guards", BenchSnapshot], Iterator[WatchedValue]]
 
 
 class Guards:
@@ -77,99 +86,112 @@ class Guards:
             self._limits = self._limits()
         return self._limits
 
+    def watched(self, now: BenchSnapshot) -> Iterator[tuple[GuardKind, WatchedValue]]:
+        """Yield every value that is watched at this moment."""
+        for kind, check in CHECKS.items():
+            for watched in check(self, now):
+                yield kind, watched
+
+    def violation(self, kind: GuardKind, watched: WatchedValue) -> GuardViolation:
+        """Return what a value beyond its limit leads to by the rules of the recipe."""
+        return GuardViolation(
+            kind,
+            self.rules.action_of(kind),
+            watched.device,
+            watched.value,
+            watched.limit,
+            watched.unit,
+            f"{watched.device}: {watched.text}: {watched.value:.6g} {watched.unit}".rstrip()
+            + f", limit {watched.limit:.6g}",
+        )
+
     def check(self, now: BenchSnapshot) -> list[GuardViolation]:
         """Return every limit that is passed at this moment."""
-        return [
-            GuardViolation(
-                kind,
-                self.rules.action_of(kind),
-                excess.device,
-                excess.value,
-                excess.limit,
-                excess.unit,
-                f"{excess.device}: {excess.text}: {excess.value:.6g} {excess.unit}".rstrip()
-                + f", limit {excess.limit:.6g}",
-            )
-            for kind, check in CHECKS.items()
-            for excess in check(self, now)
-        ]
+        return [self.violation(kind, watched) for kind, watched in self.watched(now) if watched.is_beyond]
 
 
-def _outside(device: str, value_c: float, low_c: float, high_c: float, text: str) -> Iterator[Excess]:
-    if not low_c <= value_c <= high_c:
-        yield Excess(device, value_c, low_c if value_c < low_c else high_c, "deg C", text)
+def _between(device: str, value_c: float, limits_c: tuple[float, float], title: str, text: str) -> WatchedValue:
+    low_c, high_c = limits_c
+    return WatchedValue(device, value_c, low_c, high_c, "deg C", title, text, not low_c <= value_c <= high_c)
 
 
-def _chamber_limits(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
+def _at_most(device: str, value: float, limit: float, unit: str, title: str, text: str) -> WatchedValue:
+    return WatchedValue(device, value, -math.inf, limit, unit, title, text, value > limit)
+
+
+def _chamber_limits(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     limits, margin_c = guards.limits.chamber, guards.rules.chamber_margin_c
     if limits is None or now.chamber_c is None:
-        return iter(())
+        return
     text = "the air is beyond the limits of the chamber"
-    return _outside(guards.chamber, now.chamber_c, limits.min_c - margin_c, limits.max_c + margin_c, text)
+    limits_c = limits.min_c - margin_c, limits.max_c + margin_c
+    yield _between(guards.chamber, now.chamber_c, limits_c, "air, limits of the chamber", text)
 
 
-def _unit_air(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
+def _unit_air(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     margin_c = guards.rules.chamber_margin_c
     if now.chamber_c is None:
         return
     for name, unit in guards.limits.gyros.items():
         text = f"the air is beyond what unit {name} may be exposed to"
-        yield from _outside(guards.chamber, now.chamber_c, unit.min_c - margin_c, unit.max_c + margin_c, text)
+        limits_c = unit.min_c - margin_c, unit.max_c + margin_c
+        yield _between(guards.chamber, now.chamber_c, limits_c, f"air, limits of {name}", text)
 
 
-def _unit_temperature(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
+def _unit_temperature(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     margin_c = guards.rules.gyro_margin_c
     for name, temperature_c in now.gyro_c.items():
         unit = guards.limits.gyros[name]
-        yield from _outside(name, temperature_c, unit.min_c - margin_c, unit.max_c + margin_c, "its own thermometer")
+        limits_c, text = (unit.min_c - margin_c, unit.max_c + margin_c), "its own thermometer"
+        yield _between(name, temperature_c, limits_c, text, text)
 
 
-def _chamber_deviation(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
+def _chamber_deviation(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     if now.chamber_c is None or now.setpoint_c is None:
         return
-    if any(True for _ in _foreign_change(guards, now)) and guards.rules.action_of("foreign_change") != "warn":
+    is_foreign = any(each.is_beyond for each in _foreign_change(guards, now))
+    if is_foreign and guards.rules.action_of("foreign_change") != "warn":
         return  # the air follows what others have set: what is done about that also ends the data set
-    off_c = abs(now.chamber_c - now.setpoint_c)
-    if now.taking_readings and off_c > guards.rules.chamber_deviation_c:
+    if now.taking_readings:
         text = f"the air left its set point of {now.setpoint_c:g} deg C while readings were taken"
-        yield Excess(guards.chamber, off_c, guards.rules.chamber_deviation_c, "deg C", text)
+        off_c = abs(now.chamber_c - now.setpoint_c)
+        yield _at_most(guards.chamber, off_c, guards.rules.chamber_deviation_c, "deg C", "air off its set point", text)
 
 
-def _unit_off_air(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
-    limit_c = guards.rules.max_gyro_off_air_c
-    if now.chamber_c is None:
+def _unit_off_air(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
+    if now.chamber_c is None or not now.taking_readings:
         return
+    text = f"its own thermometer differs from the air, {now.chamber_c:.1f} deg C, by"
     for name, temperature_c in now.gyro_c.items():
         off_c = abs(temperature_c - now.chamber_c)
-        if now.taking_readings and off_c > limit_c:
-            text = f"its own thermometer differs from the air, {now.chamber_c:.1f} deg C, by"
-            yield Excess(name, off_c, limit_c, "deg C", text)
+        yield _at_most(name, off_c, guards.rules.max_gyro_off_air_c, "deg C", "off the air", text)
 
 
-def _chamber_alarm(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
-    if now.alarms:
-        yield Excess(guards.chamber, float(len(now.alarms)), 0.0, "", f"alarms ({', '.join(now.alarms)})")
+def _chamber_alarm(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
+    if now.chamber_c is not None or now.alarms:
+        text = f"alarms ({', '.join(now.alarms)})"
+        yield _at_most(guards.chamber, float(len(now.alarms)), 0.0, "", "alarms", text)
 
 
-def _foreign_change(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
-    if now.foreign and not now.attended:
-        yield Excess(guards.chamber, float(len(now.foreign)), 0.0, "", f"changed by others ({'; '.join(now.foreign)})")
+def _foreign_change(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
+    if (now.chamber_c is not None or now.foreign) and not now.attended:
+        text = f"changed by others ({'; '.join(now.foreign)})"
+        yield _at_most(guards.chamber, float(len(now.foreign)), 0.0, "", "changed by others", text)
 
 
-def _stale(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
+def _stale(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     for device, silent_s in now.silent_s.items():
-        if silent_s > guards.rules.stale_s:
-            yield Excess(device, silent_s, guards.rules.stale_s, "s", "no answer; check cable and power")
+        yield _at_most(device, silent_s, guards.rules.stale_s, "s", "silent", "no answer; check cable and power")
 
 
-def _damaged(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
+def _damaged(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     for name, count in now.counts.items():
-        yield from _fraction(name, count.damaged, count.base, guards.rules.max_damaged_fraction, "lost or damaged")
+        yield _fraction(name, count.damaged, count.base, guards.rules.max_damaged_fraction, "lost or damaged")
 
 
-def _invalid(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
+def _invalid(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     for name, count in now.counts.items():
-        yield from _fraction(name, count.invalid, count.base, guards.rules.max_invalid_fraction, "marked bad")
+        yield _fraction(name, count.invalid, count.base, guards.rules.max_invalid_fraction, "marked bad")
 
 
 def is_too_many(count: float, base: float, limit: float) -> bool:
@@ -177,17 +199,16 @@ def is_too_many(count: float, base: float, limit: float) -> bool:
     return count > 1 + limit * base
 
 
-def _fraction(name: str, count: int, base: float, limit: float, quantity: str) -> Iterator[Excess]:
-    if is_too_many(count, base, limit):
-        yield Excess(name, 100 * count / base, 100 * limit, "%", f"readings {quantity}")
+def _fraction(name: str, count: int, base: float, limit: float, quantity: str) -> WatchedValue:
+    share, title = 100 * count / base if base else 0.0, f"readings {quantity}"
+    return WatchedValue(name, share, -math.inf, 100 * limit, "%", title, title, is_too_many(count, base, limit))
 
 
-def _rate(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
-    limit_dps = guards.rules.max_rate_error_fraction * abs(now.asked_dps)
-    off_dps = abs(now.rate_dps - now.asked_dps)
-    if off_dps > limit_dps:
+def _rate(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
+    if now.taking_readings or now.rate_dps != now.asked_dps:
         text = f"runs {now.rate_dps:g} deg/s instead of {now.asked_dps:g} deg/s, off by"
-        yield Excess(guards.table, off_dps, limit_dps, "deg/s", text)
+        limit_dps = guards.rules.max_rate_error_fraction * abs(now.asked_dps)
+        yield _at_most(guards.table, abs(now.rate_dps - now.asked_dps), limit_dps, "deg/s", "rate error", text)
 
 
 CHECKS: Mapping[GuardKind, Check] = {

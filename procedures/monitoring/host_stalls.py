@@ -7,8 +7,10 @@ no instrument was asked for it cannot have failed to answer: a silence counts wi
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from instruments.clock import Clock, SystemClock, attending, stands_in_stalls
 from procedures.contracts.journal import Event
@@ -22,6 +24,21 @@ MIN_S = 0.1
 SAID_FROM_S, SAY_EVERY_S = 0.5, 60.0
 #: A duration with which a clock tells how fast it runs, s.
 LONG_S = 1e6
+#: So many stalls are remembered, the newest: a data set is not longer.
+REMEMBERED = 1000
+
+
+@dataclass(frozen=True)
+class Stall:
+    """One stall, in seconds of the bench's clock. When in its interval the process was not run is not known."""
+
+    from_s: float
+    until_s: float
+    length_s: float  #: shorter than the interval by the period in which the time is read
+
+    def overlap_s(self, from_s: float, until_s: float) -> float:
+        """Return for how long at most the process was not run between two times."""
+        return min(max(min(self.until_s, until_s) - max(self.from_s, from_s), 0.0), self.length_s)
 
 
 class HostStalls:
@@ -40,6 +57,7 @@ class HostStalls:
         self._looked_s: float | None = None
         self._total_s = self._longest_s = self._unsaid_s = 0.0
         self._said_s: float | None = None
+        self._newest: deque[Stall] = deque(maxlen=REMEMBERED)
 
     @contextmanager
     def watching(self) -> Iterator[None]:
@@ -86,6 +104,12 @@ class HostStalls:
         """Return the same in seconds of the bench's clock."""
         return self.total_s() * self.speed
 
+    def since(self, from_s: float) -> tuple[Stall, ...]:
+        """Return the stalls that ended after `from_s`, a time of the bench's clock."""
+        with self._lock:
+            self._look()
+            return tuple(stall for stall in self._newest if stall.until_s > from_s)
+
     def news(self, *, at_the_end: bool = False) -> Event | None:
         """Return what is to be said of stalls since it was last said; None where there is nothing, or too soon.
 
@@ -121,6 +145,9 @@ class HostStalls:
             self._total_s += late_s
             self._unsaid_s += late_s
             self._longest_s = max(self._longest_s, late_s)
+            until_s = self._clock.now_s()
+            from_s = until_s - self.speed * (late_s + PERIOD_S)
+            self._newest.append(Stall(from_s, until_s, self.speed * late_s))
 
 
 class Lateness:

@@ -21,6 +21,7 @@ from procedures.monitoring.bench_snapshot import BenchSnapshot, ReadingCounts, g
 from procedures.monitoring.event_recorder import CampaignRecorder
 from procedures.monitoring.guards import Guards, GuardViolation
 from procedures.monitoring.host_stalls import HostStalls, not_run
+from procedures.monitoring.progress import WatchedLimit
 
 LinkState = Literal["well", "degraded", "lost"]  #: degraded: silent for a moment; lost: silent for too long
 
@@ -277,8 +278,9 @@ class BenchMonitor:
         chamber_c, setpoint_c = self.air_c, self.air_setpoint_c
         gyro_c, references = dict(self._gyro_c), dict(self.references.values)
         self._recorder.tracker.update(
-            t_s, chamber_c=chamber_c, setpoint_c=setpoint_c, gyro_c=gyro_c, references=references
-        )
+            t_s, chamber_c=chamber_c, setpoint_c=setpoint_c, gyro_c=gyro_c, references=references,
+            limits=tuple(self._watched_limits()),
+        )  # fmt: skip
         if air_heard:
             sample = EnvironmentSample(t_s, self.run, chamber_c, setpoint_c, gyro_c, references)
             self._recorder.journal.environment(sample)
@@ -286,6 +288,15 @@ class BenchMonitor:
                 for listener in self._listeners:
                     listener(t_s, chamber_c, self._gyro_c)
         return self.check_guards()
+
+    def _watched_limits(self) -> Iterator[WatchedLimit]:
+        now = self._snapshot()
+        for kind, watched in self._guards.watched(now):
+            yield WatchedLimit(
+                kind, watched.device, watched.title, watched.value, watched.low if math.isfinite(watched.low) else None,
+                watched.high, watched.unit, self._guards.rules.action_of(kind), watched.is_beyond,
+                now.silent_s.get(watched.device),
+            )  # fmt: skip
 
     def check_guards(self) -> list[GuardViolation]:
         """Return every limit that is passed by what was read last; records what has changed since the last check."""

@@ -80,6 +80,22 @@ class TurnProgress:
 
 
 @dataclass(frozen=True)
+class WatchedLimit:
+    """A value that a guard watches now, its limits, and how old it is."""
+
+    kind: str
+    device: str
+    title: str
+    value: float
+    low: float | None
+    high: float
+    unit: str
+    action: str  #: what a trip does by the rules of the recipe
+    is_beyond: bool
+    age_s: float | None  #: since the device answered; absent where it is not asked
+
+
+@dataclass(frozen=True)
 class Progress:
     """A running campaign at one moment. Each change makes a new object, so it can be read without a lock."""
 
@@ -100,6 +116,7 @@ class Progress:
     turn: TurnProgress | None = None  #: the turn by hand that is under way
     links: Mapping[str, str] = field(default_factory=dict)  #: devices that are not well: degraded or lost
     dropped: Mapping[str, str] = field(default_factory=dict)  #: units that are excluded, and why
+    limits: tuple[WatchedLimit, ...] = ()  #: what the guards watched at the last poll
     last_error: str = ""
     repeated: int = 0  #: data sets that were taken again, since this run began
     stalled_s: float = 0.0  #: how long this computer did not run labctl, real time, since this run began

@@ -6,7 +6,7 @@ another axis, upside down or not fixed to the table, and nothing that a calibrat
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from instruments.interfaces.gyro import Readings
@@ -38,6 +38,8 @@ class UnitResponse:
         self._mounting: tuple[int, int] | None = None
         self._sums: dict[str, _Sums] = {}
         self._earlier: dict[str, list[tuple[float, dict[str, float]]]] = {}
+        self._confirmed: set[str] = set()
+        self._unconfirmed: dict[str, list[int]] = {}
 
     def expect(self, name: str, outputs: Mapping[str, Nominal]) -> None:
         """Take note of what the channels of a unit mean; those without a nominal scale factor are left out."""
@@ -47,6 +49,7 @@ class UnitResponse:
         """Begin a data set of a mounting and powered session."""
         if mounting != self._mounting:
             self._mounting, self._earlier = mounting, {}
+            self._confirmed, self._unconfirmed = set(), {}
         self._sums = {}
 
     def add(self, name: str, readings: Readings) -> None:
@@ -56,6 +59,16 @@ class UnitResponse:
         for axis, output in self._outputs.get(name, {}).items():
             rates = output.rate_dps(readings.raw[output.channel.name][readings.valid])
             sums.rate_dps[axis] = sums.rate_dps.get(axis, 0.0) + float(rates.sum())
+
+    def keep(self, names: Iterable[str], number: int) -> None:
+        """Take note of a complete data set, which no comparison confirms yet for units that never answered a change."""
+        for name in names:
+            if name not in self._confirmed:
+                self._unconfirmed.setdefault(name, []).append(number)
+
+    def unconfirmed(self, name: str) -> tuple[int, ...]:
+        """Return the complete data sets of this mounting in which a unit may not have followed the table; once."""
+        return tuple(self._unconfirmed.pop(name, ()))
 
     def complaint(self, name: str, rate_dps: float, position: Position, max_rate_dps: float) -> str:
         """Return what is wrong with the answer of a unit to the table's rate, deg/s; empty where nothing is."""
@@ -71,6 +84,8 @@ class UnitResponse:
         shares = {axis: (mean - before[1][axis]) / change_dps for axis, mean in now.items()}
         share = shares[position.axis]
         if MIN_SHARE <= share <= LARGEST_SHARE:
+            self._confirmed.add(name)
+            self._unconfirmed.pop(name, None)
             return ""
         return (
             f"from {before[0]:g} to {rate_dps:.5g} deg/s of the table its output about {position.axis} changed by "

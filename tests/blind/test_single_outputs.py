@@ -14,7 +14,7 @@ from labctl.fitting.criticism import criticise
 from labctl.fitting.criticism.criticism import FittedMeans, fit_means
 from labctl.fitting.estimation.fit import fit
 from labctl.recording import to_points
-from labctl.services.criticism.report_text import sentences
+from labctl.services.criticism.answer import sentences
 from labctl.services.criticism.verification.of_version import applied_errors
 from studies.campaigns import campaign
 from studies.effect_sizes import sizes

@@ -20,4 +20,4 @@ def built(app: typer.Typer) -> Any:
 def build_once() -> None:
     """Let every run of a command in this process, and in those that are forked from it, take what was built."""
     typer.main.get_command = built
-    typer.testing._get_command = built
+    setattr(typer.testing, "_get_command", built)  # noqa: B010  a private name, which the runner of tests calls

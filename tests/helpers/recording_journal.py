@@ -17,6 +17,7 @@ class RecordingJournal:
         self.steps: list[tuple[str, int, Any]] = []
         self.headers: list[Any] = []
         self.closed: list[tuple[int, str, str]] = []
+        self.withdrawn: list[tuple[int, str, str]] = []
         self.angles: list[tuple[int, Any]] = []
         self.timed_runs: list[Any] = []
         self.clock_u: list[tuple[float, int]] = []
@@ -77,6 +78,10 @@ class RecordingJournal:
     def dataset_closed(self, dataset: int, state: Any, reason: str = "") -> None:
         self.closed.append((dataset, str(state), reason))
         self._reported("dataset_closed", dataset)
+
+    def dataset_withdrawn(self, dataset: int, gyro: str, reason: str) -> None:
+        self.withdrawn.append((dataset, gyro, reason))
+        self._reported("dataset_withdrawn", dataset)
 
     def environment(self, sample: Any) -> None:
         self.samples.append(sample)

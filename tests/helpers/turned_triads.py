@@ -8,7 +8,7 @@ import numpy as np
 
 from labctl.recording import Recording, write_recording
 from studies.triads import ABOUT_C, recording_of
-from studies.triads_simulation import TrueTriads, turned_by_hand, warmed, warmed_k
+from studies.triads_simulation import TrueTriads, Warming, turned_by_hand, warmed_k
 
 
 def unit_of(seed: int) -> TrueTriads:
@@ -23,7 +23,7 @@ def write_turned(
     t_s, rate, force, field = turned_by_hand(seed, unit, rests)
     away_k = warmed_k(len(t_s))
     if warm:
-        force = warmed(np.random.default_rng(seed + 1), unit, force, away_k)
+        force = Warming.drawn(np.random.default_rng(seed + 1)).readings(unit, force, away_k)
     made = recording_of(t_s, rate, force, field)
     columns = {**made.columns, "temperature_c": ABOUT_C + away_k} if warm else made.columns
     info = made.info.model_copy(update={"serial": serial})

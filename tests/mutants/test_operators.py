@@ -52,6 +52,17 @@ def test_each_likely_mistake_is_made_once_and_nothing_else() -> None:
     ]
 
 
+def test_an_assertion_is_turned_round_as_any_condition_is() -> None:
+    assert [each.after for each in mutants_of("assert note is not None\nassert ready(note)\n")] == [
+        "assert note is None", "assert not ready(note)",
+    ]  # fmt: skip
+
+
+def test_a_decorator_is_named_as_it_is_written_whatever_stands_before_it() -> None:
+    source = "class Stop:\n    text: str\n\n    @property\n    def over(self) -> bool: ...\n"
+    assert [(each.before, each.after) for each in mutants_of(source)] == [("@property", "")]
+
+
 def test_the_code_of_a_mutant_differs_in_what_it_says() -> None:
     removed = next(each for each in mutants_of(SOURCE) if each.operator == "CallRemoved")
     assert removed.code == SOURCE.replace("note(value_c)", "pass")

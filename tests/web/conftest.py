@@ -103,7 +103,7 @@ def profile(playwright: Playwright, tmp_path_factory: pytest.TempPathFactory) ->
     """A browser with one profile, for all tests of this worker. It keeps the scripts as they were compiled."""
     folder = tmp_path_factory.mktemp("profile")
     context = playwright.chromium.launch_persistent_context(
-        folder, executable_path=CHROMIUM, args=list(ARGUMENTS), viewport=WIDE, color_scheme="light"
+        folder, executable_path=CHROMIUM, args=list(ARGUMENTS), color_scheme="light"
     )
     yield Profile(context)
     context.close()

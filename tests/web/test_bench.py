@@ -115,7 +115,7 @@ def test_says_that_it_is_stale_and_goes_on_where_it_was(
 
     start(service)
     page = visit("/bench", alone=True)
-    expect(page.get_by_role("list")).to_contain_text("campaign running")
+    expect(page.get_by_role("region", name="Last events").get_by_role("list")).to_contain_text("campaign running")
     page.context.set_offline(True)
     service.stop()
     expect(page.get_by_text("No update since")).to_be_visible()
@@ -180,3 +180,32 @@ def test_a_bench_that_was_not_confirmed_safe_is_told_and_cleared_by_a_person(
     expect(reported).to_have_count(0)
     assert store.benches.unconfirmed(bench) == ""
     expect(page.get_by_role("button", name="Resume where it stopped")).to_be_enabled()
+
+
+def test_a_strip_for_each_limit_says_what_the_service_watches(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    start(service)
+    page = visit("/bench")
+    strips = page.get_by_role("region", name="Limits").get_by_role("listitem")
+    expect(strips.first).to_be_visible()
+    watched = service.get("/api/campaigns/1")["limits"]
+    assert {each["kind"] for each in watched} >= {"chamber_limits", "unit_air", "stale", "chamber_alarm"}
+    expect(strips).to_have_count(len(watched))
+    for each, strip in zip(watched, strips.all(), strict=True):
+        expect(strip).to_contain_text(f"{each['device']} {each['title']}")
+        expect(strip).to_contain_text(f"{each['high']:g}")
+        expect(strip).to_have_class("limit-strip good")
+    air = next(each for each in watched if each["kind"] == "chamber_limits")
+    shown = page.locator('[data-kind="chamber_limits"] .limit-value').inner_text()
+    assert float(shown.split()[0]) == pytest.approx(air["value"], abs=0.5)
+
+    page.get_by_role("link", name="Wall view").click()
+    expect(page.get_by_role("navigation", name="Pages")).to_be_hidden()
+    expect(page.get_by_role("button", name="Safe stop")).to_be_visible()
+    expect(strips).to_have_count(len(watched))
+    expect(page.get_by_role("status").filter(has_text="a question waits for an answer")).to_be_visible()
+    page.get_by_role("button", name="Sound is off").click()
+    expect(page.get_by_role("button", name="Sound is on")).to_be_visible()
+    page.get_by_role("link", name="Leave this view").click()
+    expect(page.get_by_role("navigation", name="Pages")).to_be_visible()

@@ -36,6 +36,33 @@ def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visi
     page.get_by_role("button", name="errors", exact=True).click()
     assert "level=error" in page.url
     expect(page.get_by_role("region", name="Events")).to_contain_text("No event of this kind")
+    assert_course_is_scrubbed(service, page)
+
+
+def assert_course_is_scrubbed(service: Service, page: Page) -> None:
+    """The slider moves chamber, unit, output and data set together, to what the service has of that time."""
+    from playwright.sync_api import expect
+
+    course, steps = service.get("/api/campaigns/1/course"), service.get("/api/campaigns/1/plan")["timeline"]
+    sets = service.get("/api/recordings/1/datasets")
+    card = page.get_by_role("region", name="Course")
+    card.scroll_into_view_if_needed()
+    expect(card).to_contain_text(f"all {course['samples']} times")
+    step = steps["dataset"].index(7)
+    inside_s = (steps["started_s"][step] + steps["ended_s"][step]) / 2
+    at = max(k for k, t_s in enumerate(course["t_s"]) if t_s <= inside_s)
+    assert course["t_s"][at] >= steps["started_s"][step]
+    slider = card.get_by_role("slider", name="Time of the campaign")
+    slider.fill(str(at))
+    expect(card).to_contain_text(f"{course['chamber_c'][at]:.2f} deg C")
+    (values,) = course["units_c"].values()
+    expect(card).to_contain_text(f"{values[at]:.2f} deg C")
+    expect(card).to_contain_text("7: complete")
+    (mean,) = (channel["mean"][6] for name, channel in sets["channels"].items() if name.startswith("gyro_"))
+    expect(card).to_contain_text(f"{mean:.7g}".rstrip("0"))
+    card.get_by_text("Two soaks over each other").first.click()
+    soaks = [k for k, kind in enumerate(steps["kind"]) if kind == "soak"]
+    expect(card.get_by_label("First soak").get_by_role("option")).to_have_count(len(soaks))
 
 
 def test_a_plan_says_what_further_mountings_are_worth(tmp_path: Path, chromium: Browser) -> None:

@@ -43,10 +43,10 @@ def test_a_pick_shows_everywhere_and_in_the_address(visit: Callable[..., Page], 
     box = picture.bounding_box()
     assert box is not None
     page.mouse.click(box["x"] + 0.45 * box["width"], box["y"] + 0.4 * box["height"])
-    expect(fails).to_contain_text("1 data sets selected")
+    expect(fails).to_contain_text("1 data set selected")
     assert "pick=" in page.url
     page.reload()
-    expect(page.get_by_role("region", name="Where the model fails")).to_contain_text("1 data sets selected")
+    expect(page.get_by_role("region", name="Where the model fails")).to_contain_text("1 data set selected")
     fails.get_by_role("button", name="Clear selection").click()
     expect(fails).to_contain_text("No data set is selected")
     assert "pick=" not in page.url

@@ -53,7 +53,7 @@ def test_a_cell_of_the_map_is_reached_read_and_selected(explored: Page, service:
     explored.keyboard.press("ArrowLeft")
     explored.keyboard.press("Enter")
     failing = explored.get_by_role("region", name="Where the model fails")
-    expect(failing).to_contain_text("1 data sets selected")
+    expect(failing).to_contain_text("1 data set selected")
     selected = failing.get_by_role("group", name="Selected data sets").locator("tbody tr")
     columns = service.get("/api/units/FOG-0001/calibrations/1/criticism")["views"]["sets"]
     shown = int(selected.first.locator("td").first.inner_text())
@@ -81,4 +81,4 @@ def test_the_points_over_a_channel_are_reached_from_left_to_right(explored: Page
     explored.keyboard.press("End")
     expect(line).to_contain_text(f"{max(drawn):.5g}"[:6])
     explored.keyboard.press("Enter")
-    expect(failing).to_contain_text("1 data sets selected")
+    expect(failing).to_contain_text("1 data set selected")

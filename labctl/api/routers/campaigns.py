@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Request, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from labctl.answers.campaigns import CampaignRequest, CampaignResponse, EventResponse
+from labctl.answers.course import CourseResponse
 from labctl.answers.drafts import DraftsRequest, DraftsResponse
 from labctl.answers.plans import CampaignPlanResponse
 from labctl.answers.schedule import ScheduledResponse
@@ -17,6 +18,7 @@ from labctl.api.computation import execute
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
 from labctl.api.paging import AfterNumber, Limit, Search, in_parts
+from labctl.services.campaigns.course import campaign_course
 from labctl.services.campaigns.plan_view import campaign_plan
 from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
 from labctl.services.commands.acts.start import START_CAMPAIGN
@@ -64,6 +66,16 @@ def campaign(campaign: int, service: ServiceDep) -> CampaignResponse:
 def plan(campaign: int, service: ServiceDep) -> CampaignPlanResponse:
     """The whole plan of the campaign, with the outcome of each step."""
     return campaign_plan(service.store, campaign)
+
+
+@router.get("/{campaign}/course", summary="Its temperatures")
+def course(
+    campaign: int,
+    service: ServiceDep,
+    points: Annotated[int, Query(ge=10, le=20_000, description="About as many times at most.")] = 1200,
+) -> CourseResponse:
+    """Temperatures of chamber and units while the campaign ran, also while it runs."""
+    return campaign_course(service.store, campaign, points)
 
 
 for _act in CAMPAIGN_ACTS:

@@ -161,7 +161,7 @@ def is_at_end(comparison: Comparison, effect: Candidate, *, shortest: bool = Fal
         terms = {i: o.term for i, o in enumerate(comparison.designs[axis].options) if o.candidate == effect.id}
         tau_s = {i: term.parameters["tau_s"] ** sign for i, term in terms.items() if term is not None}
         end, axis_log_bf = NEAR_END * max(tau_s.values()), comparison.axes[axis].log_bf
-        last = max((float(axis_log_bf[i]) for i, tau in tau_s.items() if tau >= end), default=-np.inf)
+        last = max(float(axis_log_bf[i]) for i, tau in tau_s.items() if tau >= end)
         inner = max((float(axis_log_bf[i]) for i, tau in tau_s.items() if tau < end), default=-np.inf)
         lead += last - inner if np.isfinite(last) and np.isfinite(inner) else 0.0
     return lead > LEAD
@@ -283,7 +283,7 @@ def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
     """
     effects = [c for c in candidates if not c.smooth]
     log_bf = np.array([c.log_bf if c.physical else -np.inf for c in effects]) - np.log(max(len(effects), 1))
-    top = max(float(log_bf.max(initial=0.0)), 0.0)
+    top = float(log_bf.max(initial=0.0))
     weights = np.exp(log_bf - top)
     total = weights.sum() + np.exp(-top)
     return {c.id: float(w / total) for c, w in zip(effects, weights, strict=True)}
@@ -295,7 +295,7 @@ def coefficients_of(comparison: Comparison, candidate: Candidate) -> dict[str, d
     for axis, index in candidate.option.items():
         option = comparison.designs[axis].options[index]
         values, covariance = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
-        u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        u = np.sqrt(np.diag(covariance))
         by_axis[axis] = with_derived({
             name: {"value": float(value), "u": float(error), "unit": unit}
             for name, unit, value, error in zip(option.names, option.units, values, u, strict=True)

@@ -9,6 +9,7 @@ import numpy as np
 from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
+from labctl.fitting.effects.equation import Equation, Source, Symbol, term_528
 from labctl.fitting.numeric.arrays import Array
 
 GRAVITY = 9.80665
@@ -65,6 +66,11 @@ class GSensitivity(_Acceleration):
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
     experiment = "each axis up and down within the same powered run"
     draws = ("map", "time")
+    equation: ClassVar = Equation(
+        "D * f[a]",
+        (Symbol("D", "g-sensitivity along the own axis", "deg/s/g", "g_own"),),
+    )
+    sources: ClassVar = (term_528("acceleration-sensitive drift rate"),)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("g_own", "deg/s/g", force_g(channels, axis))]
@@ -79,6 +85,11 @@ class CrossGSensitivity(_Acceleration):
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
     experiment = "a tumble over six faces within the same powered run"
     draws = ("map", "time")
+    equation: ClassVar = Equation(
+        "sum(D[a, j] * f[j] for j in others(a))",
+        (Symbol("D[a, j]", "g-sensitivity of output a along axis j", "deg/s/g", "g_{j}"),),
+    )
+    sources: ClassVar = (term_528("acceleration-sensitive drift rate"),)
 
     def felt_along(self, axis: str) -> tuple[str, ...]:
         return tuple(other for other in BODY_AXES if other != axis)
@@ -100,6 +111,11 @@ class GSquaredSensitivity(_Acceleration):
     ranges: ClassVar = {"fog": (0.0, 1e-4), "mems": (1e-4, 1e-2), "piezo": (0.0, 1e-2)}
     experiment = "up and down positions within one run, or a centrifuge"
     draws = ("map", "time")
+    equation: ClassVar = Equation(
+        "D * f[a]**2",
+        (Symbol("D", "sensitivity to the square of the specific force", "deg/s/g^2", "g_own_squared"),),
+    )
+    sources: ClassVar = (term_528("acceleration-squared-sensitive drift rate"),)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("g_own_squared", "deg/s/g^2", force_g(channels, axis) ** 2)]
@@ -118,9 +134,45 @@ class CentripetalAcceleration(_Acceleration):
     shows_at_rest = False
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
     aliases = ("scale_factor_even",)
-    parameters = (Parameter("by_position", "1", 0, 1),)
+    parameters = (
+        Parameter(
+            "by_position",
+            "1",
+            0,
+            1,
+            meaning="1: one coefficient for each position of the unit on the table; 0: one for all positions",
+        ),
+    )
     experiment = "the same rates at another radius, or with the unit turned by 180 deg on the table"
     draws = ("table_rate_dps", "map")
+    equation: ClassVar = Equation(
+        "(D[p] if by_position else D) * r / g_n * (pi / 180 * omega_t)**2",
+        (
+            Symbol(
+                "D[p]",
+                "g-sensitivity in position p, if the unit is 0.1 m off the axis; else times 0.1 m over the distance",
+                "deg/s/g",
+                "centripetal_{p}_up",
+            ),
+            Symbol("D", "the same, one for all positions", "deg/s/g", "centripetal"),
+        ),
+        where=(
+            ("r", "0.1"),
+            ("g_n", "9.80665"),
+        ),
+        others=(
+            Symbol("p", "position of the unit: the axis that points up", ""),
+            Symbol("r", "distance from the axis of the table", "m"),
+            Symbol("g_n", "standard acceleration of gravity", "m/s^2"),
+        ),
+    )
+    sources: ClassVar = (
+        Source(
+            "BIPM, The International System of Units, and 3rd CGPM 1901, Resolution 2",
+            "standard acceleration of gravity, 9.80665 m/s^2",
+        ),
+        term_528("acceleration-sensitive drift rate"),
+    )
 
     def felt_along(self, axis: str) -> tuple[str, ...]:
         return ()  # it follows from the rate

@@ -7,6 +7,7 @@ from typing import ClassVar
 from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Term
+from labctl.fitting.effects.equation import YANG, Equation, Source, Symbol, term_528
 
 
 class Misalignment(Effect):
@@ -21,6 +22,21 @@ class Misalignment(Effect):
     aliases = ("non_orthogonality",)
     experiment = "remove and refit the unit at least three times: the part that changes is due to the fixture"
     draws = ("table_rate_dps", "map")
+    equation: ClassVar = Equation(
+        "sum(m[a, j] * omega[j] for j in others(a))",
+        (
+            Symbol(
+                "m[a, j]",
+                "part of the rate about axis j in output a: for small angles the angle, rad",
+                "1",
+                "misalignment_{j}",
+            ),
+        ),
+    )
+    sources: ClassVar[tuple[Source, ...]] = (
+        Source(YANG, "error model, output = K rate + B: other entries of K"),
+        term_528("input-axis misalignment"),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [
@@ -42,6 +58,20 @@ class NonOrthogonality(Misalignment):
     aliases = ("misalignment",)
     experiment = "an external alignment cube"
     draws = ("table_rate_dps", "map")
+    equation: ClassVar = Equation(
+        "sum(m[a, j] * omega[j] for j in others(a))",
+        (
+            Symbol(
+                "m[a, j]",
+                "part of the rate about axis j in output a: for small angles the angle, rad",
+                "1",
+                "misalignment_{j}",
+            ),
+        ),
+    )
+    sources: ClassVar[tuple[Source, ...]] = (
+        Source(YANG, "error model: the matrix of non-orthogonality is a factor of K, so that K contains it"),
+    )
 
 
 EFFECTS: tuple[type[Effect], ...] = (Misalignment, NonOrthogonality)

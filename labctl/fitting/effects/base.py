@@ -16,6 +16,7 @@ import numpy as np
 from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Carrier, Channels
 from labctl.fitting.data.temperature.history import TemperatureHistory
+from labctl.fitting.effects.equation import Equation, Source
 from labctl.fitting.numeric.arrays import Array
 
 #: Which output axes an effect shows on: the one that turns, the others, or all alike.
@@ -33,6 +34,8 @@ class Parameter:
     low: float
     high: float
     logarithmic: bool = False
+    symbol: str = ""  #: in the equation of its effect; "": a switch, which chooses a case there
+    meaning: str = ""
 
     def grid(self, points: int) -> Array:
         """Return `points` values across the range."""
@@ -138,6 +141,8 @@ class Effect(ABC):
     one_sign: ClassVar[bool] = False  #: whether the first coefficient has the sign of its range; else of either sign
     aliases: ClassVar[tuple[str, ...]] = ()  #: ids of the same columns, in one of the shapes, whatever the schedule
     experiment: ClassVar[str] = ""  #: what would distinguish it from similar effects
+    equation: ClassVar[Equation | None] = None
+    sources: ClassVar[tuple[Source, ...]] = ()  #: of the equation, or of the definition of the effect
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
     shows_at_rest: bool = False  #: whether it is an error of the bias, at least in part: then it takes no rate to see
     remembers: ClassVar[bool] = False  #: whether it needs the temperatures before, which a state stands for in use

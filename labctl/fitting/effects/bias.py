@@ -9,6 +9,7 @@ import numpy as np
 from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Span, Term, powers
+from labctl.fitting.effects.equation import IEEE_952, OJEDA, WEISS, YANG, Equation, Source, Symbol, term_528
 
 
 class Bias(Effect):
@@ -23,6 +24,15 @@ class Bias(Effect):
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 3.0), "piezo": (0.0, 5.0)}
     experiment = "input axis up, then down, table clamped: half the sum is bias, half the difference is not"
     draws = ("map",)
+    equation: ClassVar = Equation(
+        "b",
+        (Symbol("b", "bias", "deg/s", "bias"),),
+    )
+    sources: ClassVar = (
+        term_528("bias"),
+        Source(YANG, "error model, output = K rate + B: bias B"),
+        Source(IEEE_952, "model equation, term D_F", "definition"),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("bias", "deg/s", np.ones(len(channels)))]
@@ -43,6 +53,15 @@ class BiasTemperature(Effect):
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.005, 0.08), "piezo": (0.05, 0.63)}
     experiment = "measure the temperatures in the opposite order and repeat one of them at the end"
     draws = ("temperature_c", "map")
+    equation: ClassVar = Equation(
+        "sum(b[k] * (T - T_ref)**k for k in upto(1, n))",
+        (Symbol("b[k]", "temperature coefficient of the bias of power k", "deg/s/K^k", "bias_t{k}"),),
+    )
+    sources: ClassVar = (
+        Source(OJEDA, "Eq. 4 (a parabola at one rate)"),
+        Source(IEEE_952, "model equation, term D_T", "definition"),
+        Source(WEISS, "table of the offset over temperature", "definition"),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         centred = channels.temperature_c(axis) - reference.temperature_c

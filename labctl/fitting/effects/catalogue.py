@@ -26,6 +26,7 @@ from labctl.fitting.effects import (
     thermal,
 )
 from labctl.fitting.effects.base import Effect, Term
+from labctl.fitting.effects.description import equation_of, parameters_of, sources_of
 from labctl.fitting.effects.formula import NAME, Formula
 from labctl.fitting.effects.trial import refuse_useless
 
@@ -140,7 +141,9 @@ def describe_effects() -> list[EffectJson]:
             "needs": list(kind.needs),
             "order": kind.default_order,
             "max_order": kind.max_order,
-            "parameters": [{"name": p.name, "unit": p.unit, "low": p.low, "high": p.high} for p in kind.parameters],
+            "parameters": parameters_of(kind),
+            "equation": equation_of(kind),
+            "sources": sources_of(kind),
             "plausible": {technology: list(span) for technology, span in kind.ranges.items()},
             "aliases": list(kind.aliases),
             "experiment": kind.experiment,

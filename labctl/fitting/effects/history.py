@@ -10,6 +10,7 @@ from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
+from labctl.fitting.effects.equation import IEEE_952, Equation, Source, Symbol, term_528
 
 
 class BiasDrift(Effect):
@@ -26,6 +27,12 @@ class BiasDrift(Effect):
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.5)}
     experiment = "the first temperature repeated at the end; a long record at rest"
     draws = ("time", "repeats", "legs")
+    equation: ClassVar = Equation(
+        "R * (t - t_m) / 3600",
+        (Symbol("R", "rate ramp", "deg/s/h", "bias_drift"),),
+        others=(Symbol("t_m", "middle of the recording", "s"),),
+    )
+    sources: ClassVar = (Source(IEEE_952, "Annex C.1.4, rate ramp"),)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         since_middle_s = channels.recording_t_s() - channels.history.middle_s
@@ -57,6 +64,12 @@ class RunShift(_Shift):
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.1), "piezo": (0.0, 0.5)}
     experiment = "at least two power cycles in each mounting"
     draws = ("time", "repeats")
+    equation: ClassVar = Equation(
+        "b[r]",
+        (Symbol("b[r]", "bias of powered run r less that of the first; 0 for the first", "deg/s", "run_{r}"),),
+        others=(Symbol("r", "number of the powered run", "", "run"),),
+    )
+    sources: ClassVar = (term_528("repeatability"),)
 
 
 class MountingShift(_Shift):
@@ -71,6 +84,16 @@ class MountingShift(_Shift):
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.1), "piezo": (0.0, 0.5)}
     experiment = "both mountings in one powered run"
     draws = ("time", "map")
+    equation: ClassVar = Equation(
+        "b[m]",
+        (
+            Symbol(
+                "b[m]", "output at rest in mounting m less that in the first; 0 for the first", "deg/s", "mounting_{m}"
+            ),
+        ),
+        others=(Symbol("m", "number of the mounting", "", "mounting"),),
+    )
+    sources: ClassVar = (term_528("repeatability"),)
 
 
 class RateHysteresis(Effect):
@@ -83,10 +106,24 @@ class RateHysteresis(Effect):
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     needs = ("t_s",)
-    parameters = (Parameter("by_sign", "1", 0, 1),)
+    parameters = (
+        Parameter(
+            "by_sign",
+            "1",
+            0,
+            1,
+            symbol="c",
+            meaning="how sharply the sign of the rate before decides; 0: the error is proportional to that rate",
+        ),
+    )
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.05), "piezo": (0.0, 0.2)}
     experiment = "rates in random order, each approached from both sides"
     draws = ("previous_rate",)
+    equation: ClassVar = Equation(
+        "h * tanh(c * omega_b / omega_max) if c > 0 else h * omega_b / omega_max",
+        (Symbol("h", "error after the largest rate", "deg/s", "previous_rate"),),
+    )
+    sources: ClassVar = (term_528("hysteresis error"),)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         before = np.asarray(channels["previous_rate_dps"], dtype=np.float64)
@@ -108,10 +145,34 @@ class StartTransient(Effect):
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     needs = ("t_s",)
-    parameters = (Parameter("tau_s", "s", 0.5, 20.0, logarithmic=True),)
+    parameters = (
+        Parameter(
+            "tau_s",
+            "s",
+            0.5,
+            20.0,
+            logarithmic=True,
+            symbol="tau",
+            meaning="time constant of the settling after a change of the rate",
+        ),
+    )
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.2)}
     experiment = "a longer wait before each data set; compare the first seconds of all data sets"
     draws = ("time_in_set", "previous_rate")
+    equation: ClassVar = Equation(
+        "(s_b * omega_b * u[a] - s_n * omega[a]) * E",
+        (
+            Symbol("s_b", "share of the rate before that is left at the start", "1", "start_from_rate"),
+            Symbol("s_n", "share of the present rate that is missing at the start", "1", "start_of_rate"),
+        ),
+        where=(("E", "tau / L * (exp(-t_d / tau) - exp(-(t_d + L) / tau))"),),
+        others=(
+            Symbol("E", "mean of exp(-time / tau) over the row", "1"),
+            Symbol("t_d", "start of the row since the start of its data set", "s", "since_begin_s"),
+            Symbol("L", "duration of the row", "s", "duration_s"),
+        ),
+    )
+    sources: ClassVar = (term_528("time constant"),)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         tau_s = term.parameters.get("tau_s", 4.0)

@@ -11,6 +11,7 @@ from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT, Response
 from labctl.fitting.effects.base import Column, Effect, Law, Parameter, Reference, Rows, Span, Term, by_parameter
+from labctl.fitting.effects.equation import Equation, Source, Symbol, term_528
 from labctl.fitting.numeric.arrays import Array
 
 
@@ -65,13 +66,26 @@ class TimeDelay(_Responding):
     term = "Time delay (latency)"
     sentence = "The output is delayed: while the rate changes, it is off by the delay times the angular acceleration."
     name = DELAY
-    parameters = (Parameter("delay_s", "s", 2e-4, 0.1, logarithmic=True),)
+    parameters = (
+        Parameter("delay_s", "s", 2e-4, 0.1, logarithmic=True, symbol="delta", meaning="delay of the output"),
+    )
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.03), "piezo": (0.0, 0.03)}
     experiment = (
         "a sine sweep up to the bandwidth: a delay leaves the amplitude of the output unchanged, a low bandwidth "
         "reduces it"
     )
     draws = ("time",)
+    equation: ClassVar = Equation(
+        "omega_a(t - delta) - omega_a(t)",
+        (Symbol("delta", "delay of the output", "s", "delay"),),
+        others=(Symbol("omega_a", "rate about the axis as a function of the time", "deg/s"),),
+    )
+    sources: ClassVar = (
+        Source(
+            "A. V. Oppenheim, A. S. Willsky, Signals and Systems, 2nd ed., Prentice Hall 1997",
+            "time shift: the frequency response exp(-i w delta)",
+        ),
+    )
 
 
 class Bandwidth(_Responding):
@@ -81,13 +95,30 @@ class Bandwidth(_Responding):
     term = "Bandwidth (first-order response)"
     sentence = "The output follows the rate like a first-order low-pass filter: fast changes are delayed and reduced."
     name = TIME_CONSTANT
-    parameters = (Parameter("time_constant_s", "s", 2e-4, 0.1, logarithmic=True),)
+    parameters = (
+        Parameter(
+            "time_constant_s", "s", 2e-4, 0.1, logarithmic=True, symbol="tau", meaning="time constant of the output"
+        ),
+    )
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.05)}
     experiment = (
         "a sine sweep up to the bandwidth: a delay leaves the amplitude of the output unchanged, a low bandwidth "
         "reduces it"
     )
     draws = ("time",)
+    equation: ClassVar = Equation(
+        "omega_l - omega[a]",
+        (Symbol("tau", "time constant of the output; the bandwidth at -3 dB is 1 / (2 pi tau)", "s", "time_constant"),),
+        where=(("d(omega_l)/d(t)", "(omega[a] - omega_l) / tau"),),
+        others=(Symbol("omega_l", "rate behind the low-pass filter", "deg/s"),),
+    )
+    sources: ClassVar = (
+        Source(
+            "A. V. Oppenheim, A. S. Willsky, Signals and Systems, 2nd ed., Prentice Hall 1997",
+            "first-order system: the frequency response 1 / (1 + i w tau)",
+        ),
+        term_528("bandwidth"),
+    )
 
 
 #: The effects of which the response is made.

@@ -11,6 +11,7 @@ import numpy as np
 from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Law, Parameter, Reference, Span, Term, by_parameter, powers
+from labctl.fitting.effects.equation import IEEE_952, OJEDA, YANG, Equation, Source, Symbol, term_528
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.open_loop_sine import sine_ratio, sine_ratio_slope
 
@@ -35,6 +36,14 @@ class ScaleFactor(Effect):
     aliases = ("table_rate_ratio",)
     experiment = "count whole turns against an index pulse: the integral of the output is 360 deg each"
     draws = ("table_rate_dps", "map")
+    equation: ClassVar = Equation(
+        "s * omega[a]",
+        (Symbol("s", "scale factor error", "1", "scale_factor"),),
+    )
+    sources: ClassVar = (
+        Source(YANG, "error model, output = K rate + B: diagonal of K"),
+        term_528("scale factor"),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("scale_factor", "1", channels.rate_dps(axis))]
@@ -53,6 +62,14 @@ class ScaleFactorTemperature(Effect):
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (1e-4, 5e-4), "piezo": (0.0, 2e-4)}
     experiment = "the same rates on the way up and on the way down in temperature"
     draws = ("map",)
+    equation: ClassVar = Equation(
+        "omega[a] * sum(s[k] * (T - T_ref)**k for k in upto(1, n))",
+        (Symbol("s[k]", "temperature coefficient of the scale factor of power k", "1/K^k", "scale_factor_t{k}"),),
+    )
+    sources: ClassVar = (
+        Source(OJEDA, "Eqs. 9 to 11, terms of rate to the power 1"),
+        Source(IEEE_952, "model equation, scale factor error over temperature", "definition"),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate = channels.rate_dps(axis)
@@ -79,6 +96,14 @@ class ScaleFactorAsymmetry(Effect):
     ranges: ClassVar = {"fog": (1e-5, 5e-4), "mems": (5e-5, 1e-3), "piezo": (0.0, 1e-3)}
     experiment = "at least six rates of each sign, in random order"
     draws = ("table_rate_dps", "map")
+    equation: ClassVar = Equation(
+        "s * abs(omega[a])",
+        (Symbol("s", "half the difference between the scale factors of the two directions", "1", "asymmetry"),),
+    )
+    sources: ClassVar = (
+        term_528("asymmetry error"),
+        Source(IEEE_952, "model equation, asymmetry of the scale factor", "definition"),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("asymmetry", "1", np.abs(channels.rate_dps(axis)))]
@@ -116,6 +141,14 @@ class ScaleFactorEven(_Power):
     aliases = ("centripetal_acceleration",)
     experiment = "repeat at another radius, or with the unit turned by 180 deg on the table"
     draws = ("table_rate_dps", "map")
+    equation: ClassVar = Equation(
+        "sum(s[k] * omega[a]**k for k in even(2, n))",
+        (Symbol("s[k]", "nonlinearity of power k", "(deg/s)^-(k-1)", "scale_factor_r{k}"),),
+    )
+    sources: ClassVar = (
+        Source(OJEDA, "Eq. 3 (a cubic in the rate), term of power 2"),
+        Source(IEEE_952, "model equation, nonlinearity of the scale factor", "definition"),
+    )
 
 
 class ScaleFactorOdd(_Power):
@@ -131,6 +164,14 @@ class ScaleFactorOdd(_Power):
     ranges: ClassVar = {"fog": (0.0, 5e-7), "mems": (0.0, 1e-8), "piezo": (0.0, 1e-7)}
     experiment = "more rates in the top third of the range"
     draws = ("table_rate_dps", "map")
+    equation: ClassVar = Equation(
+        "sum(s[k] * omega[a]**k for k in odd(3, n))",
+        (Symbol("s[k]", "nonlinearity of power k", "(deg/s)^-(k-1)", "scale_factor_r{k}"),),
+    )
+    sources: ClassVar = (
+        Source(OJEDA, "Eq. 3 (a cubic in the rate), term of power 3"),
+        Source(IEEE_952, "model equation, nonlinearity of the scale factor", "definition"),
+    )
 
 
 class SineResponse(Effect):
@@ -145,11 +186,33 @@ class SineResponse(Effect):
     term = "Sine response (open-loop interferometer)"
     sentence = "The output is proportional to the sine of the optical phase, so it is too small at high rates."
     origin: ClassVar[Origin] = "sensor"
-    parameters = (Parameter("k", "rad/(rad/s)", 0.05, 1.0, logarithmic=True),)
+    parameters = (
+        Parameter(
+            "k",
+            "rad/(rad/s)",
+            0.05,
+            1.0,
+            logarithmic=True,
+            symbol="K",
+            meaning="optical phase per rate, at which the law is linearised while effects compete",
+        ),
+    )
     ranges: ClassVar = {"fog": (0.0, 2.25), "mems": (0.0, 0.0), "piezo": (0.0, 0.0)}
     one_sign = True
     experiment = "more rates in the top third of the range"
     draws = ("table_rate_dps", "map")
+    equation: ClassVar = Equation(
+        "180 / pi * (sin(K * omega_r) / K - omega_r)",
+        (Symbol("K", "optical phase per rate; a fit estimates its square, k_squared", "rad/(rad/s)", "k"),),
+        where=(("omega_r", "pi / 180 * omega[a]"),),
+        others=(Symbol("omega_r", "rate about the axis in radians", "rad/s"),),
+    )
+    sources: ClassVar = (
+        Source(
+            "H. C. Lefèvre, The Fiber-Optic Gyroscope, 2nd ed., 2014",
+            "interferometer with biasing modulation: a signal proportional to the sine of the Sagnac phase",
+        ),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate = np.deg2rad(channels.rate_dps(axis))
@@ -181,11 +244,29 @@ class Saturation(Effect):
     term = "Saturation (input rate limit)"
     sentence = "Above a certain rate the output no longer increases with the rate."
     origin: ClassVar[Origin] = "sensor"
-    parameters = (Parameter("knee_dps", "deg/s", 20.0, 400.0),)
+    parameters = (
+        Parameter(
+            "knee_dps", "deg/s", 20.0, 400.0, symbol="omega_k", meaning="rate above which the output lags behind"
+        ),
+    )
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
     one_sign = True
     experiment = "rates every 2 to 5 % above 70 % of full scale"
     draws = ("table_rate_dps", "map", "worst")
+    equation: ClassVar = Equation(
+        "s * sign(omega[a]) * D * ln(1 + exp((abs(omega[a]) - omega_k) / D))",
+        (
+            Symbol(
+                "s",
+                "share of the rate above the knee that is lost, negative; -1: the output no longer increases",
+                "1",
+                "saturation",
+            ),
+        ),
+        where=(("D", "0.02 * omega_k"),),
+        others=(Symbol("D", "width of the knee", "deg/s"),),
+    )
+    sources: ClassVar = (term_528("input limits"),)
     softness: ClassVar[float] = 0.02  #: width of the knee, as a share: saturation sets in gradually
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
@@ -218,6 +299,19 @@ class RateTemperatureSurface(Effect):
         "nothing to separate: this surface includes bias, scale factor and nonlinearity with their temperature terms"
     )
     draws = ("map", "table_rate_dps", "temperature_c")
+    equation: ClassVar = Equation(
+        "sum(sum(c[i, k] * omega[a]**i * (T - T_ref)**k for k in upto(0, 2)) for i in upto(0, n))",
+        (
+            Symbol(
+                "c[i, k]",
+                "coefficient of rate to the power i and temperature to the power k",
+                "(deg/s)^(1-i) K^-k",
+                "c_r{i}_t{k}",
+            ),
+        ),
+        others=(Symbol("i", "power of the rate", ""),),
+    )
+    sources: ClassVar = (Source(OJEDA, "Eqs. 9 to 12"),)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate, centred = channels.rate_dps(axis), channels.temperature_c(axis) - reference.temperature_c

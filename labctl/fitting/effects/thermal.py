@@ -11,6 +11,7 @@ from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
+from labctl.fitting.effects.equation import IEEE_952, WEISS, Equation, Source, Symbol, term_528
 from labctl.fitting.effects.thermal_lag import LAGS
 
 
@@ -26,10 +27,53 @@ class TemperatureRate(Effect):
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
     needs = ("t_s",)
-    parameters = (Parameter("of_gradient", "1", 0, 1), Parameter("over_s", "s", 40.0, 600.0, logarithmic=True))
+    parameters = (
+        Parameter(
+            "of_gradient",
+            "1",
+            0,
+            1,
+            meaning="1: the air temperature less the thermometer's is used; 0: the rate of change of the thermometer",
+        ),
+        Parameter(
+            "over_s",
+            "s",
+            40.0,
+            600.0,
+            logarithmic=True,
+            symbol="tau_s",
+            meaning="duration over which the slope of the temperature is taken",
+        ),
+    )
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.5)}
     experiment = "two ramp speeds at one constant rate; measure during and after the soak"
     draws = ("legs", "time")
+    equation: ClassVar = Equation(
+        "D_c * (T_c - T) if of_gradient else D * Tdot",
+        (
+            Symbol("D", "error per rate of change of the temperature", "deg/s/(K/min)", "temperature_rate"),
+            Symbol("D_c", "error per difference between air and thermometer", "deg/s/K", "chamber_lead"),
+        ),
+        where=(
+            ("Tdot", "sum(k * T(t + k * h) for k in upto(-m, m)) / (h / 60 * sum(k**2 for k in upto(-m, m)))"),
+            ("m", "round(tau_s / (2 * h))"),
+            ("h", "10"),
+        ),
+        others=(
+            Symbol("Tdot", "slope of the line through the thermometer over the last and the next readings", "K/min"),
+            Symbol("k", "place of a temperature, before or after", ""),
+            Symbol("h", "spacing of the temperatures", "s"),
+            Symbol("m", "number of temperatures on either side", "1"),
+        ),
+    )
+    sources: ClassVar = (
+        Source(
+            "D. M. Shupe, Thermally induced nonreciprocity in the fiber-optic interferometer, Applied Optics 19(5), "
+            "1980, pp. 654-655",
+            "the error is proportional to the rate of change of the temperature along the fibre",
+        ),
+        Source(IEEE_952, "model equation, term D_T' T'", "definition"),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the thermometer's rate of change or (`of_gradient`) the air temperature less the thermometer's."""
@@ -58,13 +102,56 @@ class ThermalHysteresis(Effect):
     shows_at_rest = True
     needs = ("t_s",)
     parameters = (
-        Parameter("width_k", "K", 1.0, 15.0, logarithmic=True),
-        Parameter("bowed", "1", 0, 1),
-        Parameter("rounded", "1", 0, 1),
+        Parameter(
+            "width_k",
+            "K",
+            1.0,
+            15.0,
+            logarithmic=True,
+            symbol="W",
+            meaning="width of the play: how far the temperature turns back before the state changes sides",
+        ),
+        Parameter(
+            "bowed",
+            "1",
+            0,
+            1,
+            meaning="1: the loop closes at both ends of the range of temperatures; 0: it is equally wide everywhere",
+        ),
+        Parameter("rounded", "1", 0, 1, meaning="1: the state nears its new side exponentially; 0: in a straight line"),
     )
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.2), "piezo": (0.0, 0.2)}
     experiment = "temperatures on the way up and on the way down, then a smaller loop"
     draws = ("legs", "temperature_c")
+    equation: ClassVar = Equation(
+        "b * h * (4 * q * (1 - q) if bowed else 1)",
+        (Symbol("b", "half the width of the loop in the bias", "deg/s", "leg"),),
+        where=(
+            ("h", "sum(p[i] * P(r[i] * W) for i in upto(1, 4)) if rounded else P(W)"),
+            ("P(W)", "(T - T_p) / (W / 2)"),
+            ("T_p", "min(max(T_b, T - W / 2), T + W / 2)"),
+            ("q", "(T - T_min) / (T_max - T_min)"),
+        ),
+        others=(
+            Symbol("h", "state of the hysteresis: 1 when approached from below, -1 from above", "1"),
+            Symbol("P", "play of width W", "1"),
+            Symbol("T_p", "follower with play; at the start the temperature", "deg C"),
+            Symbol("T_b", "the follower one step of 10 s before", "deg C"),
+            Symbol("i", "number of a play", ""),
+            Symbol("r[i]", "nodes of the Gauss quadrature with the weight r exp(-r)", "1"),
+            Symbol("p[i]", "weights of that quadrature", "1"),
+            Symbol("q", "share of the range of temperatures, between 0 and 1", "1"),
+            Symbol("T_min", "lowest temperature of the recording", "deg C", "low_c"),
+            Symbol("T_max", "highest temperature of the recording", "deg C", "high_c"),
+        ),
+    )
+    sources: ClassVar = (
+        Source(
+            "M. A. Krasnosel'skii, A. V. Pokrovskii, Systems with Hysteresis, Springer 1989",
+            "play, and Ishlinskii's material: a sum of plays",
+        ),
+        term_528("hysteresis error"),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return a play of the temperature; with `rounded` several, so that the new side is approached smoothly."""
@@ -103,10 +190,25 @@ class WarmUp(Effect):
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
     needs = ("power_s",)
-    parameters = (Parameter("tau_s", "s", 100.0, 7200.0, logarithmic=True),)
+    parameters = (
+        Parameter(
+            "tau_s",
+            "s",
+            100.0,
+            7200.0,
+            logarithmic=True,
+            symbol="tau",
+            meaning="time constant of the settling after power-on",
+        ),
+    )
     ranges: ClassVar = {"fog": (0.0, 0.1), "mems": (0.0, 0.5), "piezo": (0.0, 2.0)}
     experiment = "a power cycle at constant temperature, and a wait of five time constants"
     draws = ("power_s", "time")
+    equation: ClassVar = Equation(
+        "b * exp(-t_on / tau)",
+        (Symbol("b", "change of the bias after power-on", "deg/s", "warm_up"),),
+    )
+    sources: ClassVar = (term_528("warm-up time"),)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         on_s = np.asarray(channels["power_s"], dtype=np.float64)
@@ -129,10 +231,28 @@ class SelfHeating(Effect):
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
     needs = ("power_s",)
-    parameters = (Parameter("tau_s", "s", 300.0, 3600.0, logarithmic=True),)
+    parameters = (
+        Parameter(
+            "tau_s",
+            "s",
+            300.0,
+            3600.0,
+            logarithmic=True,
+            symbol="tau",
+            meaning="time constant of the warming by the unit's own power",
+        ),
+    )
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.5), "piezo": (0.0, 5.0)}
     experiment = "compare the gyro's thermometer with the chamber's at rest, long after power-on"
     draws = ("power_s", "time")
+    equation: ClassVar = Equation(
+        "(b + s * omega[a]) * exp(-t_on / tau)",
+        (
+            Symbol("b", "change of the bias while the unit warms itself", "deg/s", "self_heating"),
+            Symbol("s", "change of the scale factor while the unit warms itself", "1", "self_heating_rate"),
+        ),
+    )
+    sources: ClassVar = (Source(WEISS, "drift of the offset, mostly self-heating", "definition"),)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """The share of the heating that is still to come: as bias, like a warm-up, and times the rate."""
@@ -163,6 +283,20 @@ class ThermometerError(Effect):
     ranges: ClassVar = {"fog": (-2.0, 2.0), "mems": (-2.0, 2.0), "piezo": (-2.0, 2.0)}
     experiment = "calibrate and use with the same thermometer; try a ramp that was not calibrated"
     draws = ("temperature_c", "map")
+    equation: ClassVar = Equation(
+        "(b + s * omega[a]) * (T - T_ref)",
+        (
+            Symbol("b", "temperature coefficient of the bias", "deg/s/K", "thermometer"),
+            Symbol("s", "temperature coefficient of the scale factor", "1/K", "thermometer_rate"),
+        ),
+    )
+    sources: ClassVar = (
+        Source(
+            IEEE_952,
+            "model equation, terms over temperature, with the error of the thermometer as dT",
+            "definition",
+        ),
+    )
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the temperature about its reference, as an error of the bias and of the scale factor."""

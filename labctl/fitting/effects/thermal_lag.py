@@ -17,6 +17,7 @@ import numpy as np
 from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
+from labctl.fitting.effects.equation import Equation, Source, Symbol
 from labctl.fitting.numeric.arrays import Array
 
 #: What makes the error: the distance between element and thermometer, or that of the squares of their temperatures.
@@ -25,6 +26,24 @@ Part = Literal["all", "curved"]
 SHORTEST_S, LONGEST_S = 20.0, 6000.0
 #: Time constant where a term states none, s.
 USUAL_S = 600.0
+
+#: Equations of the sensing elements, and what stands in them.
+LINES = (
+    ("d(T_g)/d(t)", "(T - T_g) / tau_T"),
+    ("tau_T", "tau_c if T_g > T else tau"),
+    ("d(T_2)/d(t)", "(T - T_2) / tau_2"),
+)
+SYMBOLS = (
+    Symbol("T_g", "temperature of the sensing element; at the start that of the thermometer", "deg C"),
+    Symbol("T_2", "temperature of a second element", "deg C"),
+    Symbol("tau_T", "time constant in this direction; tau in both unless cooling_tau_s is given", "s"),
+)
+SOURCES = (
+    Source(
+        "F. P. Incropera and others, Fundamentals of Heat and Mass Transfer",
+        "section 5.1, lumped capacitance method: the equation of T_g",
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -71,10 +90,36 @@ class Lag(Effect):
     origin: ClassVar[Origin] = "sensor"
     needs = ("t_s",)
     parameters = (
-        Parameter("tau_s", "s", SHORTEST_S, LONGEST_S, logarithmic=True),
-        Parameter("second_tau_s", "s", SHORTEST_S, LONGEST_S, logarithmic=True),
-        Parameter("cooling_tau_s", "s", SHORTEST_S, LONGEST_S, logarithmic=True),
-        Parameter("curved", "1", 0, 1),
+        Parameter(
+            "tau_s",
+            "s",
+            SHORTEST_S,
+            LONGEST_S,
+            logarithmic=True,
+            symbol="tau",
+            meaning="time constant with which the sensing element follows the thermometer",
+        ),
+        Parameter(
+            "second_tau_s",
+            "s",
+            SHORTEST_S,
+            LONGEST_S,
+            logarithmic=True,
+            symbol="tau_2",
+            meaning="time constant of a second element; left out: there is none",
+        ),
+        Parameter(
+            "cooling_tau_s",
+            "s",
+            SHORTEST_S,
+            LONGEST_S,
+            logarithmic=True,
+            symbol="tau_c",
+            meaning="time constant while the element is warmer than the thermometer; left out: the same",
+        ),
+        Parameter(
+            "curved", "1", 0, 1, meaning="1: the temperature law is curved, one coefficient more; 0: it is straight"
+        ),
     )
     draws = ("legs", "time")
 
@@ -110,6 +155,17 @@ class ThermalLag(Lag):
     shows_at_rest = True
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.1), "piezo": (0.0, 0.6)}
     experiment = "two ramp speeds: an error due to lag grows with the speed, an error due to hysteresis does not"
+    equation: ClassVar = Equation(
+        "b * (T_g - T) + b_2 * (T_2 - T) + b_c * ((T_g - T_ref)**2 - (T - T_ref)**2)",
+        (
+            Symbol("b", "temperature coefficient of the bias", "deg/s/K", "thermal_lag"),
+            Symbol("b_2", "the same of the second element; only with second_tau_s", "deg/s/K", "thermal_lag_second"),
+            Symbol("b_c", "curvature of the bias over temperature; only with curved", "deg/s/K2", "thermal_lag_curved"),
+        ),
+        where=LINES,
+        others=SYMBOLS,
+    )
+    sources: ClassVar = SOURCES
 
     def factor(self, channels: Channels, axis: str) -> Array:
         return np.ones(len(channels))
@@ -126,6 +182,22 @@ class ScaleFactorLag(Lag):
     )
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 5e-4), "piezo": (0.0, 2e-4)}
     experiment = "the same rates during a ramp of the temperature and after it, on the way up and on the way down"
+    equation: ClassVar = Equation(
+        "omega[a] * (s * (T_g - T) + s_2 * (T_2 - T) + s_c * ((T_g - T_ref)**2 - (T - T_ref)**2))",
+        (
+            Symbol("s", "temperature coefficient of the scale factor", "1/K", "scale_factor_lag"),
+            Symbol("s_2", "the same of the second element; only with second_tau_s", "1/K", "scale_factor_lag_second"),
+            Symbol(
+                "s_c",
+                "curvature of the scale factor over temperature; only with curved",
+                "1/K2",
+                "scale_factor_lag_curved",
+            ),
+        ),
+        where=LINES,
+        others=SYMBOLS,
+    )
+    sources: ClassVar = SOURCES
 
     def factor(self, channels: Channels, axis: str) -> Array:
         return channels.rate_dps(axis)

@@ -53,7 +53,7 @@ def components(
     def unlikely(variances: Array) -> float:
         first, second = np.append(variances, 0.0)[:2] * unit
         total = covariance + first * by_first + second * np.eye(len(residual))
-        return _restricted(jacobian, residual, total) + information(first)
+        return restricted_likelihood(jacobian, residual, total) + information(first)
 
     alone = minimize(unlikely, np.ones(1), method="L-BFGS-B", bounds=[(0.0, None)])
     both = minimize(unlikely, np.append(alone.x, 0.1), method="L-BFGS-B", bounds=[(0.0, None)] * 2)
@@ -62,7 +62,7 @@ def components(
     return float(first * unit[0]), float(second * unit[1])
 
 
-def _restricted(jacobian: NDArray[np.float64], residual: Array, covariance: NDArray[np.float64]) -> float:
+def restricted_likelihood(jacobian: NDArray[np.float64], residual: Array, covariance: NDArray[np.float64]) -> float:
     """Return minus the logarithm of the restricted likelihood, without its constant."""
     factor = cho_factor(covariance)
     weighted = cho_solve(factor, jacobian)

@@ -10,7 +10,7 @@ from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.acting_user import actor
 from labctl.answers.benches import BenchCheckResponse, BenchDescription
-from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest, ResumeRequest
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ResumeRequest
 from labctl.errors import BenchBusy, Conflict, StoreError
 from labctl.log import get_logger
 from labctl.services.benches.check import checked, description
@@ -249,9 +249,9 @@ class BenchRunner:
         if self._recovery.has_unfinished and self._job is None and self._may_drive:
             self.resume_unfinished()
 
-    def pause(self, campaign: int, request: ReasonRequest) -> CampaignResponse:
-        """Ask the running campaign to hold after the present data set. Raises Conflict when it does not run here."""
-        self._running(campaign).control.pause(request.text)
+    def ask(self, campaign: int, change: Callable[[Control], None]) -> CampaignResponse:
+        """Ask the running campaign for something, by its control. Raises Conflict when it does not run here."""
+        change(self._running(campaign).control)
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:

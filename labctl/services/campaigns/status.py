@@ -9,7 +9,13 @@ from typing import Literal
 
 from pydantic import TypeAdapter
 
-from labctl.answers.campaign_parts import DriverResponse, OutputResponse, PromptResponse, TurnResponse
+from labctl.answers.campaign_parts import (
+    DriverResponse,
+    OutputResponse,
+    PromptResponse,
+    TurnResponse,
+    WatchedLimitResponse,
+)
 from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.benches.identity import reported_in
@@ -51,6 +57,7 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
         prompt=None if prompt is None else PromptResponse(**asdict(prompt)),
         turn=None if progress.turn is None else TurnResponse(**asdict(progress.turn)),
         links=dict(progress.links),
+        limits=[] if state in ENDED else [WatchedLimitResponse(**asdict(each)) for each in progress.limits],
         dropped=dict(progress.dropped),
         started_at=row.started_at,
         ended_at=row.ended_at,

@@ -41,7 +41,7 @@ def criticise_unit(
     answer = _cached_criticism(CriticismResponse, store, row, measured, competing)
     if not (newer := passed_over(store, measured, recording, recordings)):
         return answer
-    from labctl.services.criticism.report_text import with_warnings  # noqa: PLC0415  slow to import
+    from labctl.services.criticism.answer import with_warnings  # noqa: PLC0415  slow to import
 
     return with_warnings(answer, newer)
 

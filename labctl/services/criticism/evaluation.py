@@ -16,9 +16,9 @@ from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.inversion import NotConverged
 from labctl.progress import report_stage
+from labctl.services.criticism.answer import answer_of, with_warnings
 from labctl.services.criticism.decimated_readings import Decimated
 from labctl.services.criticism.measurements import Measurements, refuse_unmeasured
-from labctl.services.criticism.report_text import answer_of, with_warnings
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.verification.of_version import verify
 from labctl.services.effects import catalogue_with

@@ -11,7 +11,7 @@ from labctl.answers.residuals import ResidualColumns
 from labctl.fitting import FitResult
 from labctl.fitting.criticism import ReducedRecording, Residuals
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.numeric.arrays import Array, over
 from labctl.recording import Recording
 from labctl.recording.columns import OWN_DATASET, RECORDING
@@ -32,13 +32,27 @@ def residual_columns(
         "table_rate_dps": data.at_sets(nodes.table_rate_dps()).tolist(),
         "t_s": data.at_sets(np.asarray(nodes["t_s"], dtype=np.float64)).tolist() if "t_s" in nodes else None,
     }
+    means = _means_of(points, data)
     columns = []
     for axis, residuals in left.items():
-        true = data.rows_of(nodes.rate_dps(axis)[:, None])[0, :, 0]
         temperature_c = data.at_sets(nodes.temperature_c(axis))
-        measured = data.output[axis][0] - true
+        if means is not None:  # the residual is that of the means
+            true, output = means.true_rate_dps(axis), means.outputs[axis]
+        else:
+            true, output = data.rows_of(nodes.rate_dps(axis)[:, None])[0, :, 0], data.output[axis][0]
+        measured = output - true
         columns.append(_axis(axis, shared, true, temperature_c, measured, residuals.means, residuals.floor_dps))
     return _joined(columns)
+
+
+def _means_of(points: Recording, data: ReducedRecording) -> FitData | None:
+    """Return the means of the rows of a reduced recording; None where it is divided in another way.
+
+    The first coordinate of a reduced data set is no mean: it leaves out what drifts or turns within the set.
+    """
+    means = fit_data_of(points)
+    numbers = np.asarray(means.channels["dataset"], dtype=np.int64)
+    return means if np.array_equal(numbers, np.asarray(data.dataset, dtype=np.int64)) else None
 
 
 def _of_fit(points: Recording, recording: int, base: FitResult) -> ResidualColumns:

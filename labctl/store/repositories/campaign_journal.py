@@ -251,15 +251,26 @@ class StoreJournal:
             this_one = (mine, d.number == dataset, d.state == DataSetState.OPEN.value)
             recordings = set(connection.scalars(sa.select(d.recording_id).where(*this_one)))
             if state is DataSetState.PARTIAL:
-                withdrawn = (mine, d.number == dataset, d.state == DataSetState.COMPLETE.value)
-                values = {"state": state.value, "reason": reason}
-                connection.execute(sa.update(tables.data_sets).where(*withdrawn).values(**values))
+                self._withdraw(connection, mine, dataset, reason)
             for gyro, recording in self._recordings.items():
                 if recording in recordings:
                     raw = self._raw_of(connection, gyro, recording, dataset)
                     self._close_one(connection, gyro, recording, dataset, state, reason, raw)
         for gyro in self._recordings:
             self._open.pop((dataset, gyro), None)
+
+    def dataset_withdrawn(self, dataset: int, gyro: str, reason: str) -> None:
+        """Mark a complete data set as partial for one unit: its readings are kept, and not fitted."""
+        with self._writing() as connection:
+            mine = tables.data_sets.c.recording_id == self._recordings[gyro]
+            self._withdraw(connection, mine, dataset, reason)
+
+    @staticmethod
+    def _withdraw(connection: sa.Connection, which: sa.ColumnElement[bool], dataset: int, reason: str) -> None:
+        d = tables.data_sets.c
+        withdrawn = (which, d.number == dataset, d.state == DataSetState.COMPLETE.value)
+        values = {"state": DataSetState.PARTIAL.value, "reason": reason}
+        connection.execute(sa.update(tables.data_sets).where(*withdrawn).values(**values))
 
     def _raw_of(
         self, connection: sa.Connection, gyro: str, recording: int, dataset: int

@@ -118,6 +118,11 @@ class Recordings:
             raise NotFound(f"recording {recording} is not in this database; check its number")
         return heads[0]
 
+    def environment(self, recording: int) -> dict[str, NDArray[np.generic]]:
+        """Return the temperatures around a recording in order of time, by column (n,); empty where none was logged."""
+        with self._database.reading() as connection:
+            return _environment(connection, recording) or {}
+
     def of_unit(self, serial: str) -> list[RecordingRow]:
         """Return a unit's recordings, newest first."""
         return self._heads(tables.recordings.c.serial == serial)

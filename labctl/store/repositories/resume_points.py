@@ -30,7 +30,7 @@ FINISHED = frozenset({"done", "skipped"})
 class ResumePoint:
     """Where a campaign resumes that no process runs."""
 
-    start_at: int  #: the first step that has to be run
+    start_at: int  #: the first step that has to be run, or run again because its data set was withdrawn
     complete: frozenset[int]  #: steps whose data set was complete when the process ended, before their end was recorded
     skipped: frozenset[int]
     last_t_s: float  #: campaign time of the last sign of life
@@ -78,6 +78,7 @@ class ResumePoints:
                     sa.select(d.planned).where(d.recording_id.in_(recordings), d.state == DataSetState.COMPLETE.value)
                 )
             )
+            withdrawn = self._withdrawn(connection, [unit[0] for unit in units if unit[2] is None])
             last_t_s = self._last_t_s(connection, campaign, recordings)
             ended_s = max((step[3] for step in steps if step[3] is not None), default=-1.0)
             owed, tries = self._events(connection, campaign, ended_s)
@@ -85,7 +86,10 @@ class ResumePoints:
         complete = frozenset(
             step[0] for step in steps if step[1] not in FINISHED and step[2].get("dataset") in planned - {None}
         )
-        steps_left = [step[0] for step in steps if step[1] not in FINISHED and step[0] not in complete]
+        again = {step[0] for step in steps if step[1] == "done" and step[2].get("dataset") in withdrawn}
+        steps_left = [
+            step[0] for step in steps if step[0] in again or (step[1] not in FINISHED and step[0] not in complete)
+        ]
         return ResumePoint(
             start_at=steps_left[0] if steps_left else len(steps),
             complete=complete,
@@ -99,6 +103,17 @@ class ResumePoints:
             clock_runs=runs,
             tries=tries,
         )
+
+    @staticmethod
+    def _withdrawn(connection: sa.Connection, recordings: list[int]) -> set[int]:
+        """Return the planned data sets that some unit has only in part, although their step was done."""
+        d = tables.data_sets.c
+        rows = connection.execute(sa.select(d.recording_id, d.planned, d.state).where(d.recording_id.in_(recordings)))
+        found: dict[bool, set[tuple[int, int]]] = {True: set(), False: set()}
+        for recording, planned, state in rows:
+            if planned is not None:
+                found[state == DataSetState.COMPLETE.value].add((recording, planned))
+        return {planned for _, planned in found[False] - found[True]}
 
     def _last_t_s(self, connection: sa.Connection, campaign: int, recordings: list[int]) -> float:
         e, v, d = tables.environment.c, tables.events.c, tables.data_sets.c

@@ -1,1 +1,1 @@
-"""The tables, one module per noun; `tables` holds them all."""
+"""The tables, one module per noun (`units.py`, `campaigns.py`, ...); `tables` gathers them all."""

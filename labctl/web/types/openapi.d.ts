@@ -956,6 +956,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/campaigns/{campaign}/course": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Its temperatures
+         * @description Temperatures of chamber and units while the campaign ran, also while it runs.
+         */
+        get: operations["course_api_campaigns__campaign__course_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/campaigns/{campaign}/abort": {
         parameters: {
             query?: never;
@@ -1556,6 +1576,26 @@ export interface paths {
          * @description The same, with what the version leaves; nothing is refitted.
          */
         get: operations["version_motion_api_units__serial__calibrations__version__motion_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/calibrations/{version}/point": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A point of a figure, computed again from its readings
+         * @description The readings of one data set, mean, rate, error and residual, and the same computed now from the raw readings.
+         */
+        get: operations["point_api_units__serial__calibrations__version__point_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -4068,6 +4108,11 @@ export interface components {
                 [key: string]: string;
             };
             /**
+             * Limits
+             * @description What the guards watched at the last poll; some are watched during data sets only. Empty: this process does not run the campaign.
+             */
+            limits: components["schemas"]["WatchedLimitResponse"][];
+            /**
              * Dropped
              * @description Units excluded from the rest of the campaign: name -> reason.
              */
@@ -4227,6 +4272,13 @@ export interface components {
              * @description Nonlinear parameters.
              */
             parameters: components["schemas"]["ParameterJson"][];
+            /** @description The equation of the effect; null: an effect of another package does not state it. */
+            equation: components["schemas"]["EquationJson"] | null;
+            /**
+             * Sources
+             * @description Publications of the equation, or of the definition of the effect.
+             */
+            sources: components["schemas"]["SourceJson"][];
             /**
              * Plausible
              * @description Technology -> least and largest plausible first coefficient, in the unit of the coefficient.
@@ -5579,6 +5631,44 @@ export interface components {
             bins: number;
         };
         /**
+         * CourseResponse
+         * @description Temperatures of a campaign over its time, as lists of equal length.
+         */
+        CourseResponse: {
+            /**
+             * Campaign
+             * @description Number of the campaign.
+             */
+            campaign: number;
+            /**
+             * Samples
+             * @description Number of times at which the environment was logged.
+             */
+            samples: number;
+            /**
+             * T S
+             * @description Times, s since the start of the campaign; fewer than `samples` where those are too many to show: the first and last and, of each span between, the ones at which the temperature was lowest and highest.
+             */
+            t_s: number[];
+            /**
+             * Chamber C
+             * @description Air of the chamber, deg C; null: not logged.
+             */
+            chamber_c: (number | null)[];
+            /**
+             * Setpoint C
+             * @description Set point of the chamber, deg C; null: none, or not logged.
+             */
+            setpoint_c: (number | null)[];
+            /**
+             * Units C
+             * @description By serial number: temperature of the unit by its own thermometer or the one that stands for it, deg C; null: not logged at this time.
+             */
+            units_c: {
+                [key: string]: (number | null)[];
+            };
+        };
+        /**
          * CriticisedErrors
          * @description Errors of the model as it was refitted for the criticism, and how much of what is there it explains.
          */
@@ -6642,6 +6732,27 @@ export interface components {
              * @description Whether they agree, at a probability of 1 % over all effects.
              */
             agree: boolean;
+        };
+        /**
+         * EquationJson
+         * @description The error of an output, deg/s, output minus rate, by an effect.
+         */
+        EquationJson: {
+            /**
+             * Text
+             * @description The equation as an expression of Python, then the lines that define what stands in it, after semicolons.
+             */
+            text: string;
+            /**
+             * Mathml
+             * @description The same as one element `math` of MathML.
+             */
+            mathml: string;
+            /**
+             * Symbols
+             * @description Every symbol of the equation, with its meaning and unit.
+             */
+            symbols: components["schemas"]["SymbolJson"][];
         };
         /**
          * ErrorFigures
@@ -10146,6 +10257,21 @@ export interface components {
              * @description Largest value that is tried, in `unit`.
              */
             high: number;
+            /**
+             * Symbol
+             * @description Symbol in the equation of the effect; empty: a switch, which chooses a case of the equation.
+             */
+            symbol: string;
+            /**
+             * Symbol Mathml
+             * @description The symbol as MathML; empty for a switch.
+             */
+            symbol_mathml: string;
+            /**
+             * Meaning
+             * @description What the parameter is; empty: an effect of another package does not say.
+             */
+            meaning: string;
         };
         /**
          * PictureResponse
@@ -10289,6 +10415,123 @@ export interface components {
             attendance: components["schemas"]["AttendanceResponse"] | null;
             /** @description The steps of the plan, with expected times. */
             timeline: components["schemas"]["TimelineColumns"];
+        };
+        /**
+         * PointNumbers
+         * @description The numbers of a point: residual = output - rate - modelled error.
+         */
+        PointNumbers: {
+            /**
+             * Output Dps
+             * @description Mean output of the data set's valid readings, deg/s.
+             */
+            output_dps: number;
+            /**
+             * Own Rate Dps
+             * @description Rate along the output axis, deg/s; it includes the Earth's rate where that is known.
+             */
+            own_rate_dps: number;
+            /**
+             * Measured Error Dps
+             * @description Output minus rate, deg/s.
+             */
+            measured_error_dps: number;
+            /**
+             * Modelled Error Dps
+             * @description Error that the model states, deg/s.
+             */
+            modelled_error_dps: number;
+            /**
+             * Residual Dps
+             * @description Measured error minus modelled error, deg/s.
+             */
+            residual_dps: number;
+        };
+        /**
+         * PointResponse
+         * @description One data set of one axis in a figure, and the same computed again from its raw readings.
+         */
+        PointResponse: {
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
+            serial: string;
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
+            version: number;
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
+            recording: number;
+            /**
+             * Dataset
+             * @description Number of the data set.
+             */
+            dataset: number;
+            /**
+             * Axis
+             * @description Output axis: x, y or z.
+             */
+            axis: string;
+            /**
+             * Figure
+             * @description The figure whose point it is.
+             * @enum {string}
+             */
+            figure: "residual" | "comparison";
+            /** @description The numbers of the figure. */
+            shown: components["schemas"]["PointNumbers"];
+            /** @description The same computed now from the raw readings; of the figure `residual` the modelled error is that of the fit to all data sets. null: the recording has no readings. */
+            recomputed: components["schemas"]["PointNumbers"] | null;
+            /**
+             * Equal
+             * @description Whether both agree within the rounding of a mean, `rounding_dps`; null: there are no readings.
+             */
+            equal: boolean | null;
+            /**
+             * Largest Difference Dps
+             * @description Largest difference between `shown` and `recomputed`, deg/s; null: there are no readings.
+             */
+            largest_difference_dps: number | null;
+            /**
+             * Rounding Dps
+             * @description Difference up to which both are equal, deg/s.
+             */
+            rounding_dps: number;
+            /**
+             * Readings
+             * @description Number of valid readings; 0: the recording has none.
+             */
+            readings: number;
+            /**
+             * Invalid
+             * @description Number of readings that the instrument marked as invalid; none of them counts.
+             */
+            invalid: number;
+            /**
+             * Std Dps
+             * @description Standard deviation of the readings (n - 1), deg/s; null: fewer than two readings.
+             */
+            std_dps: number | null;
+            /**
+             * Readings Sha256
+             * @description SHA-256 of the valid readings of the output, each as 8 bytes (little-endian double), in order; null: there are no readings.
+             */
+            readings_sha256: string | null;
+            /**
+             * Formula
+             * @description The residual with its numbers.
+             */
+            formula: string;
+            /**
+             * Summary
+             * @description The result of the computation from the readings, in one sentence.
+             */
+            summary: string;
         };
         /**
          * PoseColumns
@@ -12175,6 +12418,28 @@ export interface components {
             common: number | null;
         };
         /**
+         * SourceJson
+         * @description A publication that an effect is from.
+         */
+        SourceJson: {
+            /**
+             * Work
+             * @description Author, title and place of the publication, or the standard.
+             */
+            work: string;
+            /**
+             * Place
+             * @description Where in it, or what it says there.
+             */
+            place: string;
+            /**
+             * Gives
+             * @description What it contains: this equation, or the definition of the effect only; the shape is then labctl's own.
+             * @enum {string}
+             */
+            gives: "equation" | "definition";
+        };
+        /**
          * StageResponse
          * @description The stage of a followed criticism that begins now.
          */
@@ -12880,6 +13145,43 @@ export interface components {
              * @description What would distinguish it from similar effects.
              */
             experiment: string;
+        };
+        /**
+         * SymbolJson
+         * @description A symbol of an equation.
+         */
+        SymbolJson: {
+            /**
+             * Symbol
+             * @description The symbol as it stands in `text` of the equation.
+             */
+            symbol: string;
+            /**
+             * Mathml
+             * @description The symbol as MathML.
+             */
+            mathml: string;
+            /**
+             * Kind
+             * @description What it is: a coefficient, which a fit estimates; a parameter of the shape; a channel of a recording; other.
+             * @enum {string}
+             */
+            kind: "coefficient" | "parameter" | "channel" | "other";
+            /**
+             * Meaning
+             * @description What it stands for.
+             */
+            meaning: string;
+            /**
+             * Unit
+             * @description Its unit; 1: of no dimension; empty: an index.
+             */
+            unit: string;
+            /**
+             * Name
+             * @description Name of the coefficient, the parameter or the column that it stands for; empty: it has none.
+             */
+            name: string;
         };
         /**
          * TemperatureBasisJson
@@ -13986,6 +14288,62 @@ export interface components {
              * @default
              */
             experiment: string;
+        };
+        /**
+         * WatchedLimitResponse
+         * @description A value that a guard watches now, with its limits.
+         */
+        WatchedLimitResponse: {
+            /**
+             * Kind
+             * @description Guard, as in [guards] of a recipe.
+             */
+            kind: string;
+            /**
+             * Device
+             * @description Instrument or unit that the value is of.
+             */
+            device: string;
+            /**
+             * Title
+             * @description What is watched, in words.
+             */
+            title: string;
+            /**
+             * Value
+             * @description Value at the last poll, in `unit`.
+             */
+            value: number;
+            /**
+             * Low
+             * @description Lowest value that is allowed, in `unit`; null: none.
+             */
+            low: number | null;
+            /**
+             * High
+             * @description Highest value that is allowed, in `unit`.
+             */
+            high: number;
+            /**
+             * Unit
+             * @description Unit of value and limits; empty: a number of things.
+             */
+            unit: string;
+            /**
+             * Action
+             * @description What the recipe does when it is passed: warn, take_back, suspend or fail.
+             */
+            action: string;
+            /**
+             * Is Beyond
+             * @description The limit is passed. Of a share of readings, one more than the limit is needed: a single reading is no trend.
+             */
+            is_beyond: boolean;
+            /**
+             * Age S
+             * @description How long ago the device answered, s by the campaign's clock; null: it is not asked.
+             */
+            age_s: number | null;
         };
         /**
          * WithdrawFindingRequest
@@ -15632,6 +15990,40 @@ export interface operations {
             };
         };
     };
+    course_api_campaigns__campaign__course_get: {
+        parameters: {
+            query?: {
+                /** @description About as many times at most. */
+                points?: number;
+            };
+            header?: never;
+            path: {
+                campaign: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CourseResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     abort_api_campaigns__campaign__abort_post: {
         parameters: {
             query?: never;
@@ -16634,6 +17026,49 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MotionResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    point_api_units__serial__calibrations__version__point_get: {
+        parameters: {
+            query: {
+                /** @description Number of the recording. */
+                recording: number;
+                /** @description Number of the data set. */
+                dataset: number;
+                /** @description Output axis: x, y or z. */
+                axis: string;
+                /** @description The figure: residuals of the fitted model, or the version without refitting. */
+                figure?: "residual" | "comparison";
+                /** @description All recordings that are drawn together; default: `recording` alone. */
+                recordings?: number[] | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PointResponse"];
                 };
             };
             /** @description Validation Error */

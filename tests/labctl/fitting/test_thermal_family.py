@@ -21,7 +21,7 @@ from labctl.fitting.effects import Term
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording, to_points
-from labctl.services.criticism.report_text import sentences
+from labctl.services.criticism.answer import sentences
 from studies.rest_units import Hidden, unit_at_rest
 from tests.helpers.rest import at_rest, flowing, follow
 

@@ -18,7 +18,7 @@ from labctl.plots import Picture, pictures_of, report_html
 from labctl.plots.noise import ladder
 from labctl.plots.residual_maps import maps
 from labctl.recording import write_recording
-from labctl.services.criticism.report_text import answer_of
+from labctl.services.criticism.answer import answer_of
 from tests.helpers.criticism import bare_criticism, held, views
 from tests.helpers.lab import Lab
 from tests.helpers.recordings import cycled

@@ -18,7 +18,7 @@ from labctl.processes.call_forms import CallForm, read_call
 from labctl.processes.documents import BadDocument, answer, value_of
 from labctl.processes.settings import BenchSettings
 from labctl.recording import RecordingInfo
-from labctl.services.commands.acts.catalogue import BENCH_ACTS
+from labctl.services.commands.acts.catalogue import BENCH_ACTS, CAMPAIGN_ACTS
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
 from labctl.store.connection.transactions import TRANSACTIONS
 from tests.helpers.example_values import PLAIN, examples
@@ -56,13 +56,13 @@ def test_every_transaction_gets_what_was_given(name: str, monkeypatch: pytest.Mo
 
 
 ASKED: dict[str, tuple[object, ...]] = {
+    **{act.name: (act.asked(1, ReasonRequest(reason="tea")),) for act in CAMPAIGN_ACTS if act.body is ReasonRequest},
     "start": (
         CampaignStart(CampaignRequest(recipe="short", checks=["table_free"]), simulated_start=AT, wire_log=Path("é")),
     ),
     "schedule": (CampaignStart(CampaignRequest(recipe="short"), "bench", 2.0, 7),),
     "resume": (CampaignResume(None, ResumeRequest(by="Ada")), CampaignResume(3, ResumeRequest(by="Ada", reason="on"))),
     "abort": (ToCampaign(1, ReasonRequest(reason='a "reason"')), ToCampaign(2**40, ReasonRequest(reason="x"))),
-    "pause": (ToCampaign(1, ReasonRequest(reason="tea")),),
     "confirm": (ToCampaign(1, ConfirmRequest(prompt="2", confirmed=True, by="Ada")),),
     "check": (ToBench("a bench", CheckRequest()),),
     "start_live": (LiveRequest(serial="HG-1", latitude_deg=48.0, target_u=1e-4),),

@@ -45,19 +45,19 @@ from tests.helpers.openapi import openapi_document
 Asked = ToCampaign[ReasonRequest]
 
 
-def _hold_in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _linger_in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
     control.bench_runner()
-    control.record(context, HOLD.name, asked.campaign, asked.body.text)
+    control.record(context, LINGER.name, asked.campaign, asked.body.text)
     return campaign_status(context.store, asked.campaign)
 
 
-def _hold_in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
-    raise not_running(context.store, asked.campaign, "hold it")
+def _linger_in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
+    raise not_running(context.store, asked.campaign, "let it linger")
 
 
 #: Nothing but this makes an act.
-HOLD = CampaignAct(
-    name="hold",
+LINGER = CampaignAct(
+    name="linger",
     body=ReasonRequest,
     asked=Asked,
     summary="Hold the temperature",
@@ -66,8 +66,8 @@ HOLD = CampaignAct(
         help="Stay in the present soak until the campaign is resumed.",
         defaults={"reason": "held from the command line"},
     ),
-    in_service=_hold_in_service,
-    in_foreground=_hold_in_foreground,
+    in_service=_linger_in_service,
+    in_foreground=_linger_in_foreground,
     is_urgent=True,
 )
 
@@ -83,31 +83,32 @@ def test_a_declared_act_has_a_route_whose_request_is_validated_and_an_entry_in_t
     campaign = runner.start(CampaignRequest(recipe="short")).id
     service = create_app(LabService(store, VirtualClock(), runner))
     router = APIRouter(prefix="/api/campaigns")
-    add_act_route(router, HOLD)
+    add_act_route(router, LINGER)
     service.include_router(router)
     with TestClient(service) as client:
-        assert service.openapi()["paths"]["/api/campaigns/{campaign}/hold"]["post"]["summary"] == "Hold the temperature"
-        answer = client.post(f"/api/campaigns/{campaign}/hold", json={"reason": "the door is open", "by": "Ada"})
+        described = service.openapi()["paths"]["/api/campaigns/{campaign}/linger"]["post"]
+        assert described["summary"] == "Hold the temperature"
+        answer = client.post(f"/api/campaigns/{campaign}/linger", json={"reason": "the door is open", "by": "Ada"})
         assert (answer.status_code, answer.json()["id"]) == (200, campaign)
-        assert client.post(f"/api/campaigns/{campaign}/hold", json={"by": "Ada"}).status_code == 422
-        held = [row for row in store.audit.rows() if row.action == "campaign hold"]
+        assert client.post(f"/api/campaigns/{campaign}/linger", json={"by": "Ada"}).status_code == 422
+        held = [row for row in store.audit.rows() if row.action == "campaign linger"]
         assert [row.detail["reason"] for row in held] == ["the door is open (Ada)"]
 
 
 @pytest.fixture
-def with_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+def with_linger(monkeypatch: pytest.MonkeyPatch) -> None:
     """Add the line of the catalogue."""
-    monkeypatch.setattr(catalogue, "CAMPAIGN_ACTS", (*CAMPAIGN_ACTS, HOLD))
+    monkeypatch.setattr(catalogue, "CAMPAIGN_ACTS", (*CAMPAIGN_ACTS, LINGER))
 
 
-@pytest.mark.usefixtures("with_hold")
+@pytest.mark.usefixtures("with_linger")
 def test_a_declared_act_has_a_command_with_an_option_for_each_field_of_its_request(tmp_path: Path) -> None:
     database = str(tmp_path / "lab.sqlite")
-    shown = CliRunner().invoke(app, ["campaign", "hold", "--help"], env={"COLUMNS": "200"})
+    shown = CliRunner().invoke(app, ["campaign", "linger", "--help"], env={"COLUMNS": "200"})
     assert all(
         text in shown.stdout for text in ("until the campaign is resumed", "--reason", "--by", "--json", "--database")
     )
-    asked = ["campaign", "hold", "7", "--by", "Ada", "--database", database]
+    asked = ["campaign", "linger", "7", "--by", "Ada", "--database", database]
     refused = CliRunner().invoke(app, asked)
     assert (refused.exit_code, "campaign 7 is not in this database" in refused.stderr) == (2, True), refused.output
     empty = CliRunner().invoke(app, [*asked, "--reason", ""])
@@ -127,11 +128,11 @@ def sent(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
     return received
 
 
-@pytest.mark.usefixtures("with_hold")
+@pytest.mark.usefixtures("with_linger")
 def test_the_command_of_an_act_sends_its_request(sent: list[tuple[object, ...]]) -> None:
-    CliRunner().invoke(app, ["campaign", "hold", "7", "--by", "Ada", "--database", "lab.sqlite"])
+    CliRunner().invoke(app, ["campaign", "linger", "7", "--by", "Ada", "--database", "lab.sqlite"])
     request = ReasonRequest(reason="held from the command line", by="Ada")
-    assert sent == [("lab.sqlite", HOLD.command, ToCampaign(7, request), False)]
+    assert sent == [("lab.sqlite", LINGER.command, ToCampaign(7, request), False)]
 
 
 @pytest.mark.parametrize(
@@ -161,12 +162,12 @@ def test_an_option_that_is_no_field_of_the_request_goes_into_its_address(sent: l
     assert sent == [(None, RESUME.command, CampaignResume(7, request, speed=2.0), True)]
 
 
-@pytest.mark.usefixtures("with_hold")
+@pytest.mark.usefixtures("with_linger")
 def test_the_reference_of_the_command_line_has_a_declared_act() -> None:
     written = get_docs_for_click(obj=get_command(app), ctx=Context(get_command(app)), name="labctl")
-    entry = written.partition("### `labctl campaign hold`")[2].partition("### ")[0]
+    entry = written.partition("### `labctl campaign linger`")[2].partition("### ")[0]
     assert "* `--reason TEXT`: Reason for this action; it is recorded.  [default: held from the command line]" in entry
-    assert written.index("`labctl campaign hold`") < written.index("### `labctl campaign abort`")
+    assert written.index("`labctl campaign linger`") < written.index("### `labctl campaign abort`")
 
 
 def test_every_act_has_a_command_that_is_made_or_written() -> None:
@@ -206,8 +207,8 @@ SAMPLES = {"confirmed": True, "again": False, "power": "lost"}
 
 def test_the_client_has_a_method_for_each_act_that_sends_its_request() -> None:
     assert [found for act in CAMPAIGN_ACTS if (found := sent_by_client(act))] == []
-    assert sent_by_client(HOLD) == "Client has no method hold"
-    other = replace(HOLD, name="pause", body=ConfirmRequest)
+    assert sent_by_client(LINGER) == "Client has no method linger"
+    other = replace(LINGER, name="pause", body=ConfirmRequest)
     assert sent_by_client(other).startswith("Client.pause takes self, campaign, reason, by; its request has prompt")
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import socket
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -204,3 +208,89 @@ def test_a_line_of_64_kib_without_an_end_is_refused_at_once(
 ) -> None:
     monkeypatch.setattr(wire, "SAID_WITHIN_S", 30.0)
     assert sent(path, b"x" * 65536) == b""
+
+
+def test_a_request_of_just_less_than_64_kib_is_read_to_its_end_however_it_is_cut() -> None:
+    parts = [b"x" * (65536 - 4), b"\n", b"not read"]
+    caller: Any = SimpleNamespace(recv=lambda _: parts.pop(0))
+    assert wire._line(caller) == b"x" * (65536 - 4) + b"\n"
+
+
+def test_a_caller_that_could_not_be_accepted_does_not_keep_the_next_one_from_its_answer(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where the process has no file handle left for a moment."""
+    accept, failures = socket.socket.accept, [OSError(errno.EMFILE, os.strerror(errno.EMFILE))]
+
+    def flaky(listener: socket.socket) -> Any:
+        if failures:
+            raise failures.pop()
+        return accept(listener)
+
+    monkeypatch.setattr(socket.socket, "accept", flaky)
+    stopping = FakeStopping()
+    stopping.heard.set()
+    stopping.over.set()
+    server = StopServer(path, lambda _: stopping)
+    server.start()
+    answer = sent(path, LINE + b"\n")
+    server.close()
+    assert failures == []
+    assert b"stands" in answer
+
+
+def test_no_stop_that_is_being_answered_keeps_its_process_from_ending(path: Path) -> None:
+    before = set(threading.enumerate())
+    stopping = FakeStopping()
+    server = StopServer(path, lambda _: stopping)
+    server.start()
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect(str(path))
+        line.sendall(LINE + b"\n")
+        line.recv(4096)
+        begun = set(threading.enumerate()) - before
+        stopping.heard.set()
+        stopping.over.set()
+    server.close()
+    assert len(begun) == 2  # that accepts, and that answers
+    assert all(thread.daemon for thread in begun)
+
+
+class ScriptedLine:
+    """A connection whose answers come at given times, s; notes for how long each is waited for."""
+
+    def __init__(self, *answers: tuple[float, bytes]) -> None:
+        self.now, self.waits_s = 100.0, list[float]()
+        self._answers = list(answers)
+
+    def __enter__(self) -> ScriptedLine:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def settimeout(self, within_s: float) -> None:
+        self.waits_s.append(within_s)
+
+    def connect(self, _path: str) -> None: ...
+
+    def sendall(self, _request: bytes) -> None: ...
+
+    def now_s(self) -> float:
+        return self.now
+
+    def recv(self, _length: int) -> bytes:
+        after_s, answer = self._answers.pop(0)
+        self.now += after_s
+        return answer
+
+
+def test_an_asker_waits_for_the_first_word_from_its_question_on_and_for_each_later_one_from_the_word_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    line = ScriptedLine(
+        (1.0, b'{"phase": '), (0.5, b'"asked"}\n'), (2.0, b'{"phase"'), (3.5, b": "), (0.0, b'"stands"}\n')
+    )
+    monkeypatch.setattr(wire, "SystemClock", lambda: line)
+    monkeypatch.setattr(wire, "socket", SimpleNamespace(**vars(socket) | {"socket": lambda *_: line}))
+    assert [word.phase for word in ask("stop", REQUEST, silent_s=5.0, first_s=1.5)] == ["asked", "stands"]
+    assert line.waits_s == [1.5, 1.5, 0.5, 5.0, 3.0, 1e-3]  # the first is that of the connection; none is without end

@@ -27,10 +27,14 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
+from labctl.services.commands.acts.abort import ABORT
+from labctl.services.commands.acts.campaign_act import CampaignAct
+from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store, migrate, migrate_database, open_store
 from labctl.store.connection.database import Database
+from procedures.contracts.control import Control
 from tests.helpers.certifying import OVERRIDE, OVERRIDE_OPTIONS, REASON
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.written_logs import at_rest, csv_text
@@ -217,6 +221,15 @@ def cancel(client: TestClient) -> Any:
     return client.delete(f"/api/schedule/{later.json()['id']}")
 
 
+def asks_running(act: CampaignAct[Any]) -> bool:
+    """Return whether an act asks a running campaign for something; an abort comes later, when the rest is done."""
+    return act.body is ReasonRequest and act is not ABORT
+
+
+def asked(name: str) -> Callable[[TestClient], Any]:
+    return lambda client: client.post(f"/api/campaigns/1/{name}", json={"reason": "tea"})
+
+
 UNIT = "/api/units/OSU-FOG-2024/calibrations"
 PERSON = {"by": "A", "reason": "B"}
 NOTE = {"file": "x", "bytes": 1, "sha256": "0" * 64}
@@ -226,9 +239,7 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
     "/api/benches/{bench}/clear": (
         "bench clear", lambda c: c.post("/api/benches/single-axis-sim/clear", json={"by": "A. Person"}),
     ),
-    "/api/campaigns/{campaign}/pause": (
-        "campaign pause", lambda c: c.post("/api/campaigns/1/pause", json={"reason": "tea"}),
-    ),
+    **{act.command.path: (f"campaign {act.name}", asked(act.name)) for act in CAMPAIGN_ACTS if asks_running(act)},
     "/api/campaigns/{campaign}/confirm": (
         "campaign confirm", lambda c: c.post("/api/campaigns/1/confirm", json={"prompt": "1-mount", "by": "A"}),
     ),
@@ -281,7 +292,7 @@ ELSEWHERE = {
 class AlwaysThere(BenchRunner):
     """A runner for which no campaign is too fast to be paused or to be answered."""
 
-    def pause(self, campaign: int, request: ReasonRequest) -> CampaignResponse:
+    def ask(self, campaign: int, change: Callable[[Control], None]) -> CampaignResponse:
         return campaign_status(self._store, campaign)
 
     def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -90,6 +91,26 @@ def test_the_limit_that_is_named_is_the_one_that_was_passed(guards: Guards) -> N
     )
     assert (low.limit, high.limit) == (-55.0, 100.0)
     assert low.message == "imu: its own thermometer: -60 deg C, limit -55"
+
+
+def test_every_watched_value_is_there_with_its_limits_while_all_is_well(guards: Guards) -> None:
+    found = {(kind, each.device): each for kind, each in guards.watched(WELL)}
+    assert {kind for kind, _ in found} == set(CHECKS)
+    assert not any(each.is_beyond for each in found.values())
+    air = found["chamber_limits", "chamber"]
+    assert (air.value, air.low, air.high, air.unit) == (WELL.chamber_c, -72.0, 152.0, "deg C")
+    silent = found["stale", "imu"]
+    assert (silent.low, silent.high, silent.unit) == (-math.inf, 30.0, "s")
+    assert (found["chamber_alarm", "chamber"].value, found["foreign_change", "chamber"].value) == (0.0, 0.0)
+
+
+def test_what_is_watched_during_data_sets_only_is_not_there_between_them(guards: Guards) -> None:
+    between = {
+        kind for kind, _ in guards.watched(replace(WELL, taking_readings=False, counts={}, asked_dps=0.0, rate_dps=0.0))
+    }
+    assert set(CHECKS) - between == {
+        "chamber_deviation", "unit_off_air", "damaged_readings", "invalid_readings", "rate"
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("change", [{"chamber_c": None}, {"setpoint_c": None}, {"chamber_c": None, "setpoint_c": None}])

@@ -189,16 +189,26 @@ def test_a_unit_that_is_silent_beyond_a_short_stall_is_named_for_it() -> None:
     assert set(repeated(rig)) == {said}
 
 
-@pytest.mark.parametrize(("lost", "said"), [(20, "this computer did not run labctl"), (60, "imu: readings lost")])
-def test_a_stall_explains_as_many_lost_readings_as_the_unit_sends_meanwhile(lost: int, said: str) -> None:
-    rig = Busy()
-    read, losing = rig.imu.read, [True]
+@pytest.mark.parametrize(
+    ("lost", "when", "said"),
+    [
+        (20, "meanwhile", "this computer did not run labctl"),
+        (60, "meanwhile", "imu: readings lost"),  # more than the unit sends in the stall
+        (20, "later", "imu: readings lost"),  # in the same data set, while labctl ran
+    ],
+)
+def test_a_stall_explains_as_many_readings_lost_in_it_as_the_unit_sends_meanwhile(
+    lost: int, when: str, said: str
+) -> None:
+    rig, reads = Busy(), [0]
+    read = rig.imu.read
 
     def lossy(duration_s: float) -> Readings:
-        readings = read(duration_s)
-        if len(readings) and rig.journal.blocks and losing:
-            losing.clear()
+        reads[0] += bool(rig.journal.blocks)
+        if reads[0] == 1:
             rig.stall(0.2)  # counted as 0.1 s, 3 s of the bench: 30 of 100 readings
+        readings = read(duration_s)
+        if reads[0] == (1 if when == "meanwhile" else 3) and len(readings):
             return replace(readings, lost=lost)
         return readings
 

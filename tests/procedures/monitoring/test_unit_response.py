@@ -77,3 +77,19 @@ def test_another_mounting_is_not_compared_with_the_one_before() -> None:
         response.begin((mounting, 1))
         response.add("fog", readings(z=90.0))
         assert not response.complaint("fog", rate_dps, Position.of("z"), MAX_DPS)
+
+
+def test_complete_data_sets_are_unconfirmed_until_the_output_answers_a_change_of_the_rate() -> None:
+    response = UnitResponse()
+    response.expect("fog", nominal_outputs(CHANNELS, {}))
+    for number, rate_dps in enumerate((0.0, 3.0, 90.0, -90.0), start=1):
+        response.begin((1, 1))
+        response.add("fog", readings(z=rate_dps))
+        assert not response.complaint("fog", rate_dps, Position.of("z"), MAX_DPS)
+        response.keep(["fog", "other"], number)
+        if number == 2:
+            assert response.unconfirmed("fog") == (1, 2)  # between 0 and 3 deg/s nothing was compared
+    assert response.unconfirmed("fog") == ()
+    assert response.unconfirmed("other") == (1, 2, 3, 4)
+    response.begin((2, 1))
+    assert response.unconfirmed("other") == ()

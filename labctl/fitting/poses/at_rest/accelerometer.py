@@ -11,10 +11,11 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtr
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import expanded_u, freedom_of_bounded
+from labctl.fitting.numeric.freedom import expanded_u, freedom_of_bounded, student_factor
 from labctl.fitting.poses.at_rest.gravity import local_gravity_g
 from labctl.fitting.poses.at_rest.rests import Rests
 from labctl.fitting.poses.between import between_variance
@@ -30,8 +31,10 @@ SAME_POSE_DEG = 5.0
 FACE_DEG = 30.0
 #: A scale factor or misalignment that is less certain than this is not determined, and so a bias in g.
 LARGEST_U = 0.02
-#: In a rest whose gravity is off by more than this many standard deviations the unit moved.
+#: In a rest whose gravity is off by more than this many standard deviations the unit moved; by an estimated one, as far
+#: as Student's t is as unlikely.
 WRONG = 5.0
+WRONG_LEVEL = float(chdtr(1, WRONG**2))
 #: Rounds in which wrong rests are left out and taken in again.
 ROUNDS = 8
 
@@ -133,12 +136,35 @@ def fit_sizes(law: Law, gravity: float, white: Array, least: int) -> tuple[Array
         sigma = np.sqrt(white + extra)
         # at first a wrong rest would hide in the scatter that it makes itself
         usual = 1.4826 * float(np.median(np.abs(residual))) * np.sqrt(k / max(k - law.parameters, 1))
-        wrong = np.abs(residual) > WRONG * (np.hypot(usual, np.sqrt(white)) if turn == 0 else sigma)
+        wrong = (
+            np.abs(residual) > WRONG * np.hypot(usual, np.sqrt(white))
+            if turn == 0
+            else _is_wrong(jacobian, residual, sigma, used, white)
+        )
         if (turn > 0 and np.array_equal(wrong, ~used)) or np.count_nonzero(~wrong) < least:
             break
         used = ~wrong
         theta = _fitted(law.take(used), gravity, sigma[used], robust=False, start=theta)
     return _fitted(law.take(used), gravity, sigma[used], robust=False, start=theta), sigma, used
+
+
+def _is_wrong(
+    jacobian: NDArray[np.float64], residual: Array, sigma: Array, used: NDArray[np.bool_], white: Array
+) -> NDArray[np.bool_]:
+    """Return which rests (k,) do not agree with the others: by residuals of fits without them (deletion residuals).
+
+    A rest that is left out is predicted, and the prediction of few rests is uncertain; one that is used has drawn the
+    fit to itself (Cook and Weisberg 1982, section 2.2).
+    """
+    rows = jacobian / sigma[:, None]
+    covariance = np.linalg.pinv(rows[used].T @ rows[used], hermitian=True)
+    leverage = np.einsum("ki,ij,kj->k", rows, covariance, rows)
+    standard = (residual / sigma) ** 2 / np.where(used, np.maximum(1 - leverage, 1e-9), 1 + leverage)
+    freedom = freedom_of_sizes(int(np.count_nonzero(used)) - jacobian.shape[1], white[used], sigma[used])
+    # the scatter counts without the rest itself
+    others = np.maximum(freedom - standard, 1e-9) / max(freedom - 1, 1e-9)
+    standard = np.where(used, standard / others, standard)
+    return np.asarray(standard > student_factor(freedom, WRONG_LEVEL) ** 2)
 
 
 def matrices(theta: Array) -> tuple[NDArray[np.float64], Array]:

@@ -17,7 +17,7 @@ from labctl.fitting.effects import CATALOGUE, Reference
 from labctl.fitting.estimation.fit import fit, fit_preset
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording, to_points
-from labctl.services.criticism.report_text import sentences
+from labctl.services.criticism.answer import sentences
 from studies.rest_records import CELLS, TYPES, Disturbance, Unit, record
 
 OF_FORCE = ("g_sensitivity", "cross_g_sensitivity", "g_squared_sensitivity")

@@ -17,7 +17,7 @@ from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Term
 from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording, read_recording
-from labctl.services.criticism.report_text import sentences
+from labctl.services.criticism.answer import sentences
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from studies.outside_catalogue import KINDS
 from tests.helpers.criticism import held

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from labctl.fitting.criticism import verdict as module
@@ -17,16 +16,16 @@ from labctl.fitting.criticism.verdict import (
     ENOUGH_NEXT,
     LEAD,
     MOST,
+    SAME,
     Verdict,
     alias_group,
     axes_of,
     channels_behind,
     confounded_with,
-    is_at_end,
+    is_of_another_law,
     judge,
     not_physical_group,
     probabilities,
-    refines_base,
     share_removed,
 )
 
@@ -129,6 +128,28 @@ def test_a_higher_order_of_what_the_base_has_is_not_named_but_an_effect_like_it_
     assert (weak.form, weak.group) == ("unexplained", ())
 
 
+def test_an_effect_like_a_refined_one_is_not_named_where_a_channel_leads_over_it(
+    monkeypatch: pytest.MonkeyPatch, overlaps: Overlaps
+) -> None:
+    monkeypatch.setattr(module, "refines_base", lambda _comparison, candidate: candidate.id == "poly")
+    comparison = compared(channel("t_s", 22.0), effect("poly", 20.0), effect("saturation", 18.0))
+    assert (judge(comparison).form, judge(comparison).depends_on) == ("unexplained", ("t_s",))
+    overlaps({("t_s", "saturation"): 0.75})
+    assert judge(comparison).group == ("saturation", "poly")
+
+
+@pytest.mark.parametrize(
+    ("at_end", "refines", "another"),
+    [(False, False, False), (True, False, True), (False, True, True), (True, True, True)],
+)
+def test_a_law_at_its_end_or_in_a_lower_order_of_the_base_is_another_one(
+    monkeypatch: pytest.MonkeyPatch, at_end: bool, refines: bool, another: bool
+) -> None:
+    monkeypatch.setattr(module, "is_at_end", lambda *_: at_end)
+    monkeypatch.setattr(module, "refines_base", lambda *_: refines)
+    assert is_of_another_law(compared(), effect("poly", 9.0)) is another
+
+
 @pytest.mark.parametrize(("name", "limit"), [("table_rate_dps", 0.90), ("t_s", 0.75)])
 def test_a_channel_is_explained_by_an_effect_that_reproduces_enough_of_it(
     overlaps: Overlaps, name: str, limit: float
@@ -159,6 +180,11 @@ def test_the_share_removed_is_of_the_excess_over_all_axes() -> None:
     comparison.axes["x"].best.chi2 = 10.0  # below its degrees of freedom: no excess, and no negative one
     assert share_removed(comparison, effect("bias", 1.0)) == 1.0
     assert share_removed(comparison, effect("bias", 1.0, z=0, x=0)) == 1.0  # never more than all
+    comparison.axes["z"].gain = [4.0, -1e-12]
+    assert share_removed(comparison, effect("bias", 1.0)) == 4.0 / 10.0
+    assert share_removed(comparison, effect("bias", 1.0, z=1)) == 0.0  # rounding removes nothing
+    comparison.axes["z"].best.chi2, comparison.axes["z"].gain = 10.5, [0.25]
+    assert share_removed(comparison, effect("bias", 1.0)) == 0.25 / 0.5
     comparison.axes["z"].best.chi2 = 10.0
     assert share_removed(comparison, effect("bias", 1.0)) == 0.0
     assert share_removed(compared(), effect("bias", 1.0, z=1)) == 0.0
@@ -182,15 +208,15 @@ def test_a_rival_of_an_impossible_size_is_in_a_group_of_its_own() -> None:
 @pytest.mark.parametrize(
     ("share", "behind", "together"),
     [
-        (1 - 6.999 / 100, 11.999, True),  # leaves less than 7 of a chi2 of 100, less than 12 nats behind
-        (1 - 7.001 / 100, 11.999, False),
-        (1 - 6.999 / 100, 12.0, False),
+        (1 - 6.999 / 112, 11.999, True),  # leaves less than 7 of a chi2 of 112, less than 12 nats behind
+        (1 - 7 / 112, 11.999, False),
+        (1 - 6.999 / 112, 12.0, False),
     ],
 )
 def test_a_rival_that_leaves_little_of_the_signal_stays_unless_the_evidence_is_far(
     overlaps: Overlaps, share: float, behind: float, together: bool
 ) -> None:
-    leader, rival = effect("bias", 30.0, gain=100.0), effect("scale_factor", 30.0 - behind, z=1)
+    leader, rival = effect("bias", 30.0, gain=112.0), effect("scale_factor", 30.0 - behind, z=1)
     overlaps({("bias", "scale_factor"): share})
     assert alias_group(compared(leader, rival), leader) == (("bias", "scale_factor") if together else ("bias",))
 
@@ -230,6 +256,14 @@ def test_a_group_has_four_effects_and_those_that_are_the_same_as_the_first_or_th
     not_same = effect("not_same", 20.0 - 0.021)
     assert alias_group(compared(leader, *others, not_same), leader)[:2] == ("leader", "not_same")
     assert len(alias_group(compared(leader, *others, not_same), leader)) == MOST
+
+
+def test_effects_0_02_nats_apart_are_not_the_same() -> None:
+    leader, far = effect("leader", SAME), [effect(f"far{n}", -0.5 - 0.1 * n) for n in range(3)]
+    assert alias_group(compared(leader, effect("near", 0.0), *far), leader) == ("leader", "near", "far0", "far1")
+    first, second = effect("first", 0.9), effect("second", 0.8)
+    candidates = effect("leader", 1.0), first, second, effect("last", SAME), effect("not_as_last", 0.0)
+    assert alias_group(compared(*candidates), candidates[0]) == ("leader", "first", "second", "last")
 
 
 def test_axes_are_those_with_a_lead_of_evidence_or_all() -> None:
@@ -277,62 +311,32 @@ def test_weak_evidence_confounds_no_channel_however_near_the_first() -> None:
     assert confounded_with(comparison, "t_s") == ("power_s",)
 
 
+@pytest.mark.parametrize(("log_bf", "named"), [(ENOUGH - STEP, False), (ENOUGH, True)])
+def test_a_channel_without_enough_evidence_of_its_own_is_compared_with_the_best_candidate(
+    overlaps: Overlaps, log_bf: float, named: bool
+) -> None:
+    comparison = compared(effect("bias", 30.0), channel("t_s", log_bf), channel("temperature_c", ENOUGH))
+    assert confounded_with(comparison, "t_s") == (("temperature_c",) if named else ())
+    overlaps({("bias", "temperature_c"): 0.9001})
+    assert confounded_with(comparison, "t_s") == ("temperature_c",)
+    assert confounded_with(comparison, "not_compared") == ("temperature_c",)
+
+
+def test_channels_are_compared_with_the_one_that_is_meant_not_with_the_strongest() -> None:
+    comparison = compared(channel("power_s", 40.0), channel("t_s", 30.0), channel("temperature_c", 20.0))
+    assert confounded_with(comparison, "t_s") == ("power_s", "temperature_c")
+    assert confounded_with(comparison, "power_s") == ("t_s",)
+
+
 def test_probabilities_are_those_of_bayes_with_nothing_missing_as_likely_as_all_effects_together() -> None:
     candidates = [effect("a", 3.0), effect("b", 1.0), effect("c", 5.0, physical=False), channel("t_s", 9.0)]
     weights = {"a": math.exp(3.0) / 3, "b": math.exp(1.0) / 3}
     total = 1.0 + sum(weights.values())
     expected = {name: pytest.approx(each / total) for name, each in weights.items()}
     assert probabilities(candidates) == {**expected, "c": 0.0}
-    assert probabilities([effect("a", -50.0)])["a"] == pytest.approx(math.exp(-50.0), rel=1e-9)
+    assert probabilities([effect("a", -50.0)])["a"] == pytest.approx(math.exp(-50.0), rel=1e-9, abs=0.0)
     assert probabilities([effect("a", 2000.0)])["a"] == pytest.approx(1.0)
     assert probabilities([]) == {}
-
-
-def lagging(*log_bf: float, tau_s: tuple[float, ...] = (100.0, 890.0, 900.0, 1000.0), order: Any = None) -> Any:
-    """A comparison in which one effect has a shape for each time constant, with the evidence of each."""
-    terms = [SimpleNamespace(parameters={"tau_s": each}, order=order) for each in tau_s]
-    design = SimpleNamespace(options=[SimpleNamespace(candidate="lag", term=term) for term in terms])
-    leader = Candidate("lag", False, 20.0, {"z": 3}, terms[3], 50.0)  # type: ignore[arg-type]
-    axis = SimpleNamespace(log_bf=np.array(log_bf), dimensions=[1, 1, 1, 1])
-    return SimpleNamespace(designs={"z": design}, axes={"z": axis}), leader
-
-
-@pytest.mark.parametrize(
-    ("log_bf", "at_end"),
-    [
-        ((1.0, 5.0, 0.0, 8.0 + STEP), True),
-        ((1.0, 5.0, 0.0, 8.0), False),
-        ((1.0, 5.0, 8.0 + STEP, 0.0), True),  # 900 s is nine tenths of the longest
-        ((1.0, 8.0 + STEP, 5.0, 0.0), False),
-    ],
-)
-def test_a_law_is_another_where_the_longest_time_constant_leads(log_bf: tuple[float, ...], at_end: bool) -> None:
-    comparison, leader = lagging(*log_bf)
-    assert is_at_end(comparison, leader) == at_end
-    assert not is_at_end(comparison, effect("bias", 9.0))
-
-
-def test_the_shortest_time_constant_is_judged_by_its_inverse() -> None:
-    comparison, leader = lagging(8.0 + STEP, 5.0, 1.0, 0.0)
-    assert is_at_end(comparison, leader, shortest=True)
-    assert not is_at_end(comparison, leader)
-
-
-def test_a_law_in_a_lower_order_of_the_base_is_refined_and_not_missing() -> None:
-    def with_orders(dimensions: tuple[int, int], order: int | None = 2) -> tuple[Any, Candidate]:
-        terms = [SimpleNamespace(order=each, parameters={}) for each in (1, 2)]
-        options = [SimpleNamespace(candidate="poly", term=term) for term in terms]
-        own: Any = SimpleNamespace(order=order, parameters={})
-        axes = {"z": SimpleNamespace(dimensions=list(dimensions))}
-        return SimpleNamespace(designs={"z": SimpleNamespace(options=options)}, axes=axes), Candidate(
-            "poly", False, 9.0, {"z": 1}, own, 9.0
-        )
-
-    assert refines_base(*with_orders((0, 1)))
-    assert not refines_base(*with_orders((1, 1)))  # nothing of the lowest order is in the base
-    assert not refines_base(*with_orders((0, 1), order=1))
-    assert not refines_base(*with_orders((0, 1), order=None))
-    assert not refines_base(with_orders((0, 1))[0], effect("bias", 9.0))
 
 
 def test_a_verdict_names_each_effect_once_and_the_first_group_that_is_none() -> None:

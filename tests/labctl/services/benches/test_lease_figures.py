@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from instruments.clock import VirtualClock
-from labctl.errors import BenchBusy, Conflict
+from labctl.errors import BenchBusy, Conflict, StoreError
 from labctl.services.benches import lease as module
 from labctl.services.benches.lease import (
     RENEW_S,
@@ -172,6 +173,7 @@ def test_a_lease_is_kept_until_it_is_closed(shared: Store) -> None:
     assert shared.leases.holder(BENCH) is None
     assert hold._thread is not None
     assert not hold._thread.is_alive()
+    assert hold._thread.daemon  # a process that ends without `close` is not kept by it
 
 
 def test_a_simulated_bench_needs_no_lease_where_no_other_process_writes(tmp_path: Path) -> None:
@@ -204,6 +206,36 @@ def test_a_hold_for_a_campaign_is_renewed_and_forgotten_once_it_is_closed(
     assert hold._owner in module._HELD_HERE
     hold.close()
     assert hold._owner not in module._HELD_HERE
+
+
+def test_the_log_says_who_had_a_bench_before_and_once_why_a_lease_was_not_renewed(
+    shared: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[tuple[Any, ...]] = []
+    log = SimpleNamespace(info=lambda *what, **more: said.append((*what, more)), error=None)
+    log.error = log.info
+    monkeypatch.setattr(module, "log", log)
+    free, taken = (BenchHold(shared, name, VirtualClock(AT + timedelta(days=1))) for name in ("free", BENCH))
+    shared.leases.claim(FAR, replacing=None)
+    free.take()
+    taken.take()
+    assert said == [
+        ("lease.taken", {"bench": "free", "instead_of": ""}),
+        ("lease.taken", {"bench": BENCH, "instead_of": described(FAR)}),
+    ]
+    said.clear()
+    reasons = ["the disk is full", "the disk is full", "no answer", ""]
+
+    def fail(*_: object) -> bool:
+        raise StoreError(reasons.pop(0))
+
+    monkeypatch.setattr(shared.leases, "renew", fail)
+    for _ in range(4):
+        taken.renew()
+    assert said == [
+        ("lease.not_renewed", {"bench": BENCH, "reason": reason})
+        for reason in ("the disk is full", "no answer", "StoreError")
+    ]
 
 
 def test_an_import_that_a_process_left_unfinished_is_discarded_before_a_campaign(

@@ -25,7 +25,7 @@ from labctl.services.campaigns.resume import prepare_resume
 from labctl.store import open_store
 from procedures.contracts.control import Control
 from procedures.monitoring.step_clock import fitted
-from studies.table_clock import KINDS, Kind, resumed_campaign
+from studies.table_clock import KINDS, Kind, campaign, resumed_campaign
 
 RECIPE = """format = "labctl-recipe/1"
 name = "checked"
@@ -173,6 +173,14 @@ def test_what_a_resumed_campaign_states_of_its_clock_holds_at_least_as_often_as_
     assert np.median(u_ppm) < 5 * np.sqrt(np.mean(error_ppm**2))  # and not because U is too large
 
 
+def test_replies_at_ticks_are_late_otherwise_in_each_campaign_of_the_study() -> None:
+    """Each controller's clock is off by its own amount: else the ticks fall alike, and many campaigns are one."""
+    ticks = KINDS[4]
+    errors = np.array([campaign(ticks, 0.016, (33, n))[2] for n in range(12)])  # in U
+    assert errors.std() > 0.3  # 0.16 where all clocks are off by the same
+    assert np.abs(errors).max() < 1.0
+
+
 def test_runs_that_disagree_are_refused_before_the_first_data_set(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     rng = np.random.default_rng(5)
@@ -235,18 +243,26 @@ def test_a_check_for_missed_steps_that_sees_little_says_how_much(tmp_path: Path)
     assert "end other work on this computer" in said
 
 
-def test_a_unit_that_sends_angles_instead_of_rates_is_found_by_turning_the_table(tmp_path: Path) -> None:
+def test_a_unit_that_sends_angles_instead_of_rates_is_found_and_nothing_that_it_sent_counts(tmp_path: Path) -> None:
     """Like a DSP-3000 in incremental mode that hears no command: 1 deg/s where the table turns at 10."""
-    location = str(tmp_path / "lab.sqlite")
+    location, recipe = str(tmp_path / "lab.sqlite"), RECIPE.replace("[24, 26]", "[25]")
     with open_store(location, write=True) as store:
-        prepared = prepare(store, RECIPE, checked_bench(), VirtualClock(), clip=False)
+        prepared = prepare(store, recipe, checked_bench(), VirtualClock(), clip=False)
         device = prepared.bench.simulation.device("sim://kvh-rd2100/fog")._device  # type: ignore[union-attr]
         line = device.line
         device.line = lambda rate_dps, temperature_c: line(rate_dps / 10.0, temperature_c)
         answer = run(store, prepared)
-    assert answer.state == "failed"
-    assert "fog: from " in answer.reason
-    assert "10.1 % of that, limits 50 and 200 %" in answer.reason
-    assert "one that sends the angle of each sample instead of the rate" in answer.reason
-    states = rows(location, "select state, count(*) from data_sets group by state")
-    assert dict(states)["complete"] == 1
+        assert answer.state == "failed"
+        assert "fog: from " in answer.reason
+        assert "10.1 % of that, limits 50 and 200 %" in answer.reason
+        assert "one that sends the angle of each sample instead of the rate" in answer.reason
+        states = rows(location, "select distinct state, reason from data_sets where planned = 1")
+        assert states == [("partial", answer.reason)]
+        assert rows(location, "select count(*) from data_sets where state = 'complete'") == [(0,)]
+        assert rows(location, "select count(*) from events where kind = 'data_set_withdrawn'") == [(1,)]
+        request = ResumeRequest(by="A. Person", power="kept")  # the unit is set right meanwhile
+        make_clock = lambda standing: VirtualClock(standing.last_at)  # noqa: E731
+        resumed = prepare_resume(store, prepared.id, checked_bench(), make_clock, request)
+        assert run(store, resumed).state == "done"
+    complete = rows(location, "select planned, count(*) from data_sets where state = 'complete' group by planned")
+    assert complete == [(1, 1), (2, 1), (3, 1), (4, 1), (5, 1)]

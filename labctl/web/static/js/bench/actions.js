@@ -89,18 +89,24 @@ export const stopButton = (campaign) =>
     { title: "End the campaign now and bring the bench to its safe state" },
   );
 
+/**
+ * A button for an act that asks a running campaign for something: it asks who wants it and why.
+ * @param {string} label
+ * @param {string} question
+ * @param {(body: { by: string, reason: string }) => Promise<unknown>} send
+ */
+const askingButton = (label, question, send) =>
+  button(label, async () => {
+    const fields = [operatorNameField(), { name: "reason", label: "Why" }];
+    const answers = await askOperator(question, fields, { confirm: label });
+    if (answers) await send({ by: answers.by, reason: answers.reason });
+  });
+
 /** @param {number} campaign */
 export const pauseButton = (campaign) =>
-  button("Pause", async () => {
-    const answers = await askOperator(
-      "Pause the campaign after the present data set?",
-      [operatorNameField(), { name: "reason", label: "Why" }],
-      { confirm: "Pause" },
-    );
-    if (!answers) return;
-    const body = { by: answers.by, reason: answers.reason };
-    await post("/api/campaigns/{campaign}/pause", { path: { campaign }, body });
-  });
+  askingButton("Pause", "Pause the campaign after the present data set?", (body) =>
+    post("/api/campaigns/{campaign}/pause", { path: { campaign }, body }),
+  );
 
 /**
  * Ask who confirms that a real bench is clear; with `later` that it will be when the campaign begins. Returns the keys of

@@ -13,6 +13,7 @@ import { linkButton, pauseButton, resumeButton, stopButton } from "./actions.js"
 import { eventList } from "./event_list.js";
 import { followCampaign } from "./campaign_stream.js";
 import { gauges } from "./gauges.js";
+import { limitStrips } from "./limit_strips.js";
 import { liveOutput } from "./live_output.js";
 import { campaignHistory, remainingSeconds, appendStatus } from "./campaign_history.js";
 import { operatorPrompt } from "./operator_prompt.js";
@@ -20,6 +21,7 @@ import { slowText } from "./speed_text.js";
 import { turnNow } from "./turn_now.js";
 import { lastDataset } from "./last_dataset.js";
 import { historyPlot } from "./history_plot.js";
+import { alarmSound, enterWall } from "./wall_view.js";
 
 /** @import { Campaign, CampaignPlan } from "../../../types/api.js" */
 
@@ -32,9 +34,9 @@ const SPEED_REFRESH_MS = 2500;
  * `over()` is called when the campaign has ended.
  * @param {Campaign} status
  * @param {CampaignPlan} plan
- * @param {{ signal: AbortSignal, over: () => void }} page
+ * @param {{ signal: AbortSignal, over: () => void, wall: boolean }} page `wall`: state, readings and limits only, large
  */
-export function runningCampaign(status, plan, { signal, over }) {
+export function runningCampaign(status, plan, { signal, over, wall }) {
   const { timeline } = plan;
   const history = campaignHistory(status.id);
   const bar = statusBar(status, plan);
@@ -45,6 +47,10 @@ export function runningCampaign(status, plan, { signal, over }) {
     h("div", { class: "stack", "aria-live": "polite" }),
   ];
   const dials = gauges(timeline);
+  const strips = limitStrips(signal);
+  const sound = wall ? alarmSound(signal) : null;
+  if (wall) enterWall(signal);
+  let isStale = false;
   const turn = turnNow();
   const hasTable = timeline.kind.includes("home");
   const [historyFigure, outputCard, datasetCard, events] = [
@@ -73,6 +79,8 @@ export function runningCampaign(status, plan, { signal, over }) {
     now = next;
     bar.show(now);
     dials.set(now, setpoint());
+    strips.onStatus(now);
+    sound?.onStatus(now, isStale);
     appendStatus(history, now, setpoint());
     historyFigure.onStatus();
     outputCard.onStatus(now);
@@ -120,6 +128,8 @@ export function runningCampaign(status, plan, { signal, over }) {
       event: (event) => events.add(event),
       link: ({ stale, since, why }) => {
         bar.classList.toggle("stale", stale);
+        isStale = stale;
+        sound?.onStatus(now, stale);
         setChildren(
           connection,
           stale
@@ -138,6 +148,10 @@ export function runningCampaign(status, plan, { signal, over }) {
     },
     signal,
   );
+  if (wall) {
+    const leave = h("div", { class: "row wall-actions" }, sound, linkButton("Leave this view", "/bench", "tiny"));
+    return [bar, connection, leave, warningList, dials, strips, prompt, turn];
+  }
   return [
     bar,
     speed,
@@ -146,6 +160,7 @@ export function runningCampaign(status, plan, { signal, over }) {
     turn,
     warningList,
     dials,
+    strips,
     h(
       "div",
       { class: "columns", style: "--column-min: 26rem" },

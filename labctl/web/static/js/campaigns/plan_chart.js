@@ -25,16 +25,16 @@ const HOURS_FROM_S = 3 * 3600;
 
 /**
  * The chart of a plan. `give()` returns {timeline, now_s, live}: the columns of the API, the present moment in seconds of
- * the campaign (null: it does not run), and whether to show states. `pick(dataset)` is called for a clicked data set.
+ * the campaign (null: it does not run; `scrubbed`: one that was chosen), and whether to show states. `pick(dataset)` is called for a clicked data set.
  * @param {string} name
- * @param {() => { timeline: Timeline, now_s?: number | null, live?: boolean }} give
+ * @param {() => { timeline: Timeline, now_s?: number | null, scrubbed?: boolean, live?: boolean }} give
  * @param {{ height?: string, pick?: (dataset: number) => unknown }} [options]
  */
 export function planChart(name, give, { height = "24rem", pick } = {}) {
   const caption =
     "Above: set point of the chamber, with a mark for each data set. Below: the table rate of each data set. Bands: which axis of the unit points up.";
   const draw = () => {
-    const { timeline, now_s = null, live = false } = give();
+    const { timeline, now_s = null, scrubbed = false, live = false } = give();
     const unit_s = (timeline.start_s.at(-1) ?? 0) + (timeline.expected_s.at(-1) ?? 0) > HOURS_FROM_S ? 3600 : 60;
     const steps = planSteps(timeline, unit_s);
     const sets = steps.filter((step) => step.dataset !== null);
@@ -124,7 +124,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
         line: { color: colour("text"), width: 1.6, dash: "dot" },
       });
       words.push({
-        text: "now",
+        text: scrubbed ? duration(now_s) : "now",
         showarrow: false,
         xref: "x",
         yref: "paper",

@@ -1,7 +1,10 @@
 // Figures: a Plotly plot in the colours of the theme, with buttons that save it as PNG, SVG or CSV.
 
 import { saveBlob } from "./http/api.js";
+import { copyText } from "./copy_text.js";
+import { figureAddress, showIfAsked } from "./figure_link.js";
 import { csvText, fileName, traceRows } from "./csv.js";
+import { toast } from "./components.js";
 import { h, whenNearViewport } from "./elements.js";
 import { staticUrl } from "./static_url.js";
 
@@ -109,6 +112,8 @@ function withLine({ data = [], layout = {} }, text) {
  * @typedef {object} FigureOptions
  * @property {string} [height]
  * @property {() => CsvRows} [csv]
+ * @property {string} [slug] its name in an address, where several figures of a page have the same name
+ * @property {() => string | null} [cell] the notebook cell that gives this figure; null: there is none as it is now
  */
 /**
  * Create a figure. `draw()` gives {data, layout}; it is called again when the theme changes.
@@ -121,7 +126,7 @@ function withLine({ data = [], layout = {} }, text) {
  * @param {FigureOptions} [options]
  * @returns {Figure}
  */
-export function figure(name, caption, draw, { height = "20rem", csv } = {}) {
+export function figure(name, caption, draw, { height = "20rem", csv, slug = fileName(name), cell } = {}) {
   const box = h("div", { class: "plot", role: "group", "aria-label": `${name}. ${caption ?? ""}` });
   const plot = /** @type {Plot} */ (/** @type {HTMLElement} */ (box)); // Plotly gives it `on` and `data`
   /**
@@ -148,6 +153,17 @@ export function figure(name, caption, draw, { height = "20rem", csv } = {}) {
         tool("PNG", () => picture("png"), "PNG"),
         tool("SVG", () => picture("svg"), "SVG"),
         tool("CSV", () => saveBlob(new Blob([table()], { type: "text/csv" }), `${fileTitle()}.csv`), "CSV"),
+        h(
+          "button",
+          {
+            type: "button",
+            class: "button quiet tiny",
+            "aria-label": `Link: copy the address of ${name}`,
+            onclick: () => copyText(figureAddress(slug), "Link to this figure"),
+          },
+          "Link",
+        ),
+        cell ? cellButton(name, cell) : null,
       ),
     ),
     { plot, update, redraw: () => plot.data && update(), drawAt },
@@ -207,8 +223,23 @@ export function figure(name, caption, draw, { height = "20rem", csv } = {}) {
   function drawAt(width) {
     if (window.Plotly) drawWith(window.Plotly, width);
   }
+  showIfAsked(element, slug);
   whenNearViewport(element, update); // draw on demand: a page with ten figures opens as fast as one with two
   return element;
+}
+
+/**
+ * @param {string} name
+ * @param {() => string | null} cell
+ */
+function cellButton(name, cell) {
+  const copy = () => {
+    const text = cell();
+    if (text) copyText(text, "Notebook cell");
+    else toast("bad", "The Python client has no column of this channel; choose rate, temperature or time.");
+  };
+  const label = `Cell: copy a notebook cell that gives ${name}`;
+  return h("button", { type: "button", class: "button quiet tiny", "aria-label": label, onclick: copy }, "Cell");
 }
 
 /**

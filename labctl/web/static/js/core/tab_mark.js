@@ -2,9 +2,13 @@
 
 import { staticUrl } from "./static_url.js";
 
-let [name, alarm] = ["labctl", ""];
+let name = "labctl";
+/** What each part of the page says that needs a person; the first one is shown.
+ * @type {Map<string, string>} */
+const alarms = new Map();
 
 function draw() {
+  const alarm = alarms.values().next().value ?? "";
   document.title = alarm ? `${alarm} · ${name}` : name;
   const icon = document.querySelector('link[rel="icon"]');
   const file = staticUrl(alarm ? "mark-alarm.svg" : "mark.svg");
@@ -20,9 +24,11 @@ export function setPageName(title) {
 /**
  * Turn the icon of the tab red and put words before its title; "" ends that.
  * @param {string} words
+ * @param {string} source the part of the page that says it
  */
-export function setAlarm(words) {
-  if (words === alarm) return;
-  alarm = words;
+export function setAlarm(words, source) {
+  if ((alarms.get(source) ?? "") === words) return;
+  if (words) alarms.set(source, words);
+  else alarms.delete(source);
   draw();
 }

@@ -5,6 +5,7 @@ import { plainNumber, sizeText, unitText, idText } from "../core/format.js";
 import { card, chip, pageHeader, notice, table } from "../core/components.js";
 import { linkButton } from "../bench/actions.js";
 import { signatureFigure } from "./signature_plot.js";
+import { equationParts, mathElement } from "./equation.js";
 import { CHANNELS, ORIGINS, TECHNOLOGIES, VIEWS } from "./labels.js";
 
 /** @import { Effect } from "../../../types/api.js" */
@@ -125,6 +126,7 @@ export function effectDetail(effect, all) {
         ),
       ),
     ),
+    card("Equation", ...equationParts(effect)),
     h("div", { class: "columns" }, sizeCard(effect), shapeCard(effect)),
     notice(
       effect.leaves ? "good" : "",
@@ -194,7 +196,15 @@ function shapeCard(effect) {
     orders,
     table(
       [
-        { title: "Parameter", cell: (each) => h("code", {}, each.name) },
+        {
+          title: "Parameter",
+          cell: (each) => [
+            each.symbol_mathml ? mathElement(each.symbol_mathml) : null,
+            each.symbol_mathml ? " " : null,
+            h("code", {}, each.name),
+          ],
+        },
+        { title: "Meaning", prose: true, cell: (each) => each.meaning },
         { title: "Searched from", number: true, cell: (each) => `${plainNumber(each.low)} ${unitText(each.unit)}` },
         { title: "to", number: true, cell: (each) => `${plainNumber(each.high)} ${unitText(each.unit)}` },
       ],

@@ -8,6 +8,7 @@ import { labelledField, option, selectField } from "../core/fields.js";
 import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
 import { postFit } from "./accept_warnings.js";
+import { equationDetails } from "../effects/equation.js";
 import { asked, inAddress } from "./chosen_recordings.js";
 import { finishLine, keepFor, stepOf, stepOfPreview } from "./finish_line.js";
 import { heldOutName } from "./first_models.js";
@@ -188,6 +189,12 @@ export function extendModel(state, effects) {
   const element = cardWithHeader(
     "Add it",
     null,
+    h(
+      "div",
+      { class: "row", role: "group", "aria-label": `Effects of version ${state.version}` },
+      h("span", { class: "muted small" }, "In the model now:"),
+      has.map((id) => equationDetails(effects, id, idText(id)) ?? h("span", { class: "small" }, idText(id))),
+    ),
     h(
       "div",
       { class: "columns", style: "--column-min: 14rem" },

@@ -9,6 +9,8 @@ import { option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
 import { recordingMarks } from "../core/recording_marks.js";
 import { recordingsText } from "./chosen_recordings.js";
+import { residualCell } from "./notebook_cell.js";
+import { pointCard } from "./point_card.js";
 import { cellsText, colourLimit, hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap, selectedRows, datasetsUnder } from "./residual_map.js";
 import { channelName, channelTitle, scaled, setText, shownText } from "./dataset_rows.js";
@@ -42,7 +44,7 @@ export function residualDiagnostics(state) {
   const shown = (query().channels?.split(",") ?? DEFAULT_CHANNELS).filter((name) => channels.includes(name));
   shown.push(...channels.filter((name) => !shown.includes(name)).slice(0, Math.max(3 - shown.length, 0)));
   const against = shown.map((name, k) => {
-    const drawn = residualScatter(state, () => shown[k]);
+    const drawn = residualScatter(state, () => shown[k], `residual-against-${k + 1}`);
     const select = selectField(
       "Residual against",
       channels.map((each) => option(each, channelName(each))),
@@ -57,7 +59,11 @@ export function residualDiagnostics(state) {
   });
 
   const list = h("div", { class: "stack", "aria-live": "polite" });
-  const listed = () => setChildren(list, pickedDatasets(state));
+  const point = h("div", {});
+  const listed = () => {
+    setChildren(list, pickedDatasets(state));
+    setChildren(point, pickedPoint(state));
+  };
   listed();
   state.onchange((what) => {
     if (what !== "overlay") {
@@ -76,6 +82,7 @@ export function residualDiagnostics(state) {
     picture,
     h("div", { class: "columns", style: "--column-min: 19rem" }, against),
     list,
+    point,
   );
 }
 
@@ -112,8 +119,9 @@ function bindSelection(element, setsOf, state) {
 /**
  * @param {ExploreState} state
  * @param {() => string} channel
+ * @param {string} slug
  */
-function residualScatter(state, channel) {
+function residualScatter(state, channel, slug) {
   /** @type {(Place & { index: number }) | null} */
   let cursor = null;
   const draw = () => {
@@ -181,7 +189,11 @@ function residualScatter(state, channel) {
       },
     };
   };
-  const element = figure("Residual against a channel", null, draw, { height: "16rem" });
+  const element = figure("Residual against a channel", null, draw, {
+    height: "16rem",
+    slug,
+    cell: () => residualCell(state, channel(), location.origin),
+  });
   bindSelection(element, (event) => (event.points ?? []).map((point) => point.customdata), state);
   reachByKeyboard(element, {
     places: () => pointPlaces(state, channel()),
@@ -235,6 +247,18 @@ const cursorTrace = (x, y) => ({
   marker: { size: 14, symbol: "circle-open", color: colour("accent"), line: { width: 3 } },
 });
 
+/**
+ * The one data set that is selected, with its readings; null for none or several, and for pieces of a data set.
+ * @param {ExploreState} state
+ */
+function pickedPoint(state) {
+  const rows = selectedRows(state);
+  const chosen = rows.dataset.flatMap((set, k) => (state.pick.has(set) ? [k] : []));
+  if (chosen.length !== 1 || rows.pieces) return null;
+  const [k] = chosen;
+  return pointCard(state, { recording: rows.recording?.[k] ?? state.recording, dataset: rows.own[k] });
+}
+
 /** @param {ExploreState} state */
 function pickedDatasets(state) {
   const rows = selectedRows(state);
@@ -251,7 +275,7 @@ function pickedDatasets(state) {
       h(
         "p",
         {},
-        h("strong", {}, `${chosen.length} data sets selected`),
+        h("strong", {}, `${chosen.length} data ${chosen.length === 1 ? "set" : "sets"} selected`),
         `: RMS ${number(rms)} deg/s${chosen.length > MAX_LISTED ? `; the ${MAX_LISTED} furthest off are listed` : ""}.`,
       ),
       h("button", { class: "button tiny", type: "button", onclick: () => state.select([]) }, "Clear selection"),

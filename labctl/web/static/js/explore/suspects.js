@@ -3,12 +3,13 @@
 import { scrollTo, setChildren, h } from "../core/elements.js";
 import { capitalised, withUncertainty, number, oddsText, percent, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
+import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { heldOutName } from "./first_models.js";
 import { whatIf } from "./what_if.js";
 
-/** @import { Criticism, Suspect } from "../../../types/api.js" */
+/** @import { Criticism, Effect, Suspect } from "../../../types/api.js" */
 /** @import { Child } from "../../../types/pages.js" */
 /** @import { ExploreState } from "./state.js" */
 
@@ -79,9 +80,10 @@ const chanceText = (p) =>
 
 /**
  * @param {ExploreState} state
+ * @param {readonly Effect[]} effects
  * @param {{ onadd: (effect: string) => unknown, explain: (effect: string) => Promise<(number | null)[]> }} acts
  */
-export function suspectList(state, { onadd, explain }) {
+export function suspectList(state, effects, { onadd, explain }) {
   const { criticism } = state;
   const named = new Set(criticism.named);
   const drawnNow = h(
@@ -144,6 +146,7 @@ export function suspectList(state, { onadd, explain }) {
               draw(s),
               openWhatIf(s),
             ),
+            equationDetails(effects, s.effect),
           ),
           evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
           evidenceItem(

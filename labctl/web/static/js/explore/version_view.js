@@ -115,7 +115,7 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   const parts = [
     errorComparison(state, signal),
     residualDiagnostics(state),
-    suspectList(state, { onadd: adding.put, explain: (effect) => explained(state, effect, signal) }),
+    suspectList(state, effects, { onadd: adding.put, explain: (effect) => explained(state, effect, signal) }),
     adding.element,
     errorLadder(state, signal),
   ];

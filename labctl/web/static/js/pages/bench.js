@@ -6,7 +6,7 @@ import { h } from "../core/elements.js";
 import { chip, pageHeader, notice } from "../core/components.js";
 import { setTrouble } from "../core/freshness/line.js";
 import { show } from "../core/router.js";
-import { clearButton } from "../bench/actions.js";
+import { clearButton, linkButton } from "../bench/actions.js";
 import { campaignInstant } from "../campaigns/campaign_time.js";
 import { checkCard } from "../bench/check_card.js";
 import { idleBench, noBenchCard } from "../bench/idle_bench.js";
@@ -23,7 +23,7 @@ const AFTER_END_MS = 1500;
 const NEWEST = 50;
 
 /** @param {PageContext} context */
-export async function page({ signal }) {
+export async function page({ query, signal }) {
   const [benches, states, campaigns, schedule] = await Promise.all([
     get("/api/benches", { signal }),
     get("/api/benches/status", { signal }),
@@ -57,6 +57,7 @@ export async function page({ signal }) {
           ? h("span", {}, "runs ", h("a", { href: `/campaigns/${now.id}` }, `campaign ${now.id}`), `, ${now.recipe}`)
           : null,
       ),
+      now ? linkButton("Wall view", "/bench?wall=1", "tiny") : null,
     ),
   );
   const unsafe = states.filter((each) => each.unconfirmed);
@@ -64,7 +65,11 @@ export async function page({ signal }) {
   if (now) {
     const plan = await get("/api/campaigns/{campaign}/plan", { path: { campaign: now.id }, signal });
     element.append(
-      ...runningCampaign(now, plan, { signal, over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS) }),
+      ...runningCampaign(now, plan, {
+        signal,
+        over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS),
+        wall: query.wall === "1",
+      }),
     );
   } else {
     const last = campaigns.find((campaign) => campaign.bench === bench.name);

@@ -1,6 +1,7 @@
 // The page of one campaign: its plan and progress, its events, and why it ended.
 
 import { get } from "../core/http/api.js";
+import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, percent } from "../core/format.js";
 import { card, chip, factList, pageHeader, cardWithHeader, notice } from "../core/components.js";
@@ -10,6 +11,7 @@ import { linkButton, resumeControl, stopButton } from "../bench/actions.js";
 import { eventList } from "../bench/event_list.js";
 import { followCampaign } from "../bench/campaign_stream.js";
 import { remainingSeconds } from "../bench/campaign_history.js";
+import { courseCard } from "../campaigns/course.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { draftsCard } from "../campaigns/drafts.js";
 import { adviceNotice } from "../campaigns/advice.js";
@@ -45,9 +47,16 @@ export async function page({ params, query, signal }) {
   const events = eventList(MAX_EVENTS, level, now);
   const [about, reason, connection] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
   const [drafts, recordings] = [h("div", {}), h("div", {})];
+  /** @type {number | null} */
+  let scrubbed_s = null;
   const picture = planChart(
     `Campaign ${now.id} plan`,
-    () => ({ timeline: plan.timeline, now_s: isRunning(now) ? now.t_s : null, live: true }),
+    () => ({
+      timeline: plan.timeline,
+      now_s: scrubbed_s ?? (isRunning(now) ? now.t_s : null),
+      scrubbed: scrubbed_s !== null,
+      live: true,
+    }),
     {
       pick: (dataset) =>
         Object.values(now.recordings)[0] &&
@@ -97,6 +106,18 @@ export async function page({ params, query, signal }) {
     signal,
   );
 
+  const course = h("div", {});
+  loadCourse(now, path, signal)
+    .then(([answer, datasets, recording]) => {
+      const sets = datasets && { ...datasets, output: recording?.info.output ?? {} };
+      const moved = (/** @type {number} */ t_s) => {
+        scrubbed_s = t_s;
+        picture.redraw();
+      };
+      setChildren(course, courseCard(answer, plan, sets, moved));
+    })
+    .catch((error) => isAbort(error) || setChildren(course, notice("bad", messageOf(error))));
+
   const acts = isRunning(now)
     ? [linkButton("To the bench", "/bench"), here ? stopButton(now.id) : null]
     : endedActions(now, plan, here);
@@ -113,6 +134,7 @@ export async function page({ params, query, signal }) {
     about,
     drafts,
     cardWithHeader("Plan", h("span", { class: "muted small" }, "Click a data set to open its readings."), picture),
+    course,
     recordings,
     Object.assign(
       cardWithHeader(
@@ -126,6 +148,22 @@ export async function page({ params, query, signal }) {
       { id: "events" },
     ),
   );
+}
+
+/**
+ * The course of the campaign, and its first recording with the data sets.
+ * @param {Campaign} now
+ * @param {{ campaign: string }} path
+ * @param {AbortSignal} signal
+ */
+function loadCourse(now, path, signal) {
+  const first = Object.values(now.recordings)[0];
+  const one = { path: { recording: String(first) }, signal };
+  return Promise.all([
+    get("/api/campaigns/{campaign}/course", { path, signal }),
+    first === undefined ? null : get("/api/recordings/{recording}/datasets", one),
+    first === undefined ? null : get("/api/recordings/{recording}", one),
+  ]);
 }
 
 /**

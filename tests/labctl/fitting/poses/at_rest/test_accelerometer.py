@@ -9,12 +9,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.poses.at_rest.accelerometer import calibrate_accelerometer
+from labctl.fitting.poses.at_rest.accelerometer import MIN_POSES, SizeLaw, calibrate_accelerometer, fit_sizes
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY, local_gravity_g
 from labctl.fitting.poses.at_rest.rests import find_rests
 from labctl.fitting.poses.readings import readings_of
 from labctl.fitting.poses.triad import UPPER
 from studies.poses_simulation import Session, simulate_session
+from tests.helpers.poses_at_rest import BIAS_G, ERRORS, poses
 
 
 @pytest.mark.parametrize(
@@ -61,3 +62,21 @@ def test_poses_that_do_not_determine_it_are_refused_with_the_face_that_is_missin
     about_z = Rotation.from_rotvec(np.linspace(0, 5.8, 24)[:, None] * [0.0, 0.0, 1.0]).apply([1.0, 0.0, 0.05])
     with pytest.raises(NotEnoughData, match=r"with -z up too \(the nearest pose is 9\d deg from it\)"):
         calibrate_accelerometer(readings, replace(rests, accel_g=about_z))
+
+
+def kept_rests(seed: int, rests: int, wrong_g: float = 0.0) -> np.ndarray:
+    """Return which rests a fit uses, of which the fourth is off by `wrong_g`; 0.2 mg from rest to rest."""
+    force = poses(rests, seed)
+    force[3] *= 1 + wrong_g
+    noise_g = np.random.default_rng(seed).normal(0, 2e-4, force.shape)
+    readings = force @ (np.eye(3) + ERRORS).T + BIAS_G + noise_g
+    return fit_sizes(SizeLaw(readings), 1.0, np.full(rests, 1e-8), MIN_POSES)[2]
+
+
+def test_no_rest_is_left_out_because_few_others_predict_it_badly() -> None:
+    assert all(kept_rests(seed, rests).all() for rests in (13, 16, 20) for seed in range(60))
+
+
+def test_a_wrong_rest_among_few_is_left_out() -> None:
+    for seed in range(30):
+        assert np.flatnonzero(~kept_rests(seed, 20, wrong_g=0.01)).tolist() == [3]

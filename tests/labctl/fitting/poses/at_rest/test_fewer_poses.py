@@ -10,7 +10,7 @@ import pytest
 from labctl.errors import NotEnoughData
 from labctl.fitting.poses.at_rest.accelerometer import calibrate_accelerometer
 from labctl.fitting.poses.at_rest.adequacy import adequacy_of
-from labctl.fitting.poses.at_rest.fewer_poses import ByFewer, Known, by_fewer_poses
+from labctl.fitting.poses.at_rest.fewer_poses import ByFewer, Known, Scatter, by_fewer_poses
 from labctl.fitting.poses.at_rest.rests import find_rests
 from labctl.fitting.poses.readings import AXES, PoseReadings
 from labctl.fitting.poses.triad import UPPER
@@ -43,7 +43,7 @@ def known() -> Known:
     readings = session(poses(24, 1), 1)
     found = calibrate_accelerometer(readings, find_rests(readings))
     values = np.array([found.errors[place] for place in UPPER])
-    return Known(values, found.covariance[3:, 3:] + np.diag(CHANGE**2), found.bias_g, 0.0)
+    return Known(values, found.covariance[3:, 3:] + np.diag(CHANGE**2), found.bias_g)
 
 
 def later(known: Known, directions: np.ndarray, seed: int, size: float = 1.0) -> tuple[ByFewer, np.ndarray, float]:
@@ -86,6 +86,53 @@ def test_poses_that_do_not_tell_the_bias_are_refused(known: Known) -> None:
         later(known, level / np.linalg.norm(level, axis=1)[:, None], 1)
 
 
+@pytest.mark.parametrize("off_plane", [0.003, 0.01])
+def test_a_bias_square_to_the_plane_of_all_poses_is_refused_or_right(known: Known, off_plane: float) -> None:
+    """The bias square to the plane changes sizes by its square only, unless the poses leave the plane by enough."""
+    around = np.radians([0.0, 63.0, 117.0, 180.0])
+    plane = np.column_stack([np.zeros(4), np.cos(around), np.sin(around)])
+    refused: list[str] = []
+    for seed in range(20):
+        directions = plane + off_plane * np.random.default_rng(seed).normal(size=(4, 3))
+        fewer, true, error = later_or_refused(known, directions / np.linalg.norm(directions, axis=1)[:, None], seed)
+        if fewer is None:
+            refused.append(error)
+        else:
+            assert np.all(np.abs(fewer.found.bias_g - true[:3]) < 4 * fewer.found.u[:3])
+    assert len(refused) >= 10
+    assert all("bias" in each and "up" in each for each in refused)
+
+
+def later_or_refused(known: Known, directions: np.ndarray, seed: int) -> tuple[ByFewer | None, np.ndarray, str]:
+    """Return a later calibration and its true parameters, or why it was refused."""
+    try:
+        fewer, true, _ = later(known, directions, seed)
+    except NotEnoughData as error:
+        return None, np.zeros(0), str(error)
+    return fewer, true, ""
+
+
+def test_scatter_between_rests_is_known_from_the_earlier_session_too() -> None:
+    """With 0.3 mg from rest to rest and six faces, U holds the truth, and the unit is not said to have changed."""
+    scatter_g, inside, agree = 3e-4, [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        first = session(poses(24, seed) * (1 + rng.normal(0, scatter_g, (24, 1))), seed)
+        rests = find_rests(first)
+        was = calibrate_accelerometer(first, rests)
+        used = int(np.count_nonzero(was.used))
+        scatter = Scatter(was.residual_g**2 * used / was.freedom, float(rests.accel_white_var.mean()), was.freedom)
+        values = np.array([was.errors[place] for place in UPPER])
+        earlier = Known(values, was.covariance[3:, 3:] + np.diag(CHANGE**2), was.bias_g, scatter)
+        faces = np.vstack([np.eye(3), -np.eye(3)]) * (1 + rng.normal(0, scatter_g, (6, 1)))
+        fewer, true, _ = later(earlier, faces, seed)
+        theta = np.concatenate([fewer.found.bias_g, [fewer.found.errors[place] for place in UPPER]])
+        inside += list(np.abs(theta - true) < fewer.found.expanded)
+        agree.append(fewer.agrees)
+    assert 0.92 < np.mean(inside) < 0.985
+    assert np.mean(agree) > 0.93
+
+
 #: Means of six rests, one on each face, raw words: the annotated session of imucal (MaD-Lab Erlangen, MIT).
 FACES = np.array([
     [2039.635, -62.713, 13.937], [-2051.673, -30.280, -76.004], [8.944, 1991.568, -55.811],
@@ -103,7 +150,9 @@ def test_six_faces_agree_with_imucal() -> None:
     table = session(np.vstack([np.eye(3), -np.eye(3)]), 1)
     rests = find_rests(table)
     measured = replace(rests, accel_g=FACES / WORDS, density=np.full_like(rests.density, 0.0))
-    loose = Known(np.zeros(6), np.diag(np.repeat([0.1, 0.01], 3) ** 2), np.zeros(3), (NOISE / WORDS) ** 2)
+    loose = Known(
+        np.zeros(6), np.diag(np.repeat([0.1, 0.01], 3) ** 2), np.zeros(3), Scatter((NOISE / WORDS) ** 2, 0.0, 1e6)
+    )
     found = by_fewer_poses(table, measured, loose).found
     assert WORDS * found.bias_g == pytest.approx(IMUCAL_OFFSET, abs=0.6)  # 0.3 mg
     per_g = WORDS * np.linalg.norm(np.eye(3) + found.errors, axis=1)

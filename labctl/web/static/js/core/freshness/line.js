@@ -76,7 +76,7 @@ function draw() {
   const { stale, text } = freshnessWords(found, heard);
   if (line.text.textContent !== (stale ? STALE : "") + text)
     setChildren(line.text, stale ? h("strong", {}, STALE) : null, text);
-  setAlarm(notStopped ? "NOT STOPPED" : stale ? "Stale" : "");
+  setAlarm(notStopped ? "NOT STOPPED" : stale ? "Stale" : "", "freshness");
   if (found === state) return;
   const before = state;
   state = found;
