@@ -16,6 +16,7 @@ STUDIES = (
     "drift_coverage",
     "table_clock",
     "figures_agree",
+    "page_figures",
     "hand_turns",
     "poses",
     "triads",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -62,12 +63,14 @@ def vector_of(turn: Array) -> Array:
 
 
 def turned_by_hand(
-    seed: int, unit: TrueTriads, rests: int, pose_g: float = 0.0002, place_ut: float = 0.0
+    seed: int, unit: TrueTriads, rests: int, pose_g: float = 0.0002, place_ut: float = 0.0, on_way: bool = True
 ) -> tuple[Array, Array, Array, Array]:
     """Return time (n,), s, outputs (n, 3) of the gyro, deg/s, and of the accelerometer, g, and field (n, 3), uT.
 
     `pose_g` and `place_ut` are errors of force and field that are others in each rest. Poses are spread over the
-    sphere; from one to the next the unit is turned about a fixed axis of the body, slow at both ends.
+    sphere; from one to the next the unit is turned about a fixed axis of the body, slow at both ends, and the error of
+    the field goes from one place's to the next's: iron near the unit adds to the field of the room. Not `on_way`: the
+    field is without an error while the unit is turned.
     """
     rng = np.random.default_rng(seed)
     still, moving = round(REST_S * RATE_HZ), round(TURN_S * RATE_HZ)
@@ -77,21 +80,27 @@ def turned_by_hand(
     up, north = np.array([0.0, 0.0, 1.0]), np.radians(DIP_DEG)
     field = FIELD_UT * np.array([np.cos(north), 0.0, -np.sin(north)])
     at = _spread(rng, 0)
-    rates, forces, fields = [], [], []
+    rates, forces, poses, places = [], [], [], []
     for k in range(rests):
         rates.append(np.zeros((still, 3)))
         forces.append(np.tile(at.T @ up + rng.normal(0, pose_g, 3), (still, 1)))
-        fields.append(np.tile(at.T @ field + rng.normal(0, place_ut, 3), (still, 1)))
+        places.append(rng.normal(0, place_ut, 3))
+        poses.append([at] * still)
         if k + 1 == rests:
             break
         turn = _turn_to(at, _spread(rng, k + 1))
-        on_way = [at @ rotation(part * turn) for part in angle]
+        turned = [at @ rotation(part * turn) for part in angle]
         rates.append(np.degrees(speed[:, None] * turn))
         shaking = 0.2 * np.sin(2 * np.pi * share[:, None] * np.array([2.0, 3.0, 5.0]))
-        forces.append(np.array([each.T @ up for each in on_way]) + shaking)
-        fields.append(np.array([each.T @ field for each in on_way]))
+        forces.append(np.array([each.T @ up for each in turned]) + shaking)
+        poses.append(turned)
         at = at @ rotation(turn)
-    rate, force, seen = (np.vstack(parts) for parts in (rates, forces, fields))
+    rate, force = np.vstack(rates), np.vstack(forces)
+    added = [np.tile(places[0], (still, 1))]
+    for one, following in pairwise(places):
+        added.append(on_way * (np.outer(1 - share, one) + np.outer(share, following)))
+        added.append(np.tile(following, (still, 1)))
+    seen = np.einsum("nij,ni->nj", np.concatenate(poses), field + np.vstack(added))
     n = len(rate)
     return (
         np.arange(n) / RATE_HZ,

@@ -107,6 +107,10 @@ class ComparisonResponse(ResponseModel):
     least_turn_rate_dps: float = Field(
         description="The error per turn is computed where the magnitude of the rate is at least this, deg/s."
     )
+    earth_turning_dps: float | None = Field(
+        description="Size of the horizontal part of the Earth's rate, deg/s, which goes round with the table: it is in "
+        "the errors here, as nothing is fitted; a fit takes it off. null: the latitude is not known."
+    )
     at_rest_dps: float = Field(
         description="A data set counts as at rest if the magnitude of its table rate is below this, deg/s."
     )

@@ -16,7 +16,7 @@ LEVEL = 5
 
 
 class CompressionMiddleware:
-    """Compresses by gzip what has no ETag: a strong ETag is of exactly the bytes that are sent (RFC 9110, 8.8.1).
+    """Compresses by gzip what has no strong ETag: that is of exactly the bytes that are sent (RFC 9110, 8.8.1).
 
     Server-sent events that go on, pictures and archives pass as they are; what is large is compressed in a thread.
     """
@@ -36,13 +36,14 @@ class CompressionMiddleware:
 
 
 class _Responder(GZipResponder):
-    """One answer; compressed unless it has an ETag."""
+    """One answer; compressed unless it has a strong ETag."""
 
     _is_file = False
 
     async def send_with_compression(self, message: Message) -> None:
         if message["type"] == "http.response.start":
-            self._is_file = "etag" in Headers(raw=message["headers"])
+            etag = Headers(raw=message["headers"]).get("etag")
+            self._is_file = etag is not None and not etag.startswith("W/")
         if self._is_file:
             await self.send(message)
         else:

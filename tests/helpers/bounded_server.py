@@ -117,6 +117,11 @@ def bounded_server(
             await super().startup(sockets)
             ready.set()
 
+        async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().shutdown(sockets)
+            while self.server_state.tasks:  # what it has cancelled ends, as it does while a lifespan ends
+                await asyncio.sleep(0)
+
     with socket.create_server(("127.0.0.1", 0), backlog=limits.backlog) as listener:
         config = uvicorn.Config(
             within(app), http=protocol, ws="none", lifespan="off", log_config=None, log_level=log_level,

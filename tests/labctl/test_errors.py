@@ -31,6 +31,7 @@ ARGUMENTS: dict[type[Exception], tuple[Any, ...]] = {
     of_procedures.PlanRefused: ("recipe", ["one", "two"], "do this"),
     of_procedures.BadData: ("gyro", "text"),
     of_procedures.NoReadings: ("gyro", "text"),
+    of_procedures.NotFollowing: ("gyro", "text"),
     of_procedures.GuardTripped: ("kind", "action", "text", "device"),
     of_procedures.StepFailed: ("text", {"far": 1.0}),
 }

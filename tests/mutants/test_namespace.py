@@ -13,9 +13,13 @@ from mutants import namespace
 
 @pytest.mark.skipif(not namespace.is_possible(), reason="this system allows no namespaces of users and processes")
 def test_what_runs_apart_sees_its_own_processes_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = "import os; print(os.getpid(), sorted(int(each) for each in os.listdir('/proc') if each.isdigit()))"
-    command = [*namespace.UNSHARE, sys.executable, "-c", seen]
-    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "1 [1]\n"
+    seen = (
+        "import os; print(os.getpid(), sorted(int(each) for each in os.listdir('/proc') if each.isdigit()), "
+        "os.path.isdir('/dev/shm') and os.listdir('/dev/shm'))"
+    )
+    command = [*namespace.UNSHARE, *namespace.OWN_MEMORY, sys.executable, "-c", seen]
+    seen_there = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert seen_there in {"1 [1] []\n", "1 [1] False\n"}  # not what other processes have in memory
     monkeypatch.setenv(namespace.APART, "yes")
     assert namespace.run_apart([]) is None
 

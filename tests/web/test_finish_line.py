@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -119,3 +120,44 @@ def test_the_versions_are_played_again_from_the_ladder(service: Service, visit: 
     first, last = (residual_of(service, unit, version)["error"] for version in (1, 2))
     expect(played).to_contain_text(f"Version 1: {shown(first['rms_dps']):.3f} deg/s")
     expect(played).to_contain_text(f"Version 2: {shown(last['rms_dps'])} deg/s")
+
+
+def test_two_versions_lie_side_by_side_with_one_scale_and_one_camera(
+    service: Service, visit: Callable[..., Page], unit: str
+) -> None:
+    from playwright.sync_api import expect
+
+    service.post(f"/api/units/{unit}/calibrations/1/improve", {"add": ["sine_response"]})
+    page = visit(f"/explore?unit={unit}&version=2&view=surface")
+    settled(page)
+    choice = page.get_by_label("Beside the residual")
+    choice.select_option(label="the residual of version 1")
+    expect(page).to_have_url(re.compile("beside=1"))
+    drawn = figure(page, "Residual surfaces of two versions")
+    for version, scene in ((2, "scene"), (1, "scene2")):
+        columns = service.get(f"/api/units/{unit}/calibrations/{version}/comparison")["columns"]
+        residual = dict(zip(columns["dataset"], columns["residual_dps"], strict=True))
+        (dots,) = (each for each in drawn["data"] if each["name"] == f"version {version}")
+        assert (dots["type"], dots["scene"]) == ("scatter3d", scene)
+        assert dots["z"] == pytest.approx([residual[number] for number in dots["customdata"]])
+        assert sorted(dots["customdata"]) == sorted(residual)
+        title = next(each["text"] for each in drawn["layout"]["annotations"] if f"version {version}:" in each["text"])
+        rms = (sum(value**2 for value in residual.values()) / len(residual)) ** 0.5
+        assert float(title.split("RMS ")[1].split()[0]) == pytest.approx(rms, rel=0.06)  # two digits
+    layout = drawn["layout"]
+    for axis in ("xaxis", "yaxis", "zaxis"):
+        assert layout["scene"][axis]["range"] == layout["scene2"][axis]["range"]
+    plot = page.locator('.plot[aria-label^="Residual surfaces of two versions"]')
+    camera = {
+        "eye": {"x": 0.3, "y": -2.4, "z": 0.7},
+        "center": {"x": 0, "y": 0, "z": 0},
+        "up": {"x": 0, "y": 0, "z": 1},
+    }
+    plot.evaluate("(plot, camera) => Plotly.relayout(plot, {'scene2.camera': camera})", camera)
+    page.wait_for_function(
+        """() => {
+          const plots = [...document.querySelectorAll('.plot')];
+          const plot = plots.find((each) => each.getAttribute('aria-label').startsWith('Residual surfaces of two'));
+          return [plot.layout.scene, plot.layout.scene2].every(({ camera }) => camera.eye.x === 0.3);
+        }"""
+    )

@@ -58,17 +58,6 @@ class NonOrthogonality(Misalignment):
     aliases = ("misalignment",)
     experiment = "an external alignment cube"
     draws = ("table_rate_dps", "map")
-    equation: ClassVar = Equation(
-        "sum(m[a, j] * omega[j] for j in others(a))",
-        (
-            Symbol(
-                "m[a, j]",
-                "part of the rate about axis j in output a: for small angles the angle, rad",
-                "1",
-                "misalignment_{j}",
-            ),
-        ),
-    )
     sources: ClassVar[tuple[Source, ...]] = (
         Source(YANG, "error model: the matrix of non-orthogonality is a factor of K, so that K contains it"),
     )

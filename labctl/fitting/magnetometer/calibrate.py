@@ -10,8 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.magnetometer.ellipsoid import PARAMETERS, PLACES, Ellipsoid, at, nearest_ellipsoid, quadric
-from labctl.fitting.magnetometer.rest_scatter import scatter_of
+from labctl.fitting.magnetometer.ellipsoid import (
+    PARAMETERS,
+    PLACES,
+    Ellipsoid,
+    at,
+    nearest_ellipsoid,
+    quadric,
+    unweighed,
+)
+from labctl.fitting.magnetometer.places import Places, Weights
+from labctl.fitting.magnetometer.rest_scatter import RestScatter, scatter_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.freedom import combined_freedom, expanded_u
 
@@ -22,6 +31,8 @@ LARGEST_U = 0.02
 #: A reading further from the ellipsoid than this many robust standard deviations is left out.
 WRONG = 5.0
 ROUNDS = 8
+#: Rounds of weights by the variances, and of variances by the distances from what the weights lead to.
+WEIGHINGS = 1
 #: More than this share of readings left out is a disturbed field.
 MAX_LEFT_OUT = 0.05
 #: Left-out readings are predicted from the others in this many blocks of time.
@@ -87,8 +98,8 @@ def calibrate_magnetometer(
     """Fit hard and soft iron to readings (n, 3), uT, in order of time, of turns in a constant field.
 
     `field_ut` is its size; without it the matrix has the determinant 1. `rest` (n,) numbers the rests from 1, 0 between
-    them, where they are known: the field of a place is one error of all readings of a rest. Raises NotEnoughData,
-    naming what to do.
+    them, where they are known: the field of a place is one error of all readings of a rest, and changes on the way to
+    the next (`Places`). Raises NotEnoughData, naming what to do.
     """
     if len(readings_ut) < MIN_READINGS:
         raise NotEnoughData(
@@ -97,13 +108,16 @@ def calibrate_magnetometer(
             "turn it slowly through all directions"
         )
     ellipsoid, used = _robust(subject, readings_ut)
+    places, scatter = None, None
+    if rest is not None and np.any(rest[used]):
+        places = Places.of(rest[used])
+        ellipsoid, scatter = _weighed(readings_ut[used], ellipsoid, places)
     repetition = _repetition(ellipsoid.distance)
     values, by_parameter = _values(ellipsoid.parameters, field_ut)
     normal = by_parameter @ np.linalg.inv(ellipsoid.jacobian.T @ ellipsoid.jacobian) @ by_parameter.T
-    if rest is None:
+    if scatter is None:
         total, freedom = _by_repetition(ellipsoid, repetition, normal)
     else:
-        scatter = scatter_of(ellipsoid.jacobian, ellipsoid.distance, rest[used])
         total, freedom = scatter.covariance(by_parameter), scatter.freedom(by_parameter)
     soft = np.zeros((3, 3))
     for value, (i, j) in zip(values[3:9], PLACES, strict=True):
@@ -114,7 +128,7 @@ def calibrate_magnetometer(
     result = Magnetometer(
         values[:3], soft, float(values[9]), total, freedom, used,
         float(np.sqrt(np.mean(np.diff(ellipsoid.distance) ** 2) / 2)), float(np.sqrt(np.mean(ellipsoid.distance**2))),
-        _held_out(readings_ut[used], ellipsoid), float(size.std()), repetition, angle, gap,
+        _held_out(readings_ut[used], ellipsoid, places, scatter), float(size.std()), repetition, angle, gap,
     )  # fmt: skip
     _require_determined(subject, result, np.sqrt(np.maximum(np.diag(normal), 0.0)))
     return result
@@ -154,6 +168,22 @@ def _robust(subject: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDA
     return (ellipsoid if last is None else last), is_used
 
 
+def _weighed(readings: NDArray[np.float64], ellipsoid: Ellipsoid, places: Places) -> tuple[Ellipsoid, RestScatter]:
+    """Return the ellipsoid by generalised least squares, readings weighed by what their places share, and the scatter.
+
+    An error that a variance is estimated from is then none of the parameters': U is not large where they are wrong.
+    """
+    scatter = scatter_of(ellipsoid.jacobian, ellipsoid.distance, places)
+    for _ in range(WEIGHINGS):
+        product = Weights.of(places, scatter.ratios).product
+        weighed = nearest_ellipsoid(readings, ellipsoid.centre, ellipsoid.matrix, product)
+        if weighed is None:
+            break
+        ellipsoid = weighed
+        scatter = scatter_of(ellipsoid.jacobian, ellipsoid.distance, places)
+    return ellipsoid, scatter
+
+
 def _repetition(distance: Array) -> float:
     """Return the sum of the autocorrelation of distances (n,), 1 and more: pairs of lags as long as they add something.
 
@@ -191,12 +221,17 @@ def _derivative(of: Callable[[Array], Array], at_parameters: Array) -> NDArray[n
     return np.column_stack(columns)
 
 
-def _held_out(readings: NDArray[np.float64], ellipsoid: Ellipsoid) -> float:
+def _held_out(
+    readings: NDArray[np.float64], ellipsoid: Ellipsoid, places: Places | None, scatter: RestScatter | None
+) -> float:
     """Return the root mean square distance of each block of time from the ellipsoid of all others, uT."""
     squares = []
     for block in np.array_split(np.arange(len(readings)), BLOCKS):
-        others = np.delete(readings, block, axis=0)
-        without = nearest_ellipsoid(others, ellipsoid.centre, ellipsoid.matrix)
+        others = np.delete(np.arange(len(readings)), block)
+        weighed = unweighed
+        if places is not None and scatter is not None:
+            weighed = Weights.of(places.kept(others), scatter.ratios).product
+        without = nearest_ellipsoid(readings[others], ellipsoid.centre, ellipsoid.matrix, weighed)
         if without is None:  # what only this block shows is not held out
             without = ellipsoid
         squares.append(at(readings[block], without.centre, without.matrix, without.noise).distance ** 2)

@@ -8,6 +8,7 @@ ellipsoid, to first order (Sampson 1982). Noise lengthens a vector by its part s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,8 @@ PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 ROUNDS, CONVERGED = 50, 1e-6
 #: A system of normal equations in scaled columns is singular beyond this condition of its columns.
 LARGEST_CONDITION = 1e6
+#: Returns columns^T V^-1 columns (p, p) of columns (n, p), V the covariance of the distances but for a factor.
+Product = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -65,16 +68,29 @@ def quadric(readings: NDArray[np.float64]) -> tuple[Array, NDArray[np.float64]] 
     return origin + size * centre, vectors * np.sqrt(values) @ vectors.T / size
 
 
-def nearest_ellipsoid(readings: NDArray[np.float64], centre: Array, matrix: NDArray[np.float64]) -> Ellipsoid | None:
-    """Return the ellipsoid with the least squared distances from readings (n, 3), from a start; None: undetermined."""
+def unweighed(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return columns^T columns (p, p) of columns (n, p): the product by which all rows weigh alike."""
+    return columns.T @ columns
+
+
+def nearest_ellipsoid(
+    readings: NDArray[np.float64], centre: Array, matrix: NDArray[np.float64],
+    product: Product = unweighed,
+) -> Ellipsoid | None:  # fmt: skip
+    """Return the ellipsoid with the least squared distances from readings (n, 3), from a start; None: undetermined.
+
+    `product` weighs them.
+    """
     best = at(readings, centre, matrix, 0.0)
     for _ in range(ROUNDS):
-        length = np.linalg.norm(best.jacobian, axis=0)
-        scaled = best.jacobian / length
-        if not np.linalg.cond(scaled) < LARGEST_CONDITION:
+        normal = product(np.column_stack([best.jacobian, best.distance]))
+        length = np.sqrt(np.diag(normal)[:-1])
+        scaled = normal[:-1, :-1] / np.outer(length, length)
+        if not np.linalg.cond(scaled) < LARGEST_CONDITION**2:
             return None
-        step = -np.linalg.lstsq(scaled, best.distance)[0] / length
-        u = best.noise * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / length
+        step = -np.linalg.solve(scaled, normal[:-1, -1] / length) / length
+        noise = np.sqrt(normal[-1, -1] / max(len(readings) - PARAMETERS, 1))
+        u = noise * np.sqrt(np.diag(np.linalg.inv(scaled))) / length
         moved_parameters = best.parameters + step
         matrix = _symmetric(moved_parameters[3:])
         if not np.all(np.linalg.eigvalsh(matrix) > 0):
@@ -94,9 +110,8 @@ def at(readings: NDArray[np.float64], centre: Array, matrix: NDArray[np.float64]
     pull = along @ matrix
     slope = np.linalg.norm(pull, axis=1)
     longer = noise**2 * (np.sum(matrix**2) - slope**2) / 2
-    columns = [
-        along[:, i] * from_centre[:, j] + (along[:, j] * from_centre[:, i] if i != j else 0.0) for i, j in PLACES
-    ]
+    foot = from_centre / size[:, None]  # on the ellipsoid: the derivatives do not contain the distance's own noise
+    columns = [along[:, i] * foot[:, j] + (along[:, j] * foot[:, i] if i != j else 0.0) for i, j in PLACES]
     jacobian = np.column_stack([-pull, *columns]) / slope[:, None]
     return Ellipsoid(centre, matrix, jacobian, (size - 1 - longer) / slope)
 

@@ -1,8 +1,7 @@
-"""Scatter of a magnetometer's distances where rests are known: noise of a reading, and one error of each rest.
+"""Scatter of a magnetometer's distances where rests are known: noise of a reading, and errors of its places.
 
-While a unit lies still, its place does not change, and neither does what iron or currents near it add to the field: all
-readings of a rest share one error, however many they are. Of k rests and nine parameters that error is known by fewer
-than k values, which the autocorrelation of the residuals does not show: the parameters have taken most of it.
+Of k rests and nine parameters the error of a place is known by few values, which the autocorrelation of the residuals
+does not show: the parameters have taken most of it.
 """
 
 from __future__ import annotations
@@ -11,108 +10,112 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_solve
 
+from labctl.fitting.magnetometer.places import Places, Weights
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.freedom import combined_freedom, scatter_by_variances
 
-#: Where the ratio of the two variances is looked for, a logarithm.
-LOG_RATIO = (-18.0, 8.0)
-TOLERANCE = 1e-4
+#: Where the ratios of the variances to that of a reading are searched, a logarithm, and where the search starts.
+LOG_RATIO, START = (-18.0, 8.0), (-1.0, -1.0)
+TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class RestScatter:
-    """Variances of the readings and of the rests by the restricted likelihood, and what they make of a fit."""
+    """Variances by the restricted likelihood, and what they make of a fit that weighs the readings by them."""
 
-    white_var: float  #: of a reading, uT^2
-    place_var: float  #: shared by the readings of a rest, uT^2
-    by_reading: NDArray[np.float64]  #: (9, 9) covariance of the parameters by readings of variance 1
-    by_rest: NDArray[np.float64]  #: (9, 9) by rests of variance 1
-    information: NDArray[np.float64]  #: (2, 2) on the two variances
+    variances: Array  #: (3,) of a reading, of a rest's error, of what a way adds, uT^2
+    by_variance: NDArray[np.float64]  #: (3, 9, 9) derivatives of the parameters' covariance, the weights kept
+    information: NDArray[np.float64]  #: (3, 3) on the variances
+
+    @property
+    def ratios(self) -> Array:
+        """Variances of rests and ways over that of a reading, (2,)."""
+        return np.asarray(self.variances[1:] / self.variances[0])
 
     def covariance(self, by_parameter: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the covariance (q, q) of values whose derivative by the parameters is (q, 9)."""
-        whole = self.white_var * self.by_reading + self.place_var * self.by_rest
+        whole = np.tensordot(self.variances, self.by_variance, 1)
         return np.asarray(by_parameter @ whole @ by_parameter.T)
 
     def freedom(self, by_parameter: NDArray[np.float64]) -> Array:
         """Return the degrees of freedom (q,) of the standard uncertainties of such values."""
-        slopes = np.array([
-            np.einsum("qi,ij,qj->q", by_parameter, each, by_parameter) for each in (self.by_reading, self.by_rest)
-        ])  # fmt: skip
-        variance = slopes.T @ np.array([self.white_var, self.place_var])
-        return combined_freedom(variance, [], scatter_by_variances(slopes, self.information))
+        slopes = np.einsum("qi,vij,qj->vq", by_parameter, self.by_variance, by_parameter)
+        return combined_freedom(slopes.T @ self.variances, [], scatter_by_variances(slopes, self.information))
 
 
-def scatter_of(jacobian: NDArray[np.float64], distance: Array, rest: NDArray[np.int64]) -> RestScatter:
-    """Return the scatter of distances (n,) with derivatives (n, 9); `rest` (n,) is 0 for a reading between rests.
+def scatter_of(jacobian: NDArray[np.float64], distance: Array, places: Places) -> RestScatter:
+    """Return the scatter of distances (n,) with derivatives (n, 9) by the parameters.
 
     The variances are those of the largest restricted likelihood (Patterson and Thompson 1971): what the fit of the
     parameters takes of the residuals is not counted.
     """
-    from scipy.optimize import minimize_scalar
+    from scipy.optimize import minimize
 
-    problem = _Problem.of(jacobian, distance, rest)
-    found = minimize_scalar(problem.unlikely, bounds=LOG_RATIO, method="bounded", options={"xatol": TOLERANCE})
-    ratio = float(np.exp(found.x))
-    white = problem.white_var(ratio)
-    inverse = np.linalg.inv(jacobian.T @ jacobian)
-    of_rests = problem.sums[:, :-1] @ inverse
-    by_reading, by_rest = (np.asarray(each, dtype=np.float64) for each in (inverse, of_rests.T @ of_rests))
-    return RestScatter(white, ratio * white, by_reading, by_rest, problem.information(ratio) / white**2)
+    problem = _Problem.of(jacobian, distance, places)
+    found = minimize(
+        lambda logs: problem.unlikely(np.exp(logs)), np.array(START), method="Powell", bounds=[LOG_RATIO] * 2,
+        options={"xtol": TOLERANCE, "ftol": 1e-8},
+    )  # fmt: skip
+    return problem.scatter(np.exp(found.x))
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """What the likelihood needs: products of the columns (the derivatives, then the distances), whole and by rest."""
+    """What the likelihood needs: products of the columns (the derivatives, then the distances), whole and by place.
+
+    The derivatives are J = Q R, of which Q is used: centre and matrix have units of very different sizes.
+    """
 
     n: int
+    triangle: NDArray[np.float64]  #: R (9, 9)
     whole: NDArray[np.float64]  #: (10, 10)
-    sums: NDArray[np.float64]  #: (k, 10) of each rest
-    count: Array  #: (k,) readings of each rest
+    sums: NDArray[np.float64]  #: (k, 10), as of `Weights`
+    places: Places
 
     @staticmethod
-    def of(jacobian: NDArray[np.float64], distance: Array, rest: NDArray[np.int64]) -> _Problem:
-        columns = np.column_stack([jacobian, distance])
-        _, place = np.unique(rest, return_inverse=True)
-        sums = np.array([np.bincount(place, column) for column in columns.T], dtype=np.float64).T
-        kept = np.unique(rest) > 0
-        return _Problem(len(columns), columns.T @ columns, sums[kept], np.bincount(place)[kept].astype(np.float64))
+    def of(jacobian: NDArray[np.float64], distance: Array, places: Places) -> _Problem:
+        orthogonal, triangle = np.linalg.qr(jacobian)
+        columns = np.column_stack([orthogonal, distance])
+        none = Weights.of(places, np.zeros(2))
+        return _Problem(len(columns), triangle, columns.T @ columns, none.sums(columns), places)
 
-    def _normal(self, ratio: float) -> NDArray[np.float64]:
-        """Return columns^T V^-1 columns (10, 10) for V = 1 + ratio times the same of each rest (Woodbury)."""
-        taken = ratio / (1 + ratio * self.count)
-        return np.asarray(self.whole - (self.sums.T * taken) @ self.sums)
-
-    def white_var(self, ratio: float) -> float:
-        """Return the variance of a reading, uT^2, that is likeliest at a ratio of the variances."""
-        normal = self._normal(ratio)
+    def _white_var(self, normal: NDArray[np.float64]) -> float:
+        """Return the variance of a reading, uT^2, that is likeliest, by columns^T V^-1 columns (10, 10)."""
         left = normal[-1, -1] - normal[-1, :-1] @ np.linalg.solve(normal[:-1, :-1], normal[:-1, -1])
         return float(left / (self.n - len(normal) + 1))
 
-    def unlikely(self, log_ratio: float) -> float:
+    def unlikely(self, ratios: Array) -> float:
         """Return minus the logarithm of the restricted likelihood, without its constant."""
-        ratio = float(np.exp(log_ratio))
-        normal = self._normal(ratio)
+        weights = Weights.of(self.places, ratios)
+        normal = weights.product_of(self.whole, self.sums)
         _, of_normal = np.linalg.slogdet(normal[:-1, :-1])
-        of_noise = float(np.sum(np.log1p(ratio * self.count)))
-        return (of_noise + float(of_normal) + (self.n - len(normal) + 1) * np.log(self.white_var(ratio))) / 2
+        of_white = (self.n - len(normal) + 1) * np.log(self._white_var(normal))
+        return (weights.log_determinant + float(of_normal) + float(of_white)) / 2
 
-    def information(self, ratio: float) -> NDArray[np.float64]:
-        """Return the information (2, 2) on both variances in units of the first one to the power -2.
+    def scatter(self, ratios: Array) -> RestScatter:
+        """Return the scatter by ratios (2,) of the variances.
 
-        tr(P D_i P D_j) / 2 with D_1 = 1 and D_2 = Z Z^T, Z (n, k) the rest of each reading; as P V P = P, products
-        of k rests and nine columns are enough.
+        The information is tr(P D_i P D_j) / 2 with D_1 = 1 and D_i = Z S_i Z^T; as P V P = P, products of k places and
+        nine columns are enough. The covariance is N^-1 J^T V^-1 (.) V^-1 J N^-1 with N = J^T V^-1 J.
         """
-        count, sums = self.count, self.sums[:, :-1]
-        inverse = np.linalg.inv(self._normal(ratio)[:-1, :-1])
-        share = 1 / (1 + ratio * count)
-        # Z^T P Z, and the same with one more P between
-        across = np.diag(count * share) - (share[:, None] * sums) @ inverse @ (sums.T * share)
-        # ratio times D_2 = V - D_1, and P V P = P
-        of_rests = float(np.sum(across**2))
-        trace = float(np.trace(across))
-        total = self.n - len(inverse)
-        mixed = trace - ratio * of_rests
-        white = float(total - ratio * trace) - ratio * mixed
-        return np.array([[white, mixed], [mixed, of_rests]]) / 2
+        weights, parts = Weights.of(self.places, ratios), self.places.parts
+        normal = weights.product_of(self.whole, self.sums)
+        inverse, white = np.linalg.inv(normal[:-1, :-1]), self._white_var(normal)
+        root = weights.root
+        weighed = root[:, None] * cho_solve(weights.factor, self.sums[:, :-1])  # Z^T V^-1 J
+        across = root[:, None] * cho_solve(weights.factor, np.diag(root)) - weighed @ inverse @ weighed.T  # Z^T P Z
+        times = parts @ across
+        shared = np.einsum("iab,jba->ij", times, times)
+        trace = np.einsum("iaa->i", times)
+        mixed = trace - shared @ ratios  # D_1 = V - sum of ratio D_i
+        own = self.n - len(inverse) - trace @ ratios - mixed @ ratios
+        information = np.block([[np.array([[own]]), mixed[None]], [mixed[:, None], shared]]) / 2
+        back = np.linalg.inv(self.triangle)
+        of_places = weighed @ inverse @ back.T
+        by_place = np.einsum("ai,vab,bj->vij", of_places, parts, of_places)
+        by_white = back @ inverse @ back.T - np.tensordot(ratios, by_place, 1)
+        return RestScatter(
+            white * np.append(1.0, ratios), np.concatenate([[by_white], by_place]), information / white**2
+        )

@@ -17,7 +17,7 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.error_per_turn import AT_REST_DPS, MIN_RATE_DPS, bias_at_rest, turn_errors
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.channels import Channels, body_rates
-from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows
 from labctl.fitting.models.fitted_model import FittedModel
@@ -134,6 +134,7 @@ def compare_version(
         serial=serial, version=version, recording=measured.row.id, recordings=list(measured.recordings),
         fitted_to=row.recording, source=_source(calibration, row.recordings, measured),
         held=held, left_out=list(calibration.document["left_out"]),
+        earth_turning_dps=turning_size_dps(data.info) or None,
         least_turn_rate_dps=MIN_RATE_DPS, at_rest_dps=AT_REST_DPS,
         columns=_columns(data, errors, measured.row.id), over_rate=over_rate, over_temperature=over_temperature,
     )  # fmt: skip

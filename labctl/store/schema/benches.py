@@ -1,4 +1,4 @@
-"""Benches, who drives each at present, and the air of their rooms."""
+"""Benches, who drives each at present, and the air of the laboratory around them."""
 
 from __future__ import annotations
 

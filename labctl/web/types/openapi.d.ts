@@ -736,7 +736,7 @@ export interface paths {
         /**
          * The catalogue of physical effects
          * @description Every effect that a model can contain: its standard term, description, origin, channels, coefficients and
-         *     ranges.
+         *     ranges. 304 when the caller has it already.
          */
         get: operations["effects_api_effects_get"];
         put?: never;
@@ -5489,6 +5489,11 @@ export interface components {
              * @description The error per turn is computed where the magnitude of the rate is at least this, deg/s.
              */
             least_turn_rate_dps: number;
+            /**
+             * Earth Turning Dps
+             * @description Size of the horizontal part of the Earth's rate, deg/s, which goes round with the table: it is in the errors here, as nothing is fitted; a fit takes it off. null: the latitude is not known.
+             */
+            earth_turning_dps: number | null;
             /**
              * At Rest Dps
              * @description A data set counts as at rest if the magnitude of its table rate is below this, deg/s.
@@ -15609,7 +15614,9 @@ export interface operations {
     effects_api_effects_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                "if-none-match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -15622,6 +15629,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CatalogueResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

@@ -121,6 +121,7 @@ export interface Plot extends HTMLElement {
 export interface PlotEvent {
   points: { x: number; y: number; customdata?: any }[];
   [range: `xaxis.${string}`]: unknown;
+  [camera: `scene${string}.camera`]: unknown;
 }
 
 /** Rows of a CSV file, the first of them its headings. */
@@ -139,6 +140,7 @@ export interface Figure extends HTMLElement {
 export interface Plotly {
   restyle: (plot: HTMLElement, changed: object, traces: number[]) => Promise<unknown>;
   react: (plot: HTMLElement, data: PlotTrace[], layout: PlotLayout, config: object) => Promise<unknown>;
+  relayout: (plot: HTMLElement, changed: object) => Promise<unknown>;
   toImage: (plot: HTMLElement | Picture, options: object) => Promise<string>;
 }
 

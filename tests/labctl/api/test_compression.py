@@ -13,6 +13,7 @@ from starlette.responses import StreamingResponse
 from starlette.testclient import TestClient
 
 from labctl.api.compression import CompressionMiddleware
+from labctl.api.routers import effects
 
 ROWS = [{"serial": f"A{number}", "rate_dps": number / 7} for number in range(500)]
 BODY = json.dumps(ROWS).encode()
@@ -71,3 +72,18 @@ def test_events_are_sent_one_by_one(client: TestClient) -> None:
     headers, raw = sent(client, "/events", "gzip")
     assert "content-encoding" not in headers
     assert raw == b"data: 1\n\n" * 500
+
+
+def test_the_catalogue_is_sent_once_and_compressed() -> None:
+    """A weak ETag is of the content, not of its bytes: it may travel compressed."""
+    app = FastAPI()
+    app.add_middleware(CompressionMiddleware)
+    app.include_router(effects.router)
+    client = TestClient(app)
+    first = client.get("/api/effects", headers={"Accept-Encoding": "gzip"})
+    assert first.headers["Content-Encoding"] == "gzip"
+    assert first.headers["Cache-Control"] == "no-cache"
+    assert first.headers["ETag"].startswith('W/"')
+    again = client.get("/api/effects", headers={"If-None-Match": first.headers["ETag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    assert client.get("/api/effects", headers={"If-None-Match": 'W/"other"'}).json() == first.json()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from labctl.fitting.magnetometer.rest_scatter import scatter_of
 from labctl.fitting.numeric.freedom import (
     MAX_FREEDOM,
     combined_freedom,
@@ -40,20 +39,3 @@ def test_one_variance_of_independent_residuals_has_as_many_degrees_as_they_excee
     variance = np.array([3.0])  # of anything that is proportional to it
     freedom = combined_freedom(variance, [], scatter_by_variances(np.array([[1.0]]), information))
     assert freedom == pytest.approx([16])
-
-
-def test_the_scatter_of_rests_is_what_the_dense_likelihood_says() -> None:
-    rng = np.random.default_rng(3)
-    rest = np.repeat(np.arange(10) % 2 * (1 + np.arange(10) // 2), 8)  # stretches in motion and at rest
-    place = np.concatenate([[0.0], rng.normal(0, 2.0, 5)])
-    jacobian = rng.normal(size=(80, 3))
-    found = scatter_of(jacobian, rng.normal(0, 1.0, 80) + place[rest], rest)
-    shared = (rest[:, None] == rest) & (rest[:, None] > 0)
-    parts = [np.eye(80), shared.astype(np.float64)]
-    total = found.white_var * parts[0] + found.place_var * parts[1]
-    assert found.information == pytest.approx(information_of(jacobian, total, parts), rel=1e-6)
-    weights = np.linalg.pinv(jacobian)
-    assert found.covariance(np.eye(3)) == pytest.approx(weights @ total @ weights.T, rel=1e-9)
-    assert 0.7 < np.sqrt(found.white_var) < 1.3
-    assert 0.8 < np.sqrt(found.place_var) < 5.0
-    assert np.all(found.freedom(np.eye(3)) < 77)

@@ -113,6 +113,26 @@ def test_what_is_watched_during_data_sets_only_is_not_there_between_them(guards:
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("change", "kind", "is_watched"),
+    [
+        ({"attended": True}, "foreign_change", False),
+        ({"rate_dps": 100.0}, "rate", True),
+        ({"taking_readings": False, "rate_dps": 99.9}, "rate", True),
+        ({"taking_readings": False, "rate_dps": 100.0}, "rate", False),
+    ],
+)
+def test_a_value_is_watched_where_its_guard_could_trip(
+    guards: Guards, change: dict[str, Any], kind: str, is_watched: bool
+) -> None:
+    assert (kind in {each for each, _ in guards.watched(replace(WELL, **change))}) is is_watched
+
+
+def test_no_reading_is_expected_and_none_is_bad(guards: Guards) -> None:
+    nothing = replace(WELL, counts={"imu": ReadingCounts(expected=0)})
+    assert [each.value for kind, each in guards.watched(nothing) if kind == "damaged_readings"] == [0.0]
+
+
 @pytest.mark.parametrize("change", [{"chamber_c": None}, {"setpoint_c": None}, {"chamber_c": None, "setpoint_c": None}])
 def test_without_a_chamber_no_guard_of_the_air_trips(guards: Guards, change: dict[str, Any]) -> None:
     assert guards.check(replace(WELL, **change)) == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import tempfile
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -41,20 +42,38 @@ def ended(runner: BenchRunner) -> None:
         job.thread.join()
 
 
+def stopped_on_its_way(runner: BenchRunner, request: CampaignRequest) -> int:
+    """Run a campaign up to its first data set, where it waits until it is asked to stop; returns its number."""
+    reached, asked = threading.Event(), threading.Event()
+
+    def wait_in_a_data_set() -> None:
+        job = runner._job
+        if job is not None and job.progress is not None and job.progress.step_text.startswith("data set"):
+            reached.set()
+            assert asked.wait(60.0)
+
+    end = runner.listen(wait_in_a_data_set)
+    campaign = runner.start(request).id
+    assert reached.wait(60.0)
+    runner.stop_latch.prepare()
+    runner.abort(campaign, StopRequest.new("Ada", "key", "test of the stop", campaign, holds=False))
+    asked.set()
+    ended(runner)
+    end()
+    return campaign
+
+
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The logs of a service that has run a campaign, stopped a second one, and resumed that."""
     folder = tmp_path_factory.mktemp("logged")
     request = CampaignRequest(recipe=RECIPE, fit=False)
     with open_store(str(folder / "lab.sqlite"), write=True) as store:
-        runner = BenchRunner(store, BENCH, VirtualClock, wire_logs=folder / "logs")
+        runner = BenchRunner(store, BENCH, VirtualClock, wire_logs=folder / "logs", safe_within_s=0.0)
         runner.start(request)
         ended(runner)
-        second = runner.start(request)
-        runner.stop_latch.prepare()
-        runner.abort(second.id, StopRequest.new("Ada", "key", "test of the stop", second.id, holds=False))
-        ended(runner)
-        runner.resume(second.id, ResumeRequest(by="Ada", power="kept"))
+        second = stopped_on_its_way(runner, request)
+        runner.resume(second, ResumeRequest(by="Ada", power="kept"))
         ended(runner)
         runner.close()
     return folder / "logs"

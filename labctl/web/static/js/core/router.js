@@ -31,17 +31,23 @@ const address = () => location.pathname + location.search;
  */
 export async function navigate(path) {
   keepPlace();
+  clearTimeout(scrolling);
   history.pushState(null, "", path);
   await show();
   if (location.hash) scrollToAnchor(location.hash);
   else window.scrollTo(0, 0);
 }
 
+/** Writes down how far the entry is scrolled, once scrolling has ended.
+ * @type {ReturnType<typeof setTimeout> | undefined} */
+let scrolling;
+
 /** Write down how far this entry of the history is scrolled. */
 const keepPlace = () => history.replaceState({ scrolled: window.scrollY }, "");
 
 /** Return to an entry of the history: its page, unless that is shown already, and where one was on it. */
 async function goBack() {
+  clearTimeout(scrolling); // it is of the entry that was left, and would be written into this one
   const place = history.state?.scrolled;
   if (address() !== shown) await show();
   if (place !== undefined) window.scrollTo(0, place);
@@ -151,8 +157,6 @@ export function start() {
   });
   history.scrollRestoration = "manual"; // the browser restores it before the page is there
   window.addEventListener("popstate", goBack);
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  let scrolling;
   window.addEventListener(
     "scroll",
     () => {

@@ -8,7 +8,7 @@ import { count, number } from "../core/format.js";
 import { button, factList, loadInto, notice } from "../core/components.js";
 import { pointCell } from "./notebook_cell.js";
 
-/** @import { Samples } from "../../../types/api.js" */
+/** @import { Point, Samples } from "../../../types/api.js" */
 /** @import { ExploreState } from "./state.js" */
 
 /** @typedef {{ recording: number, dataset: number }} Place */
@@ -59,7 +59,7 @@ export function pointCard(state, place) {
   return element;
 }
 
-/** @param {import("../../../types/api.js").Point} point */
+/** @param {Point} point */
 const facts = (point) =>
   factList([
     ["Mean output", number(point.shown.output_dps, DIGITS), "deg/s", spread(point)],
@@ -77,7 +77,7 @@ const facts = (point) =>
       : null,
   ]);
 
-/** @param {import("../../../types/api.js").Point} point */
+/** @param {Point} point */
 const spread = (point) => (point.std_dps === null ? null : `readings have s = ${number(point.std_dps, 3)} deg/s`);
 
 /**

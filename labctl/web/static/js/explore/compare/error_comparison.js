@@ -4,6 +4,7 @@ import { get } from "../../core/http/api.js";
 import { h } from "../../core/elements.js";
 import { cardWithHeader, loadInto } from "../../core/components.js";
 import { toggleGroup } from "../../core/fields.js";
+import { number } from "../../core/format.js";
 import { query, updateQuery } from "../../core/router.js";
 import { allPanels, overRate, overTemperature } from "./model_lines.js";
 import { asked } from "../chosen_recordings.js";
@@ -19,7 +20,7 @@ import { fullTurn } from "./full_turn.js";
 const AT_REST = new Set(["warm", "rest"]);
 /** Views in which the data sets of several recordings have marks of their own. */
 const SEVERAL = new Set(["lines", "warm", "panels", "rest"]);
-/** @type {[id: string, text: string, draw: (comparison: Comparison, state: ExploreState) => HTMLElement][]} */
+/** @type {[id: string, text: string, draw: (comparison: Comparison, state: ExploreState, signal: AbortSignal) => HTMLElement][]} */
 const VIEWS = [
   ["lines", "Error over rate", overRate],
   ["warm", "Error over temperature", overTemperature],
@@ -51,7 +52,7 @@ export function errorComparison(state, signal) {
         signal,
       });
       source.textContent = sourceText(comparison);
-      return view[2](comparison, state);
+      return view[2](comparison, state, signal);
     });
   shown();
   state.onchange((what) => what === "axis" && shown());
@@ -68,7 +69,7 @@ export function errorComparison(state, signal) {
 }
 
 /** @param {Comparison} comparison */
-function sourceText({ source, held, left_out: leftOut }) {
+function sourceText({ source, held, left_out: leftOut, earth_turning_dps: turning }) {
   const at = Object.entries(held).map(([name, value]) => `${name} ${Number(value.toPrecision(4))}`);
-  return `Error model from ${source}.${at.length ? ` Lines are at ${at.join(", ")}.` : ""}${leftOut.length ? ` Without ${leftOut.map((line) => line.effect.replaceAll("_", " ")).join(", ")}, which ${leftOut.length > 1 ? "do" : "does"} not leave with the calibration.` : ""}`;
+  return `Error model from ${source}.${at.length ? ` Lines are at ${at.join(", ")}.` : ""}${leftOut.length ? ` Without ${leftOut.map((line) => line.effect.replaceAll("_", " ")).join(", ")}, which ${leftOut.length > 1 ? "do" : "does"} not leave with the calibration.` : ""}${turning ? ` The part of the Earth's rate that goes round with the table, ${number(turning, 2)} deg/s, is in these errors; a fit takes it off.` : ""}`;
 }

@@ -2,6 +2,8 @@
 
 import { colour } from "../../core/figure.js";
 
+/** @import { Plot } from "../../../../types/pages.js" */
+
 /** @typedef {[title: string, range: [low: number, high: number]]} SceneAxis */
 /** @typedef {Record<"x" | "y" | "z", SceneAxis>} Axes */
 
@@ -61,4 +63,22 @@ export function sceneLayout(titles, axes) {
     scene2: scene(1),
     annotations: titles.map(title),
   };
+}
+
+/** @type {readonly (readonly [from: `scene${string}.camera`, to: `scene${string}.camera`])[]} */
+const CAMERAS = [
+  ["scene.camera", "scene2.camera"],
+  ["scene2.camera", "scene.camera"],
+];
+
+/**
+ * One camera for both scenes: turning one turns the other.
+ * @param {Plot} plot
+ */
+export function linkCameras(plot) {
+  plot.on("plotly_relayout", (changed) => {
+    if (CAMERAS.every(([from]) => from in changed)) return; // both were set by this function
+    for (const [from, to] of CAMERAS)
+      if (from in changed) window.Plotly.relayout(plot, { [from]: changed[from], [to]: changed[from] });
+  });
 }

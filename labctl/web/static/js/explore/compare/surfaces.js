@@ -3,7 +3,12 @@
 import { colour, figure } from "../../core/figure.js";
 import { alongRate, linesOf, ownRows, positionsOf, rms, span } from "./rows.js";
 import { number } from "../../core/format.js";
-import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
+import { get } from "../../core/http/api.js";
+import { h, setChildren } from "../../core/elements.js";
+import { loadInto } from "../../core/components.js";
+import { query, updateQuery } from "../../core/router.js";
+import { asked } from "../chosen_recordings.js";
+import { barPlace, linkCameras, sceneLayout, twoScenes } from "./scenes.js";
 
 /** @import { Comparison } from "../../../../types/api.js" */
 /** @import { Picture, PlotTrace } from "../../../../types/pages.js" */
@@ -14,10 +19,102 @@ import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
 const SCALE = "Viridis";
 
 /**
+ * The surfaces of the version, or its residual beside that of another version, by choice.
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ * @param {AbortSignal} signal
+ */
+export function surfaces(comparison, state, signal) {
+  const others = state.versions.filter((version) => version !== state.version);
+  if (!others.length) return modelAndResidual(comparison, state);
+  const place = h("div", {});
+  let beside = others.find((version) => String(version) === query().beside) ?? null;
+  async function show() {
+    if (beside === null) return setChildren(place, modelAndResidual(comparison, state));
+    const version = beside;
+    return loadInto(place, `Reading version ${version}`, async () => {
+      const other = await get("/api/units/{serial}/calibrations/{version}/comparison", {
+        path: { serial: state.serial, version },
+        query: asked(state),
+        signal,
+      });
+      return twoVersions([comparison, other], [state.version, version], state.axis);
+    });
+  }
+  const choice = h(
+    "select",
+    {
+      /** @param {Event} event */
+      onchange: (event) => {
+        beside = Number(/** @type {HTMLSelectElement} */ (event.target).value) || null;
+        updateQuery({ beside: beside === null ? null : String(beside) });
+        show();
+      },
+    },
+    h("option", { value: "" }, "the measured error and the model"),
+    others.map((version) =>
+      h("option", { value: String(version), selected: version === beside }, `the residual of version ${version}`),
+    ),
+  );
+  show();
+  return h("div", { class: "stack" }, h("label", { class: "field" }, "Beside the residual", choice), place);
+}
+
+/**
+ * The residuals of two versions of the same recordings, with one scale and one camera.
+ * @param {readonly Comparison[]} comparisons
+ * @param {readonly number[]} versions
+ * @param {string} axis
+ */
+function twoVersions(comparisons, versions, axis) {
+  const all = comparisons.map((each) => ownRows(each, axis));
+  /** @returns {Picture} */
+  const draw = () => {
+    const reach = span(all.flatMap((rows) => rows.residual_dps));
+    const shared = { colorscale: SCALE, cmin: reach[0], cmax: reach[1] };
+    /** @type {Axes} */
+    const axes = {
+      x: ["rate, deg/s", span(all.flatMap((rows) => rows.rate))],
+      y: ["deg C", span(all.flatMap((rows) => rows.temperature_c))],
+      z: ["residual, deg/s", reach],
+    };
+    const bar = {
+      showscale: true,
+      colorbar: { title: { text: "deg/s" }, thickness: 12, outlinewidth: 0, ...barPlace() },
+    };
+    return {
+      data: all.flatMap((rows, k) => {
+        const scene = k ? "scene2" : "scene";
+        const surface = residualSurface(rows, shared, scene);
+        return [
+          ...(surface ? [{ ...surface, ...(k ? {} : bar) }] : []),
+          dots(rows, rows.residual_dps, `version ${versions[k]}`, scene),
+        ];
+      }),
+      layout: {
+        ...sceneLayout(
+          all.map((rows, k) => `version ${versions[k]}: residual, RMS ${number(rms(rows.residual_dps), 2)} deg/s`),
+          axes,
+        ),
+        showlegend: false,
+      },
+    };
+  };
+  const element = figure(
+    "Residual surfaces of two versions",
+    `Axis ${axis} turned about itself: what version ${versions[0]} (left) and version ${versions[1]} (right) leave of the same data sets. One scale, one camera: drag either to rotate both.`,
+    draw,
+    { height: twoScenes() },
+  );
+  element.ondrawn = linkCameras;
+  return element;
+}
+
+/**
  * @param {Comparison} comparison
  * @param {ExploreState} state
  */
-export function surfaces(comparison, state) {
+function modelAndResidual(comparison, state) {
   const rows = ownRows(comparison, state.axis);
   const lines = linesOf(comparison.over_rate, state.axis, positionsOf(rows));
   /** @returns {Picture} */
@@ -54,18 +151,20 @@ export function surfaces(comparison, state) {
           hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>modelled %{z:.4g} deg/s<extra></extra>",
         })),
         dots(rows, rows.measured_error_dps, "measured", "scene"),
-        residualSurface(rows, shared),
+        residualSurface(rows, shared, "scene2"),
         dots(rows, rows.residual_dps, "residual", "scene2"),
       ].filter((trace) => trace !== null),
       layout: { ...sceneLayout(titles, axes), showlegend: false },
     };
   };
-  return figure(
+  const element = figure(
     "Error surface",
-    `Axis ${state.axis} turned about itself. Left: the measured error (dots) and the model (surface). Right: the residual of the model. Both plots have the same scale; drag to rotate them.`,
+    `Axis ${state.axis} turned about itself. Left: the measured error (dots) and the model (surface). Right: the residual of the model. Both plots have the same scale and one camera; drag either to rotate both.`,
     draw,
     { height: twoScenes() },
   );
+  element.ondrawn = linkCameras;
+  return element;
 }
 
 /**
@@ -92,9 +191,10 @@ const dots = (rows, z, label, scene) => ({
  * The mean residual of each cell as a surface; null where cells do not make a grid.
  * @param {Rows} rows
  * @param {object} shared
+ * @param {string} scene
  * @returns {PlotTrace | null}
  */
-function residualSurface(rows, shared) {
+function residualSurface(rows, shared, scene) {
   const rates = [...new Set(rows.rate_level_dps)].sort((a, b) => a - b);
   const warm = [...new Set(rows.temperature_level_c)].sort((a, b) => a - b);
   /** @type {Map<string, number[]>} */
@@ -110,7 +210,7 @@ function residualSurface(rows, shared) {
   return {
     type: "surface",
     name: "residual",
-    scene: "scene2",
+    scene,
     ...shared,
     showscale: false,
     opacity: 0.85,
