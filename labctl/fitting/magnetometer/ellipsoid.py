@@ -70,7 +70,7 @@ def quadric(readings: NDArray[np.float64]) -> tuple[Array, NDArray[np.float64]] 
 
 def unweighed(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return columns^T columns (p, p) of columns (n, p): the product by which all rows weigh alike."""
-    return columns.T @ columns
+    return np.asarray(columns.T @ columns)
 
 
 def nearest_ellipsoid(

@@ -114,8 +114,8 @@ class _Problem:
         information = np.block([[np.array([[own]]), mixed[None]], [mixed[:, None], shared]]) / 2
         back = np.linalg.inv(self.triangle)
         of_places = weighed @ inverse @ back.T
-        by_place = np.einsum("ai,vab,bj->vij", of_places, parts, of_places)
-        by_white = back @ inverse @ back.T - np.tensordot(ratios, by_place, 1)
+        by_place = of_places.T @ parts @ of_places
+        by_white = np.asarray(back @ inverse @ back.T - np.tensordot(ratios, by_place, 1), dtype=np.float64)
         return RestScatter(
             white * np.append(1.0, ratios), np.concatenate([[by_white], by_place]), information / white**2
         )

@@ -1,4 +1,4 @@
-"""A stream of events ends as a whole response, whoever ends it."""
+"""A stream of events ends as a whole response when its server or its client ends it."""
 
 from __future__ import annotations
 
