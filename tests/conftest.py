@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import itertools
 import os
 import shutil
@@ -16,6 +17,7 @@ import pytest
 from hypothesis import settings
 
 from tests.helpers import memory_folder
+from tests.helpers.built_command import build_once
 from tests.helpers.cortex_m import INSTALL_CORTEX_M, has_cortex_m
 from tests.helpers.leftovers import leftover_tasks, leftover_threads
 from tests.helpers.signal_defaults import default_signals
@@ -30,6 +32,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 IN_MEMORY = memory_folder.enter()
 # `labctl stop` finds benches by what is kept here: those of the tests are no benches of the user.
 os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / f"tests-of-labctl-state-{os.getuid()}-{os.getpid()}")
+build_once()
 # The processes that tests start would each compile all modules again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
@@ -156,6 +159,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for item in items if not is_there else ():
             if item.get_closest_marker(marker):
                 item.add_marker(pytest.mark.skip(reason=reason))
+
+
+def pytest_collection_finish() -> None:
+    """Leave the tests and the modules to no later search for garbage: each would walk through a million objects."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_sessionfinish(exitstatus: int) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import socket
+import ssl
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,22 +29,58 @@ from labctl.store.connection.database import Database
 from tests.helpers.waiting import wait_until
 
 if TYPE_CHECKING:
-    from playwright.sync_api import ConsoleMessage, Page
+    from playwright.sync_api import BrowserContext, ConsoleMessage, Page
 
 WIDE, NARROW = {"width": 1280, "height": 860}, {"width": 390, "height": 844}
 #: How long a page may take before a test gives up: a busy machine is slow, not wrong.
 PATIENCE_MS = 45_000
 REQUEST_S = 120.0
+LOOPBACK = "127.0.0.1"
+#: For plain HTTP: otherwise each client reads the certificates of all authorities, 25 ms.
+NO_CERTIFICATES = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 #: For requests that run when the service stops, whole seconds.
 GRACE_S = 20
 
+#: How often a page is asked whether it is so far, milliseconds; by default at each frame, which it then has to draw.
+POLL_MS = 50
+#: The figure of a name, once Plotly has drawn it.
+PLOT = """[...document.querySelectorAll(".plot")].find((each) => each.getAttribute("aria-label").startsWith(name))"""
+DRAWN = f"name => Boolean({PLOT}?.data)"
 #: The traces and the layout of a figure as Plotly has them, with typed arrays as lists.
-READ = """name => {
-  const plot = [...document.querySelectorAll(".plot")].find((each) => each.getAttribute("aria-label").startsWith(name));
-  if (!plot?.data) return null;
+READ = f"""name => {{
+  const plot = {PLOT};
   const plain = (key, value) => (ArrayBuffer.isView(value) ? [...value] : value);
-  return JSON.stringify({data: plot.data, layout: plot.layout}, plain);
-}"""
+  return JSON.stringify({{data: plot.data, layout: plot.layout}}, plain);
+}}"""
+
+
+@cache
+def usual_port() -> socket.socket:
+    """Take a port for the services of this process: a browser keeps compiled scripts by their whole address.
+
+    A socket that is bound and does not listen keeps the port: no other program is given it, and a service may open it.
+    """
+    kept = socket.socket()
+    kept.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    kept.bind((LOOPBACK, 0))
+    return kept
+
+
+def listening(port: int) -> socket.socket:
+    """Return a socket that listens to a port; to the usual one for 0, or to any other while that one is in use."""
+    for number in (port,) if port else (usual_port().getsockname()[1], 0):
+        listener = socket.socket()
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((LOOPBACK, number))
+            listener.listen()
+        except OSError as error:
+            listener.close()
+            if port or error.errno != errno.EADDRINUSE:
+                raise
+        else:
+            return listener
+    raise AssertionError("no port is free")
 
 
 class Server(uvicorn.Server):
@@ -84,16 +123,14 @@ class Service:
         runner = BenchRunner(store, load_bench(self.bench), self.clock) if self.bench else None
         computation = InWorkers(store, self.limits, preload=WORKER_MODULES) if self.limits else None
         self.lab_service = LabService(store, SystemClock(), runner, computation)
-        listener = socket.socket()
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(("127.0.0.1", self.port))
+        listener = listening(self.port)
         self.port = listener.getsockname()[1]
-        self.url = f"http://127.0.0.1:{self.port}"
+        self.url = f"http://{LOOPBACK}:{self.port}"
         app = create_app(self.lab_service, AccessPolicy(keys=self.keys))
         self._server = Server(uvicorn.Config(app, log_level="error", lifespan="on", timeout_graceful_shutdown=GRACE_S))
         self._thread = threading.Thread(target=self._server.serve_until_stopped, args=(listener,), name="test service")
         self._thread.start()
-        self._http = httpx.Client(base_url=self.url, timeout=REQUEST_S)  # one: each reads all certificates, 30 ms
+        self._http = httpx.Client(base_url=self.url, timeout=REQUEST_S, verify=NO_CERTIFICATES)
         assert self._server.ready.wait(REQUEST_S)
         assert self._server.started
 
@@ -122,6 +159,30 @@ class Service:
         return wait_until(self.lab_service.bench_access.listen, lambda: self.get(path), holds)
 
 
+class Profile:
+    """The profile of a browser: tests follow each other in it, and take over nothing but files and compiled scripts."""
+
+    #: What a page of an earlier test could leave behind.
+    LEFT = "cookies,local_storage,indexeddb,cache_storage,service_workers,file_systems,websql"
+
+    def __init__(self, context: BrowserContext) -> None:
+        self._context = context
+        self._kept = context.pages[0]  # a browser without a page may end
+        self._session = context.new_cdp_session(self._kept)
+
+    def new_page(self) -> Page:
+        """Open a page."""
+        return self._context.new_page()
+
+    def clear(self, origin: str) -> None:
+        """Close all pages, and forget what those of a service kept."""
+        for page in self._context.pages:
+            if page is not self._kept:
+                page.close()
+        self._session.send("Storage.clearDataForOrigin", {"origin": origin, "storageTypes": self.LEFT})
+        self._context.clear_cookies()
+
+
 class Faults(list[str]):
     """What a page complained of; a test that expects a complaint clears it."""
 
@@ -144,13 +205,13 @@ class Faults(list[str]):
 def settled(page: Page) -> None:
     """Wait until the page has what it asked for."""
     page.wait_for_selector("main h1")
-    page.wait_for_function("() => !document.querySelector('main[aria-busy], .busy')")
+    page.wait_for_function("() => !document.querySelector('main[aria-busy], .busy')", polling=POLL_MS)
 
 
 def figure(page: Page, name: str) -> dict[str, Any]:
     """Return what a figure of the page shows, once it is drawn."""
     plot = page.locator(f'.plot[aria-label^="{name}"]').first
     plot.scroll_into_view_if_needed()
-    page.wait_for_function(f"name => ({READ})(name) !== null", arg=name)
+    page.wait_for_function(DRAWN, arg=name, polling=POLL_MS)
     found: dict[str, Any] = json.loads(page.evaluate(READ, name))
     return found

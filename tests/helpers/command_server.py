@@ -16,6 +16,7 @@ import socket
 import sys
 from typing import Any, TextIO, cast
 
+from tests.helpers.built_command import build_once, built
 from tests.helpers.paths import ROOT
 
 #: What commands of labctl load when they are called.
@@ -31,6 +32,8 @@ def serve(address: str) -> None:
     """Fork a process for each request until standard input ends; returns in the forked processes only."""
     for module in MODULES:
         importlib.import_module(module)
+    build_once()
+    built(importlib.import_module("labctl.cli.app").app)
     gc.freeze()  # pages that the collector does not touch stay shared
     woken, waking = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     signal.set_wakeup_fd(waking)

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import pytest
 
 from labctl.services.campaigns import preparation
-from tests.helpers.browser import PATIENCE_MS, WIDE, Faults, Service
+from tests.helpers.browser import PATIENCE_MS, WIDE, Faults, Profile, Service
+from tests.helpers.migrated_databases import migrated_once
 from tests.helpers.paced_hand import PacedClock, PacedPerson
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserContext, Page
+    from playwright.sync_api import Browser, BrowserContext, Page, Playwright
 
 CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium")
 ARGUMENTS = (
@@ -23,14 +24,45 @@ ARGUMENTS = (
 )  # fmt: skip
 
 
+@pytest.fixture(scope="module", autouse=True)
+def databases() -> Iterator[None]:
+    """Take new databases from one that was migrated."""
+    with migrated_once():
+        yield
+
+
 @pytest.fixture(autouse=True)
 def answers(shared_answers: Path) -> Path:
     """All pages share their kept answers."""
     return shared_answers
 
 
+@pytest.fixture(scope="session")
+def furnish(tmp_path_factory: pytest.TempPathFactory, cache_of_fixtures: None) -> Callable[..., Path]:
+    """Return a folder with the database of a service after requests: `furnish(lambda service: ...)`."""
+
+    def furnished(requests: Callable[[Service], object]) -> Path:
+        serving = Service(tmp_path_factory.mktemp("furnished"))
+        serving.start()
+        try:
+            requests(serving)
+        finally:
+            serving.stop()
+        return serving.folder
+
+    return furnished
+
+
+@pytest.fixture(scope="module")
+def template() -> Path | None:
+    """The folder that each service of a module begins with a copy of; without, it begins empty."""
+    return None
+
+
 @pytest.fixture
-def service(tmp_path: Path) -> Iterator[Service]:
+def service(tmp_path: Path, template: Path | None) -> Iterator[Service]:
+    if template:
+        shutil.copytree(template, tmp_path, dirs_exist_ok=True)
     serving = Service(tmp_path)
     serving.start()
     yield serving
@@ -48,16 +80,34 @@ def waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service
 
 
 @pytest.fixture(scope="session")
-def chromium() -> Iterator[Browser]:
+def playwright() -> Iterator[Playwright]:
     if CHROMIUM is None:
         pytest.skip("no chromium (on Debian: apt-get install chromium)")
     from playwright.sync_api import expect, sync_playwright
 
     expect.set_options(timeout=PATIENCE_MS)
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(ARGUMENTS))
-        yield browser
-        browser.close()
+    with sync_playwright() as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
+def chromium(playwright: Playwright) -> Iterator[Browser]:
+    """A browser for contexts that share nothing; each of them compiles all scripts again (1 s)."""
+    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(ARGUMENTS))
+    yield browser
+    browser.close()
+
+
+@pytest.fixture(scope="session")
+def profile(playwright: Playwright, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Profile]:
+    """A browser with one profile, for all tests of this worker. It keeps the scripts as they were compiled."""
+    folder = tmp_path_factory.mktemp("profile")
+    context = playwright.chromium.launch_persistent_context(
+        folder, executable_path=CHROMIUM, args=list(ARGUMENTS), color_scheme="light"
+    )
+    yield Profile(context)
+    context.close()
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 @pytest.fixture
@@ -68,24 +118,32 @@ def faults() -> Iterator[Faults]:
 
 
 @pytest.fixture
-def visit(chromium: Browser, service: Service, faults: Faults) -> Iterator[Callable[..., Page]]:
-    """Open a page of the service in a browser of its own: `visit("/bench", size=NARROW, dark=True)`.
+def visit(
+    request: pytest.FixtureRequest, profile: Profile, service: Service, faults: Faults
+) -> Iterator[Callable[..., Page]]:
+    """Open a page of the service: `visit("/bench", size=NARROW, dark=True)`.
 
     Unless `idle`, the browser is never idle: a page without figures does not load Plotly for the next one (1 s).
+    With `alone`, the page has a context of its own: for a test that changes more than its page.
     """
     contexts: list[BrowserContext] = []
 
-    def opened(path: str, *, size: dict[str, int] = WIDE, dark: bool = False, idle: bool = False) -> Page:
-        context = chromium.new_context(
-            viewport=size,
-            color_scheme="dark" if dark else "light",
-            accept_downloads=True,
-        )
-        contexts.append(context)
-        context.set_default_timeout(PATIENCE_MS)
+    def new_page(alone: bool) -> Page:
+        if not alone:
+            return profile.new_page()
+        chromium: Browser = request.getfixturevalue("chromium")
+        contexts.append(chromium.new_context())
+        return contexts[-1].new_page()
+
+    def opened(
+        path: str, *, size: dict[str, int] = WIDE, dark: bool = False, idle: bool = False, alone: bool = False
+    ) -> Page:
+        page = new_page(alone)
+        page.set_default_timeout(PATIENCE_MS)
+        page.set_viewport_size({"width": size["width"], "height": size["height"]})
+        page.emulate_media(color_scheme="dark" if dark else "light")
         if not idle:
-            context.add_init_script("window.requestIdleCallback = () => 0")
-        page = context.new_page()
+            page.add_init_script("window.requestIdleCallback = () => 0")
         page.on("pageerror", lambda error: faults.append(f"{path}: {error}"))
         page.on("console", lambda reported: faults.hear(path, reported))
         page.on("request", lambda asked: faults.check_request(asked.url, service.url))
@@ -95,3 +153,4 @@ def visit(chromium: Browser, service: Service, faults: Faults) -> Iterator[Calla
     yield opened
     for context in contexts:
         context.close()
+    profile.clear(service.url)

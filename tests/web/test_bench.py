@@ -114,7 +114,7 @@ def test_says_that_it_is_stale_and_goes_on_where_it_was(
     from playwright.sync_api import expect
 
     start(service)
-    page = visit("/bench")
+    page = visit("/bench", alone=True)
     expect(page.get_by_role("region", name="Last events").get_by_role("list")).to_contain_text("campaign running")
     page.context.set_offline(True)
     service.stop()

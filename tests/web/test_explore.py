@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -16,15 +17,19 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.timeout(300)
 
 
+@pytest.fixture(scope="module")
+def template(furnish: Callable[..., Path]) -> Path:
+    def fitted(service: Service) -> None:
+        hidden = {"recipe": "ojeda2000-121", "hide": ["scale_factor_asymmetry=0.0002"], "seed": 1}
+        serial = service.post("/api/recordings/simulated", hidden)["serial"]
+        service.post(f"/api/units/{serial}/calibrations", {"model": "ojeda2000"})
+
+    return furnish(fitted)
+
+
 @pytest.fixture
 def explored(service: Service) -> str:
-    made = service.post(
-        "/api/recordings/simulated",
-        {"recipe": "ojeda2000-121", "hide": ["scale_factor_asymmetry=0.0002"], "seed": 1},
-    )
-    serial = made["serial"]
-    service.post(f"/api/units/{serial}/calibrations", {"model": "ojeda2000"})
-    return f"/explore?unit={serial}"
+    return f"/explore?unit={service.get('/api/recordings/1')['serial']}"
 
 
 def test_a_pick_shows_everywhere_and_in_the_address(visit: Callable[..., Page], explored: str) -> None:

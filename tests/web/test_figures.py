@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,14 +20,23 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.timeout(400)
 
 
+@pytest.fixture(scope="module")
+def template(furnish: Callable[..., Path]) -> Path:
+    """A unit with 630 data sets about three axes, an odd scale factor hidden in it, and a first model."""
+
+    def fitted(service: Service) -> None:
+        recording = three_axes(4, scale_factor_odd=3e-9)
+        service.lab_service.store.recordings.add_import(recording, recording.info.started_at)
+        path = f"/api/units/{recording.info.serial}/calibrations"
+        service.post(path, {"model": "yang2018"})
+        service.get(f"{path}/1/criticism")  # kept: the page need not wait for it
+
+    return furnish(fitted)
+
+
 @pytest.fixture
 def unit(service: Service) -> str:
-    """Return a unit with 630 data sets about three axes, an odd scale factor hidden in it, and a first model."""
-    recording = three_axes(4, scale_factor_odd=3e-9)
-    service.lab_service.store.recordings.add_import(recording, recording.info.started_at)
-    service.post(f"/api/units/{recording.info.serial}/calibrations", {"model": "yang2018"})
-    service.get(f"/api/units/{recording.info.serial}/calibrations/1/criticism")  # kept: the page need not wait for it
-    return recording.info.serial
+    return str(service.get("/api/recordings/1")["serial"])
 
 
 def opened(visit: Callable[..., Page], unit: str, view: str, **dress: Any) -> Page:

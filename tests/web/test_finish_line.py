@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -24,13 +25,21 @@ WATCH = """() => {
 }"""
 
 
+@pytest.fixture(scope="module")
+def template(furnish: Callable[..., Path]) -> Path:
+    """Import the real gyro and fit it with the effect left out that it shows."""
+
+    def fitted(service: Service) -> None:
+        made = service.post("/api/recordings/example", {"name": "osu-fog"})
+        path = f"/api/units/{made['serial']}/calibrations"
+        service.post(path, {"recording": made["recording"], "model": "bias_scale"})
+
+    return furnish(fitted)
+
+
 @pytest.fixture
 def unit(service: Service) -> str:
-    """Import the real gyro and fit it with the effect left out that it shows."""
-    made = service.post("/api/recordings/example", {"name": "osu-fog"})
-    path = f"/api/units/{made['serial']}/calibrations"
-    service.post(path, {"recording": made["recording"], "model": "bias_scale"})
-    return str(made["serial"])
+    return str(service.get("/api/recordings/1")["serial"])
 
 
 def make_version(page: Page) -> None:

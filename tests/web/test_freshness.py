@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,23 +27,32 @@ FREE = "is on the bench and free"
 HEARTBEAT = "/health/heartbeat"
 
 
-@pytest.fixture
-def served(tmp_path: Path) -> Iterator[ServiceProcess]:
-    with running(tmp_path / "lab.sqlite") as process:
+@contextmanager
+def bench_page(chromium: Browser, service: ServiceProcess) -> Iterator[Page]:
+    """Open the bench page of a service in a process of its own; nothing runs there."""
+    from playwright.sync_api import expect
+
+    page = chromium.new_page()
+    try:
+        page.goto(f"{service.url}/bench")
+        settled(page)
+        expect(page.get_by_text(FREE)).to_be_visible()
+        yield page
+    finally:
+        page.close()
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceProcess]:
+    """A service that no test disturbs."""
+    with running(tmp_path_factory.mktemp("served") / "lab.sqlite") as process:
         yield process
 
 
 @pytest.fixture
 def idle(served: ServiceProcess, chromium: Browser) -> Iterator[Page]:
-    """The bench page of a service in a process of its own; nothing runs there."""
-    from playwright.sync_api import expect
-
-    page = chromium.new_page()
-    page.goto(f"{served.url}/bench")
-    settled(page)
-    expect(page.get_by_text(FREE)).to_be_visible()
-    yield page
-    page.close()
+    with bench_page(chromium, served) as page:
+        yield page
 
 
 def colour(page: Page) -> str:
@@ -62,24 +72,25 @@ def expect_stale(page: Page) -> None:
     assert colour(page) == text
 
 
-def test_a_service_that_stands_still_or_is_killed_is_stale_within_5_s(served: ServiceProcess, idle: Page) -> None:
+def test_a_service_that_stands_still_or_is_killed_is_stale_within_5_s(tmp_path: Path, chromium: Browser) -> None:
     from playwright.sync_api import expect
 
-    line, calm = idle.locator("[data-freshness]"), colour(idle)
-    expect(line).to_contain_text("Last answer of the service 0 s ago")
-    os.kill(served.web_pid, signal.SIGSTOP)
-    expect_stale(idle)
-    os.kill(served.web_pid, signal.SIGCONT)
-    expect_fresh(idle, line, calm)
-    os.kill(served.bench_pid, signal.SIGSTOP)  # the supervisor ends it, and starts another
-    expect_stale(idle)
-    expect_fresh(idle, line, calm)
-    settled(idle)  # a page that is drawn again at this moment has no values that could be stale
-    holder = holder_of(str(served.database))
-    assert holder is not None
-    for pid in (served.process.pid, holder.pid):  # the web process ends with the supervisor
-        os.kill(pid, signal.SIGKILL)
-    expect_stale(idle)
+    with running(tmp_path / "lab.sqlite") as served, bench_page(chromium, served) as idle:
+        line, calm = idle.locator("[data-freshness]"), colour(idle)
+        expect(line).to_contain_text("Last answer of the service 0 s ago")
+        os.kill(served.web_pid, signal.SIGSTOP)
+        expect_stale(idle)
+        os.kill(served.web_pid, signal.SIGCONT)
+        expect_fresh(idle, line, calm)
+        os.kill(served.bench_pid, signal.SIGSTOP)  # the supervisor ends it, and starts another
+        expect_stale(idle)
+        expect_fresh(idle, line, calm)
+        settled(idle)  # a page that is drawn again at this moment has no values that could be stale
+        holder = holder_of(str(served.database))
+        assert holder is not None
+        for pid in (served.process.pid, holder.pid):  # the web process ends with the supervisor
+            os.kill(pid, signal.SIGKILL)
+        expect_stale(idle)
 
 
 def expect_fresh(page: Page, line: Locator, calm: str) -> None:
@@ -120,7 +131,7 @@ def test_a_service_that_answers_but_refuses_what_the_page_shows_is_stale(idle: P
 def test_a_page_asks_once_a_second_and_not_while_its_tab_is_hidden(visit: Callable[..., Page], faults: Faults) -> None:
     from playwright.sync_api import expect
 
-    page = visit("/units")
+    page = visit("/units", alone=True)
     page.clock.install()
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url) if request.url.endswith(HEARTBEAT) else None)

@@ -98,7 +98,7 @@ def test_whatever_answers_in_place_of_the_service_the_page_says_not_stopped_unti
     from playwright.sync_api import expect
 
     begin(service)
-    page = visit("/bench", size=size, dark=size is NARROW)
+    page = visit("/bench", size=size, dark=size is NARROW, alone=True)
     failing = Failing(page)
     press_stop(page)
     over = page.get_by_role("alertdialog")

@@ -31,7 +31,7 @@ def test_every_figure_is_printed_whole_and_in_light_colours(service: Service, vi
     made = service.post("/api/recordings/simulated", {"serial": "FOG-0001", "recipe": "short"})
     fit = {"recording": made["recording"], "effects": ["bias", "scale_factor"]}
     service.post("/api/units/FOG-0001/calibrations", fit)
-    page = visit("/explore?unit=FOG-0001", dark=True)
+    page = visit("/explore?unit=FOG-0001", dark=True, alone=True)
     settled(page)
     page.get_by_role("region", name="Error of the versions").wait_for()
     page.wait_for_function("() => window.Plotly")

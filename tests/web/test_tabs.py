@@ -35,7 +35,7 @@ def test_a_stop_in_the_ninth_tab_of_a_running_campaign_is_carried_out(
     recipe = (RECIPES / "short.toml").read_text(encoding="utf-8")
     service.post("/api/campaigns", {"recipe": recipe})
     service.until("/api/campaigns/1", lambda answer: answer["prompt"] is not None)
-    first = visit("/bench")
+    first = visit("/bench", alone=True)
     settled(first)
     tabs = [first]
     for _ in range(TABS):
