@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve
 
 from labctl.fitting.magnetometer.places import Places, Weights
 from labctl.fitting.numeric.arrays import Array
@@ -104,9 +103,9 @@ class _Problem:
         normal = weights.product_of(self.whole, self.sums)
         inverse, white = np.linalg.inv(normal[:-1, :-1]), self._white_var(normal)
         root = weights.root
-        weighed = root[:, None] * cho_solve(weights.factor, self.sums[:, :-1])  # Z^T V^-1 J
-        across = root[:, None] * cho_solve(weights.factor, np.diag(root)) - weighed @ inverse @ weighed.T  # Z^T P Z
-        times = parts @ across
+        weighed = root[:, None] * weights.solve(self.sums[:, :-1])  # Z^T V^-1 J
+        across = root[:, None] * weights.solve(np.diag(root)) - weighed @ inverse @ weighed.T  # Z^T P Z
+        times = np.array([part @ across for part in parts])
         shared = np.einsum("iab,jba->ij", times, times)
         trace = np.einsum("iaa->i", times)
         mixed = trace - shared @ ratios  # D_1 = V - sum of ratio D_i
@@ -114,7 +113,7 @@ class _Problem:
         information = np.block([[np.array([[own]]), mixed[None]], [mixed[:, None], shared]]) / 2
         back = np.linalg.inv(self.triangle)
         of_places = weighed @ inverse @ back.T
-        by_place = of_places.T @ parts @ of_places
+        by_place = np.array([of_places.T @ (part @ of_places) for part in parts])
         by_white = np.asarray(back @ inverse @ back.T - np.tensordot(ratios, by_place, 1), dtype=np.float64)
         return RestScatter(
             white * np.append(1.0, ratios), np.concatenate([[by_white], by_place]), information / white**2

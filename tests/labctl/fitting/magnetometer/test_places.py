@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from scipy.sparse import csr_array
 
 from labctl.fitting.magnetometer.places import MAX_PLACES, Places, Weights
 from labctl.fitting.magnetometer.rest_scatter import scatter_of
@@ -16,14 +17,14 @@ from labctl.fitting.poses.between import gls, restricted_likelihood
 REST = np.array([0] * 2 + [1] * 3 + [0] * 4 + [2] * 3 + [0] * 2)
 
 
-def of_readings(places: Places, part: NDArray[np.float64]) -> NDArray[np.float64]:
+def of_readings(places: Places, part: csr_array) -> NDArray[np.float64]:
     """Return a covariance of places (k, k) as one of readings (n, n)."""
-    return np.asarray(part[np.ix_(places.number, places.number)])
+    return np.asarray(part.toarray()[np.ix_(places.number, places.number)])
 
 
 def test_the_error_of_a_way_goes_from_one_rest_to_the_next() -> None:
     places = Places.of(REST)
-    shares = places.of_rests[places.number]
+    shares = places.of_rests.toarray()[places.number]
     assert shares[:5] == pytest.approx(np.tile([1.0, 0.0], (5, 1)))
     assert shares[5:9, 0] == pytest.approx([0.875, 0.625, 0.375, 0.125])
     assert shares[9:] == pytest.approx(np.tile([0.0, 1.0], (5, 1)))
@@ -48,9 +49,15 @@ def test_what_a_way_adds_is_a_bridge_between_rests_and_a_walk_from_one() -> None
 def test_a_long_record_has_a_bounded_number_of_places() -> None:
     rest = np.repeat(np.arange(60) % 2 * (1 + np.arange(60) // 2), 500)
     places = Places.of(rest)
-    assert 300 < len(places.of_rests) <= MAX_PLACES + 60
+    assert 300 < places.of_rests.shape[0] <= MAX_PLACES + 60
     for number in (1, 2, 30):
         assert len(np.unique(places.number[rest == number])) == 1
+
+
+def test_a_place_shares_errors_with_those_of_the_stretches_beside_it_alone() -> None:
+    rest = np.repeat(np.arange(6000) % 2 * (1 + np.arange(6000) // 2), 2)
+    weights = Weights.of(Places.of(rest), np.array([1.0, 1.0]))
+    assert weights.factor.shape == (3, 6000)  # the diagonal and two below it, of 6,000
 
 
 @pytest.mark.parametrize("rest", [REST, np.repeat([1, 2, 3], 5), np.repeat([0, 1, 0], [3, 4, 3])])
@@ -58,7 +65,9 @@ def test_readings_are_weighed_as_by_the_dense_covariance(rest: NDArray[np.int64]
     rng, places = np.random.default_rng(1), Places.of(rest)
     columns = rng.normal(size=(len(rest), 3))
     ratios = np.array([2.0, 5.0])
-    total = np.eye(len(rest)) + of_readings(places, np.tensordot(ratios, places.parts, 1))
+    total = np.eye(len(rest)) + sum(
+        ratio * of_readings(places, part) for ratio, part in zip(ratios, places.parts, strict=True)
+    )
     weights = Weights.of(places, ratios)
     assert weights.product(columns) == pytest.approx(columns.T @ np.linalg.solve(total, columns))
     assert weights.log_determinant == pytest.approx(np.linalg.slogdet(total)[1])
