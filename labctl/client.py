@@ -31,12 +31,13 @@ from labctl.answers.campaigns import (
     ResumeRequest,
 )
 from labctl.answers.certification import CalibrationStateResponse
+from labctl.answers.common_fields import CriticismVerdict
 from labctl.answers.fixed_coefficients import FixedCoefficients
 from labctl.answers.points import PointFigure, PointResponse
 from labctl.answers.recordings import ImportResponse, RecordingResponse
 from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.schedule import ScheduledResponse
-from labctl.answers.units import UnitResponse, UnitState, UnitVerdict
+from labctl.answers.units import UnitResponse, UnitState
 from labctl.calibration import Calibration, read_calibration
 from labctl.calibration.certification import warn
 from labctl.errors import CalibrationWithdrawn
@@ -130,7 +131,7 @@ class Client:
         *,
         due_within: str | None = None,
         calibration: UnitState | None = None,
-        verdict: UnitVerdict | None = None,
+        verdict: CriticismVerdict | None = None,
         search: str = "",
         limit: int | None = None,
     ) -> list[UnitResponse]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -16,6 +16,9 @@ POSITION = "Position of the unit: the body axis that points up, such as z or -x.
 KIND = "Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table)."
 TECHNOLOGY = "Technology of the gyro: fog (fibre-optic), mems or piezo; null: not known."
 ROOM_UNIT = "Unit of the quantity: deg C for temperature, % for relative humidity, hPa for air pressure."
+
+#: What a criticism says of a model; `verdict` of its answer says what each means.
+CriticismVerdict = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
 
 # who and what
 Serial = Annotated[str, Field(description="Serial number of the unit.")]

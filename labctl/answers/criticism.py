@@ -9,6 +9,7 @@ from typing_extensions import Doc, TypedDict
 
 from labctl.answers.base import ResponseModel
 from labctl.answers.common_fields import (
+    CriticismVerdict,
     RecordingNumber,
     Serial,
     VersionNumber,
@@ -248,7 +249,7 @@ class CriticismResponse(ResponseModel):
         description="Only for several recordings: repeatability, agreement between the recordings, and the error "
         "when each recording is predicted by a fit to the others.",
     )
-    verdict: Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"] = Field(
+    verdict: CriticismVerdict = Field(
         description="adequate: the residual is explained by noise; missing: the named effects are missing in the "
         "model; ambiguous: one of the named effects is missing, and the data do not distinguish them; unexplained: "
         "no effect of the catalogue explains the residual; insufficient_data: too little was measured for a "

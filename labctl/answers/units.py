@@ -44,8 +44,6 @@ class RecalibrationResponse(ResponseModel):
 
 
 UnitState = Literal["in_force", "overdue", "none"]
-#: Which verdicts of a criticism a version can be certified with.
-UnitVerdict = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
 
 
 class UnitResponse(ResponseModel):

@@ -7,7 +7,8 @@ from datetime import datetime, timedelta
 from functools import cache
 from typing import get_args
 
-from labctl.answers.units import ExportFormatResponse, RecalibrationResponse, UnitResponse, UnitState, UnitVerdict
+from labctl.answers.common_fields import CriticismVerdict
+from labctl.answers.units import ExportFormatResponse, RecalibrationResponse, UnitResponse, UnitState
 from labctl.errors import BadInput
 from labctl.exports import export_formats
 from labctl.services.calibrations.due import campaign_of
@@ -39,7 +40,7 @@ def list_units(
         if calibration or verdict:
             raise BadInput("due_within is given together with calibration or verdict; give one of them")
         return units_due(store, now, within, request)
-    for name, value, choices in (("calibration", calibration, UnitState), ("verdict", verdict, UnitVerdict)):
+    for name, value, choices in (("calibration", calibration, UnitState), ("verdict", verdict, CriticismVerdict)):
         if value is not None and value not in get_args(choices):
             raise BadInput(f"{name} {value!r}: choose one of {', '.join(get_args(choices))}")
     page = store.units.page(request, UnitFilter(now, calibration, verdict))

@@ -6,8 +6,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
+from labctl.answers.common_fields import CriticismVerdict
 from labctl.answers.datasheet import DatasheetResponse
-from labctl.answers.units import TrendResponse, UnitResponse, UnitState, UnitVerdict
+from labctl.answers.units import TrendResponse, UnitResponse, UnitState
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.api.paging import AfterSerial, Limit, Search, in_parts
@@ -33,7 +34,7 @@ def units(
         Query(description="Only units with a version in force, with one that is overdue, or with none in force."),
     ] = None,
     verdict: Annotated[
-        UnitVerdict | None, Query(description="Only units whose version in force was certified with this verdict.")
+        CriticismVerdict | None, Query(description="Only units whose version in force was certified with this verdict.")
     ] = None,
     search: Search = "",
     limit: Limit = None,
