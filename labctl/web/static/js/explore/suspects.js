@@ -133,7 +133,7 @@ export function suspectList(state, effects, { onadd, explain }) {
             { class: "stack", style: "gap: .3rem" },
             h(
               "div",
-              { class: "row tight" },
+              { class: "row", style: "gap: .2rem .4rem" },
               h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, idText(s.effect)),
               named.has(s.effect) ? chip("likely missing", "warn") : null,
               s.physical !== false ? null : chip("not physical for this type of gyro"),
