@@ -65,7 +65,7 @@ export async function longList({ what, hint, search = "", filters = [], read, dr
   const input = h("input", { type: "search", value: search, maxlength: "200", oninput: () => typed() });
   const field = h(
     "div",
-    { class: "row" },
+    { class: "row", style: "align-items: flex-start" },
     labelledField(`Search ${what}`, input, hint),
     filters.map(({ name, label, options }) =>
       selectField(label, [option("", `All ${what}`), ...options], wanted[name], (value) => choose(name, value)),
