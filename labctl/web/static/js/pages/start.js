@@ -41,7 +41,7 @@ export async function page({ signal }) {
       h(
         "p",
         {},
-        "695 dwells on a heated rate table. The error after a usual fit is fifteen times the noise; find out why.",
+        "695 dwells on a heated rate table. The error after a usual fit is sixteen times the noise; find out why.",
       ),
       h(
         "div",
