@@ -161,6 +161,7 @@ function overview(units, found) {
             ),
           ),
         ),
+        units.length === SHOWN ? h("a", { class: "small", href: "/units" }, "All units") : null,
       ),
       card(
         "Data",
