@@ -109,7 +109,9 @@ export async function longList({ what, hint, search = "", filters = [], read, dr
     if (!rows.length) setChildren(table, chosen ? emptyState(h("p", {}, noneOf(what, wanted))) : empty);
     else setChildren(table, draw(rows));
     status.textContent =
-      next || chosen ? `${count(rows.length)} of ${count(total)} ${what}${chosen ? " found" : ""}` : "";
+      rows.length && (next || chosen)
+        ? `${count(rows.length)} of ${count(total)} ${what}${chosen ? " found" : ""}`
+        : "";
   }
 
   const refresh = () => readPart(Math.max(PART, shown.rows.length));
