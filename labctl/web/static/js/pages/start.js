@@ -59,7 +59,7 @@ export async function page({ signal }) {
         h(
           "p",
           {},
-          "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect the model lacks.",
+          "A simulated gyro with an effect that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect the model lacks.",
         ),
         button("Simulate a recording", openSimulated),
       ),
