@@ -117,7 +117,11 @@ export function recipeChoice(all, choice, chosen) {
             `${each.description}. `,
             each.datasets === null
               ? null
-              : h("span", { class: "nowrap" }, `${count(each.datasets)} data sets, ${duration(each.expected_s)}`),
+              : h(
+                  "span",
+                  { class: "nowrap" },
+                  `${count(each.datasets)} data ${each.datasets === 1 ? "set" : "sets"}, ${duration(each.expected_s)}`,
+                ),
           ),
           each.refused
             ? chip("beyond the bench", "warn")

@@ -65,7 +65,7 @@ export async function longList({ what, hint, search = "", filters = [], read, dr
   const input = h("input", { type: "search", value: search, maxlength: "200", oninput: () => typed() });
   const field = h(
     "div",
-    { class: "row" },
+    { class: "row", style: "align-items: flex-start" },
     labelledField(`Search ${what}`, input, hint),
     filters.map(({ name, label, options }) =>
       selectField(label, [option("", `All ${what}`), ...options], wanted[name], (value) => choose(name, value)),
@@ -109,7 +109,9 @@ export async function longList({ what, hint, search = "", filters = [], read, dr
     if (!rows.length) setChildren(table, chosen ? emptyState(h("p", {}, noneOf(what, wanted))) : empty);
     else setChildren(table, draw(rows));
     status.textContent =
-      next || chosen ? `${count(rows.length)} of ${count(total)} ${what}${chosen ? " found" : ""}` : "";
+      rows.length && (next || chosen)
+        ? `${count(rows.length)} of ${count(total)} ${what}${chosen ? " found" : ""}`
+        : "";
   }
 
   const refresh = () => readPart(Math.max(PART, shown.rows.length));

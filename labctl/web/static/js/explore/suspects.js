@@ -55,9 +55,14 @@ export function verdictCard(state) {
         ? null
         : [capitalised(heldOutName(state.motion)), number(error.heldout_rms_dps), "deg/s"],
       ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s"],
-      noise.vs_datasheet
-        ? ["Drift", number(noise.drift_dps), "deg/s", `${number(noise.vs_datasheet, 2)} times the data sheet's`]
-        : ["Drift", number(noise.drift_dps), "deg/s"],
+      noise.drift_dps === null
+        ? null
+        : [
+            "Drift",
+            number(noise.drift_dps),
+            "deg/s",
+            noise.vs_datasheet ? `${number(noise.vs_datasheet, 2)} times the data sheet's` : null,
+          ],
       criticism.lack_of_fit.statistic === null
         ? null
         : [
@@ -133,7 +138,7 @@ export function suspectList(state, effects, { onadd, explain }) {
             { class: "stack", style: "gap: .3rem" },
             h(
               "div",
-              { class: "row tight" },
+              { class: "row", style: "gap: .2rem .4rem" },
               h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, idText(s.effect)),
               named.has(s.effect) ? chip("likely missing", "warn") : null,
               s.physical !== false ? null : chip("not physical for this type of gyro"),

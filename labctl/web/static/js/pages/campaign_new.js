@@ -193,6 +193,7 @@ function planCard(answer, bench) {
         `${ends.toLocaleDateString("en-GB", { day: "numeric", month: "short" })}${simulated ? `, ${SIMULATED}` : ""}`,
       ],
       answer.bench === bench?.name ? null : ["Bench", answer.bench],
+      ["Recipe", answer.recipe],
     ]),
     attendanceNotice(answer.attendance),
     mountingWorth(answer.misalignment),

@@ -41,7 +41,7 @@ export async function page({ signal }) {
       h(
         "p",
         {},
-        "695 dwells on a heated rate table. The error after a usual fit is fifteen times the noise; find out why.",
+        "695 dwells on a heated rate table. The error after a usual fit is sixteen times the noise; find out why.",
       ),
       h(
         "div",
@@ -59,7 +59,7 @@ export async function page({ signal }) {
         h(
           "p",
           {},
-          "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect the model lacks.",
+          "A simulated gyro with an effect that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect the model lacks.",
         ),
         button("Simulate a recording", openSimulated),
       ),
@@ -161,6 +161,7 @@ function overview(units, found) {
             ),
           ),
         ),
+        units.length === SHOWN ? h("a", { class: "small", href: "/units" }, "All units") : null,
       ),
       card(
         "Data",

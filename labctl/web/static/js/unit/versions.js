@@ -100,7 +100,7 @@ const columnsOf = (unit, issued, explore) => [
     cell: (row) =>
       h(
         "div",
-        { class: "row tight", style: "gap: .2rem" },
+        { class: "row version-actions" },
         act(unit, row),
         h("details", {}, h("summary", {}, "Files"), exportFiles(unit, row.version)),
         fetchedBy(unit.serial, row.version),
