@@ -170,6 +170,7 @@ from labctl.answers.criticism import (
     SlowProcess as SlowProcess,
     StageResponse as StageResponse,
     Suspect as Suspect,
+    Undistinguished as Undistinguished,
     WorstDataSet as WorstDataSet,
 )
 from labctl.answers.datasheet import (

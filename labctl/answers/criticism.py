@@ -186,6 +186,15 @@ class Experiment(TypedDict):
     """Least chi2 (at most 40) by which a rival fails to explain the leading effect, per hour, 1/h."""
 
 
+class Undistinguished(TypedDict):
+    """An effect of the model that the data could not tell from others."""
+
+    effect: str
+    """Id of an effect that the version has and its parent has not."""
+    others: list[str]
+    """Ids of the effects that would explain the data as well in its place."""
+
+
 class Remainder(TypedDict):
     """What remains beside all effects that were named."""
 
@@ -291,6 +300,11 @@ class CriticismResponse(ResponseModel):
     further: list[list[str]] = Field(
         default_factory=list,
         description="Effects that could be tried although the model is adequate; equivalent effects are in one group.",
+    )
+    undistinguished: list[Undistinguished] = Field(
+        default_factory=list,
+        description="Effects of an adequate model that these data could not tell from others when they were added: the "
+        "error is corrected, the cause is not known.",
     )
     hypothesis: Literal["temperature_not_logged"] | None = Field(
         default=None,

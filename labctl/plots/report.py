@@ -39,7 +39,7 @@ def _number(value: float | None) -> str:
 
 def _errors(error: CriticisedErrors) -> str:
     figures = (
-        ("left after the fit", error["rms_dps"]),
+        ("residual RMS", error["rms_dps"]),
         ("at temperatures left out of the fit", error["heldout_rms_dps"]),
         ("noise floor", error["noise_floor_dps"]),
     )

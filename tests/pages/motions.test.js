@@ -97,8 +97,8 @@ test("the first models and the held-out error are those of the motion", () => {
   );
   assert.deepEqual(firstModels("profile")[0].body.effects?.slice(2), ["time_delay", "bandwidth"]);
   assert.equal(firstModels(undefined)[0].id, "bias_scale");
-  assert.equal(heldOutName("poses"), "at left-out turns");
-  assert.equal(heldOutName("rest"), "at left-out temperatures");
+  assert.equal(heldOutName("poses"), "at turns left out");
+  assert.equal(heldOutName("rest"), "at temperatures left out");
 });
 
 test("a band is faded in a form that the drawing library knows", () => {

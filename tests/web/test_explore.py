@@ -105,7 +105,9 @@ def test_a_saved_picture_says_what_it_is_of(visit: Callable[..., Page], explored
     assert page.get_by_text(f"unit {serial}, version 1 (").count() == 0, "the figure of the page stays as it was"
 
 
-@pytest.mark.parametrize("view", ["Error over rate", "Error over temperature", "Surface", "At rest", "Per full turn"])
+@pytest.mark.parametrize(
+    "view", ["Error over rate", "Error over temperature", "Surface", "At rest", "Error of a full turn"]
+)
 def test_measured_and_modelled_are_compared_in_every_view(visit: Callable[..., Page], explored: str, view: str) -> None:
     from playwright.sync_api import expect
 

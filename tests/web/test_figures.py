@@ -65,7 +65,7 @@ def test_the_pictures_of_a_tri_axial_recording_are_true(
     check_panels(figure(page, "Error of every output"), compared, rows)
     page.get_by_role("button", name="Surface").click()
     check_surfaces(figure(page, "Error surface"), compared, rows)
-    page.get_by_role("button", name="Per full turn").click()
+    page.get_by_role("button", name="Error of a full turn").click()
     check_turns(figure(page, "Error after a full turn"), rows)
 
 

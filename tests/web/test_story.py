@@ -35,7 +35,7 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     expect(learn).to_contain_text("the part of the residual that scale factor asymmetry would explain")
     learn.get_by_role("button", name="Add", exact=True).first.click()
     adding = page.get_by_role("region", name="Add it")
-    expect(adding).to_contain_text("Left after the fit")
+    expect(adding).to_contain_text("RMS residual")
     adding.get_by_role("button", name="Make version 2").click()
     page.wait_for_url("**version=2**")
     expect(page.get_by_role("region", name="Verdict")).to_contain_text("Nothing is missing")

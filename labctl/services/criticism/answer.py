@@ -175,7 +175,7 @@ def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[
             wanted = list(
                 dict.fromkeys(CATALOGUE[e].experiment for e in verdict.indistinguishable[:3] if e in CATALOGUE)
             )
-        said += [f"To tell: {experiment}." for experiment in wanted]
+        said += [f"To distinguish them: {experiment}." for experiment in wanted]
     said += advice_sentences(found.advice)
     if verdict.not_physical and verdict.groups:
         technology = found.data.info.technology or "this technology"

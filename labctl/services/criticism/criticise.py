@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from labctl.answers.base import ResponseModel
-from labctl.answers.criticism import CriticismResponse
+from labctl.answers.criticism import CriticismResponse, Undistinguished
 from labctl.answers.residuals import ResidualsResponse
-from labctl.errors import BadInput
+from labctl.errors import BadInput, LabctlError
 from labctl.services.cache import cached_group
 from labctl.services.criticism.decimated_readings import reading_beside
 from labctl.services.criticism.versions import content_digest, version_of
@@ -39,11 +39,43 @@ def criticise_unit(
     row = version_of(store, serial, version)
     measured = chosen_rows(store, serial, recording, recordings, other_unit=other_unit)
     answer = _cached_criticism(CriticismResponse, store, row, measured, competing)
+    if answer.verdict == "adequate" and row.parent is not None:
+        answer = _with_undistinguished(answer, store, row, measured)
     if not (newer := passed_over(store, measured, recording, recordings)):
         return answer
     from labctl.services.criticism.answer import with_warnings  # noqa: PLC0415  slow to import
 
     return with_warnings(answer, newer)
+
+
+def _with_undistinguished(
+    answer: CriticismResponse, store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...]
+) -> CriticismResponse:
+    """Return an answer that says which effects of its model these data could not tell from others.
+
+    Beside an effect that was added, what explains the same looks like noise: only the version before shows it.
+    """
+    try:
+        before = version_of(store, row.serial, row.parent)
+        earlier = _cached_criticism(CriticismResponse, store, before, measured, ())
+    except LabctlError:
+        return answer  # the version before cannot be compared with these data
+    if earlier.verdict != "ambiguous":
+        return answer
+    added = [each for each in row.answer["model"]["effects"] if each not in before.answer["model"]["effects"]]
+    groups = {suspect["effect"]: suspect["alias_group"] for suspect in earlier.suspects}
+    found: list[Undistinguished] = []
+    for effect in added:
+        others = [each for each in groups.get(effect, ()) if each in earlier.named and each not in added]
+        if effect in earlier.named and others:
+            found.append({"effect": effect, "others": others})
+    said = [
+        f"These data do not show that the cause is {each['effect']}, which version {row.version} contains: "
+        f"{' or '.join(each['others'])} would explain them as well (criticism of version {before.version})."
+        for each in found
+    ]
+    first, *rest = answer.text
+    return answer.model_copy(update={"undistinguished": found, "text": [first, *said, *rest]})
 
 
 def residuals_unit(

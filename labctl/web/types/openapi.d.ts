@@ -5831,6 +5831,11 @@ export interface components {
              */
             further: string[][];
             /**
+             * Undistinguished
+             * @description Effects of an adequate model that these data could not tell from others when they were added: the error is corrected, the cause is not known.
+             */
+            undistinguished: components["schemas"]["Undistinguished"][];
+            /**
              * Hypothesis
              * @description temperature_not_logged: the residual of a record at rest wanders slowly, in a way that the logged thermometer does not explain.
              */
@@ -13810,6 +13815,22 @@ export interface components {
             overdue: boolean;
             /** @description The uncertainty over the calibrated range; null unless `grid` was requested. */
             grid: components["schemas"]["UncertaintyGrid"] | null;
+        };
+        /**
+         * Undistinguished
+         * @description An effect of the model that the data could not tell from others.
+         */
+        Undistinguished: {
+            /**
+             * Effect
+             * @description Id of an effect that the version has and its parent has not.
+             */
+            effect: string;
+            /**
+             * Others
+             * @description Ids of the effects that would explain the data as well in its place.
+             */
+            others: string[];
         };
         /**
          * UnitResponse

@@ -176,7 +176,9 @@ def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
         found.comparison,
     )
     said = sentences(reported, [{"do": "the rates in random order"}, {"do": "another"}])
-    assert [line for line in said if line.startswith("To tell")] == ["To tell: the rates in random order."]
+    assert [line for line in said if line.startswith("To distinguish")] == [
+        "To distinguish them: the rates in random order."
+    ]
 
 
 def test_what_is_not_physical_is_suspected_last_with_probability_0() -> None:

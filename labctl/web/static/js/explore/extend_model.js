@@ -25,7 +25,7 @@ import { plausibility, relativeChange, residualFigure } from "./preview_result.j
  */
 const errorsOf = ({ motion }) => [
   ["raw_rms_dps", "Without correction"],
-  ["rms_dps", "Left after the fit"],
+  ["rms_dps", "RMS residual"],
   ["heldout_rms_dps", capitalised(heldOutName(motion))],
   ["noise_floor_dps", "Noise floor"],
 ];

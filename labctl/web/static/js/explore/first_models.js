@@ -39,4 +39,4 @@ export const firstModels = (motion) => BY_MOTION[motion ?? "rates"];
  * @param {RecordingRow["motion"] | undefined} motion
  */
 export const heldOutName = (motion) =>
-  motion === "turns" || motion === "poses" ? "at left-out turns" : "at left-out temperatures";
+  motion === "turns" || motion === "poses" ? "at turns left out" : "at temperatures left out";

@@ -1,7 +1,7 @@
 // The verdict in words, and the suspected effects with their evidence.
 
 import { scrollTo, setChildren, h } from "../core/elements.js";
-import { capitalised, withUncertainty, number, oddsText, percent, idText } from "../core/format.js";
+import { withUncertainty, number, oddsText, percent, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
@@ -46,14 +46,14 @@ export function verdictCard(state) {
     others.map((line) => h("p", { class: "muted" }, line)),
     factList([
       [
-        "Left after the fit, RMS",
+        "RMS residual of the fitted model",
         number(error.rms_dps),
         "deg/s",
         Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null,
       ],
       error.heldout_rms_dps === null
         ? null
-        : [capitalised(heldOutName(state.motion)), number(error.heldout_rms_dps), "deg/s"],
+        : [`RMS ${heldOutName(state.motion)} of the fit`, number(error.heldout_rms_dps), "deg/s"],
       ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s"],
       noise.drift_dps === null
         ? null
@@ -66,7 +66,7 @@ export function verdictCard(state) {
       criticism.lack_of_fit.statistic === null
         ? null
         : [
-            "Residual variance over that of the noise",
+            "Residual variance over that of noise and drift",
             number(criticism.lack_of_fit.statistic),
             null,
             chanceText(criticism.lack_of_fit.p_value),
@@ -178,9 +178,17 @@ export function suspectList(state, effects, { onadd, explain }) {
     if (what === "overlay" && !state.overlay)
       setChildren(drawnNow, "Select a suspected effect to draw the part of the residual that it would explain.");
   });
+  const isAdequate = criticism.verdict === "adequate";
   return cardWithHeader(
-    "Which effects are missing",
+    isAdequate ? "Weak hints" : "Which effects are missing",
     null,
+    isAdequate && speaking.length
+      ? h(
+          "p",
+          { class: "muted" },
+          "Odds against one effect alone, before the number of effects tried is counted. None of these is distinguished from noise: what each would explain is in its row.",
+        )
+      : null,
     speaking.length
       ? [drawnNow, list, open]
       : h(

@@ -3,11 +3,13 @@
 import { get, getFollowed, post } from "../core/http/api.js";
 import { isAbort } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
-import { busyIndicator, errorPage, notice } from "../core/components.js";
+import { busyIndicator, button, errorPage, notice } from "../core/components.js";
 import { option, toggleGroup } from "../core/fields.js";
+import { idText } from "../core/format.js";
 import { navigate } from "../core/router.js";
 import { jointCard } from "../joint/card.js";
 import { showTour } from "../tour/tour.js";
+import { askCertification } from "../unit/certification.js";
 import { asked as askedFor } from "./chosen_recordings.js";
 import { errorComparison } from "./compare/error_comparison.js";
 import { axisNames, inDatasetOrder } from "./dataset_rows.js";
@@ -133,17 +135,23 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
 function nextSteps({ unit, calibration }, criticism) {
   const isEnd = criticism.verdict === "adequate";
   const plan = criticism.experiments.find((each) => each.toml)?.toml;
-  const unitPage = `/units/${encodeURIComponent(unit.serial)}?version=${calibration.version}`;
+  const { serial } = unit;
+  const { version } = calibration;
+  const certify = async () => {
+    await navigate(`/units/${encodeURIComponent(serial)}?version=${version}`);
+    await askCertification(serial, version);
+  };
   return [
     notice(
       isEnd ? "good" : "warn",
       h("p", {}, h("strong", {}, criticism.text[0])),
       isEnd ? h("p", {}, "These data say nothing more: no effect of the catalogue has evidence in them.") : null,
+      unknownCauses(criticism),
     ),
     h(
       "div",
       { class: "row" },
-      h("a", { class: `button ${isEnd ? "primary" : ""}`, href: unitPage }, "Certify"),
+      button("Certify", certify, { kind: isEnd ? "primary" : "" }),
       h(
         "a",
         {
@@ -155,6 +163,19 @@ function nextSteps({ unit, calibration }, criticism) {
     ),
   ];
 }
+
+/**
+ * What an adequate model does not show: which of several effects is the cause.
+ * @param {Criticism} criticism
+ */
+const unknownCauses = ({ undistinguished }) =>
+  undistinguished.map(({ effect, others }) =>
+    h(
+      "p",
+      {},
+      `The error is corrected; the cause is not known: ${[effect, ...others].map(idText).join(" or ")}. Another experiment tells.`,
+    ),
+  );
 
 /**
  * What an effect would explain of the residual, data set by data set.

@@ -127,7 +127,9 @@ function selectors(units, unit, own, versions, version, chosen) {
   return [
     selectField(
       "Unit",
-      [...new Set([unit.serial, ...units.map((each) => each.serial)])].sort().map((each) => option(each, each)),
+      [...new Set([unit.serial, ...units.map((each) => each.serial)])]
+        .sort((a, b) => a.localeCompare(b, "en", { numeric: true }))
+        .map((each) => option(each, each)),
       unit.serial,
       (value) => to({ unit: value }),
     ),

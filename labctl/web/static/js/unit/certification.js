@@ -203,7 +203,7 @@ function assessed(known) {
         "deg/s",
         known.error.raw_rms_dps === null ? null : `${number(known.error.raw_rms_dps)} without correction`,
       ],
-      ["At left-out temperatures", number(known.error.heldout_rms_dps), "deg/s"],
+      ["RMS error at temperatures left out of the fit", number(known.error.heldout_rms_dps), "deg/s"],
     ]),
     known.objections.some((each) => each.what === "verdict")
       ? null

@@ -14,7 +14,7 @@ import { heldText } from "./held.js";
 /** @type {["rms_dps" | "heldout_rms_dps" | "noise_floor_dps", string][]} */
 const ERRORS = [
   ["rms_dps", "RMS"],
-  ["heldout_rms_dps", "at left-out temperatures"],
+  ["heldout_rms_dps", "at temperatures left out of the fit"],
   ["noise_floor_dps", "noise floor"],
 ];
 /** Coverage factor of the bars: expanded uncertainty. */

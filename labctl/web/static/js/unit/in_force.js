@@ -48,7 +48,7 @@ export function inForce(unit, rows, force) {
             force.verdict_recording ? `recording ${force.verdict_recording}` : null,
           ],
       ["RMS error", number(row?.rms_dps), "deg/s"],
-      ["At left-out temperatures", number(row?.heldout_rms_dps), "deg/s"],
+      ["RMS error at temperatures left out of the fit", number(row?.heldout_rms_dps), "deg/s"],
     ]),
     force?.override ? overridden(force) : null,
     left !== null && left < 0

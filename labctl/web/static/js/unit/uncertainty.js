@@ -124,13 +124,13 @@ function aboutAnyAxis({ any_axis }) {
     h(
       "p",
       { class: "muted small" },
-      `Largest expanded uncertainty, in deg/s, for rate vectors of any direction up to ${number(rows[0][1].reach_dps, 4)} deg/s. The angles of the mountings count in the frame of the case; up to a rotation of this frame, for a unit whose axes are aligned in use, only their differences count.`,
+      `Largest expanded uncertainty, in deg/s, for rate vectors of any direction up to ${number(rows[0][1].reach_dps, 4)} deg/s. The angles of the mountings count in the frame of the case; for a unit whose axes are aligned in use, only their differences count.`,
     ),
     table(
       [
         { title: "Output", cell: ([axis]) => axis },
         { title: "Frame of the case", number: true, cell: ([, one]) => figure(one.bound_dps) },
-        { title: "Up to a rotation", number: true, cell: ([, one]) => figure(one.aligned_bound_dps) },
+        { title: "Aligned in use", number: true, cell: ([, one]) => figure(one.aligned_bound_dps) },
         rows.some(([, one]) => one.cross_rates)
           ? {
               title: "Per deg/s about axes without output",

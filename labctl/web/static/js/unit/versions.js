@@ -94,7 +94,7 @@ const columnsOf = (unit, issued, explore) => [
       ),
   },
   { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
-  { title: "Left-out temperatures, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
+  { title: "RMS at temperatures left out, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
   {
     title: "Action",
     cell: (row) =>

@@ -27,7 +27,7 @@ const VIEWS = [
   ["panels", "Every output and axis", allPanels],
   ["surface", "Surface", surfaces],
   ["rest", "At rest", atRest],
-  ["turn", "Per full turn", fullTurn],
+  ["turn", "Error of a full turn", fullTurn],
 ];
 
 /**

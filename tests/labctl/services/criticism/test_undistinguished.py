@@ -1,0 +1,45 @@
+"""An adequate model still says which of its effects the data could not tell from others when they were added."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from labctl.answers.calibrations import FitRequest, ImproveRequest
+from labctl.recording.interchange import read_recording
+from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.calibrations.revision import improve_unit
+from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.recordings.examples import example
+from labctl.store import Store, open_store
+
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+GYRO = "OSU-FOG-2024"
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    """Open a store with the real fibre-optic gyro, to whose first version a sine has been added."""
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as opened:
+        opened.recordings.add_import(read_recording(example("osu-fog")), AT)
+        fit_unit(opened, GYRO, FitRequest(model="bias_scale"), AT)
+        improve_unit(opened, GYRO, ImproveRequest(add=["sine_response"]), AT)
+        yield opened
+
+
+def test_an_adequate_version_names_what_would_explain_its_data_as_well(store: Store) -> None:
+    before, after = criticise_unit(store, GYRO, 1, None), criticise_unit(store, GYRO, 2, None)
+    assert (before.verdict, before.undistinguished) == ("ambiguous", [])
+    assert after.verdict == "adequate"
+    assert after.undistinguished == [
+        {"effect": "sine_response", "others": [name for name in before.named if name != "sine_response"]}
+    ]
+    assert after.text[1].startswith("These data do not show that the cause is sine_response")
+
+
+def test_a_version_with_both_is_not_asked_which_it_is(store: Store) -> None:
+    improve_unit(store, GYRO, ImproveRequest(add=["scale_factor_odd", "sine_response"], version=1), AT)
+    assert criticise_unit(store, GYRO, 3, None).undistinguished == []
