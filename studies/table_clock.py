@@ -24,7 +24,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.resolution import resolve
 from procedures.contracts.journal import ClockRun
 from procedures.monitoring.step_clock import MeasuredClock, measured
-from procedures.planning.clock_runs import BLOCK_EVERY_S, FIRST_RUNS, LATER_RUNS, run_lengths_s
+from procedures.planning.clock_runs import BLOCK_EVERY_S, FIRST_RUNS, LATER_RUNS, drawn_lengths_s, run_lengths_s
 from studies.report_tables import wilson
 
 CAMPAIGNS = int(os.environ.get("LABCTL_STUDY_CAMPAIGNS", "1000"))
@@ -125,7 +125,8 @@ class TimedTable:
 
     def time_block(self, number: int, session: int, block: int) -> MeasuredClock | None:
         """Time some runs; returns the clock by all so far."""
-        for steady_s in run_lengths_s(number, len(self.runs), 10.0, self.table.limits.clock_run_s):
+        planned_s = run_lengths_s(number, len(self.runs), 10.0, self.table.limits.clock_run_s)
+        for steady_s in drawn_lengths_s(planned_s, self._rng):
             self._device.clock_ratio = self.ratio(self.clock.now_s() + steady_s / 2)
             run = self.table.time_run(RATE_DPS, steady_s, self.clock.sleep)
             middle_s = run.began_s + run.duration_s / 2

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from instruments.interfaces.table import COVERAGE, HomeCheck, OpenLoopTable
 from procedures.contracts.errors import StepFailed, TableStopped
 from procedures.contracts.journal import ClockRun, DataSetState, Event
@@ -15,7 +17,7 @@ from procedures.monitoring import step_clock
 from procedures.monitoring.event_recorder import warning
 from procedures.monitoring.host_stalls import not_run
 from procedures.monitoring.step_clock import LARGEST_CHANGE_PPM, MeasuredClock
-from procedures.planning.clock_runs import FIRST_RUNS, run_lengths_s
+from procedures.planning.clock_runs import FIRST_RUNS, drawn_lengths_s, run_lengths_s
 
 #: So many runs are added where those that were planned disagree, and a run is repeated where this computer stalled.
 MAX_ADDED, STALLED_ATTEMPTS = 8, 5
@@ -34,14 +36,16 @@ def measure_clock(context: ExecutionContext, step: MeasureClock) -> dict[str, fl
         return {}
     first = not any(run.session == context.clock_session for run in context.clock_runs)
     block = 1 + max((run.block for run in context.clock_runs), default=0)
-    lengths_s = step.runs_s or run_lengths_s(FIRST_RUNS, 0, step.short_s, table.limits.clock_run_s)
-    for steady_s in lengths_s:
+    planned_s = step.runs_s or run_lengths_s(FIRST_RUNS, 0, step.short_s, table.limits.clock_run_s)
+    rng = _length_generator(context, block)
+    for steady_s in drawn_lengths_s(planned_s, rng):
         _add_run(context, table, step.rate_dps, steady_s, block)
     clock_result = step_clock.measured(context.clock_runs, table.step_clock)
     for n in range(MAX_ADDED):
         if clock_result is not None and clock_result.expanded_ppm <= table.limits.clock_limit_ppm:
             break
-        _add_run(context, table, step.rate_dps, lengths_s[n % len(lengths_s)], block)
+        (steady_s,) = drawn_lengths_s([planned_s[n % len(planned_s)]], rng)
+        _add_run(context, table, step.rate_dps, steady_s, block)
         clock_result = step_clock.measured(context.clock_runs, table.step_clock)
     if clock_result is None:
         raise StepFailed(f"the step clock is not known: {len(context.clock_runs)} runs are too few; plan more of them")
@@ -49,6 +53,14 @@ def measure_clock(context: ExecutionContext, step: MeasureClock) -> dict[str, fl
     _use(context, clock_result)
     _say_clock(context, clock_result)
     return _figures(clock_result)
+
+
+def _length_generator(context: ExecutionContext, block: int) -> np.random.Generator:
+    """Return the generator of the lengths of a block's runs: another one for each recipe, session, block and day.
+
+    A session that is replayed from its wire log, on the clock of the log, draws the same.
+    """
+    return np.random.default_rng((context.recipe.seed, context.clock_session, block, context.clock.utc().toordinal()))
 
 
 def _use(context: ExecutionContext, measured_clock: MeasuredClock) -> None:

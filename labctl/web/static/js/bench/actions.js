@@ -192,7 +192,7 @@ export const answerButtons = (campaign, prompt) => [
       [operatorNameField(), { name: "reason", label: "Why" }],
       {
         text: "This ends the campaign: the table stops, and the chamber returns to its safe temperature.",
-        confirm: "It cannot be done: end the campaign: end the campaign",
+        confirm: "It cannot be done: end the campaign",
         kind: "danger",
       },
     );
