@@ -109,7 +109,7 @@ def calibrate_magnetometer(
     places, scatter = None, None
     if rest is not None and np.any(rest[used]):
         places = Places.of(rest[used])
-        ellipsoid, scatter = _weighed(readings_ut[used], ellipsoid, places)
+        ellipsoid, scatter = _weighed(subject, readings_ut[used], ellipsoid, places)
     repetition = _repetition(ellipsoid.distance)
     values, by_parameter = _values(ellipsoid.parameters, field_ut)
     normal = by_parameter @ np.linalg.inv(ellipsoid.jacobian.T @ ellipsoid.jacobian) @ by_parameter.T
@@ -151,10 +151,7 @@ def _robust(subject: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDA
         start = quadric(readings[is_used]) if ellipsoid is None else (ellipsoid.centre, ellipsoid.matrix)
         ellipsoid = None if start is None else nearest_ellipsoid(readings[is_used], *start)
         if ellipsoid is None:
-            raise NotEnoughData(
-                f"{subject}: the readings lie on no ellipsoid that they determine; turn the unit slowly through all "
-                "directions (each axis up and down, and turned in each), away from iron and currents"
-            )
+            raise _undetermined(subject)
         every = at(readings, ellipsoid.centre, ellipsoid.matrix, ellipsoid.noise).distance
         usual = 1.4826 * float(np.median(np.abs(every[is_used])))
         right = np.abs(every) <= WRONG * max(usual, 1e-12)
@@ -166,16 +163,26 @@ def _robust(subject: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDA
     return (ellipsoid if last is None else last), is_used
 
 
-def _weighed(readings: NDArray[np.float64], ellipsoid: Ellipsoid, places: Places) -> tuple[Ellipsoid, RestScatter]:
+def _undetermined(subject: str) -> NotEnoughData:
+    return NotEnoughData(
+        f"{subject}: the readings lie on no ellipsoid that they determine; turn the unit slowly through all "
+        "directions (each axis up and down, and turned in each), away from iron and currents"
+    )
+
+
+def _weighed(
+    subject: str, readings: NDArray[np.float64], ellipsoid: Ellipsoid, places: Places
+) -> tuple[Ellipsoid, RestScatter]:
     """Return the ellipsoid by generalised least squares, readings weighed by what their places share, and the scatter.
 
     An error that a variance is estimated from is then none of the parameters': U is not large where they are wrong.
+    Raises NotEnoughData where there is none: the scatter says nothing of an ellipsoid by equal weights.
     """
     scatter = scatter_of(ellipsoid.jacobian, ellipsoid.distance, places)
     product = Weights.of(places, scatter.ratios).product
     weighed = nearest_ellipsoid(readings, ellipsoid.centre, ellipsoid.matrix, product)
     if weighed is None:
-        return ellipsoid, scatter
+        raise _undetermined(subject)
     # once is enough: a second round changes the variances by less than a thousandth
     return weighed, scatter_of(weighed.jacobian, weighed.distance, places)
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
+from labctl.fitting.magnetometer import calibrate
 from labctl.fitting.magnetometer.calibrate import calibrate_magnetometer
-from labctl.fitting.magnetometer.ellipsoid import PLACES, quadric
+from labctl.fitting.magnetometer.ellipsoid import PLACES, Ellipsoid, Product, nearest_ellipsoid, quadric, unweighed
+from labctl.fitting.numeric.arrays import Array
 from tests.helpers.magnetic_turns import FIELD_UT, HARD_IRON_UT, SOFT_IRON, fields, readings_of
 
 
@@ -60,6 +63,21 @@ def test_a_field_that_differs_with_place_is_not_explained() -> None:
     field = fields(1500)
     drift = 1 + 0.05 * np.sin(np.linspace(0, 9, len(field)))[:, None]
     assert calibrate_magnetometer("m", readings_of(field * drift, 4), FIELD_UT).verdict == "unexplained"
+
+
+def test_without_an_ellipsoid_by_the_weights_of_places_nothing_is_stated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The scatter of places says nothing of an ellipsoid by equal weights."""
+    readings, rest = readings_of(fields(400), 1), np.repeat(np.arange(40) % 2 * (1 + np.arange(40) // 2), 10)
+    assert calibrate_magnetometer("m", readings, FIELD_UT, rest).u.shape == (10,)
+
+    def only_by_equal_weights(
+        of: NDArray[np.float64], centre: Array, matrix: NDArray[np.float64], product: Product = unweighed
+    ) -> Ellipsoid | None:
+        return nearest_ellipsoid(of, centre, matrix) if product is unweighed else None
+
+    monkeypatch.setattr(calibrate, "nearest_ellipsoid", only_by_equal_weights)
+    with pytest.raises(NotEnoughData, match=r"turn the unit slowly through all directions"):
+        calibrate_magnetometer("m", readings, FIELD_UT, rest)
 
 
 def test_turns_about_one_axis_do_not_determine_the_others() -> None:
