@@ -1,0 +1,158 @@
+"""Laws that are proposed for a residual: fitted with the model, held to data that were left out, and put into words.
+
+A law is a description and no cause: it says what the error follows, not why. It is proposed where no effect of the
+catalogue explains a residual, and only where the data that a fit has not seen are predicted better with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from labctl.errors import LabctlError
+from labctl.fitting.criticism.criticism import Criticism
+from labctl.fitting.criticism.laws.search import Search, State
+from labctl.fitting.criticism.laws.shapes import TABLE_RATE, library, scales_of
+from labctl.fitting.criticism.model_comparison import Comparison
+from labctl.fitting.criticism.search.held_out import held_out_rises
+from labctl.fitting.effects import Term
+from labctl.fitting.effects.formula import Formula
+from labctl.fitting.estimation.fit import fit_preset
+from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.models.presets import changed
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.progress import report_stage
+
+#: Laws at most that are proposed, and states of the search that are looked through for them.
+MAX_LAWS, MAX_TRIED = 5, 16
+#: Channels besides the rate that a law may depend on, the first of those that the residual follows.
+MAX_CHANNELS = 2
+#: Two laws are one where what they take off the data sets is so alike.
+ALIKE = 0.9995
+#: A law is not proposed that has this much less evidence than the best, nats.
+FAR_BEHIND = 12.0
+#: More formulas than this no model has.
+MAX_NAMES = 40
+TEMPERATURE = "temperature_c"
+#: Shares of the rates of the data sets at which laws are compared: between them and, where the unit can, beyond.
+BETWEEN = tuple(float(share) for share in np.linspace(0.1, 1.25, 24))
+
+
+@dataclass(frozen=True)
+class Law:
+    """A description of a residual: formulas, each times a coefficient of its own, and what comes of them."""
+
+    terms: tuple[Term, ...]  #: as a model has them
+    kinds: tuple[str, ...]  #: what each is, in words
+    evidence: float  #: log Bayes factor against the model, less the price of its length, nats
+    probability: float  #: among the laws that are proposed
+    fit: FitResult  #: the model with it
+    taken_dps: dict[str, Array]  #: axis -> (m,) what the fit with it takes off the residual of each data set
+
+    @property
+    def formulas(self) -> tuple[str, ...]:
+        """Its formulas as `improve --formula` takes them: `name: expression`."""
+        return tuple(f"{term.effect}: {term.formula}" for term in self.terms)
+
+
+@dataclass(frozen=True)
+class Breaking:
+    """Where the errors of two laws differ most, which describe the data sets alike: a measurement there refutes one."""
+
+    rate_dps: float
+    temperature_c: float | None
+    difference_dps: float  #: between the two
+
+
+@single_threaded
+def laws_of(found: Criticism) -> list[Law]:
+    """Return the laws that are proposed for what a model leaves, at most five, the likeliest first.
+
+    They are functions of the rate and of the channels that the residual follows. None of them makes the error at
+    temperatures or rates that were left out worse.
+    """
+    comparison, base = found.beside_missing, found.base
+    if comparison is None or base is None:
+        return []
+    scales = scales_of(found.data, _channels(found))
+    if not scales:
+        return []
+    states = Search(comparison, library(scales)).run()
+    report_stage("holding laws to data that were left out")
+    laws: list[Law] = []
+    for state in states[:MAX_TRIED]:
+        if len(laws) == MAX_LAWS or (laws and state.score < laws[0].evidence - FAR_BEHIND):
+            break
+        law = _fitted(found, comparison, base, state)
+        if law is not None and not any(_are_alike(law, other) for other in laws):
+            laws.append(law)
+    total = logsumexp([law.evidence for law in laws]) if laws else 0.0
+    return [replace(law, probability=float(np.exp(law.evidence - total))) for law in laws]
+
+
+def breaking(laws: Sequence[Law], found: Criticism) -> Breaking | None:
+    """Return where the two likeliest laws differ most, with all else of their fits; None for fewer than two.
+
+    The rates are those of the data sets, of their axes alone, times a share of up to a quarter more, as far as the unit
+    goes; the other channels are those of the data sets.
+    """
+    if len(laws) < 2:
+        return None
+    data, most = found.fit_data, Breaking(0.0, None, 0.0)
+    limit_dps = data.info.max_rate_dps or np.inf
+    for axis in data.outputs:
+        rate_dps = data.true_rate_dps(axis)
+        for share in BETWEEN:
+            channels = data.channels.with_rates({**data.channels.rates, axis: share * rate_dps})
+            first, second = (law.fit.fitted.error_dps(channels, axis) for law in laws[:2])
+            apart = np.where(np.abs(share * rate_dps) <= limit_dps, np.abs(first - second), 0.0)
+            row = int(np.argmax(apart))
+            if float(apart[row]) > most.difference_dps:
+                temperature_c = float(data.temperature_c[row]) if data.channels.history.thermometer else None
+                most = Breaking(share * float(rate_dps[row]), temperature_c, float(apart[row]))
+    return most if most.difference_dps > 0 else None
+
+
+def _channels(found: Criticism) -> list[str]:
+    """Return the rate, and the first channels that the residual follows; the temperature where it follows none."""
+    follows = [name for name in found.verdict.depends_on if name != TABLE_RATE]
+    if TEMPERATURE not in follows[:MAX_CHANNELS]:
+        follows = [*follows[: MAX_CHANNELS - 1], TEMPERATURE]
+    return [TABLE_RATE, *follows[:MAX_CHANNELS]]
+
+
+def _fitted(found: Criticism, comparison: Comparison, base: FitResult, state: State) -> Law | None:
+    """Return a law as it is fitted beside a model; None where what was left out is not predicted better with it."""
+    names = [name for name in (f"law_{k}" for k in range(1, MAX_NAMES)) if name not in comparison.model.effect_ids]
+    terms = tuple(Term(name, formula=text) for name, text in zip(names, state.formulas, strict=False))
+    if held_out_rises(comparison, terms, {term.effect: Formula(term.effect, term.formula) for term in terms}):
+        return None
+    try:
+        fit = fit_preset(found.fit_data, changed(base.fitted.model, terms))
+    except LabctlError:  # what is exported could not be inverted, or the means do not determine it
+        return None
+    if _is_worse(base, fit):
+        return None
+    kinds = tuple(part.shape.kind for part in state.parts)
+    taken = {axis: values - fit.residual_dps[axis] for axis, values in base.residual_dps.items()}
+    return Law(terms, kinds, state.score, 0.0, fit, taken)
+
+
+def _is_worse(before: FitResult, after: FitResult) -> bool:
+    """Return whether a fit leaves more than the one before it, of all data sets or of those left out."""
+    pairs = [
+        (before.error.rms_dps, after.error.rms_dps),
+        (before.error.heldout_rms_dps, after.error.heldout_rms_dps),
+    ]
+    return any(old is not None and (new is None or new >= old) for old, new in pairs)
+
+
+def _are_alike(one: Law, other: Law) -> bool:
+    """Return whether two laws take the same off the data sets."""
+    a, b = (np.concatenate(list(law.taken_dps.values())) for law in (one, other))
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return size > 0 and float(a @ b) / size > ALIKE

@@ -1,0 +1,209 @@
+"""The search for a law: terms of the library are added one by one, by the evidence for each and a prior on length.
+
+Several beginnings are followed side by side (a beam), because the best first term is often not one of the best pair.
+The evidence is that by which effects compete (`evidence`): beside the model, with its noise and drift.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadInput
+from labctl.fitting.criticism.candidate_shape import CandidateShape
+from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence_of
+from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.noise_grid import Noise
+from labctl.fitting.criticism.laws.shapes import Shape, bounds_of
+from labctl.fitting.criticism.model_comparison import Comparison, centred, constant_coordinates, orthogonalised
+from labctl.fitting.effects import Term
+from labctl.fitting.effects.formula import Formula
+from labctl.fitting.numeric.arrays import Array
+from labctl.progress import report_stage
+
+#: Terms at most, and how many beginnings are followed.
+MAX_TERMS, BEAM = 4, 3
+#: A term is added where it brings so much evidence, nats, beyond the price of its length.
+LEAST = 3.0
+#: Price of each symbol of a formula, nats.
+PER_SYMBOL = 0.7
+#: Of the terms of the library, the best of so many kinds have their constants moved.
+REFINED = 8
+#: Calls for moving the constants of one term.
+MOST_CALLS = 30
+#: A noise that is less likely than this beside the model is left out of the search.
+LEAST_WEIGHT = 0.02
+NAME = "law"
+
+
+@dataclass(frozen=True)
+class Part:
+    """One term of a law, with its constants."""
+
+    shape: Shape
+    formulas: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class State:
+    """Terms that were added so far, and the evidence for all of them less the price of their length, nats."""
+
+    parts: tuple[Part, ...] = ()
+    score: float = 0.0
+
+    @property
+    def formulas(self) -> tuple[str, ...]:
+        """The formulas of all terms."""
+        return tuple(text for part in self.parts for text in part.formulas)
+
+
+class Search:
+    """The evidence for formulas beside a model and terms that were added."""
+
+    def __init__(self, comparison: Comparison, shapes: Sequence[Shape]) -> None:
+        self._comparison = comparison
+        self._shapes = [shape for shape in shapes if all(self._rows(text) is not None for text in shape.formulas())]
+        self._kept: dict[tuple[str, str], NDArray[np.float64]] = {}
+        # that one of so many shapes fits by chance is in the price of each term
+        self._price = float(np.log(max(len(self._shapes), 1)))
+
+    def run(self) -> list[State]:
+        """Return the laws that were met, the best first; each has more evidence than any part of it."""
+        beam, met = [State()], list[State]()
+        for number in range(1, MAX_TERMS + 1):
+            report_stage(f"searching a law, term {number}")
+            longer = [state for begun in beam for state in self._longer(begun)]
+            if not longer:
+                break
+            longer = _different(sorted(longer, key=lambda state: -state.score))
+            met += longer
+            beam = longer[:BEAM]
+        return _different(sorted(met, key=lambda state: -state.score))
+
+    def _longer(self, begun: State) -> list[State]:
+        """Return a state with one term more, in several ways."""
+        evidence = self._evidence(begun.formulas, [shape.formulas() for shape in self._shapes])
+        worth = evidence - np.array([self._price + PER_SYMBOL * shape.nodes for shape in self._shapes])
+        found = []
+        best_of_kind: dict[str, int] = {}
+        for index in np.argsort(-worth).tolist():
+            best_of_kind.setdefault(self._shapes[index].kind, index)
+        for index in list(best_of_kind.values())[:REFINED]:
+            part, gained = self._refined(begun, self._shapes[index], float(worth[index]))
+            if gained > LEAST:
+                found.append(self._pruned(State((*begun.parts, part), begun.score + gained)))
+        return found
+
+    def _pruned(self, state: State) -> State:
+        """Return a state without the terms that are not worth their price beside those that came later."""
+        for part in state.parts[:-1]:
+            others = tuple(each for each in state.parts if each is not part)
+            beside = [text for each in others for text in each.formulas]
+            worth = float(self._evidence(beside, [part.formulas])[0]) - self._price_of(part.shape)
+            if worth < LEAST:
+                state = State(others, state.score - worth)
+        return state
+
+    def _price_of(self, shape: Shape) -> float:
+        """Return the price of a term whose constants were moved, nats."""
+        moved = 0.5 * len(shape.constants) * float(np.log(len(self._comparison.data)))
+        return self._price + PER_SYMBOL * shape.nodes + moved
+
+    def _refined(self, begun: State, shape: Shape, worth: float) -> tuple[Part, float]:
+        """Return a term with the constants that have most evidence, and what it is worth."""
+        from scipy.optimize import minimize  # noqa: PLC0415  slow to load, and not needed without a search
+
+        names = list(shape.constants)
+        if not names:
+            return Part(shape, shape.formulas()), worth
+        bounds = bounds_of(shape)
+
+        noises = self._likely((*begun.formulas, *shape.formulas()))
+
+        def unlikely(values: Array) -> float:
+            constants = dict(zip(names, map(float, values), strict=True))
+            return -float(self._evidence(begun.formulas, [shape.formulas(constants)], noises)[0])
+
+        start = np.array([shape.constants[name] for name in names])
+        best = minimize(
+            unlikely, start, method="Nelder-Mead", bounds=[bounds[name] for name in names],
+            options={"maxfev": MOST_CALLS, "xatol": 1e-3, "fatol": 0.05},
+        )  # fmt: skip
+        moved = replace(shape, constants=dict(zip(names, map(float, best.x), strict=True)))
+        gained = float(self._evidence(begun.formulas, [moved.formulas()])[0])
+        return Part(moved, moved.formulas()), gained - self._price_of(shape)
+
+    def _likely(self, beside: Sequence[str]) -> dict[str, list[Noise]]:
+        """Return the noises of each axis that are likely beside the model and formulas."""
+        likely = {}
+        for axis in self._comparison.designs:
+            found = self._on_axis(axis, beside, (), self._comparison.axes[axis].noises)
+            pairs = zip(found.noises, found.weights, strict=True)
+            likely[axis] = [noise for noise, weight in pairs if weight >= LEAST_WEIGHT] or [found.best.noise]
+        return likely
+
+    def _evidence(
+        self, beside: Sequence[str], tried: Sequence[tuple[str, ...]], noises: Mapping[str, list[Noise]] | None = None
+    ) -> Array:
+        """Return the log Bayes factor of each option beside the model and formulas, over all axes, nats.
+
+        `noises` by axis are averaged over; by default all.
+        """
+        total = np.zeros(len(tried))
+        for axis, known in self._comparison.axes.items():
+            found = self._on_axis(axis, beside, tried, known.noises if noises is None else noises[axis])
+            total += np.maximum(found.log_bf, 0.0)
+        return total
+
+    def _on_axis(
+        self, axis: str, beside: Sequence[str], tried: Sequence[tuple[str, ...]], noises: list[Noise]
+    ) -> AxisEvidence:
+        of = self._comparison
+        return evidence_of(
+            self._design(axis, beside, tried), of.data.error_dps(axis), of.white_var[axis], of.scales[axis], noises
+        )
+
+    def _design(self, axis: str, beside: Sequence[str], tried: Sequence[tuple[str, ...]]) -> Design:
+        given = self._comparison.designs[axis]
+        more = [self._columns(axis, text) for text in beside]
+        base = np.concatenate([given.base, *more], axis=2)
+        precision = np.concatenate([given.precision, np.zeros(len(more))])
+        level = constant_coordinates(base, self._comparison.data)
+        exact = base[:, :, precision == 0]
+        options = [orthogonalised(centred(self._option(axis, texts), level), exact) for texts in tried]
+        return replace(given, base=base, precision=precision, options=options)
+
+    def _option(self, axis: str, texts: tuple[str, ...]) -> CandidateShape:
+        rows = np.concatenate([self._columns(axis, text) for text in texts], axis=2)
+        return CandidateShape(NAME, Term(NAME, formula=texts[0]), rows, texts, ("deg/s",) * len(texts))
+
+    def _columns(self, axis: str, text: str) -> NDArray[np.float64]:
+        key = axis, text
+        if key not in self._kept:
+            rows = self._rows(text, axis)
+            assert rows is not None
+            if len(self._kept) > 20000:
+                self._kept.clear()
+            self._kept[key] = rows
+        return self._kept[key]
+
+    def _rows(self, text: str, axis: str | None = None) -> NDArray[np.float64] | None:
+        """Return the coordinates of a formula, (R, m, 1); None where it is not finite everywhere."""
+        data = self._comparison.data
+        axis = axis or str(data.info.axes[0])
+        try:
+            column, *_ = Formula(NAME, text).columns(data.nodes, axis, Term(NAME), self._comparison.model.reference)
+        except BadInput:
+            return None
+        return data.rows_of(column.values[:, None])
+
+
+def _different(states: Sequence[State]) -> list[State]:
+    """Return states without those that have the terms of a better one in another order."""
+    found: dict[frozenset[str], State] = {}
+    for state in states:
+        found.setdefault(frozenset(state.formulas), state)
+    return list(found.values())
