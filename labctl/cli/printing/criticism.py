@@ -80,6 +80,23 @@ def print_criticism(answer: CriticismResponse) -> None:
         fitted = {each["effect"] for each in answer.suspects if each["rms_after_dps"] is not None}
         first = next((name for name in answer.named if name in fitted), answer.named[0])
         console.print(f"next: labctl improve {answer.serial} --add {first}", style="dim")
+    _print_laws(answer)
+
+
+def _print_laws(answer: CriticismResponse) -> None:
+    """Print the laws that are proposed, what would follow from the likeliest, and the command that takes it."""
+    if not answer.laws:
+        return
+    print_heading("laws, which describe and name no cause")
+    for law in answer.laws:
+        errors = f"{format_number(law['rms_after_dps'])} deg/s, held-out {format_number(law['heldout_rms_after_dps'])}"
+        text = f"{100 * law['probability']:.0f} %: {'; '.join(law['formulas'])}: {errors}"
+        console.print(text, soft_wrap=not console.is_terminal)
+    first = answer.laws[0]
+    for sentence in first["follows"]:
+        console.print(f"If it is the first: {sentence}", style="dim", soft_wrap=not console.is_terminal)
+    words = " ".join(f"--formula '{formula}'" for formula in first["formulas"])
+    console.print(f"next: labctl improve {answer.serial} {words}", style="dim", soft_wrap=True)
 
 
 def _print_applied(answer: CriticismResponse, *, whole: bool) -> None:

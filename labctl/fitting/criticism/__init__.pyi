@@ -12,10 +12,12 @@ from labctl.fitting.criticism.effect_size import (
     size_in_noise_units as size_in_noise_units,
     size_reference as size_reference,
 )
+from labctl.fitting.criticism.laws.consequences import consequences as consequences
 from labctl.fitting.criticism.laws.proposals import (
     Breaking as Breaking,
     Law as Law,
     breaking as breaking,
+    coefficients_of_law as coefficients_of_law,
     laws_of as laws_of,
 )
 from labctl.fitting.criticism.reduction import ReducedRecording as ReducedRecording

@@ -5836,6 +5836,13 @@ export interface components {
              */
             undistinguished: components["schemas"]["Undistinguished"][];
             /**
+             * Laws
+             * @description Only for unexplained: at most five formulas that describe the residual and predict what is left out of the fit better than the model, the likeliest first. A law is a description, and no cause.
+             */
+            laws: components["schemas"]["ProposedLaw"][];
+            /** @description Where the two likeliest laws differ most; null: fewer than two. */
+            law_test: components["schemas"]["LawTest"] | null;
+            /**
              * Hypothesis
              * @description temperature_not_logged: the residual of a record at rest wanders slowly, in a way that the logged thermometer does not explain.
              */
@@ -8358,6 +8365,32 @@ export interface components {
             noise_floor_dps: number | null;
         };
         /**
+         * LawTest
+         * @description Where the two likeliest laws differ most: a measurement there refutes one of them.
+         */
+        LawTest: {
+            /**
+             * Rate Dps
+             * @description Rate, deg/s.
+             */
+            rate_dps: number;
+            /**
+             * Temperature C
+             * @description Temperature, deg C; null: the recording has no thermometer.
+             */
+            temperature_c: number | null;
+            /**
+             * Difference Dps
+             * @description Difference of the errors that the two fits expect there, deg/s.
+             */
+            difference_dps: number;
+            /**
+             * Do
+             * @description What to measure, in words.
+             */
+            do: string;
+        };
+        /**
          * Leaving
          * @description When the bias of an axis leaves the limit.
          */
@@ -10813,6 +10846,63 @@ export interface components {
              * @description Time within which the answer must arrive, s by the campaign's clock; null: no limit.
              */
             within_s: number | null;
+        };
+        /**
+         * ProposedLaw
+         * @description A formula that describes a residual which no effect of the catalogue explains: a description, and no cause.
+         */
+        ProposedLaw: {
+            /**
+             * Formulas
+             * @description Its terms as `labctl improve --formula` takes them, 'name: expression'; each has a coefficient of its own.
+             */
+            formulas: string[];
+            /**
+             * Kinds
+             * @description What each part of it is, in words.
+             */
+            kinds: string[];
+            /**
+             * Equations
+             * @description Output axis -> error in deg/s, with the coefficients of the axis.
+             */
+            equations: {
+                [key: string]: string;
+            };
+            /**
+             * Coefficients
+             * @description Output axis -> name of the term -> its coefficient in a fit of the model with the law.
+             */
+            coefficients: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
+            /**
+             * Probability
+             * @description Probability among the laws that are proposed, 0 to 1.
+             */
+            probability: number;
+            /**
+             * Log Bayes Factor
+             * @description Natural logarithm of the Bayes factor of the model with the law against the model, less the price of its length and of the laws that were tried.
+             */
+            log_bayes_factor: number;
+            /**
+             * Rms After Dps
+             * @description RMS residual of a fit of the model with the law, deg/s.
+             */
+            rms_after_dps: number | null;
+            /**
+             * Heldout Rms After Dps
+             * @description RMS error of that fit on data sets left out in turn, deg/s; null: none can be left out.
+             */
+            heldout_rms_after_dps: number | null;
+            /**
+             * Follows
+             * @description What else would follow from it, a sentence each.
+             */
+            follows: string[];
         };
         /**
          * PublicCertificate

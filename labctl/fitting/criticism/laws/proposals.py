@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from labctl.answers.fitted_model import Coefficient
 from labctl.errors import LabctlError
 from labctl.fitting.criticism.criticism import Criticism
 from labctl.fitting.criticism.laws.search import Search, State
@@ -25,6 +26,7 @@ from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.presets import changed
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.json_numbers import none_for_nan
 from labctl.progress import report_stage
 
 #: Laws at most that are proposed, and states of the search that are looked through for them.
@@ -92,6 +94,20 @@ def laws_of(found: Criticism) -> list[Law]:
             laws.append(law)
     total = logsumexp([law.evidence for law in laws]) if laws else 0.0
     return [replace(law, probability=float(np.exp(law.evidence - total))) for law in laws]
+
+
+def coefficients_of_law(law: Law) -> dict[str, dict[str, Coefficient]]:
+    """Return axis -> term -> value, standard uncertainty and unit of its coefficient in the fit with it."""
+    found: dict[str, dict[str, Coefficient]] = {}
+    for axis, fit in law.fit.fitted.axes.items():
+        u = none_for_nan(fit.u)
+        rows = {owner: k for k, owner in enumerate(fit.effects)}
+        found[axis] = {
+            term.effect: {"value": float(fit.values[row, 0]), "u": u[row][0], "unit": "deg/s"}
+            for term in law.terms
+            if (row := rows.get(term.effect)) is not None
+        }
+    return found
 
 
 def breaking(laws: Sequence[Law], found: Criticism) -> Breaking | None:

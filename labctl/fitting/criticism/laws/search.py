@@ -114,7 +114,7 @@ class Search:
 
     def _refined(self, begun: State, shape: Shape, worth: float) -> tuple[Part, float]:
         """Return a term with the constants that have most evidence, and what it is worth."""
-        from scipy.optimize import minimize  # noqa: PLC0415  slow to load, and not needed without a search
+        from scipy.optimize import minimize
 
         names = list(shape.constants)
         if not names:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from labctl.answers.calibrations import FitRequest, ImproveRequest
-from labctl.recording.interchange import read_recording
+from labctl.recording import read_recording
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.revision import improve_unit
 from labctl.services.criticism.criticise import criticise_unit

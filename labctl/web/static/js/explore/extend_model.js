@@ -42,8 +42,9 @@ export function extendModel(state, effects) {
   const has = state.calibration.model.effects;
   const chosen = h("div", { class: "row", "aria-live": "polite" });
   const result = h("div", { class: "stack" });
-  /** @type {HTMLInputElement} */
-  const formula = h("input", {
+  /** @type {HTMLTextAreaElement} */
+  const formula = h("textarea", {
+    rows: "2",
     placeholder: "wet_scale: (humidity_pct - 40) * rate_dps",
     oninput: () => {
       change.formula = formula.value.trim();
@@ -95,7 +96,12 @@ export function extendModel(state, effects) {
   const body = () => ({
     add: [...change.add],
     remove: [...change.remove],
-    formula: change.formula ? [change.formula] : [],
+    formula: change.formula
+      ? change.formula
+          .split("\n")
+          .map((line) => line.trim())
+          .filter(Boolean)
+      : [],
     ...asked(state),
   });
   const isEmpty = () => !change.add.size && !change.remove.size && !change.formula;
@@ -200,7 +206,7 @@ export function extendModel(state, effects) {
       { class: "columns", style: "--column-min: 14rem" },
       pick,
       drop,
-      labelledField("A formula of your own", formula, "name: expression over channels"),
+      labelledField("A formula of your own", formula, "name: expression over channels, one in a line"),
     ),
     chosen,
     h("div", { class: "row" }, button("Preview", preview, { kind: "primary" })),
@@ -212,6 +218,14 @@ export function extendModel(state, effects) {
     put: async (effect) => {
       change.add.add(effect);
       show();
+      scrollTo(element);
+      await preview();
+    },
+    /** @param {readonly string[]} formulas */
+    putLaw: async (formulas) => {
+      change.formula = formulas.join("\n");
+      formula.value = change.formula;
+      stale();
       scrollTo(element);
       await preview();
     },

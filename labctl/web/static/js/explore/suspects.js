@@ -86,9 +86,9 @@ const chanceText = (p) =>
 /**
  * @param {ExploreState} state
  * @param {readonly Effect[]} effects
- * @param {{ onadd: (effect: string) => unknown, explain: (effect: string) => Promise<(number | null)[]> }} acts
+ * @param {{ onadd: (effect: string) => unknown, onlaw: (formulas: string[]) => unknown, explain: (effect: string) => Promise<(number | null)[]> }} acts
  */
-export function suspectList(state, effects, { onadd, explain }) {
+export function suspectList(state, effects, { onadd, onlaw, explain }) {
   const { criticism } = state;
   const named = new Set(criticism.named);
   const drawnNow = h(
@@ -197,6 +197,7 @@ export function suspectList(state, effects, { onadd, explain }) {
           "No effect of the catalogue has enough evidence in these data: each explains no more of the error than additional coefficients would explain by chance.",
         ),
     aliasNotice(criticism),
+    lawList(state, onlaw),
     experimentList(criticism),
     untestableEffects(criticism),
   );
@@ -271,6 +272,49 @@ function aliasNotice(criticism) {
       {},
       "Adding any one of these effects lowers the error; only another experiment shows which of them is real.",
     ),
+  );
+}
+
+/**
+ * Formulas that describe what no effect explains; each can be tried as a change of the model.
+ * @param {ExploreState} state
+ * @param {(formulas: string[]) => unknown} onlaw
+ */
+function lawList({ criticism, axis, motion }, onlaw) {
+  const { laws, law_test: test } = criticism;
+  if (!laws.length) return null;
+  return h(
+    "section",
+    { class: "stack", "aria-label": "Laws that describe it" },
+    h("h3", {}, "Laws that describe it"),
+    h(
+      "p",
+      { class: "muted" },
+      "No effect of the catalogue explains this residual. A law says what it follows and names no cause.",
+    ),
+    laws.map((law) =>
+      h(
+        "div",
+        { class: "notice stack" },
+        h("p", {}, h("code", {}, law.equations[axis] ?? Object.values(law.equations)[0]), " deg/s"),
+        h(
+          "p",
+          { class: "muted small" },
+          `${percent(law.probability)} among these laws. RMS with it ${number(law.rms_after_dps)} deg/s, ${heldOutName(motion)} ${number(law.heldout_rms_after_dps)} deg/s.`,
+        ),
+        h(
+          "ul",
+          { class: "small" },
+          law.follows.map((line) => h("li", {}, line)),
+        ),
+        h(
+          "div",
+          { class: "row" },
+          button("Try this law", () => onlaw(law.formulas), { kind: "tiny" }),
+        ),
+      ),
+    ),
+    test ? h("p", {}, `To tell the first two apart, ${test.do}.`) : null,
   );
 }
 

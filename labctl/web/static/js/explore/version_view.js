@@ -117,7 +117,11 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   const parts = [
     errorComparison(state, signal),
     residualDiagnostics(state),
-    suspectList(state, effects, { onadd: adding.put, explain: (effect) => explained(state, effect, signal) }),
+    suspectList(state, effects, {
+      onadd: adding.put,
+      onlaw: adding.putLaw,
+      explain: (effect) => explained(state, effect, signal),
+    }),
     adding.element,
     errorLadder(state, signal),
   ];

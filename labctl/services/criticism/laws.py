@@ -1,0 +1,72 @@
+"""Laws that are proposed for a residual without a name, as an answer: equation, figures, and what would follow."""
+
+from __future__ import annotations
+
+from labctl.answers.criticism import LawTest, ProposedLaw
+from labctl.fitting.criticism import Breaking, Criticism, Law, breaking, coefficients_of_law, consequences, laws_of
+from labctl.progress import report_stage
+
+#: Verdicts that leave something without a name.
+WITHOUT_NAME = frozenset({"unexplained"})
+
+
+def proposed_laws(found: Criticism) -> tuple[list[ProposedLaw], LawTest | None]:
+    """Return laws for what has no name, and where the two likeliest differ most; none beside a name."""
+    if found.verdict.form not in WITHOUT_NAME or found.comparison is None:
+        return [], None
+    report_stage("searching a law")
+    laws = laws_of(found)
+    return [_law(law, found) for law in laws], _test(breaking(laws, found), found)
+
+
+def _law(law: Law, found: Criticism) -> ProposedLaw:
+    coefficients = coefficients_of_law(law)
+    return {
+        "formulas": list(law.formulas),
+        "kinds": list(law.kinds),
+        "equations": {
+            axis: " + ".join(f"{of_axis[term.effect]['value']:.4g} * {term.formula}" for term in law.terms)
+            for axis, of_axis in coefficients.items()
+        },
+        "coefficients": coefficients,
+        "probability": law.probability,
+        "log_bayes_factor": law.evidence,
+        "rms_after_dps": law.fit.error.rms_dps,
+        "heldout_rms_after_dps": law.fit.error.heldout_rms_dps,
+        "follows": consequences(law, found),
+    }
+
+
+def _test(place: Breaking | None, found: Criticism) -> LawTest | None:
+    if place is None:
+        return None
+    floor_dps = found.floor.rms_dps
+    at = f"{place.rate_dps:.4g} deg/s" + (
+        "" if place.temperature_c is None else f" and {place.temperature_c:.3g} deg C"
+    )
+    times = f", {place.difference_dps / floor_dps:.1f} times the noise floor" if floor_dps else ""
+    return {
+        "rate_dps": place.rate_dps,
+        "temperature_c": place.temperature_c,
+        "difference_dps": place.difference_dps,
+        "do": f"measure at {at}: there the two likeliest laws differ most, by {place.difference_dps:.3g} deg/s{times}",
+    }
+
+
+def law_sentences(laws: list[ProposedLaw], test: LawTest | None) -> list[str]:
+    """Return the likeliest law in words, and what would tell it from the next; nothing without a law."""
+    if not laws:
+        return []
+    first = laws[0]
+    axis, equation = next(iter(first["equations"].items()))
+    of_axis = f" on axis {axis}" if len(first["equations"]) > 1 else ""
+    others = f", or {len(laws) - 1} other{'s' if len(laws) > 2 else ''}" if len(laws) > 1 else ""
+    law = (
+        f"A law describes it, which names no cause{of_axis}: {equation} deg/s{others}; with it the residual is "
+        f"{_dps(first['rms_after_dps'])}, at parts left out of the fit {_dps(first['heldout_rms_after_dps'])}."
+    )
+    return [law] if test is None else [law, f"To tell the laws apart, {test['do']}."]
+
+
+def _dps(value: float | None) -> str:
+    return "not known" if value is None else f"{value:.3g} deg/s"
