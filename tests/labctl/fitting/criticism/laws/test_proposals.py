@@ -1,0 +1,77 @@
+"""Laws for a residual without a name, of a simulated gyro with an error that no effect of the catalogue describes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from labctl.fitting.criticism import Criticism, Law, breaking, coefficients_of_law, consequences, criticise, laws_of
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.effects.formula import read_formula
+from labctl.fitting.models.presets import usual_model
+from labctl.recording import Recording, to_points
+from tests.helpers.simulated_recordings import single_axis
+from tests.helpers.unnamed_error import SIZE_DPS, error_dps, with_wave
+
+
+def judged(recording: Recording) -> Criticism:
+    return criticise(recording, usual_model(fit_data_of(to_points(recording))))
+
+
+@pytest.fixture(scope="module")
+def found() -> Criticism:
+    return judged(with_wave(single_axis(3)))
+
+
+@pytest.fixture(scope="module")
+def laws(found: Criticism) -> list[Law]:
+    return laws_of(found)
+
+
+def test_the_likeliest_law_is_the_true_one(found: Criticism, laws: list[Law]) -> None:
+    assert found.verdict.form == "unexplained"
+    assert len(laws[0].formulas) == 1
+    coefficient = coefficients_of_law(laws[0])["z"]["law_1"]
+    rates = np.linspace(-100.0, 100.0, 41)
+    channels = found.fit_data.channels.take(np.arange(len(found.fit_data)) < 1)
+    formula = read_formula(laws[0].formulas[0])
+    term = laws[0].terms[0]
+    described = []
+    for rate in rates:
+        (column,) = formula.columns(
+            channels.with_rates({"z": np.array([rate])}), "z", term, laws[0].fit.fitted.model.reference
+        )
+        described.append(coefficient["value"] * float(column.values[0]))
+    assert described == pytest.approx(error_dps(rates), abs=0.1 * SIZE_DPS)
+
+
+def test_a_law_leaves_less_of_the_data_sets_and_of_those_left_out(found: Criticism, laws: list[Law]) -> None:
+    assert found.base is not None
+    for law in laws:
+        before, after = found.base.error, law.fit.error
+        assert after.rms_dps < 0.2 * before.rms_dps  # type: ignore[operator]
+        assert after.heldout_rms_dps < 0.2 * before.heldout_rms_dps  # type: ignore[operator]
+    assert sum(law.probability for law in laws) == pytest.approx(1.0)
+
+
+def test_it_says_what_else_would_follow(found: Criticism, laws: list[Law]) -> None:
+    said = consequences(laws[0], found)
+    assert said[0] == "It changes its sign with the direction of the rate, and is 0 at rest."
+
+
+def test_two_laws_are_told_apart_where_they_differ_most(found: Criticism, laws: list[Law]) -> None:
+    """Of one law there is nothing to tell; two that differ in period part where no data set is."""
+    assert breaking(laws[:1], found) is None
+    other = replace(laws[0], fit=found.base)
+    place = breaking([laws[0], other], found)
+    assert place is not None
+    assert place.difference_dps > SIZE_DPS / 2
+    assert abs(place.rate_dps) <= 125.0
+
+
+def test_nothing_is_proposed_for_noise() -> None:
+    quiet = judged(single_axis(4))
+    assert quiet.verdict.form == "adequate"
+    assert laws_of(quiet) == []

@@ -1,0 +1,39 @@
+"""The library of shapes: formulas of channels in their own range, with constants that can be moved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from labctl.fitting.criticism.laws.shapes import OF_CHANNEL, Scale, Shape, bounds_of, library
+from labctl.fitting.effects.formula import read_formula
+
+RATE = Scale("table_rate_dps", "(rate_dps/100)", 0.0, 100.0)
+TEMPERATURE = Scale("temperature_c", "((temperature_c - 20)/30)", 20.0, 30.0)
+
+
+def test_every_formula_of_the_library_can_be_given_to_a_model() -> None:
+    formulas = [
+        text for shape in library({"table_rate_dps": RATE, "temperature_c": TEMPERATURE}) for text in shape.formulas()
+    ]
+    assert len(formulas) == len({read_formula(f"law: {text}").text for text in formulas}) > 300
+
+
+def test_a_law_without_a_rate_has_no_shape_of_it() -> None:
+    texts = [text for shape in library({"temperature_c": TEMPERATURE}) for text in shape.formulas()]
+    assert texts
+    assert not any("rate" in text for text in texts)
+
+
+def test_constants_are_written_with_three_digits_and_negative_ones_in_brackets() -> None:
+    shape = Shape("step", ("tanh(({u} - {k})/{w})",), {"k": -0.25, "w": 0.1}, frozenset("k")).of("x")
+    assert shape.formulas() == ("tanh((x - (-0.25))/0.1)",)
+    assert shape.formulas({"w": 0.123456}) == ("tanh((x - (-0.25))/0.123)",)
+    assert shape.times("y", "times y").formulas() == ("y * tanh((x - (-0.25))/0.1)",)
+
+
+@pytest.mark.parametrize("shape", [shape for shape in OF_CHANNEL if shape.constants][::7])
+def test_constants_move_about_where_they_begin(shape: Shape) -> None:
+    for name, (low, high) in bounds_of(shape).items():
+        assert low < shape.constants[name] < high
+        assert name in shape.places or np.sign(low) == np.sign(high)
