@@ -65,7 +65,7 @@ def law_sentences(laws: list[ProposedLaw], test: LawTest | None) -> list[str]:
         f"A law describes it, which names no cause{of_axis}: {equation} deg/s{others}; with it the residual is "
         f"{_dps(first['rms_after_dps'])}, at parts left out of the fit {_dps(first['heldout_rms_after_dps'])}."
     )
-    return [law] if test is None else [law, f"To tell the laws apart, {test['do']}."]
+    return [law] if test is None else [law, f"To distinguish the laws, {test['do']}."]
 
 
 def _dps(value: float | None) -> str:

@@ -314,7 +314,7 @@ function lawList({ criticism, axis, motion }, onlaw) {
         ),
       ),
     ),
-    test ? h("p", {}, `To tell the first two apart, ${test.do}.`) : null,
+    test ? h("p", {}, `To distinguish the first two, ${test.do}.`) : null,
   );
 }
 
