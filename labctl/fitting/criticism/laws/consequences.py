@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from labctl.fitting.criticism.criticism import Criticism
-from labctl.fitting.criticism.laws.proposals import TEMPERATURE, Law
+from labctl.fitting.criticism.laws.proposals import Law
+from labctl.fitting.criticism.laws.shapes import TEMPERATURE
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.formula import RATES, Formula
 from labctl.fitting.numeric.arrays import Array

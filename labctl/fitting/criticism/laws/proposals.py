@@ -16,7 +16,7 @@ from labctl.answers.fitted_model import Coefficient
 from labctl.errors import LabctlError
 from labctl.fitting.criticism.criticism import Criticism
 from labctl.fitting.criticism.laws.search import Search, State
-from labctl.fitting.criticism.laws.shapes import TABLE_RATE, library, scales_of
+from labctl.fitting.criticism.laws.shapes import TABLE_RATE, TEMPERATURE, library, scales_of
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.search.held_out import held_out_rises
 from labctl.fitting.effects import Term
@@ -39,7 +39,6 @@ ALIKE = 0.9995
 FAR_BEHIND = 12.0
 #: More formulas than this no model has.
 MAX_NAMES = 40
-TEMPERATURE = "temperature_c"
 #: Shares of the rates of the data sets at which laws are compared: between them and, where the unit can, beyond.
 BETWEEN = tuple(float(share) for share in np.linspace(0.1, 1.25, 24))
 

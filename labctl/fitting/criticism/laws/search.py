@@ -6,7 +6,8 @@ The evidence is that by which effects compete (`evidence`): beside the model, wi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +18,8 @@ from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence_of
 from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.noise_grid import Noise
-from labctl.fitting.criticism.laws.shapes import Shape, bounds_of
-from labctl.fitting.criticism.model_comparison import Comparison, centred, constant_coordinates, orthogonalised
+from labctl.fitting.criticism.laws.shapes import TABLE_RATE, TEMPERATURE, Shape, bounds_of
+from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.formula import Formula
 from labctl.fitting.numeric.arrays import Array
@@ -31,12 +32,13 @@ LEAST = 3.0
 #: Price of each symbol of a formula, nats.
 PER_SYMBOL = 0.7
 #: Of the terms of the library, the best of so many kinds have their constants moved.
-REFINED = 8
+REFINED = 6
 #: Calls for moving the constants of one term.
-MOST_CALLS = 30
+MOST_CALLS = 25
 #: A noise that is less likely than this beside the model is left out of the search.
 LEAST_WEIGHT = 0.02
 NAME = "law"
+WORD = re.compile(r"[a-z_][a-z0-9_]*")
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ class Search:
         self._comparison = comparison
         self._shapes = [shape for shape in shapes if all(self._rows(text) is not None for text in shape.formulas())]
         self._kept: dict[tuple[str, str], NDArray[np.float64]] = {}
+        self._others = frozenset(comparison.data.nodes.columns) - {TEMPERATURE, TABLE_RATE}
         # that one of so many shapes fits by chance is in the price of each term
         self._price = float(np.log(max(len(self._shapes), 1)))
 
@@ -85,14 +88,16 @@ class Search:
 
     def _longer(self, begun: State) -> list[State]:
         """Return a state with one term more, in several ways."""
-        evidence = self._evidence(begun.formulas, [shape.formulas() for shape in self._shapes])
-        worth = evidence - np.array([self._price + PER_SYMBOL * shape.nodes for shape in self._shapes])
+        axes = self._by_axis(begun.formulas, [shape.formulas() for shape in self._shapes])
+        worth = sum(axes.values()) - np.array([self._price + PER_SYMBOL * shape.nodes for shape in self._shapes])
         found = []
         best_of_kind: dict[str, int] = {}
         for index in np.argsort(-worth).tolist():
             best_of_kind.setdefault(self._shapes[index].kind, index)
         for index in list(best_of_kind.values())[:REFINED]:
-            part, gained = self._refined(begun, self._shapes[index], float(worth[index]))
+            strongest = max(axes, key=lambda axis: float(axes[axis][index]))
+            part = self._refined(begun, self._shapes[index], strongest)
+            gained = float(self._evidence(begun.formulas, [part.formulas])[0]) - self._price_of(part.shape)
             if gained > LEAST:
                 found.append(self._pruned(State((*begun.parts, part), begun.score + gained)))
         return found
@@ -112,20 +117,19 @@ class Search:
         moved = 0.5 * len(shape.constants) * float(np.log(len(self._comparison.data)))
         return self._price + PER_SYMBOL * shape.nodes + moved
 
-    def _refined(self, begun: State, shape: Shape, worth: float) -> tuple[Part, float]:
-        """Return a term with the constants that have most evidence, and what it is worth."""
+    def _refined(self, begun: State, shape: Shape, axis: str) -> Part:
+        """Return a term with the constants that have most evidence on an axis, that on which it shows most."""
         from scipy.optimize import minimize
 
         names = list(shape.constants)
         if not names:
-            return Part(shape, shape.formulas()), worth
-        bounds = bounds_of(shape)
-
-        noises = self._likely((*begun.formulas, *shape.formulas()))
+            return Part(shape, shape.formulas())
+        bounds, noises = bounds_of(shape), self._likely((*begun.formulas, *shape.formulas()), axis)
 
         def unlikely(values: Array) -> float:
             constants = dict(zip(names, map(float, values), strict=True))
-            return -float(self._evidence(begun.formulas, [shape.formulas(constants)], noises)[0])
+            found = self._on_axis(axis, begun.formulas, [shape.formulas(constants)], noises)
+            return -float(max(found.log_bf[0], 0.0))
 
         start = np.array([shape.constants[name] for name in names])
         best = minimize(
@@ -133,30 +137,24 @@ class Search:
             options={"maxfev": MOST_CALLS, "xatol": 1e-3, "fatol": 0.05},
         )  # fmt: skip
         moved = replace(shape, constants=dict(zip(names, map(float, best.x), strict=True)))
-        gained = float(self._evidence(begun.formulas, [moved.formulas()])[0])
-        return Part(moved, moved.formulas()), gained - self._price_of(shape)
+        return Part(moved, moved.formulas())
 
-    def _likely(self, beside: Sequence[str]) -> dict[str, list[Noise]]:
-        """Return the noises of each axis that are likely beside the model and formulas."""
-        likely = {}
-        for axis in self._comparison.designs:
-            found = self._on_axis(axis, beside, (), self._comparison.axes[axis].noises)
-            pairs = zip(found.noises, found.weights, strict=True)
-            likely[axis] = [noise for noise, weight in pairs if weight >= LEAST_WEIGHT] or [found.best.noise]
-        return likely
+    def _likely(self, beside: Sequence[str], axis: str) -> list[Noise]:
+        """Return the noises of an axis that are likely beside the model and formulas."""
+        found = self._on_axis(axis, beside, (), self._comparison.axes[axis].noises)
+        pairs = zip(found.noises, found.weights, strict=True)
+        return [noise for noise, weight in pairs if weight >= LEAST_WEIGHT] or [found.best.noise]
 
-    def _evidence(
-        self, beside: Sequence[str], tried: Sequence[tuple[str, ...]], noises: Mapping[str, list[Noise]] | None = None
-    ) -> Array:
-        """Return the log Bayes factor of each option beside the model and formulas, over all axes, nats.
+    def _evidence(self, beside: Sequence[str], tried: Sequence[tuple[str, ...]]) -> Array:
+        """Return the log Bayes factor of each option beside the model and formulas, over all axes, nats."""
+        return np.asarray(sum(self._by_axis(beside, tried).values()))
 
-        `noises` by axis are averaged over; by default all.
-        """
-        total = np.zeros(len(tried))
-        for axis, known in self._comparison.axes.items():
-            found = self._on_axis(axis, beside, tried, known.noises if noises is None else noises[axis])
-            total += np.maximum(found.log_bf, 0.0)
-        return total
+    def _by_axis(self, beside: Sequence[str], tried: Sequence[tuple[str, ...]]) -> dict[str, Array]:
+        """Return axis -> log Bayes factor of each option, nats; 0 on an axis where it is unlikely."""
+        return {
+            axis: np.maximum(self._on_axis(axis, beside, tried, known.noises).log_bf, 0.0)
+            for axis, known in self._comparison.axes.items()
+        }
 
     def _on_axis(
         self, axis: str, beside: Sequence[str], tried: Sequence[tuple[str, ...]], noises: list[Noise]
@@ -171,14 +169,14 @@ class Search:
         more = [self._columns(axis, text) for text in beside]
         base = np.concatenate([given.base, *more], axis=2)
         precision = np.concatenate([given.precision, np.zeros(len(more))])
-        level = constant_coordinates(base, self._comparison.data)
-        exact = base[:, :, precision == 0]
-        options = [orthogonalised(centred(self._option(axis, texts), level), exact) for texts in tried]
-        return replace(given, base=base, precision=precision, options=options)
+        # shapes are centred on what was measured, and need not be made orthogonal to the base as a person's formulas
+        return replace(given, base=base, precision=precision, options=[self._option(axis, texts) for texts in tried])
 
     def _option(self, axis: str, texts: tuple[str, ...]) -> CandidateShape:
         rows = np.concatenate([self._columns(axis, text) for text in texts], axis=2)
-        return CandidateShape(NAME, Term(NAME, formula=texts[0]), rows, texts, ("deg/s",) * len(texts))
+        # a formula as an effect would be read again each time
+        of = next((name for name in WORD.findall(texts[0]) if name in self._others), TABLE_RATE)
+        return CandidateShape(of, None, rows, texts, ("deg/s",) * len(texts))
 
     def _columns(self, axis: str, text: str) -> NDArray[np.float64]:
         key = axis, text

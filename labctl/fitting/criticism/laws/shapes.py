@@ -19,7 +19,7 @@ from labctl.fitting.effects.formula import OWN_RATE
 from labctl.fitting.numeric.arrays import Array
 
 #: Names of the rate among the channels of a verdict, and in a formula.
-TABLE_RATE = "table_rate_dps"
+TABLE_RATE, TEMPERATURE = "table_rate_dps", "temperature_c"
 #: Significant digits of a constant.
 DIGITS = 3
 #: Where knees, steps and bumps stand, as shares of the range, and how wide they are.
@@ -122,13 +122,13 @@ def scales_of(data: ReducedRecording, channels: Sequence[str]) -> dict[str, Scal
         if name == TABLE_RATE and fastest > 0:
             largest = _rounded(fastest)
             scales[name] = Scale(name, f"({OWN_RATE}/{largest:g})", 0.0, largest)
-        elif name in known and name in (*data.nodes.columns, "temperature_c"):
+        elif name in known and name in (*data.nodes.columns, TEMPERATURE):
             scales[name] = _scale(name, _values(data, name, axis))
     return scales
 
 
 def _values(data: ReducedRecording, name: str, axis: str) -> Array:
-    if name == "temperature_c":
+    if name == TEMPERATURE:
         return data.nodes.temperature_c(axis)
     return np.asarray(data.nodes[name], dtype=np.float64)
 
