@@ -32,12 +32,13 @@ LEAST = 3.0
 #: Price of each symbol of a formula, nats.
 PER_SYMBOL = 0.7
 #: Of the terms of the library, the best of so many kinds have their constants moved.
-REFINED = 6
+REFINED = 8
 #: Calls for moving the constants of one term.
 MOST_CALLS = 25
 #: A noise that is less likely than this beside the model is left out of the search.
 LEAST_WEIGHT = 0.02
 NAME = "law"
+NUMBER = re.compile(r"[0-9.]+")
 WORD = re.compile(r"[a-z_][a-z0-9_]*")
 
 
@@ -93,7 +94,7 @@ class Search:
         found = []
         best_of_kind: dict[str, int] = {}
         for index in np.argsort(-worth).tolist():
-            best_of_kind.setdefault(self._shapes[index].kind, index)
+            best_of_kind.setdefault(NUMBER.sub("", self._shapes[index].kind), index)  # powers are of one kind
         for index in list(best_of_kind.values())[:REFINED]:
             strongest = max(axes, key=lambda axis: float(axes[axis][index]))
             part = self._refined(begun, self._shapes[index], strongest)
