@@ -25,7 +25,7 @@ DiagnosisState = Literal["criticising", "awaiting_confirmation", "measuring", "d
 #: What a diagnosis that is done has found.
 DiagnosisOutcome = Literal[
     "one_cause", "several_causes", "adequate", "indistinguishable", "hours_spent", "unexplained", "insufficient_data",
-    "cannot_be_done",
+    "cannot_be_done", "ended_by_person",
 ]  # fmt: skip
 #: What came of an experiment.
 ExperimentResult = Literal["measured", "cannot_be_done"]
@@ -57,7 +57,7 @@ class ConfirmExperimentRequest(Request):
     """A person's answer to the experiment that a diagnosis proposes."""
 
     cleans_texts = True  # no answer is refused for the words that describe it
-    round: int = Field(ge=1, description="Number of the round whose experiment is meant; an answer to another is refused.")
+    round: int = Field(ge=1, description="Number of the round whose experiment is meant; another is refused.")
     by: Person = Field(min_length=1, max_length=200)
     confirmed: bool = Field(
         default=True,
@@ -144,7 +144,8 @@ class DiagnosisResponse(ResponseModel):
         "adequate: nothing is missing; indistinguishable: no experiment on this bench distinguishes the named effects; "
         "hours_spent: no experiment fits into the hours that are left; unexplained: no effect of the catalogue "
         "explains the residual; insufficient_data: too little was measured for a verdict; cannot_be_done: none of the "
-        "experiments that would distinguish the named effects can be done; null: it is not done."
+        "experiments that would distinguish the named effects can be done; ended_by_person: a person "
+        "ended it for good; null: it is not done."
     )
     named: list[str] = Field(description="Ids of the effects that the newest verdict is based on.")
     why: str = Field(description="The outcome, or the reason of a stop, in a sentence; empty while it goes on.")

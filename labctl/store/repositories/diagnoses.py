@@ -201,7 +201,9 @@ class Diagnoses:
             append(connection, at, "diagnosis experiment", _subject(diagnosis), detail)
 
     @transaction
-    def set_state(self, diagnosis: int, was: Sequence[DiagnosisState], state: DiagnosisState, why: str, at: datetime) -> None:
+    def set_state(
+        self, diagnosis: int, was: Sequence[DiagnosisState], state: DiagnosisState, why: str, at: datetime
+    ) -> None:
         """Stop a diagnosis, or let it go on. Raises Conflict where it is in none of the states that it `was` in."""
         with self._database.writing() as connection:
             self._move(connection, diagnosis, was, state, "its state", {"why": why})
