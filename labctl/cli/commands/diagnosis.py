@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import BenchName, Database, Json, RecordingIds, Serial, recording_numbers
+from labctl.cli.options import BenchName, Database, Json, Serial, recording_numbers
 from labctl.cli.output import print_json, stderr
 from labctl.cli.printing.diagnosis import DiagnosisPrinter, print_diagnosis_end
 
@@ -24,6 +24,15 @@ VersionOption = Annotated[
     int | None,
     typer.Option("--version", metavar="N", help="Version that is judged; default: the unit's newest version."),
 ]
+RecordingOption = Annotated[
+    str | None,
+    typer.Option(
+        "--recording",
+        metavar="ID[,ID...]",
+        help="Recordings to begin with, such as 1,2; default: those that the version was fitted to, and those of "
+        "earlier diagnoses.",
+    ),
+]
 EndOption = Annotated[
     bool, typer.Option("--end", help="End the diagnosis of the unit that has not ended, for good; run nothing.")
 ]
@@ -34,7 +43,7 @@ def diagnose(
     bench: BenchName = None,
     hours: Hours = None,
     version: VersionOption = None,
-    recording: RecordingIds = None,
+    recording: RecordingOption = None,
     end: EndOption = False,
     as_json: Json = False,
     database: Database = None,
@@ -94,5 +103,5 @@ def ask_experiment(answer: DiagnosisResponse, proposed: DiagnosisRound) -> Reply
         return None
     if line.lower() not in {"yes", "y"}:
         return "cannot_be_done", os_user(), line
-    by = ask_bench_clear(QUESTIONS)
+    by = ask_bench_clear({str(check): text for check, text in QUESTIONS.items()})
     return ("confirmed", by, "") if by else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from typing import cast
 
 from labctl.answers.common_fields import CriticismVerdict
@@ -36,7 +37,7 @@ def _answer(store: Store, row: DiagnosisRow) -> DiagnosisResponse:
         outcome=cast(DiagnosisOutcome, row.outcome) if row.outcome else None,
         named=list(rounds[-1].named) if rounds else [], why=row.why if row.state in _EXPLAINED else "",
         next=_next(row, rounds), ended_at=row.ended_at, recordings=list(row.recordings),
-        rounds=[_round(each, later) for each, later in zip(rounds, [*rounds[1:], None], strict=True)],
+        rounds=[_round(each, later) for each, later in zip_longest(rounds, rounds[1:])],
     )  # fmt: skip
 
 

@@ -8,7 +8,12 @@ from datetime import datetime
 from instruments.bench_config import BenchFile
 from labctl.acting_user import actor
 from labctl.answers.campaigns import BENCH_CHECKS
-from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
+from labctl.answers.diagnosis import (
+    ConfirmExperimentRequest,
+    DiagnosisRequest,
+    DiagnosisResponse,
+    DiagnosisState,
+)
 from labctl.errors import Conflict, StartNotConfirmed
 from labctl.services.criticism.versions import version_of
 from labctl.services.diagnosis import sentences
@@ -16,6 +21,9 @@ from labctl.services.diagnosis.answer import diagnosis_answer
 from labctl.services.diagnosis.experiment_bench import bench_of_unit
 from labctl.services.recordings.loading import chosen_rows
 from labctl.store import CalibrationRecord, DiagnosisRow, NewDiagnosis, Store
+
+#: States from which a diagnosis can be stopped.
+STOPPABLE: tuple[DiagnosisState, ...] = ("criticising", "awaiting_confirmation", "measuring")
 
 
 def begin(
@@ -83,8 +91,7 @@ def _refuse_unchecked(row: DiagnosisRow, checks: Sequence[str]) -> None:
 
 def stop(store: Store, diagnosis: int, reason: str, at: datetime) -> DiagnosisResponse:
     """Stop a diagnosis, which can be resumed; its campaign is for the caller to stop. Raises Conflict."""
-    was = ("criticising", "awaiting_confirmation", "measuring")
-    store.diagnoses.set_state(diagnosis, was, "stopped", reason, at)
+    store.diagnoses.set_state(diagnosis, STOPPABLE, "stopped", reason, at)
     return diagnosis_answer(store, diagnosis)
 
 
@@ -94,7 +101,7 @@ def resume(store: Store, diagnosis: int, reason: str, at: datetime) -> Diagnosis
     rounds = store.diagnoses.rounds(diagnosis)
     open_round = rounds[-1] if rounds and rounds[-1].is_open else None
     if open_round is None:
-        state = "criticising"
+        state: DiagnosisState = "criticising"
     else:
         is_asked = not BenchFile.model_validate(dict(row.bench)).is_simulated and not open_round.confirmed_by
         state = "awaiting_confirmation" if is_asked else "measuring"

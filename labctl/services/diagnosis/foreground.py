@@ -152,7 +152,7 @@ class ForegroundDiagnosis:
     def _note_stop(self, diagnosis: int, text: str) -> str:
         """Write down that the diagnosis was stopped here; returns what to say."""
         answer = self._answer(diagnosis)
-        if answer.state in {"criticising", "awaiting_confirmation", "measuring"}:
+        if answer.state in begin.STOPPABLE:
             with self._open() as store:
                 begin.stop(store, diagnosis, f"stopped by {actor().name} at the terminal", SystemClock().utc())
         before = f"{text.partition('; `labctl campaign resume')[0]}; " if text else ""
