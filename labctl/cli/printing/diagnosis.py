@@ -59,7 +59,8 @@ def _print_round(each: DiagnosisRound) -> None:
         f"residual {format_number(each.rms_dps)} deg/s RMS, held-out {format_number(each.heldout_rms_dps)}, noise "
         f"floor {format_number(each.noise_floor_dps)}"
     )
-    console.print(f"round {each.number}, {each.spent_hours:.1f} h: ", each.verdict, sep="", end="", style="bold")
+    verdict = verdict_text(each)
+    console.print(f"round {each.number}, {each.spent_hours:.1f} h: {verdict}", end="", style="bold", soft_wrap=True)
     console.print(f" ({suspects})" if suspects else "", soft_wrap=True)
     console.print(f"  recordings {of}: {figures}", style="dim", soft_wrap=True)
     if each.experiment is not None:
@@ -81,13 +82,18 @@ def print_diagnosis_end(answer: DiagnosisResponse) -> None:
 
 
 def _print_course(answer: DiagnosisResponse) -> None:
-    highest: dict[str, float] = {}
+    highest = {effect: 1.0 for each in answer.rounds for effect in each.named}
     for each in answer.rounds:
         for effect, probability in each.suspects.items():
             highest[effect] = max(probability, highest.get(effect, 0.0))
     columns = sorted(highest, key=lambda effect: -highest[effect])[:MAX_COLUMNS]
-    rows = table("probability of each suspect", "bench h", "verdict", *columns, numbers=0)
+    rows = table("probability of each suspect; –: not listed", "bench h", "verdict", *columns)
     for each in answer.rounds:
-        values = [format_number(each.suspects.get(effect, 0.0), 2) for effect in columns]
-        rows.add_row(f"{each.spent_hours:.1f}", each.verdict, *values)
+        values = [format_number(each.suspects.get(effect), 2) for effect in columns]
+        rows.add_row(f"{each.spent_hours:.1f}", verdict_text(each), *values)
     console.print(rows)
+
+
+def verdict_text(each: DiagnosisRound) -> str:
+    """Return a verdict with the effects that it is based on."""
+    return f"{each.verdict}: {', '.join(each.named)}" if each.named else each.verdict

@@ -176,10 +176,14 @@ def _bench(row: DiagnosisRow) -> BenchFile:
 
 
 def _done(rounds: list[RoundRow]) -> list[DoneExperiment]:
-    return [
-        DoneExperiment(ChosenExperiment.model_validate(each.experiment).toml, _came(each))
+    over = [
+        (each, ChosenExperiment.model_validate(each.experiment))
         for each in rounds
         if each.experiment is not None and each.came
+    ]
+    return [
+        DoneExperiment(experiment.toml, _came(each), experiment.hours, each.took_hours or 0.0)
+        for each, experiment in over
     ]
 
 

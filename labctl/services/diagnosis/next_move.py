@@ -25,6 +25,8 @@ class DoneExperiment:
 
     toml: str
     came: ExperimentResult
+    expected_hours: float
+    took_hours: float  #: of the bench
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,13 @@ class Progress:
     def left_hours(self) -> float:
         """Bench hours that are left."""
         return max(self.hours - self.spent_hours, 0.0)
+
+    @property
+    def pace(self) -> float:
+        """How much longer the experiments that were measured took than expected; at least 1."""
+        measured = [each for each in self.done if each.came == "measured"]
+        expected_hours = sum(each.expected_hours for each in measured)
+        return max(sum(each.took_hours for each in measured) / expected_hours, 1.0) if expected_hours else 1.0
 
 
 @dataclass(frozen=True)
@@ -86,9 +95,9 @@ def _experiment(progress: Progress, criticism: CriticismResponse) -> Measure | E
     useful = [each for each in possible if len(came.get(experiment_key(each["toml"]), ())) < MAX_RUNS]
     if not useful:
         return End("indistinguishable", sentences.all_were_run(named, len(possible), MAX_RUNS))
-    affordable = [each for each in useful if each["hours"] <= progress.left_hours]
+    affordable = [each for each in useful if each["hours"] * progress.pace <= progress.left_hours]
     if not affordable:
-        shortest_hours = min(each["hours"] for each in useful)
+        shortest_hours = progress.pace * min(each["hours"] for each in useful)
         return End("hours_spent", sentences.hours_spent(named, progress.hours, progress.left_hours, shortest_hours))
     # the criticism gives the best first; one that has been measured comes behind all that have not
     ranked = sorted(affordable, key=lambda each: len(came.get(experiment_key(each["toml"]), ())))
