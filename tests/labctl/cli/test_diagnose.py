@@ -30,7 +30,7 @@ def ambiguous(tmp_path_factory: pytest.TempPathFactory) -> Lab:
     """Return a lab with a unit that has a dead band, which the rates of its campaign do not distinguish."""
     lab = Lab(tmp_path_factory.mktemp("diagnose"))
     (lab.folder / "few.toml").write_text(RECIPE)
-    lab.run("campaign", "start", str(lab.folder / "few.toml"), "--hide", "dead_band=SIZE")
+    lab.run("campaign", "start", str(lab.folder / "few.toml"), "--hide", "dead_band=0.86")
     lab.run("fit", UNIT, "--effects", MODEL)
     return lab
 
