@@ -32,6 +32,7 @@ from labctl.answers.campaigns import (
 )
 from labctl.answers.certification import CalibrationStateResponse
 from labctl.answers.common_fields import CriticismVerdict
+from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
 from labctl.answers.fixed_coefficients import FixedCoefficients
 from labctl.answers.points import PointFigure, PointResponse
 from labctl.answers.recordings import ImportResponse, RecordingResponse
@@ -53,6 +54,9 @@ __all__ = [
     "CampaignRequest",
     "CampaignResponse",
     "Client",
+    "ConfirmExperimentRequest",
+    "DiagnosisRequest",
+    "DiagnosisResponse",
     "EventResponse",
     "FitRequest",
     "FitResponse",
@@ -323,6 +327,41 @@ class Client:
         """
         answer = ConfirmRequest(prompt=prompt, by=by, confirmed=confirmed and not again, again=again, reason=reason)
         return self._act(campaign, "confirm", answer)
+
+    def start_diagnosis(self, serial: str, request: DiagnosisRequest | None = None) -> DiagnosisResponse:
+        """Run experiments on the service's bench until one missing effect is left; returns at once.
+
+        `diagnosis` says how far it is.
+        """
+        response = self._post(f"/api/units/{_part(serial)}/diagnoses", request or DiagnosisRequest())
+        return DiagnosisResponse.model_validate(json_of(response))
+
+    def diagnoses(self, serial: str) -> list[DiagnosisResponse]:
+        """Return the diagnoses of a unit, newest first."""
+        return self._connection.get_list(f"/api/units/{_part(serial)}/diagnoses", DiagnosisResponse)
+
+    def diagnosis(self, diagnosis: int) -> DiagnosisResponse:
+        """Return a diagnosis with its rounds."""
+        return self._connection.get(f"/api/diagnoses/{diagnosis}", DiagnosisResponse)
+
+    def confirm_experiment(self, diagnosis: int, request: ConfirmExperimentRequest) -> DiagnosisResponse:
+        """Confirm the experiment that waits for a person, or answer that it cannot be done."""
+        return self._diagnosis_act(diagnosis, "confirm", request)
+
+    def stop_diagnosis(self, diagnosis: int, reason: str, *, by: str = "") -> DiagnosisResponse:
+        """Stop a diagnosis and the campaign that it runs; `resume_diagnosis` continues it."""
+        return self._diagnosis_act(diagnosis, "stop", ReasonRequest(reason=reason, by=by))
+
+    def resume_diagnosis(self, diagnosis: int, reason: str, *, by: str = "") -> DiagnosisResponse:
+        """Continue a diagnosis that was stopped."""
+        return self._diagnosis_act(diagnosis, "resume", ReasonRequest(reason=reason, by=by))
+
+    def end_diagnosis(self, diagnosis: int, reason: str, *, by: str = "") -> DiagnosisResponse:
+        """End a diagnosis for good, and the campaign that it runs."""
+        return self._diagnosis_act(diagnosis, "end", ReasonRequest(reason=reason, by=by))
+
+    def _diagnosis_act(self, diagnosis: int, act: str, request: Request) -> DiagnosisResponse:
+        return DiagnosisResponse.model_validate(json_of(self._post(f"/api/diagnoses/{diagnosis}/{act}", request)))
 
     def _act(self, campaign: int, act: str, request: Request) -> CampaignResponse:
         return CampaignResponse.model_validate(json_of(self._post(f"/api/campaigns/{campaign}/{act}", request)))

@@ -49,6 +49,7 @@ def upgrade() -> None:
         sa.Column("experiment", sa.JSON(), nullable=True),
         sa.Column("why", sa.Text(), nullable=False),
         sa.Column("confirmed_by", sa.String(200), server_default="", nullable=False),
+        sa.Column("since", sa.BigInteger(), nullable=False),
         sa.Column("campaign_id", _ROW_ID, nullable=True),
         sa.Column("recording_id", _ROW_ID, nullable=True),
         sa.Column("took_hours", sa.Float(), nullable=True),

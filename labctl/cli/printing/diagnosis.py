@@ -20,14 +20,14 @@ class DiagnosisPrinter:
 
     def __init__(self, *, quiet: bool) -> None:
         """`quiet`: print nothing."""
-        self._quiet = quiet
+        self.quiet = quiet
         self._judged = 0
         self._over = 0
         self._began = False
 
     def update(self, answer: DiagnosisResponse) -> None:
         """Print the rounds, and the results of experiments, that are new."""
-        if self._quiet:
+        if self.quiet:
             return
         if not self._began:
             self._began = True

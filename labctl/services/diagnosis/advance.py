@@ -18,6 +18,7 @@ import tomli_w
 from instruments.bench_config import BenchFile
 from labctl.answers.criticism import CriticismResponse
 from labctl.answers.diagnosis import ChosenExperiment, DiagnosisState, ExperimentResult
+from labctl.errors import LabctlError
 from labctl.log import get_logger
 from labctl.services.diagnosis import sentences
 from labctl.services.diagnosis.next_move import DoneExperiment, End, Progress, next_move
@@ -27,9 +28,6 @@ from procedures.contracts.errors import PlanRefused, RecipeError
 
 log = get_logger()
 
-#: The bench cannot do the experiment: it is left out, and the next best is chosen.
-CANNOT_BE_DONE = (PlanRefused, RecipeError)
-
 
 @dataclass(frozen=True)
 class ExperimentStart:
@@ -38,6 +36,24 @@ class ExperimentStart:
     recipe: str  #: TOML; its name belongs to this round alone
     bench: BenchFile
     confirmed_by: str  #: person who confirmed that a real bench is clear; empty: none has yet
+    since: datetime  #: when it was decided, or confirmed
+
+    @property
+    def name(self) -> str:
+        """Name of its recipe, which no other campaign has."""
+        return str(tomllib.loads(self.recipe)["name"])
+
+
+class NotBegun(LabctlError):
+    """An experiment was not begun in time on a real bench: a person has to confirm it again."""
+
+
+class CannotBeDone(LabctlError):
+    """The campaign of an experiment was refused when it was to begin."""
+
+
+#: The bench cannot do the experiment: it is left out, and the next best is chosen.
+REFUSALS = (PlanRefused, RecipeError, CannotBeDone)
 
 
 class Laboratory(Protocol):
@@ -48,7 +64,10 @@ class Laboratory(Protocol):
         ...
 
     def start(self, experiment: ExperimentStart) -> None:
-        """Start a campaign, or run it to its end. Raises PlanRefused where the bench cannot do it, LabctlError."""
+        """Start a campaign, or run it to its end; one that was asked for already is not started again.
+
+        Raises one of `REFUSALS` where the bench cannot do it, NotBegun, LabctlError.
+        """
         ...
 
     def go_on(self, campaign: CampaignRow, *, resumed: bool) -> bool:
@@ -109,29 +128,30 @@ class DiagnosisRunner:
     def _measure(self, row: DiagnosisRow, last: RoundRow) -> bool:
         """Start the campaign of a round, have it go on, or write down its end."""
         experiment = ChosenExperiment.model_validate(last.experiment)
-        if (campaign := self._campaign(row, last, experiment)) is None:
-            start = ExperimentStart(experiment.toml, _bench(row), last.confirmed_by)
+        if (campaign := self._campaign(row, last)) is None:
             try:
-                self._laboratory.start(start)
-            except CANNOT_BE_DONE as error:
+                self._laboratory.start(ExperimentStart(experiment.toml, _bench(row), last.confirmed_by, last.since))
+            except REFUSALS as error:
                 self._conclude(row, last, "cannot_be_done", sentences.not_done(str(error)))
                 return True
-            if (campaign := self._campaign(row, last, experiment)) is None:
+            except NotBegun as error:
+                with self._open_store() as store:
+                    store.diagnoses.unconfirm(row.id, last.number, str(error), self._now())
+                return False
+            if (campaign := self._campaign(row, last)) is None:
                 return False
         if campaign.state not in ENDED and not self._laboratory.go_on(campaign, resumed=False):
             return False
         self._conclude_campaign(row, last, campaign.id)
         return True
 
-    def _campaign(self, row: DiagnosisRow, last: RoundRow, experiment: ChosenExperiment) -> CampaignRow | None:
+    def _campaign(self, row: DiagnosisRow, last: RoundRow) -> CampaignRow | None:
         """Return the campaign of a round, where it was written down, and note it."""
         with self._open_store() as store:
-            number = last.campaign or store.diagnoses.campaign_of_recipe(tomllib.loads(experiment.toml)["name"])
-            if number is None:
-                return None
-            if last.campaign is None:
-                store.diagnoses.note_campaign(row.id, last.number, number)
-            return store.campaigns.get(number)
+            campaign = campaign_of_round(store, last)
+            if campaign is not None and last.campaign is None:
+                store.diagnoses.note_campaign(row.id, last.number, campaign.id)
+            return campaign
 
     def _conclude_campaign(self, row: DiagnosisRow, last: RoundRow, number: int) -> None:
         with self._open_store() as store:
@@ -160,6 +180,19 @@ class DiagnosisRunner:
         with self._open_store() as store:
             store.diagnoses.conclude_round(row.id, last.number, came, text, recording, took_hours, self._now())
         log.info("diagnosis.experiment", diagnosis=row.id, round=last.number, came=came, text=text)
+
+
+def campaign_of_round(store: Store, last: RoundRow) -> CampaignRow | None:
+    """Return the campaign of a round, by its recipe where it is not noted yet; None where none was written down."""
+    number = last.campaign
+    if number is None and last.experiment is not None:
+        number = store.diagnoses.campaign_of_recipe(recipe_name(last))
+    return None if number is None else store.campaigns.get(number)
+
+
+def recipe_name(last: RoundRow) -> str:
+    """Return the name of the recipe of a round, which no other campaign has."""
+    return str(tomllib.loads(ChosenExperiment.model_validate(last.experiment).toml)["name"])
 
 
 def bench_hours(store: Store, campaign: int) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
+from typing import Literal
 
 from instruments.bench_config import BenchFile
 from labctl.acting_user import actor
@@ -17,13 +18,27 @@ from labctl.answers.diagnosis import (
 from labctl.errors import Conflict, StartNotConfirmed
 from labctl.services.criticism.versions import version_of
 from labctl.services.diagnosis import sentences
+from labctl.services.diagnosis.advance import campaign_of_round, recipe_name
 from labctl.services.diagnosis.answer import diagnosis_answer
 from labctl.services.diagnosis.experiment_bench import bench_of_unit
 from labctl.services.recordings.loading import chosen_rows
-from labctl.store import CalibrationRecord, DiagnosisRow, NewDiagnosis, Store
+from labctl.store import CalibrationRecord, CampaignRow, DiagnosisRow, NewDiagnosis, Store
 
+#: States in which a process goes on by itself.
+MOVING: tuple[DiagnosisState, ...] = ("criticising", "measuring")
 #: States from which a diagnosis can be stopped.
 STOPPABLE: tuple[DiagnosisState, ...] = ("criticising", "awaiting_confirmation", "measuring")
+
+#: Whether a person has confirmed an experiment, who, and the reason why it cannot be done.
+Reply = tuple[Literal["confirmed", "cannot_be_done"], str, str]
+
+
+def confirmation_of(number: int, reply: Reply) -> ConfirmExperimentRequest:
+    """Return what a person has answered at a terminal about the experiment of a round."""
+    what, by, reason = reply
+    return ConfirmExperimentRequest(
+        round=number, by=by, confirmed=what == "confirmed", reason=reason, checks=list(BENCH_CHECKS)
+    )
 
 
 def begin(
@@ -91,7 +106,7 @@ def _refuse_unchecked(row: DiagnosisRow, checks: Sequence[str]) -> None:
 
 def stop(store: Store, diagnosis: int, reason: str, at: datetime) -> DiagnosisResponse:
     """Stop a diagnosis, which can be resumed; its campaign is for the caller to stop. Raises Conflict."""
-    store.diagnoses.set_state(diagnosis, STOPPABLE, "stopped", reason, at)
+    store.diagnoses.halt(diagnosis, STOPPABLE, "stopped", reason, at)
     return diagnosis_answer(store, diagnosis)
 
 
@@ -105,8 +120,25 @@ def resume(store: Store, diagnosis: int, reason: str, at: datetime) -> Diagnosis
     else:
         is_asked = not BenchFile.model_validate(dict(row.bench)).is_simulated and not open_round.confirmed_by
         state = "awaiting_confirmation" if is_asked else "measuring"
-    store.diagnoses.set_state(diagnosis, ("stopped", "failed"), state, reason, at)
+    number = None if open_round is None else open_round.number
+    store.diagnoses.resume(diagnosis, state, number, reason, at)
     return diagnosis_answer(store, diagnosis)
+
+
+def open_campaign(store: Store, diagnosis: int) -> CampaignRow | None:
+    """Return the campaign of the experiment that is not over; None for none."""
+    rounds = store.diagnoses.rounds(diagnosis)
+    return campaign_of_round(store, rounds[-1]) if rounds and rounds[-1].is_open else None
+
+
+def withdraw_start(store: Store, diagnosis: int, at: datetime) -> None:
+    """Take the experiment that is not over out of the schedule, where it waits there."""
+    rounds = store.diagnoses.rounds(diagnosis)
+    if rounds and rounds[-1].is_open:
+        name = recipe_name(rounds[-1])
+        for entry in store.starts.all(ended=False):
+            if entry.recipe_name == name:
+                store.starts.cancel(entry.id, at)
 
 
 def end(store: Store, diagnosis: int, reason: str, at: datetime) -> DiagnosisResponse:

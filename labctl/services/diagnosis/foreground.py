@@ -4,29 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Literal, Protocol
+from typing import Protocol
 
 from instruments.clock import SystemClock
 from labctl.acting_user import actor
 from labctl.answers.campaigns import BENCH_CHECKS, ResumeRequest, StartRequest
 from labctl.answers.criticism import CriticismResponse
-from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse, DiagnosisRound
+from labctl.answers.diagnosis import DiagnosisRequest, DiagnosisResponse, DiagnosisRound
 from labctl.config import default_database
 from labctl.errors import NotFound, Stopped
 from labctl.services.campaigns.execution import AskClear, Attend, Observe, run_here
 from labctl.services.campaigns.resumability import retries_exhausted
 from labctl.services.campaigns.resume import resume_here
-from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.diagnosis import begin
 from labctl.services.diagnosis.advance import DiagnosisRunner, ExperimentStart
 from labctl.services.diagnosis.answer import diagnosis_answer
+from labctl.services.diagnosis.begin import Reply
 from labctl.services.diagnosis.experiment_bench import simulated_day
+from labctl.services.diagnosis.in_service import criticise_together
 from labctl.services.planning.loading import load_bench
 from labctl.store import CampaignRow, Store, open_store
 from procedures.contracts.campaign_state import ENDED, CampaignState
-
-#: Who has confirmed an experiment; or why it cannot be done; or neither: the diagnosis waits.
-Reply = tuple[Literal["confirmed", "cannot_be_done"], str, str]
 
 
 class Terminal(Protocol):
@@ -51,7 +49,7 @@ class ForegroundLaboratory:
     def criticise(self, serial: str, version: int, recordings: list[int]) -> CriticismResponse:
         """Judge a version by several recordings together."""
         with open_store(self._database, write=False) as store:
-            return criticise_unit(store, serial, version, None, recordings=recordings)
+            return criticise_together(store, serial, version, tuple(recordings))
 
     def start(self, experiment: ExperimentStart) -> None:
         """Run a campaign to its end."""
@@ -128,10 +126,9 @@ class ForegroundDiagnosis:
         answer = self._answer(diagnosis)
         if answer.state not in {"stopped", "failed"}:
             return answer
-        number = answer.rounds[-1].campaign if answer.rounds and answer.rounds[-1].came is None else None
-        if number is not None:
-            with open_store(self._database, write=False) as store:
-                campaign = store.campaigns.get(number)
+        with open_store(self._database, write=False) as store:
+            campaign = begin.open_campaign(store, diagnosis)
+        if campaign is not None:
             self._laboratory.go_on(campaign, resumed=True)
         with self._open() as store:
             return begin.resume(store, diagnosis, f"continued by {actor().name}", SystemClock().utc())
@@ -141,10 +138,7 @@ class ForegroundDiagnosis:
         last = answer.rounds[-1]
         if (reply := self._ask(answer, last)) is None:
             return False
-        what, by, reason = reply
-        request = ConfirmExperimentRequest(
-            round=last.number, by=by, confirmed=what == "confirmed", reason=reason, checks=list(BENCH_CHECKS)
-        )
+        request = begin.confirmation_of(last.number, reply)
         with self._open() as store:
             begin.answer_experiment(store, answer.id, request, SystemClock().utc())
         return True

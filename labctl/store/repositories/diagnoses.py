@@ -72,6 +72,7 @@ class RoundRow(NewRound):
     diagnosis: int
     at: datetime
     confirmed_by: str
+    since: datetime  #: when the experiment was chosen, confirmed or asked for again
     campaign: int | None
     recording: int | None
     took_hours: float | None
@@ -135,7 +136,8 @@ class Diagnoses:
         query = sa.select(
             r.number, r.recordings, r.verdict, r.named, r.suspects, r.spent_hours, r.rms_dps, r.heldout_rms_dps,
             r.noise_floor_dps, r.experiment, r.why, r.diagnosis_id.label("diagnosis"), r.at, r.confirmed_by,
-            r.campaign_id.label("campaign"), r.recording_id.label("recording"), r.took_hours, r.came, r.came_text,
+            r.since, r.campaign_id.label("campaign"), r.recording_id.label("recording"), r.took_hours, r.came,
+            r.came_text,
         )  # fmt: skip
         with self._database.reading() as connection:
             return records_of(RoundRow, connection.execute(query.where(r.diagnosis_id == diagnosis).order_by(r.number)))
@@ -163,7 +165,7 @@ class Diagnoses:
                 **asdict(new), "recordings": list(new.recordings), "named": list(new.named),
                 "suspects": dict(new.suspects), "experiment": None if new.experiment is None else dict(new.experiment),
             }  # fmt: skip
-            connection.execute(sa.insert(r).values(**values, diagnosis_id=diagnosis, at=at))
+            connection.execute(sa.insert(r).values(**values, diagnosis_id=diagnosis, at=at, since=at))
             detail = {"round": new.number, "verdict": new.verdict, "named": list(new.named), "decided": new.why}
             append(connection, at, "diagnosis round", _subject(diagnosis), detail)
 
@@ -172,8 +174,16 @@ class Diagnoses:
         """Write down who has confirmed the experiment of a round. Raises Conflict where none waits for it."""
         with self._database.writing() as connection:
             self._move(connection, diagnosis, ("awaiting_confirmation",), "measuring", f"round {number}")
-            self._change_round(connection, diagnosis, number, {"confirmed_by": by})
+            self._change_round(connection, diagnosis, number, {"confirmed_by": by, "since": at})
             append(connection, at, "diagnosis confirm", _subject(diagnosis), {"round": number, "by": by})
+
+    @transaction
+    def unconfirm(self, diagnosis: int, number: int, why: str, at: datetime) -> None:
+        """Have a person confirm an experiment again that was not begun in time. Raises Conflict."""
+        with self._database.writing() as connection:
+            self._move(connection, diagnosis, ("measuring",), "awaiting_confirmation", f"round {number}")
+            self._change_round(connection, diagnosis, number, {"confirmed_by": "", "since": at})
+            append(connection, at, "diagnosis missed", _subject(diagnosis), {"round": number, "reason": why})
 
     @transaction
     def note_campaign(self, diagnosis: int, number: int, campaign: int) -> None:
@@ -201,13 +211,25 @@ class Diagnoses:
             append(connection, at, "diagnosis experiment", _subject(diagnosis), detail)
 
     @transaction
-    def set_state(
+    def halt(
         self, diagnosis: int, was: Sequence[DiagnosisState], state: DiagnosisState, why: str, at: datetime
     ) -> None:
-        """Stop a diagnosis, or let it go on. Raises Conflict where it is in none of the states that it `was` in."""
+        """Stop a diagnosis, or note that it failed. Raises Conflict where it is in none of the states `was`."""
         with self._database.writing() as connection:
             self._move(connection, diagnosis, was, state, "its state", {"why": why})
             append(connection, at, f"diagnosis {state}", _subject(diagnosis), {"reason": why})
+
+    @transaction
+    def resume(self, diagnosis: int, state: DiagnosisState, number: int | None, why: str, at: datetime) -> None:
+        """Let a diagnosis that was stopped or has failed go on; `number` is its round that is not over.
+
+        Raises Conflict for any other.
+        """
+        with self._database.writing() as connection:
+            self._move(connection, diagnosis, ("stopped", "failed"), state, "its state")
+            if number is not None:
+                self._change_round(connection, diagnosis, number, {"since": at})
+            append(connection, at, "diagnosis resume", _subject(diagnosis), {"reason": why})
 
     @transaction
     def end(self, diagnosis: int, outcome: DiagnosisOutcome, why: str, at: datetime) -> None:

@@ -45,6 +45,7 @@ diagnosis_rounds = sa.Table(
     sa.Column("experiment", sa.JSON(none_as_null=True)),  #: that was chosen; null: none
     sa.Column("why", sa.Text, nullable=False),  #: the choice, or the end, in a sentence
     sa.Column("confirmed_by", sa.String(200), nullable=False, server_default=""),
+    sa.Column("since", Instant, nullable=False),  #: when the experiment was chosen, confirmed or asked for again
     sa.Column("campaign_id", RowId, sa.ForeignKey("campaigns.id")),
     sa.Column("recording_id", RowId, sa.ForeignKey("recordings.id")),
     sa.Column("took_hours", sa.Float),  #: of the bench, by the campaign of the experiment
