@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
 
 import tomli_w
 
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.campaigns import StartRequest
 from labctl.answers.common_fields import CriticismVerdict
 from labctl.answers.criticism import CriticismResponse, Experiment
+from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.campaigns.execution import run_here
 from labctl.services.diagnosis.foreground import ForegroundLaboratory
+from labctl.store import open_store
+
+NOW = datetime(2026, 11, 1, tzinfo=UTC)
+UNIT = "FOG-0001"
 
 #: A recipe that takes less than a tenth of a second in virtual time.
 TINY = {
@@ -48,11 +59,27 @@ def criticism(
     return CriticismResponse.model_validate(document)
 
 
+def fitted_database(folder: Path) -> Path:
+    """Return a database with a simulated unit in which an effect is hidden, its recording and a version."""
+    location = folder / "lab.sqlite"
+    run_here(str(location), StartRequest(recipe="short", bench="single-axis-sim", hide=["warm_up=0.05"]))
+    with open_store(str(location), write=True) as store:
+        fit_unit(store, UNIT, FitRequest(effects=["bias", "scale_factor"]), NOW)
+    return location
+
+
+def copied(database: Path, folder: Path) -> str:
+    """Copy a database, which no process may have open, into a folder; returns where the copy is."""
+    folder.mkdir(exist_ok=True)
+    for part in database.parent.iterdir():
+        shutil.copy(part, folder)
+    return str(folder / database.name)
+
+
 class ScriptedLaboratory(ForegroundLaboratory):
     """Runs campaigns in this process; what a criticism says is given, by the number of recordings that it judges."""
 
     script: Callable[[list[int]], CriticismResponse]
-    started = 0
 
     def criticise(self, serial: str, version: int, recordings: list[int]) -> CriticismResponse:
         """Return what the script says of the recordings."""

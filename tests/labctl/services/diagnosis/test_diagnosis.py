@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
-from labctl.answers.calibrations import FitRequest
-from labctl.answers.campaigns import BENCH_CHECKS, StartRequest
+from labctl.answers.campaigns import BENCH_CHECKS
 from labctl.answers.criticism import CriticismResponse
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
 from labctl.errors import BadInput, Conflict, StartNotConfirmed
-from labctl.services.calibrations.fitting import fit_unit
-from labctl.services.campaigns.execution import run_here
 from labctl.services.commands.foreground_control import no_terminal
 from labctl.services.diagnosis import begin
 from labctl.services.diagnosis.answer import diagnosis_answer
@@ -26,36 +21,12 @@ from labctl.store import Store, open_store
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaigns import Campaigns
 from labctl.store.repositories.diagnoses import Diagnoses
-from tests.helpers.diagnoses import ScriptedLaboratory, criticism, experiment
+from tests.helpers.diagnoses import NOW, UNIT, ScriptedLaboratory, copied, criticism, experiment
 
-NOW = datetime(2026, 11, 1, tzinfo=UTC)
-UNIT = "FOG-0001"
 #: Beyond the range of the chamber of the bench.
 TOO_HOT = experiment("a temperature that the chamber does not reach", 1.0, temperatures_c=[500.0])
 FIRST = experiment("at rest at one temperature", 1.0)
 SECOND = experiment("the temperatures up and down", 2.0, temperatures_c=[25.0, 26.0], temperature_order="up_down")
-
-
-@pytest.fixture(scope="module")
-def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a database with a unit, its recording and a version."""
-    location = tmp_path_factory.mktemp("diagnosis") / "lab.sqlite"
-    run_here(str(location), StartRequest(recipe="short", bench="single-axis-sim", hide=["warm_up=0.05"]))
-    with open_store(str(location), write=True) as store:
-        fit_unit(store, UNIT, FitRequest(effects=["bias", "scale_factor"]), NOW)
-    return location
-
-
-@pytest.fixture
-def location(fitted: Path, tmp_path: Path) -> str:
-    return _copied(fitted, tmp_path)
-
-
-def _copied(fitted: Path, folder: Path) -> str:
-    folder.mkdir(exist_ok=True)
-    for part in fitted.parent.iterdir():
-        shutil.copy(part, folder)
-    return str(folder / fitted.name)
 
 
 def one_after_two(recordings: list[int]) -> CriticismResponse:
@@ -158,11 +129,11 @@ def killed_after(number: int, location: str) -> bool:
 
 
 def test_a_kill_after_any_write_leads_to_the_same_end(fitted: Path, tmp_path: Path) -> None:
-    expected = _comparable(run(_copied(fitted, tmp_path / "whole"), one_after_one))
+    expected = _comparable(run(copied(fitted, tmp_path / "whole"), one_after_one))
     number = 0
     while True:
         number += 1
-        location = _copied(fitted, tmp_path / str(number))
+        location = copied(fitted, tmp_path / str(number))
         was_killed = killed_after(number, location)
         has_ended = not was_killed or is_done(location)
         answer = diagnosis_of(location) if has_ended else run(location, one_after_one)

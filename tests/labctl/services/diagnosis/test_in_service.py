@@ -3,33 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
 from instruments.clock import VirtualClock
-from labctl.answers.calibrations import FitRequest
-from labctl.answers.campaigns import StartRequest
 from labctl.answers.criticism import CriticismResponse
 from labctl.api import create_app
 from labctl.client import Client
 from labctl.services import lab_service
-from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import run_here
 from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
-from tests.helpers.diagnoses import criticism, experiment
+from tests.helpers.diagnoses import NOW, UNIT, criticism, experiment
+from tests.helpers.service import transport_to
 from tests.helpers.waiting import eventually
 
-NOW = datetime(2026, 11, 1, tzinfo=UTC)
-UNIT = "FOG-0001"
 EXPERIMENTS = [
     experiment("a temperature that the chamber does not reach", 1.0, temperatures_c=[500.0]),
     experiment("at rest at one temperature", 1.0),
@@ -70,12 +63,9 @@ class Service:
 
 
 @pytest.fixture
-def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+def service(location: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     monkeypatch.setattr(lab_service, "criticise_together", scripted)
-    location = str(tmp_path / "lab.sqlite")
-    run_here(location, StartRequest(recipe="short", bench="single-axis-sim", hide=["warm_up=0.05"]))
     opened = Service(location)
-    fit_unit(opened.store, UNIT, FitRequest(effects=["bias", "scale_factor"]), NOW)
     yield opened
     opened.lab.close()
 
@@ -140,7 +130,7 @@ def test_a_move_that_fails_again_and_again_waits_for_a_person(
 
 
 def test_the_client_has_a_method_for_each_path(service: Service) -> None:
-    with Client("http://testserver", transport=service.http._transport) as client:
+    with Client("http://testserver", transport=transport_to(service.http)) as client:
         started = client.start_diagnosis(UNIT)
         assert client.diagnosis(started.id) == started
         assert client.stop_diagnosis(started.id, "lunch").state == "stopped"
