@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
+from typing import Literal
 from urllib.parse import quote, urlencode
 
 import httpx
@@ -329,12 +330,8 @@ class Client:
         return self._act(campaign, "confirm", answer)
 
     def start_diagnosis(self, serial: str, request: DiagnosisRequest | None = None) -> DiagnosisResponse:
-        """Run experiments on the service's bench until one missing effect is left; returns at once.
-
-        `diagnosis` says how far it is.
-        """
-        response = self._post(f"/api/units/{_part(serial)}/diagnoses", request or DiagnosisRequest())
-        return DiagnosisResponse.model_validate(json_of(response))
+        """Run experiments on the service's bench until one missing effect is left; returns at once."""
+        return self._diagnosis(f"/api/units/{_part(serial)}/diagnoses", request or DiagnosisRequest())
 
     def diagnoses(self, serial: str) -> list[DiagnosisResponse]:
         """Return the diagnoses of a unit, newest first."""
@@ -346,22 +343,16 @@ class Client:
 
     def confirm_experiment(self, diagnosis: int, request: ConfirmExperimentRequest) -> DiagnosisResponse:
         """Confirm the experiment that waits for a person, or answer that it cannot be done."""
-        return self._diagnosis_act(diagnosis, "confirm", request)
+        return self._diagnosis(f"/api/diagnoses/{diagnosis}/confirm", request)
 
-    def stop_diagnosis(self, diagnosis: int, reason: str, *, by: str = "") -> DiagnosisResponse:
-        """Stop a diagnosis and the campaign that it runs; `resume_diagnosis` continues it."""
-        return self._diagnosis_act(diagnosis, "stop", ReasonRequest(reason=reason, by=by))
+    def act_on_diagnosis(
+        self, diagnosis: int, act: Literal["stop", "resume", "end"], reason: str, *, by: str = ""
+    ) -> DiagnosisResponse:
+        """Stop a diagnosis and abort its campaign, resume both, or end the diagnosis for good."""
+        return self._diagnosis(f"/api/diagnoses/{diagnosis}/{act}", ReasonRequest(reason=reason, by=by))
 
-    def resume_diagnosis(self, diagnosis: int, reason: str, *, by: str = "") -> DiagnosisResponse:
-        """Continue a diagnosis that was stopped."""
-        return self._diagnosis_act(diagnosis, "resume", ReasonRequest(reason=reason, by=by))
-
-    def end_diagnosis(self, diagnosis: int, reason: str, *, by: str = "") -> DiagnosisResponse:
-        """End a diagnosis for good, and the campaign that it runs."""
-        return self._diagnosis_act(diagnosis, "end", ReasonRequest(reason=reason, by=by))
-
-    def _diagnosis_act(self, diagnosis: int, act: str, request: Request) -> DiagnosisResponse:
-        return DiagnosisResponse.model_validate(json_of(self._post(f"/api/diagnoses/{diagnosis}/{act}", request)))
+    def _diagnosis(self, path: str, request: Request) -> DiagnosisResponse:
+        return DiagnosisResponse.model_validate(json_of(self._post(path, request)))
 
     def _act(self, campaign: int, act: str, request: Request) -> CampaignResponse:
         return CampaignResponse.model_validate(json_of(self._post(f"/api/campaigns/{campaign}/{act}", request)))

@@ -94,7 +94,7 @@ def _end(database: str | None, url: str | None, serial: str) -> DiagnosisRespons
         number = next((each.id for each in client.diagnoses(serial) if not each.ended), None)
         if number is None:
             raise NotFound(f"unit {serial!r} has no open diagnosis; `labctl diagnose {serial}` starts one")
-        return client.end_diagnosis(number, "ended on the command line", by=os_user())
+        return client.act_on_diagnosis(number, "end", "ended on the command line", by=os_user())
 
 
 def _follow(
@@ -117,7 +117,7 @@ def _follow(
         if answer is None:
             answer = client.start_diagnosis(serial, request)
         elif answer.state in {"stopped", "failed"}:
-            answer = client.resume_diagnosis(answer.id, "continued on the command line", by=os_user())
+            answer = client.act_on_diagnosis(answer.id, "resume", "continued on the command line", by=os_user())
         while not answer.ended and answer.state not in {"stopped", "failed"}:
             printer.update(answer)
             if answer.state == "awaiting_confirmation":

@@ -166,13 +166,11 @@ def run_here(
 ) -> CampaignResponse:
     """Run a campaign in this process, until it is over; `attend` is given the operator that it asks.
 
-    `bench` is its bench where it is not one by file or name, such as that of an earlier campaign.
-
-    `say` is called with the text about a campaign that was left on a simulated bench. `ask_clear` is given the
-    questions about a real bench that is not confirmed to be clear yet, and returns who has confirmed it. `wire_log` is
-    the file that gets every byte between labctl and the bench. Raises
-    Conflict for a campaign that was left on a real bench, StartNotConfirmed where no person has confirmed that it is
-    clear.
+    `bench` is its bench, where that is not one by file or name. `say` is called with the text about a campaign that was
+    left on a simulated bench. `ask_clear` is given the questions about a real bench that is not confirmed to be clear
+    yet, and returns who has confirmed it. `wire_log` is the file that gets every byte between labctl and the bench.
+    Raises Conflict for a campaign that was left on a real bench, StartNotConfirmed where no person has confirmed that
+    it is clear.
     """
     bench_file = seeded(bench or load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
     bench_file = with_hidden_effects(on_date(bench_file, request.simulated_start), request.hide)

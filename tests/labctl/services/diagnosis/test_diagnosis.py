@@ -220,6 +220,8 @@ def test_on_a_real_bench_a_person_confirms_each_experiment(waiting: tuple[str, i
         asked = ConfirmExperimentRequest(round=1, by="Ann", checks=list(BENCH_CHECKS))
         answer = begin.answer_experiment(store, number, asked, NOW)
         assert (answer.state, answer.rounds[0].confirmed_by) == ("measuring", "Ann")
+        last = store.audit.rows()[-1]
+        assert (last.action, last.detail["by"]) == ("diagnosis confirm", "Ann")
 
 
 def test_a_person_who_answers_that_it_cannot_be_done_gets_the_next_best(waiting: tuple[str, int]) -> None:

@@ -109,9 +109,14 @@ def test_one_that_is_stopped_leaves_the_schedule_and_is_begun_again_when_it_is_r
 
 def test_one_that_is_ended_for_good_lets_another_begin(service: Service) -> None:
     number = service.post(f"/api/units/{UNIT}/diagnoses", 201)["id"]
+    service.post(f"/api/diagnoses/{number}/stop", reason="lunch")
+    service.post(f"/api/diagnoses/{number}/resume", reason="back")
     ended = service.post(f"/api/diagnoses/{number}/end", reason="enough")
     assert (ended["state"], ended["outcome"], ended["ended"]) == ("done", "ended_by_person", True)
     assert service.post(f"/api/units/{UNIT}/diagnoses", 201)["id"] == number + 1
+    rows = [(row.action, row.detail.get("reason")) for row in service.store.audit.rows()]
+    stop, resume, end = ("diagnosis stopped", "lunch"), ("diagnosis resume", "back"), ("diagnosis end", "enough")
+    assert [row for row in rows if row[0] != "diagnosis start"][-3:] == [stop, resume, end]
     assert "was changed in the meantime" in service.post(f"/api/diagnoses/{number}/stop", 409, reason="x")["detail"]
 
 
@@ -133,7 +138,7 @@ def test_the_client_has_a_method_for_each_path(service: Service) -> None:
     with Client("http://testserver", transport=transport_to(service.http)) as client:
         started = client.start_diagnosis(UNIT)
         assert client.diagnosis(started.id) == started
-        assert client.stop_diagnosis(started.id, "lunch").state == "stopped"
-        assert client.resume_diagnosis(started.id, "back").state == "criticising"
-        assert client.end_diagnosis(started.id, "enough").ended
+        assert client.act_on_diagnosis(started.id, "stop", "lunch").state == "stopped"
+        assert client.act_on_diagnosis(started.id, "resume", "back").state == "criticising"
+        assert client.act_on_diagnosis(started.id, "end", "enough").ended
         assert [each.id for each in client.diagnoses(UNIT)] == [started.id]
