@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from labctl.answers.campaigns import BENCH_CHECKS
+from labctl.answers.campaigns import BENCH_CHECKS, CampaignResponse
 from labctl.answers.criticism import CriticismResponse
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
-from labctl.errors import BadInput, Conflict, StartNotConfirmed
-from labctl.services.commands.foreground_control import no_terminal
+from labctl.errors import BadInput, Conflict, StartNotConfirmed, Stopped
+from labctl.services.commands.foreground_control import CampaignTerminal, OpenTerminal, no_terminal
 from labctl.services.diagnosis import begin
 from labctl.services.diagnosis.answer import diagnosis_answer
 from labctl.services.diagnosis.foreground import ForegroundDiagnosis, begin_here, no_questions
@@ -42,9 +43,11 @@ def one_after_one(recordings: list[int]) -> CriticismResponse:
     return one_after_two(recordings if len(recordings) == 1 else [*recordings, 3])
 
 
-def diagnosis(location: str, script: Callable[[list[int]], CriticismResponse]) -> ForegroundDiagnosis:
-    made = ForegroundDiagnosis(location, no_terminal, no_questions, lambda _: None)
-    laboratory = ScriptedLaboratory(location, no_terminal)
+def diagnosis(
+    location: str, script: Callable[[list[int]], CriticismResponse], terminal: OpenTerminal = no_terminal
+) -> ForegroundDiagnosis:
+    made = ForegroundDiagnosis(location, terminal, no_questions, lambda _: None)
+    laboratory = ScriptedLaboratory(location, terminal)
     laboratory.script = script
     made._laboratory = laboratory
     made._runner._laboratory = laboratory
@@ -83,6 +86,33 @@ def test_its_campaigns_are_on_the_same_units_on_other_days(location: str) -> Non
         simulations = [row.bench["simulation"] for row in store.campaigns.all()]
     assert [each["hidden"] for each in simulations] == [{"warm_up": 0.05}] * 3
     assert len({each["noise_seed"] for each in simulations}) == 3
+
+
+def test_a_ctrl_c_stops_it_and_the_same_command_continues_its_campaign(location: str) -> None:
+    answer, _ = begin_here(location, UNIT, DiagnosisRequest(hours=24), None)
+
+    pressed: list[int] = []
+
+    def press(status: CampaignResponse) -> None:
+        if not pressed:
+            pressed.append(status.id)
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def terminal() -> Iterator[CampaignTerminal]:
+        yield CampaignTerminal(observe=press)
+
+    with pytest.raises(Stopped, match=f"campaign 2 was stopped; .*; `labctl diagnose {UNIT}` continues it"):
+        diagnosis(location, one_after_one, terminal).run(answer.id)
+    stopped = diagnosis_of(location)
+    assert (stopped.state, stopped.rounds[-1].came) == ("stopped", None)
+    assert f"`labctl diagnose {UNIT}` continues it" in stopped.next
+    ended = run(location, one_after_one)
+    assert (ended.id, ended.outcome) == (answer.id, "one_cause")
+    assert campaigns(location) == ["diagnosis-1-round-2", "short"]
+    with open_store(location, write=False) as store:
+        kinds = [event.message for event in store.campaigns.events(2)]
+    assert any("resumed" in each for each in kinds)
 
 
 class KillAfter:
