@@ -65,12 +65,16 @@ function rounds(diagnosis) {
               number: true,
               cell: (/** @type {typeof lines[number]} */ line) => line.probabilities[place] ?? "",
             })),
-            { title: "Experiment, and what came", prose: true, cell: (line) => line.experiment },
           ],
           lines,
           { label: "Rounds of the diagnosis, with the probability of each suspect", dense: true },
         )
       : h("p", { class: "muted" }, "The recordings so far are being judged."),
+    h(
+      "ol",
+      { class: "small" },
+      lines.map((line) => h("li", {}, line.experiment)),
+    ),
     diagnosis.next ? h("p", { class: "small muted" }, diagnosis.next) : null,
   );
 }

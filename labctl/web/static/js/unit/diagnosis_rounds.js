@@ -3,7 +3,7 @@
 /** @import { Diagnosis, DiagnosisRound } from "../../../types/api.js" */
 
 /** Suspects that have a column, at most. */
-const MAX_COLUMNS = 6;
+const MAX_COLUMNS = 5;
 
 /** @type {Record<string, string>} */
 const STATES = {
