@@ -71,9 +71,9 @@ function rounds(diagnosis) {
         )
       : h("p", { class: "muted" }, "The recordings so far are being judged."),
     h(
-      "ol",
-      { class: "small" },
-      lines.map((line) => h("li", {}, line.experiment)),
+      "ul",
+      { class: "plain small" },
+      lines.map((line, place) => h("li", {}, `Round ${place + 1}: ${line.experiment}`)),
     ),
     diagnosis.next ? h("p", { class: "small muted" }, diagnosis.next) : null,
   );
