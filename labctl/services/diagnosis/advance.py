@@ -18,7 +18,7 @@ import tomli_w
 from instruments.bench_config import BenchFile
 from labctl.answers.criticism import CriticismResponse
 from labctl.answers.diagnosis import ChosenExperiment, DiagnosisState, ExperimentResult
-from labctl.errors import LabctlError
+from labctl.errors import BadInput, LabctlError, NotEnoughData
 from labctl.log import get_logger
 from labctl.services.diagnosis import sentences
 from labctl.services.diagnosis.next_move import DoneExperiment, End, Progress, next_move
@@ -102,7 +102,15 @@ class DiagnosisRunner:
     def _judge(self, row: DiagnosisRow, rounds: list[RoundRow]) -> None:
         """Criticise all recordings together, and write down what is decided by it."""
         recordings = sorted({*row.recordings, *(each.recording for each in rounds if each.recording is not None)})
-        criticism = self._laboratory.criticise(row.serial, row.version, recordings)
+        try:
+            criticism = self._laboratory.criticise(row.serial, row.version, recordings)
+        except (BadInput, NotEnoughData) as error:
+            if not rounds or rounds[-1].recording is None:
+                raise
+            text = sentences.not_judged(rounds[-1].recording, str(error))
+            with self._open_store() as store:
+                store.diagnoses.reject_recording(row.id, rounds[-1].number, text, self._now())
+            return
         spent_hours = sum(each.took_hours or 0.0 for each in rounds)
         move = next_move(Progress(row.hours, spent_hours, _done(rounds)), criticism)
         number = len(rounds) + 1

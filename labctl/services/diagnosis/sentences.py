@@ -35,6 +35,11 @@ def not_done(reason: str) -> str:
     return f"cannot be done: {reason}; it is not proposed again"
 
 
+def not_judged(recording: int, reason: str) -> str:
+    """Return that the recording of an experiment cannot be judged with the others."""
+    return f"recording {recording} cannot be judged with the others, and is left out: {reason}"
+
+
 def adequate(spent_hours: float) -> str:
     """Return that nothing is missing."""
     return f"The model is adequate: noise explains the residual of all recordings together{_after(spent_hours)}."

@@ -211,6 +211,19 @@ class Diagnoses:
             append(connection, at, "diagnosis experiment", _subject(diagnosis), detail)
 
     @transaction
+    def reject_recording(self, diagnosis: int, number: int, text: str, at: datetime) -> None:
+        """Write down that the recording of an experiment cannot be judged with the others: it is left out. Raises
+        Conflict.
+        """
+        r = tables.diagnosis_rounds
+        mine = sa.update(r).where(r.c.diagnosis_id == diagnosis, r.c.number == number, r.c.came == "measured")
+        values = {"came": "cannot_be_done", "came_text": text, "recording_id": None}
+        with self._database.writing() as connection:
+            if connection.execute(mine.values(**values)).rowcount != 1:
+                raise _taken(diagnosis, f"round {number}")
+            append(connection, at, "diagnosis experiment", _subject(diagnosis), {"round": number, "text": text})
+
+    @transaction
     def halt(
         self, diagnosis: int, was: Sequence[DiagnosisState], state: DiagnosisState, why: str, at: datetime
     ) -> None:

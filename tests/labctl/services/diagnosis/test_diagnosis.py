@@ -12,7 +12,7 @@ import pytest
 from labctl.answers.campaigns import BENCH_CHECKS, CampaignResponse
 from labctl.answers.criticism import CriticismResponse
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
-from labctl.errors import BadInput, Conflict, StartNotConfirmed, Stopped
+from labctl.errors import BadInput, Conflict, NotEnoughData, StartNotConfirmed, Stopped
 from labctl.services.commands.foreground_control import CampaignTerminal, OpenTerminal, no_terminal
 from labctl.services.diagnosis import begin
 from labctl.services.diagnosis.answer import diagnosis_answer
@@ -195,6 +195,21 @@ def test_the_hours_end_it(location: str) -> None:
     ended = diagnosis(location, one_after_two).run(answer.id)
     assert (ended.outcome, ended.spent_hours) == ("hours_spent", 0.0)
     assert "0.5 h of 0.5 h are left" in ended.why
+
+
+def test_a_recording_that_cannot_be_judged_with_the_others_is_left_out(location: str) -> None:
+    def script(recordings: list[int]) -> CriticismResponse:
+        if 2 in recordings:
+            raise NotEnoughData("the recording has 1 temperature; measure at 2 more temperatures")
+        if 3 in recordings:
+            return criticism("missing", "warm_up", recordings=recordings)
+        return criticism("ambiguous", "thermal_lag", "warm_up", experiments=[FIRST, SECOND], recordings=recordings)
+
+    answer = run(location, script)
+    assert [each.came for each in answer.rounds] == ["cannot_be_done", "measured", None]
+    assert answer.rounds[0].came_text.startswith("recording 2 cannot be judged with the others, and is left out: the")
+    assert (answer.outcome, answer.rounds[-1].recordings) == ("one_cause", [1, 3])
+    assert answer.spent_hours == pytest.approx(sum(each.took_hours or 0.0 for each in answer.rounds))
 
 
 def test_a_unit_that_was_imported_needs_a_bench(location: str) -> None:
