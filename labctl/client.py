@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
+from typing import Literal
 from urllib.parse import quote, urlencode
 
 import httpx
@@ -32,6 +33,7 @@ from labctl.answers.campaigns import (
 )
 from labctl.answers.certification import CalibrationStateResponse
 from labctl.answers.common_fields import CriticismVerdict
+from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
 from labctl.answers.fixed_coefficients import FixedCoefficients
 from labctl.answers.points import PointFigure, PointResponse
 from labctl.answers.recordings import ImportResponse, RecordingResponse
@@ -53,6 +55,9 @@ __all__ = [
     "CampaignRequest",
     "CampaignResponse",
     "Client",
+    "ConfirmExperimentRequest",
+    "DiagnosisRequest",
+    "DiagnosisResponse",
     "EventResponse",
     "FitRequest",
     "FitResponse",
@@ -323,6 +328,31 @@ class Client:
         """
         answer = ConfirmRequest(prompt=prompt, by=by, confirmed=confirmed and not again, again=again, reason=reason)
         return self._act(campaign, "confirm", answer)
+
+    def start_diagnosis(self, serial: str, request: DiagnosisRequest | None = None) -> DiagnosisResponse:
+        """Run experiments on the service's bench until one missing effect is left; returns at once."""
+        return self._diagnosis(f"/api/units/{_part(serial)}/diagnoses", request or DiagnosisRequest())
+
+    def diagnoses(self, serial: str) -> list[DiagnosisResponse]:
+        """Return the diagnoses of a unit, newest first."""
+        return self._connection.get_list(f"/api/units/{_part(serial)}/diagnoses", DiagnosisResponse)
+
+    def diagnosis(self, diagnosis: int) -> DiagnosisResponse:
+        """Return a diagnosis with its rounds."""
+        return self._connection.get(f"/api/diagnoses/{diagnosis}", DiagnosisResponse)
+
+    def confirm_experiment(self, diagnosis: int, request: ConfirmExperimentRequest) -> DiagnosisResponse:
+        """Confirm the experiment that waits for a person, or answer that it cannot be done."""
+        return self._diagnosis(f"/api/diagnoses/{diagnosis}/confirm", request)
+
+    def act_on_diagnosis(
+        self, diagnosis: int, act: Literal["stop", "resume", "end"], reason: str, *, by: str = ""
+    ) -> DiagnosisResponse:
+        """Stop a diagnosis and abort its campaign, resume both, or end the diagnosis for good."""
+        return self._diagnosis(f"/api/diagnoses/{diagnosis}/{act}", ReasonRequest(reason=reason, by=by))
+
+    def _diagnosis(self, path: str, request: Request) -> DiagnosisResponse:
+        return DiagnosisResponse.model_validate(json_of(self._post(path, request)))
 
     def _act(self, campaign: int, act: str, request: Request) -> CampaignResponse:
         return CampaignResponse.model_validate(json_of(self._post(f"/api/campaigns/{campaign}/{act}", request)))

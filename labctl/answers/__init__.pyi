@@ -181,6 +181,13 @@ from labctl.answers.datasheet import (
     MeasuredUnder as MeasuredUnder,
 )
 from labctl.answers.course import CourseResponse as CourseResponse
+from labctl.answers.diagnosis import (
+    ChosenExperiment as ChosenExperiment,
+    ConfirmExperimentRequest as ConfirmExperimentRequest,
+    DiagnosisRequest as DiagnosisRequest,
+    DiagnosisResponse as DiagnosisResponse,
+    DiagnosisRound as DiagnosisRound,
+)
 from labctl.answers.drafts import (
     AppliedDraft as AppliedDraft,
     CoefficientChange as CoefficientChange,

@@ -87,6 +87,12 @@ class RemoteControl:
             raise Conflict(NO_BENCH)
         return self._bench
 
+    def own_bench(self) -> BenchFile | None:
+        """Return the bench of the bench process. Raises Conflict without one."""
+        if self._bench is None:
+            raise Conflict(NO_BENCH)
+        return self._bench
+
     def perform(self, act: BenchAct[RequestT, ResponseT], _: CommandContext, asked: RequestT) -> ResponseT:
         """Have the bench process carry out an act; an abort stops the bench by a way of its own first."""
         if act.name == ABORT.name:

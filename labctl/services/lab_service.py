@@ -25,12 +25,15 @@ from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.resumability import NO_BENCH, with_resume
 from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses_of
 from labctl.services.check_gyros import alarms
+from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.computed import carry_out
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.registry import MAKE_DRAFTS
-from labctl.services.commands.requests import ToCampaign
+from labctl.services.commands.requests import CampaignStart, ToCampaign
 from labctl.services.computation import Computation, InThreads, Pending
+from labctl.services.diagnosis.in_service import ServiceLaboratory, criticise_together
+from labctl.services.diagnosis.watch import DiagnosisWatch
 from labctl.services.drafts.answers import with_drafts
 from labctl.services.drafts.watch import DraftWatch
 from labctl.services.live.live_stream import LiveEventStream
@@ -86,6 +89,14 @@ class LabService:
             lambda: self.bench_access.live_state(watched=True), self.bench_access.listen
         )
         self._drafts = DraftWatch(store, clock, lambda: None if self.bench is None else self.bench.name, self._draft)
+        laboratory = ServiceLaboratory(
+            store,
+            lambda *asked: self.computation.run(criticise_together, *asked),
+            lambda request: self.execute(START_CAMPAIGN, CampaignStart(request)),
+        )
+        self._diagnoses = DiagnosisWatch(
+            store, clock, lambda: None if self.bench is None else self.bench.name, laboratory
+        )
         self._opened_at = clock.utc()
         self._closed = False
         self._hooks = ExitStack()
@@ -106,6 +117,7 @@ class LabService:
         remove_abandoned()
         self.bench_access.start()
         self._drafts.start()
+        self._diagnoses.start()
 
     def _draft(self, campaign: int) -> DraftsResponse:
         return self.execute(MAKE_DRAFTS, ToCampaign(campaign, DraftsRequest()))
@@ -113,6 +125,7 @@ class LabService:
     def end_soon(self) -> None:
         """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
         self._drafts.end_soon()
+        self._diagnoses.end_soon()
         self.bench_access.end_soon()
         self.computation.end_soon()
 
@@ -124,8 +137,10 @@ class LabService:
         with self._hooks:
             self.left = self.bench_access.close()
             self._drafts.end_soon()
+            self._diagnoses.end_soon()
             self.computation.close()
             self._drafts.close()
+            self._diagnoses.close()
             self.fetches.write()
             self.store.close()
 

@@ -49,6 +49,13 @@ from labctl.store.repositories.certificates import (
     CertificateRow as CertificateRow,
     Certificates as Certificates,
 )
+from labctl.store.repositories.diagnoses import (
+    Diagnoses as Diagnoses,
+    DiagnosisRow as DiagnosisRow,
+    NewDiagnosis as NewDiagnosis,
+    NewRound as NewRound,
+    RoundRow as RoundRow,
+)
 from labctl.store.repositories.drafts.repository import (
     DraftEvent as DraftEvent,
     DraftRow as DraftRow,

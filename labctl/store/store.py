@@ -18,6 +18,7 @@ from labctl.store.repositories.campaigns import Campaigns
 from labctl.store.repositories.certificates import Certificates
 from labctl.store.repositories.certified_versions import CertifiedVersions
 from labctl.store.repositories.check_gyros import CheckGyros
+from labctl.store.repositories.diagnoses import Diagnoses
 from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.fetches import Fetches
 from labctl.store.repositories.keys import Keys
@@ -53,6 +54,7 @@ class Store:
         self.release_requests = ReleaseRequests(database)
         self.fetches = Fetches(database)
         self.drafts = Drafts(database)
+        self.diagnoses = Diagnoses(database)
         self.standards = Standards(database)
         self.check_gyros = CheckGyros(database)
         self.sensor_versions = SensorVersions(database)

@@ -162,16 +162,17 @@ def run_here(
     say: Callable[[str], None] | None = None,
     ask_clear: AskClear | None = None,
     wire_log: Path | None = None,
+    bench: BenchFile | None = None,
 ) -> CampaignResponse:
     """Run a campaign in this process, until it is over; `attend` is given the operator that it asks.
 
-    `say` is called with the text about a campaign that was left on a simulated bench. `ask_clear` is given the
-    questions about a real bench that is not confirmed to be clear yet, and returns who has confirmed it. `wire_log` is
-    the file that gets every byte between labctl and the bench. Raises
-    Conflict for a campaign that was left on a real bench, StartNotConfirmed where no person has confirmed that it is
-    clear.
+    `bench` is its bench, where that is not one by file or name. `say` is called with the text about a campaign that was
+    left on a simulated bench. `ask_clear` is given the questions about a real bench that is not confirmed to be clear
+    yet, and returns who has confirmed it. `wire_log` is the file that gets every byte between labctl and the bench.
+    Raises Conflict for a campaign that was left on a real bench, StartNotConfirmed where no person has confirmed that
+    it is clear.
     """
-    bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
+    bench_file = seeded(bench or load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
     bench_file = with_hidden_effects(on_date(bench_file, request.simulated_start), request.hide)
     with open_for(bench_file, database or default_database()) as store, holding(store, bench_file) as control:
         clock = clock_for(bench_file, request.speed, request.simulated_start)

@@ -55,6 +55,13 @@ class CampaignControl(Protocol):
         """Return the bench that a start is for. Raises Conflict where the service has none."""
         ...
 
+    def own_bench(self) -> BenchFile | None:
+        """Return the bench that this service drives; None where no service runs, and each campaign names its bench.
+
+        Raises Conflict where the service has none.
+        """
+        ...
+
     def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, asked: RequestT, /) -> ResponseT:
         """Have an act carried out by the process that has the bench. Raises LabctlError."""
         ...

@@ -56,6 +56,10 @@ class ForegroundControl:
         """Return the bench that a start names, or the shipped one that fits its recipe."""
         return load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
 
+    def own_bench(self) -> BenchFile | None:
+        """Return None: each campaign names its bench."""
+        return None
+
     def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, asked: RequestT) -> ResponseT:
         """Carry out an act in this process."""
         return act.in_foreground(self, context, asked)

@@ -29,6 +29,13 @@ from labctl.services.commands.acts.live import END_LIVE, START_LIVE
 from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.command import Command, Newest, NoContent
 from labctl.services.commands.context import CommandContext
+from labctl.services.commands.diagnoses import (
+    CONFIRM_EXPERIMENT,
+    END_DIAGNOSIS,
+    RESUME_DIAGNOSIS,
+    START_DIAGNOSIS,
+    STOP_DIAGNOSIS,
+)
 from labctl.services.commands.encoding import log_file, recording_files
 from labctl.services.commands.requests import (
     LogFile,
@@ -226,6 +233,7 @@ _ELSEWHERE: tuple[Command[Any, Any], ...] = (
     START_CAMPAIGN, *(act.command for act in CAMPAIGN_ACTS), CHECK_BENCH, START_LIVE, END_LIVE,
     ADD_STANDARD, ADD_STANDARD_CERTIFICATE, ADD_STANDARD_CHECK, MARK_STANDARD_BAD, WITHDRAW_FINDING, SET_CHECK_GYRO,
     ADD_ENVIRONMENT, KEEP_ACCELEROMETER, KEEP_MAGNETOMETER,
+    START_DIAGNOSIS, CONFIRM_EXPERIMENT, STOP_DIAGNOSIS, RESUME_DIAGNOSIS, END_DIAGNOSIS,
 )  # fmt: skip
 #: All of them, in the order above.
 COMMANDS: tuple[Command[Any, Any], ...] = (

@@ -65,6 +65,14 @@ class ToCampaign(Addressed, Generic[BodyT_co]):
 
 
 @dataclass(frozen=True)
+class ToDiagnosis(Addressed, Generic[BodyT_co]):
+    """A request for a diagnosis."""
+
+    diagnosis: int
+    body: BodyT_co
+
+
+@dataclass(frozen=True)
 class ToBench(Addressed, Generic[BodyT_co]):
     """A request for a bench."""
 

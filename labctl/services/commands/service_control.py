@@ -32,6 +32,10 @@ class ServiceControl:
         """Return this service's bench. Raises Conflict without one."""
         return self.bench_runner().bench
 
+    def own_bench(self) -> BenchFile | None:
+        """Return this service's bench. Raises Conflict without one."""
+        return self.bench_runner().bench
+
     def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, asked: RequestT) -> ResponseT:
         """Carry out an act on this service's bench."""
         return act.in_service(self, context, asked)

@@ -76,7 +76,7 @@ def evaluate(
         raise
     columns = residual_columns(criticised.data, criticised.residuals, measured.points, measured.row.id, criticised.base)
     serial, version = calibration.serial, calibration.version
-    experiments = _experiments(store, measured.row.campaign, criticised)
+    experiments = _experiments(store, measured.widest.campaign, criticised)  # not of a short experiment that came later
     criticism = answer_of(serial, version, measured.recordings, criticised, experiments)
     laws, law_test = proposed_laws(criticised)
     said = [*criticism.text, *law_sentences(laws, law_test), *held_sentences(model)]

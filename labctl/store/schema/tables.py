@@ -13,6 +13,7 @@ from labctl.store.schema.calibrations import (
 )
 from labctl.store.schema.campaigns import campaigns, events, steps, timed_runs
 from labctl.store.schema.certificates import certificate_withdrawals, certificates
+from labctl.store.schema.diagnoses import diagnoses, diagnosis_rounds
 from labctl.store.schema.drafts import drafts
 from labctl.store.schema.keys import api_keys
 from labctl.store.schema.manifests import block_digests, manifest_head, manifests
@@ -46,6 +47,8 @@ __all__ = [
     "check_gyros",
     "data_set_means",
     "data_sets",
+    "diagnoses",
+    "diagnosis_rounds",
     "drafts",
     "environment",
     "events",

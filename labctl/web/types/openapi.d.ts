@@ -1147,6 +1147,133 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/diagnoses": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Diagnoses of a unit
+         * @description Every diagnosis of the unit with its rounds, the newest first.
+         */
+        get: operations["diagnoses_api_units__serial__diagnoses_get"];
+        put?: never;
+        /**
+         * Diagnose a unit
+         * @description Run experiments on this service's bench, one after the other, until one missing effect is left.
+         *
+         *     Answered at once; the service carries it out. On a bench that is not simulated a person confirms each experiment.
+         *     Refused while another diagnosis of the unit has not ended.
+         */
+        post: operations["start_api_units__serial__diagnoses_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/diagnoses/{diagnosis}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * One diagnosis
+         * @description How far it is: each round with the probability of every suspect, the experiment chosen by it, and its result.
+         */
+        get: operations["diagnosis_api_diagnoses__diagnosis__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/diagnoses/{diagnosis}/confirm": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Confirm an experiment
+         * @description Have the proposed experiment run, or answer that it cannot be done; then the next best one is proposed.
+         */
+        post: operations["confirm_api_diagnoses__diagnosis__confirm_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/diagnoses/{diagnosis}/stop": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop a diagnosis
+         * @description Stop it, and end the campaign that it runs, in the safe state; it can be resumed.
+         */
+        post: operations["stop_api_diagnoses__diagnosis__stop_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/diagnoses/{diagnosis}/resume": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Resume a diagnosis
+         * @description Continue one that was stopped, or could not go on; its campaign is resumed, safe state first.
+         */
+        post: operations["resume_api_diagnoses__diagnosis__resume_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/diagnoses/{diagnosis}/end": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * End a diagnosis
+         * @description End it for good, and the campaign that it runs, in the safe state.
+         */
+        post: operations["end_api_diagnoses__diagnosis__end_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/start": {
         parameters: {
             query?: never;
@@ -5101,6 +5228,42 @@ export interface components {
          */
         CheckRequest: Record<string, never>;
         /**
+         * ChosenExperiment
+         * @description The experiment that a round has chosen, as the criticism proposed it.
+         */
+        ChosenExperiment: {
+            /**
+             * Separates
+             * @description Ids of the effects that it separates: the leading one, then those that are distinguished from it.
+             */
+            separates: string[];
+            /**
+             * Do
+             * @description The experiment in words.
+             */
+            do: string;
+            /**
+             * Toml
+             * @description Its recipe, as a TOML file.
+             */
+            toml: string;
+            /**
+             * Power
+             * @description Probability, before the experiment, that it decides between the leading effect and its nearest rival, 0 to 1.
+             */
+            power: number;
+            /**
+             * Hours
+             * @description Expected time on the bench, h.
+             */
+            hours: number;
+            /**
+             * Per Hour
+             * @description Least chi2 (at most 40) by which a rival fails to explain the leading effect, per hour, 1/h.
+             */
+            per_hour: number;
+        };
+        /**
          * ClearRequest
          * @description Who has inspected a bench whose safe state was not confirmed.
          */
@@ -5512,6 +5675,39 @@ export interface components {
              * @description A line over temperature for each level of the table rate.
              */
             over_temperature: components["schemas"]["ModelLines"][];
+        };
+        /**
+         * ConfirmExperimentRequest
+         * @description A person's answer to the experiment that a diagnosis proposes.
+         */
+        ConfirmExperimentRequest: {
+            /**
+             * Round
+             * @description Number of the round whose experiment is meant; another is refused.
+             */
+            round: number;
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
+            by: string;
+            /**
+             * Confirmed
+             * @description true: run the experiment; false: the experiment cannot be done, and the next best one is chosen.
+             * @default true
+             */
+            confirmed?: boolean;
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             * @default
+             */
+            reason?: string;
+            /**
+             * Checks
+             * @description Needed to run it on a bench that is not simulated, all three: chamber_clear (the chamber is clear), table_free (the table is free to turn), limiter_on (the independent temperature limiter is on).
+             */
+            checks?: ("chamber_clear" | "table_free" | "limiter_on")[];
         };
         /**
          * ConfirmRequest
@@ -6325,6 +6521,218 @@ export interface components {
              * @default
              */
             version: string;
+        };
+        /**
+         * DiagnosisRequest
+         * @description How a unit is to be diagnosed.
+         */
+        DiagnosisRequest: {
+            /**
+             * Hours
+             * @description Largest time on the bench, h.
+             * @default 24
+             */
+            hours?: number;
+            /**
+             * Version
+             * @description Version that is judged in every round; default: the unit's newest version.
+             */
+            version?: number | null;
+            /**
+             * Recordings
+             * @description Recordings that the version is judged by at first; default: those that it was fitted to, and those of earlier diagnoses of the unit.
+             */
+            recordings?: number[];
+        };
+        /**
+         * DiagnosisResponse
+         * @description A search for what is missing in a model, by one experiment after the other.
+         */
+        DiagnosisResponse: {
+            /**
+             * Id
+             * @description Number of the diagnosis.
+             */
+            id: number;
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
+            serial: string;
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
+            version: number;
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
+            bench: string;
+            /**
+             * Hours
+             * @description Largest time on the bench, h.
+             */
+            hours: number;
+            /**
+             * Spent Hours
+             * @description Time that its campaigns have taken on the bench so far, h.
+             */
+            spent_hours: number;
+            /**
+             * By
+             * @description Who asked for it.
+             */
+            by: string;
+            /**
+             * Created At
+             * Format: date-time
+             * @description Time at which it was asked for.
+             */
+            created_at: string;
+            /**
+             * State
+             * @description criticising: the recordings so far are judged; awaiting_confirmation: a person has to confirm the experiment; measuring: the campaign of the experiment runs; done: see `outcome`; stopped: a person stopped it, and it can be resumed; failed: it could not go on, see `why`, and it can be resumed.
+             * @enum {string}
+             */
+            state: "criticising" | "awaiting_confirmation" | "measuring" | "done" | "stopped" | "failed";
+            /**
+             * Ended
+             * @description Whether it is done: stopped and failed ones can be resumed.
+             */
+            ended: boolean;
+            /**
+             * Outcome
+             * @description one_cause: one effect is missing; several_causes: the named effects are missing together; adequate: nothing is missing; indistinguishable: no experiment on this bench distinguishes the named effects; hours_spent: no experiment fits into the hours that are left; unexplained: no effect of the catalogue explains the residual; insufficient_data: too little was measured for a verdict; cannot_be_done: none of the experiments that would distinguish the named effects can be done; ended_by_person: a person ended it for good; null: it is not done.
+             */
+            outcome: ("one_cause" | "several_causes" | "adequate" | "indistinguishable" | "hours_spent" | "unexplained" | "insufficient_data" | "cannot_be_done" | "ended_by_person") | null;
+            /**
+             * Named
+             * @description Ids of the effects that the newest verdict is based on.
+             */
+            named: string[];
+            /**
+             * Why
+             * @description The outcome, or the reason of a stop, in a sentence; empty while it goes on.
+             */
+            why: string;
+            /**
+             * Next
+             * @description What to do now, in a sentence; empty: nothing has to be done.
+             */
+            next: string;
+            /**
+             * Ended At
+             * @description Time of its end; null: it has not ended.
+             */
+            ended_at: string | null;
+            /**
+             * Recordings
+             * @description Numbers of the recordings that it began with.
+             */
+            recordings: number[];
+            /**
+             * Rounds
+             * @description Its rounds, oldest first.
+             */
+            rounds: components["schemas"]["DiagnosisRound"][];
+        };
+        /**
+         * DiagnosisRound
+         * @description One criticism of all recordings so far, what was chosen by it, and what came of that.
+         */
+        DiagnosisRound: {
+            /**
+             * Number
+             * @description Number of the round, counted from 1.
+             */
+            number: number;
+            /**
+             * At
+             * Format: date-time
+             * @description Time of the criticism.
+             */
+            at: string;
+            /**
+             * Recordings
+             * @description Numbers of the recordings that were judged together.
+             */
+            recordings: number[];
+            /**
+             * Verdict
+             * @description Verdict of the criticism on all of them together.
+             * @enum {string}
+             */
+            verdict: "adequate" | "missing" | "ambiguous" | "unexplained" | "insufficient_data";
+            /**
+             * Named
+             * @description Ids of the effects that the verdict is based on.
+             */
+            named: string[];
+            /**
+             * Suspects
+             * @description Id of each effect that may be missing -> its probability, 0 to 1, most probable first.
+             */
+            suspects: {
+                [key: string]: number;
+            };
+            /**
+             * Spent Hours
+             * @description Time on the bench in all earlier rounds, h.
+             */
+            spent_hours: number;
+            /**
+             * Rms Dps
+             * @description RMS residual of the data set means by the model as refitted, deg/s; null: unknown.
+             */
+            rms_dps: number | null;
+            /**
+             * Heldout Rms Dps
+             * @description RMS error on data that were left out of the fit, deg/s; null: not known.
+             */
+            heldout_rms_dps: number | null;
+            /**
+             * Noise Floor Dps
+             * @description RMS error of data-set means due to noise and drift alone, deg/s; null: not known.
+             */
+            noise_floor_dps: number | null;
+            /** @description The experiment that was chosen; null: none, the end. */
+            experiment: components["schemas"]["ChosenExperiment"] | null;
+            /**
+             * Why
+             * @description The choice of the experiment, or the end, in a sentence.
+             */
+            why: string;
+            /**
+             * Confirmed By
+             * @description Person who confirmed the experiment; empty: no person did, or none was asked.
+             */
+            confirmed_by: string;
+            /**
+             * Campaign
+             * @description Number of the campaign of the experiment; null: none was started.
+             */
+            campaign: number | null;
+            /**
+             * Recording
+             * @description Number of the recording that it gave; null: none yet.
+             */
+            recording: number | null;
+            /**
+             * Took Hours
+             * @description Time that the campaign took on the bench, h; null: it is not over.
+             */
+            took_hours: number | null;
+            /**
+             * Came
+             * @description measured: the experiment was done; cannot_be_done: it failed or was refused, and is not proposed again; null: it is not over, or there is none.
+             */
+            came: ("measured" | "cannot_be_done") | null;
+            /**
+             * Came Text
+             * @description What was expected and what came, in a sentence; empty: it is not over.
+             */
+            came_text: string;
         };
         /**
          * DraftReport
@@ -16450,6 +16858,243 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ScheduledResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    diagnoses_api_units__serial__diagnoses_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DiagnosisResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    start_api_units__serial__diagnoses_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["DiagnosisRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DiagnosisResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    diagnosis_api_diagnoses__diagnosis__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                diagnosis: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DiagnosisResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    confirm_api_diagnoses__diagnosis__confirm_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                diagnosis: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ConfirmExperimentRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DiagnosisResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    stop_api_diagnoses__diagnosis__stop_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                diagnosis: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ReasonRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DiagnosisResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    resume_api_diagnoses__diagnosis__resume_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                diagnosis: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ReasonRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DiagnosisResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    end_api_diagnoses__diagnosis__end_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                diagnosis: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ReasonRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DiagnosisResponse"];
                 };
             };
             /** @description Validation Error */

@@ -95,7 +95,7 @@ export const stopButton = (campaign) =>
  * @param {string} question
  * @param {(body: { by: string, reason: string }) => Promise<unknown>} send
  */
-const askingButton = (label, question, send) =>
+export const askingButton = (label, question, send) =>
   button(label, async () => {
     const fields = [operatorNameField(), { name: "reason", label: "Why" }];
     const answers = await askOperator(question, fields, { confirm: label });

@@ -10,6 +10,7 @@ import { certificationTable, waitingNotice } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
 import { certificateTable } from "../unit/certificate_state.js";
 import { datasheetCard } from "../unit/datasheet.js";
+import { diagnosisCard } from "../unit/diagnosis.js";
 import { inForce } from "../unit/in_force.js";
 import { sensorsCard } from "../unit/sensors.js";
 import { trendCard } from "../trend/card.js";
@@ -24,13 +25,14 @@ import { versionsCard } from "../unit/versions.js";
 /** @param {PageContext} context */
 export async function page({ params, signal }) {
   const path = { serial: params.serial };
-  const [unit, rows, history, issued, waiting, sensors] = await Promise.all([
+  const [unit, rows, history, issued, waiting, sensors, diagnoses] = await Promise.all([
     get("/api/units/{serial}", { path, signal }),
     get("/api/units/{serial}/calibrations", { path, signal }),
     get("/api/units/{serial}/certifications", { path, signal }),
     get("/api/units/{serial}/certificates", { path, signal }),
     get("/api/units/{serial}/release-requests", { path, signal }),
     get("/api/units/{serial}/sensors", { path, signal }),
+    get("/api/units/{serial}/diagnoses", { path, signal }),
   ]);
   const force = history.find((act) => act.version === unit.certified_version && act.act === "certify");
   const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
@@ -50,6 +52,7 @@ export async function page({ params, signal }) {
       ? [
           versionsCard(unit, rows, issued, explore),
           ladder(unit.serial, signal),
+          diagnosisCard(unit.serial, diagnoses, signal),
           unit.recordings.length > 1 ? trendCard(unit.serial, rows, signal) : null,
           ...versionCards(unit.serial, rows, signal),
         ]

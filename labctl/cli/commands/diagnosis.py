@@ -1,0 +1,169 @@
+"""`labctl diagnose`: experiments on the bench until one cause is left."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import BenchName, Database, Json, Serial, recording_numbers
+from labctl.cli.output import print_json, stderr
+from labctl.cli.printing.diagnosis import DiagnosisPrinter, print_diagnosis_end
+from labctl.errors import Conflict, NotFound
+
+if TYPE_CHECKING:
+    from labctl.answers.diagnosis import (
+        DiagnosisRequest,
+        DiagnosisResponse,
+        DiagnosisRound,
+    )
+    from labctl.services.diagnosis.begin import Reply
+
+#: How often the service is asked how far a diagnosis is, s.
+POLL_S = 1.0
+Hours = Annotated[
+    float | None,
+    typer.Option("--hours", metavar="H", help="Largest time on the bench, h; default: 24."),
+]
+VersionOption = Annotated[
+    int | None,
+    typer.Option("--version", metavar="N", help="Version that is judged; default: the unit's newest version."),
+]
+RecordingOption = Annotated[
+    str | None,
+    typer.Option(
+        "--recording",
+        metavar="ID[,ID...]",
+        help="Recordings to begin with, such as 1,2; default: those that the version was fitted to, and those of "
+        "earlier diagnoses.",
+    ),
+]
+EndOption = Annotated[
+    bool, typer.Option("--end", help="End the diagnosis of the unit that has not ended, for good; run nothing.")
+]
+
+
+def diagnose(
+    serial: Serial,
+    bench: BenchName = None,
+    hours: Hours = None,
+    version: VersionOption = None,
+    recording: RecordingOption = None,
+    end: EndOption = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Run experiments one after the other until one missing effect is left, or no experiment can distinguish more.
+
+    A diagnosis that was stopped is continued. On a bench that is not simulated each experiment has to be confirmed.
+    """
+    from labctl.answers.diagnosis import DiagnosisRequest
+    from labctl.services.commands.open import service_url
+
+    with one_clear_line():
+        given = {"version": version, "recordings": recording_numbers(recording)}
+        request = DiagnosisRequest.model_validate(given if hours is None else {**given, "hours": hours})
+        printer = DiagnosisPrinter(quiet=as_json)
+        url = service_url(database)
+        if end:
+            answer = _end(database, url, serial)
+        elif url is not None:
+            answer = _follow(url, serial, request, bench, printer)
+        else:
+            answer = _run(database, serial, request, bench, printer)
+    if as_json:
+        print_json(answer)
+    else:
+        print_diagnosis_end(answer)
+    if not answer.ended or answer.outcome == "insufficient_data":
+        raise typer.Exit(1)
+
+
+def _end(database: str | None, url: str | None, serial: str) -> DiagnosisResponse:
+    """End the open diagnosis of a unit, here or in the service that holds the database."""
+    if url is None:
+        from labctl.services.diagnosis.foreground import end_here
+
+        return end_here(database, serial)
+    from labctl.client import Client
+    from labctl.config import os_user
+
+    with Client(url) as client:
+        number = next((each.id for each in client.diagnoses(serial) if not each.ended), None)
+        if number is None:
+            raise NotFound(f"unit {serial!r} has no open diagnosis; `labctl diagnose {serial}` starts one")
+        return client.act_on_diagnosis(number, "end", "ended on the command line", by=os_user())
+
+
+def _follow(
+    url: str, serial: str, request: DiagnosisRequest, bench: str | None, printer: DiagnosisPrinter
+) -> DiagnosisResponse:
+    """Have the service that holds the database diagnose a unit, and print how it goes, until it ends or waits."""
+    from instruments.clock import SystemClock
+    from labctl.client import Client
+    from labctl.config import os_user
+    from labctl.services.diagnosis.begin import confirmation_of
+
+    if bench is not None:
+        raise Conflict(
+            f"--bench {bench}: the service at {url} holds this database and diagnoses on its own bench; leave the "
+            "option out, stop the service, or name another --database"
+        )
+    clock = SystemClock()
+    with Client(url) as client:
+        answer = next((each for each in client.diagnoses(serial) if not each.ended), None)
+        if answer is None:
+            answer = client.start_diagnosis(serial, request)
+        elif answer.state in {"stopped", "failed"}:
+            answer = client.act_on_diagnosis(answer.id, "resume", "continued on the command line", by=os_user())
+        while not answer.ended and answer.state not in {"stopped", "failed"}:
+            printer.update(answer)
+            if answer.state == "awaiting_confirmation":
+                if (reply := ask_experiment(answer, answer.rounds[-1])) is None:
+                    return answer
+                answer = client.confirm_experiment(answer.id, confirmation_of(answer.rounds[-1].number, reply))
+            else:
+                clock.sleep(POLL_S)
+                answer = client.diagnosis(answer.id)
+    printer.update(answer)
+    return answer
+
+
+def _run(
+    database: str | None, serial: str, request: DiagnosisRequest, bench: str | None, printer: DiagnosisPrinter
+) -> DiagnosisResponse:
+    """Diagnose a unit in this process."""
+    from labctl.cli.campaign_terminal import campaign_terminal
+    from labctl.services.diagnosis.foreground import ForegroundDiagnosis, begin_here
+
+    answer, is_new = begin_here(database, serial, request, bench)
+    if not is_new:
+        stderr.print(
+            f"labctl: diagnosis {answer.id} of {serial} has not ended and goes on with its own bench, hours, version "
+            "and recordings"
+        )
+    terminal = campaign_terminal(quiet=printer.quiet)
+    return ForegroundDiagnosis(database, terminal, ask_experiment, printer.update).run(answer.id)
+
+
+def ask_experiment(answer: DiagnosisResponse, proposed: DiagnosisRound) -> Reply | None:
+    """Put an experiment on a real bench to the person at the terminal; None without a terminal or an answer."""
+    if not sys.stdin.isatty():
+        return None
+    from labctl.cli.terminal_operator import ask_bench_clear
+    from labctl.config import os_user
+    from labctl.services.benches.start_confirmation import QUESTIONS
+
+    stderr.print(
+        f"Experiment of round {proposed.number} on bench {answer.bench}: {proposed.why}. Type yes to run it, the "
+        "reason why it cannot be done, or nothing to leave it for later."
+    )
+    line = sys.stdin.readline().strip()
+    if not line:
+        return None
+    if line.lower() not in {"yes", "y"}:
+        return "cannot_be_done", os_user(), line
+    by = ask_bench_clear({str(check): text for check, text in QUESTIONS.items()})
+    return ("confirmed", by, "") if by else None

@@ -1,0 +1,67 @@
+"""Commands on diagnoses: start, confirm the experiment that is proposed, stop, resume, end for good."""
+
+from __future__ import annotations
+
+from labctl.answers.campaigns import ReasonRequest, ResumeRequest
+from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
+from labctl.services.commands.acts.abort import ABORT
+from labctl.services.commands.acts.resume import RESUME
+from labctl.services.commands.command import Command
+from labctl.services.commands.context import CommandContext
+from labctl.services.commands.requests import CampaignResume, ToCampaign, ToDiagnosis, ToUnit
+from labctl.services.diagnosis import begin
+from procedures.contracts.campaign_state import ENDED, CampaignState
+
+
+def _start(context: CommandContext, asked: ToUnit[DiagnosisRequest]) -> DiagnosisResponse:
+    return begin.begin(context.store, asked.serial, asked.body, context.control.own_bench(), context.now())
+
+
+def _confirm(context: CommandContext, asked: ToDiagnosis[ConfirmExperimentRequest]) -> DiagnosisResponse:
+    return begin.answer_experiment(context.store, asked.diagnosis, asked.body, context.now())
+
+
+def _stop(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
+    """Write the stop down first: else the end of the campaign would be taken for that of the experiment."""
+    answer = begin.stop(context.store, asked.diagnosis, asked.body.text, context.now())
+    _abort_campaign(context, asked)
+    return answer
+
+
+def _resume(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
+    """Resume the campaign first: else its end would be taken for that of the experiment."""
+    if (
+        campaign := begin.open_campaign(context.store, asked.diagnosis)
+    ) is not None and campaign.state is CampaignState.ABORTED:
+        body = ResumeRequest(by=asked.body.by or "a person", reason=asked.body.reason)
+        RESUME.execute(context, CampaignResume(campaign.id, body))
+    return begin.resume(context.store, asked.diagnosis, asked.body.text, context.now())
+
+
+def _end(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
+    answer = begin.end(context.store, asked.diagnosis, asked.body.text, context.now())
+    _abort_campaign(context, asked)
+    return answer
+
+
+def _abort_campaign(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> None:
+    """End the campaign that a diagnosis runs, in the safe state, or take it out of the schedule."""
+    begin.withdraw_start(context.store, asked.diagnosis, context.now())
+    campaign = begin.open_campaign(context.store, asked.diagnosis)
+    if campaign is not None and campaign.state not in ENDED:
+        ABORT.execute(context, ToCampaign(campaign.id, asked.body))
+
+
+_DIAGNOSIS = "/api/diagnoses/{diagnosis}"
+
+START_DIAGNOSIS = Command(
+    method="POST", path="/api/units/{serial}/diagnoses", handler=_start, responses={201: DiagnosisResponse}
+)
+CONFIRM_EXPERIMENT = Command(
+    method="POST", path=_DIAGNOSIS + "/confirm", handler=_confirm, responses={200: DiagnosisResponse}
+)
+STOP_DIAGNOSIS = Command(method="POST", path=_DIAGNOSIS + "/stop", handler=_stop, responses={200: DiagnosisResponse})
+RESUME_DIAGNOSIS = Command(
+    method="POST", path=_DIAGNOSIS + "/resume", handler=_resume, responses={200: DiagnosisResponse}
+)
+END_DIAGNOSIS = Command(method="POST", path=_DIAGNOSIS + "/end", handler=_end, responses={200: DiagnosisResponse})

@@ -1,0 +1,110 @@
+"""What a diagnosis says of its choices, its results and its end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from labctl.answers.criticism import Experiment
+from labctl.answers.diagnosis import ChosenExperiment
+
+
+def choice(experiment: Experiment, of: int) -> str:
+    """Return why an experiment is chosen."""
+    best = f"the best of the {of} experiments that are left" if of > 1 else "the only experiment that is left"
+    return (
+        f"{hours(experiment['hours'])}: {experiment['do']}: it distinguishes {pair(experiment['separates'])} with "
+        f"{percent(experiment['power'])} power ({experiment['per_hour']:.2g} chi2 per bench hour, {best})"
+    )
+
+
+def expected(experiment: ChosenExperiment) -> str:
+    """Return what is expected of an experiment."""
+    return (
+        f"expected: {pair(experiment.separates)} distinguished with {percent(experiment.power)} power in "
+        f"{hours(experiment.hours)}"
+    )
+
+
+def measured(took_hours: float, campaign: int) -> str:
+    """Return that an experiment was measured."""
+    return f"measured in {hours(took_hours)} by campaign {campaign}"
+
+
+def not_done(reason: str) -> str:
+    """Return that an experiment cannot be done."""
+    return f"cannot be done: {reason}; it is not proposed again"
+
+
+def not_judged(recording: int, reason: str) -> str:
+    """Return that the recording of an experiment cannot be judged with the others."""
+    return f"recording {recording} cannot be judged with the others, and is left out: {reason}"
+
+
+def adequate(spent_hours: float) -> str:
+    """Return that nothing is missing."""
+    return f"The model is adequate: noise explains the residual of all recordings together{_after(spent_hours)}."
+
+
+def found(named: Sequence[str], spent_hours: float) -> str:
+    """Return what is missing."""
+    what = f"One cause is left: {named[0]}" if len(named) == 1 else f"Missing together: {', '.join(named)}"
+    return f"{what}{_after(spent_hours)}."
+
+
+def unexplained(depends_on: Sequence[str]) -> str:
+    """Return that the catalogue has no effect for the residual."""
+    channels = f", which depends on {', '.join(depends_on)}" if depends_on else ""
+    return f"No effect of the catalogue explains the residual{channels}."
+
+
+def insufficient(text: Sequence[str]) -> str:
+    """Return that there is too little for a verdict."""
+    return f"Too little was measured for a verdict. {text[0] if text else ''}".strip()
+
+
+def none_offered(named: Sequence[str]) -> str:
+    """Return that no experiment distinguishes what is left."""
+    return f"No experiment on this bench distinguishes {_either(named)}."
+
+
+def all_were_run(named: Sequence[str], experiments: int, runs: int) -> str:
+    """Return that all experiments were measured and did not distinguish what is left."""
+    return f"Each of the {experiments} experiments was measured {runs} times and does not distinguish {_either(named)}."
+
+
+def none_can_be_done(named: Sequence[str], experiments: int) -> str:
+    """Return that no experiment can be done."""
+    how_many = "The only experiment" if experiments == 1 else f"Each of the {experiments} experiments"
+    return f"{how_many} that would distinguish {_either(named)} cannot be done."
+
+
+def hours_spent(named: Sequence[str], of_hours: float, left_hours: float, shortest_hours: float) -> str:
+    """Return that the hours are spent."""
+    return (
+        f"{hours(left_hours)} of {hours(of_hours)} are left, and the shortest experiment that may distinguish "
+        f"{_either(named)} takes {hours(shortest_hours)}; give more with --hours"
+    )
+
+
+def hours(value: float) -> str:
+    """Write hours with their unit."""
+    return f"{value:.1f} h"
+
+
+def percent(share: float) -> str:
+    """Write a probability; one below 1 is never written as 100 %."""
+    return f"{min(100 * share, 99.0 if share < 1 else 100.0):.0f} %"
+
+
+def pair(separates: Sequence[str]) -> str:
+    """Write the leading effect and its rivals."""
+    leader, *rivals = separates
+    return f"{leader} from {', '.join(rivals)}" if rivals else leader
+
+
+def _either(named: Sequence[str]) -> str:
+    return " and ".join([", ".join(named[:-1]), named[-1]] if len(named) > 1 else named)
+
+
+def _after(spent_hours: float) -> str:
+    return f", after {hours(spent_hours)} on the bench" if spent_hours else ""

@@ -1,0 +1,149 @@
+// The diagnosis of a unit: experiments on the bench, one after the other, until one missing effect is left.
+
+import { get, post } from "../core/http/api.js";
+import { h, setChildren } from "../core/elements.js";
+import { button, cardWithHeader, chip, table } from "../core/components.js";
+import { dialog } from "../core/dialog.js";
+import { askBenchClear, askingButton } from "../bench/actions.js";
+import { diagnosisState, lineOfRound, suspectColumns } from "./diagnosis_rounds.js";
+
+/** @import { Diagnosis } from "../../../types/api.js" */
+
+/** How often a diagnosis that goes on is read again, ms. */
+const POLL_MS = 2000;
+
+/**
+ * A card of the newest diagnosis, with the button that starts one; it is read again as long as it goes on.
+ * @param {string} serial
+ * @param {readonly Diagnosis[]} diagnoses newest first
+ * @param {AbortSignal} signal
+ */
+export function diagnosisCard(serial, diagnoses, signal) {
+  const place = h("div");
+  /** @param {readonly Diagnosis[]} rows */
+  const draw = (rows) => {
+    const newest = rows[0];
+    setChildren(place, newest ? rounds(newest) : explanation(), newest && !newest.ended ? acts(newest, again) : null);
+    setChildren(beside, !newest || newest.ended ? startButton(serial, again) : null);
+    if (newest && !newest.ended && !signal.aborted) setTimeout(() => signal.aborted || again(), POLL_MS);
+  };
+  const beside = h("div");
+  const again = async () => draw(await get("/api/units/{serial}/diagnoses", { path: { serial }, signal }));
+  draw(diagnoses);
+  return cardWithHeader("Diagnosis by experiments", beside, place);
+}
+
+const explanation = () =>
+  h(
+    "p",
+    { class: "muted" },
+    "Experiments on the bench, one after the other, until one missing effect is left. Nothing has been diagnosed yet.",
+  );
+
+/** @param {Diagnosis} diagnosis */
+function rounds(diagnosis) {
+  const { text, kind } = diagnosisState(diagnosis);
+  const columns = suspectColumns(diagnosis.rounds);
+  const lines = diagnosis.rounds.map((round) => lineOfRound(round, columns));
+  return h(
+    "div",
+    {},
+    h(
+      "p",
+      {},
+      chip(text, kind),
+      ` version ${diagnosis.version} on bench ${diagnosis.bench}, ${diagnosis.spent_hours.toFixed(1)} h of ${diagnosis.hours} h on the bench`,
+    ),
+    diagnosis.why ? h("p", { class: "strong" }, diagnosis.why) : null,
+    lines.length
+      ? table(
+          [
+            { title: "Bench h", number: true, cell: (line) => line.hours },
+            { title: "Verdict", cell: (line) => line.verdict },
+            ...columns.map((effect, place) => ({
+              title: effect,
+              number: true,
+              cell: (/** @type {typeof lines[number]} */ line) => line.probabilities[place] ?? "",
+            })),
+          ],
+          lines,
+          { label: "Rounds of the diagnosis, with the probability of each suspect", dense: true },
+        )
+      : h("p", { class: "muted" }, "The recordings so far are being judged."),
+    h(
+      "ul",
+      { class: "plain small" },
+      lines.map((line, place) => h("li", {}, `Round ${place + 1}: ${line.experiment}`)),
+    ),
+    diagnosis.next ? h("p", { class: "small muted" }, diagnosis.next) : null,
+  );
+}
+
+/**
+ * @param {Diagnosis} diagnosis
+ * @param {() => Promise<void>} again
+ */
+function acts(diagnosis, again) {
+  const path = { diagnosis: diagnosis.id };
+  const isHalted = diagnosis.state === "stopped" || diagnosis.state === "failed";
+  return h(
+    "div",
+    { class: "row" },
+    diagnosis.state === "awaiting_confirmation" ? confirmButtons(diagnosis, again) : null,
+    isHalted
+      ? askingButton("Resume", "Continue the diagnosis where it stopped?", (body) =>
+          post("/api/diagnoses/{diagnosis}/resume", { path, body }).then(again),
+        )
+      : askingButton("Stop", "Stop the diagnosis, and abort its campaign?", (body) =>
+          post("/api/diagnoses/{diagnosis}/stop", { path, body }).then(again),
+        ),
+    askingButton("End for good", "End the diagnosis for good?", (body) =>
+      post("/api/diagnoses/{diagnosis}/end", { path, body }).then(again),
+    ),
+  );
+}
+
+/**
+ * @param {Diagnosis} diagnosis
+ * @param {() => Promise<void>} again
+ */
+function confirmButtons(diagnosis, again) {
+  const path = { diagnosis: diagnosis.id };
+  const round = diagnosis.rounds.length;
+  return [
+    button(
+      "Run this experiment",
+      async () => {
+        const bench = (await get("/api/benches")).find((each) => each.name === diagnosis.bench);
+        const clear = bench ? await askBenchClear(bench) : null;
+        if (!clear) return;
+        const body = { round, by: clear.confirmed_by ?? "", confirmed: true, checks: clear.checks ?? [] };
+        await post("/api/diagnoses/{diagnosis}/confirm", { path, body });
+        await again();
+      },
+      { kind: "primary" },
+    ),
+    askingButton("Cannot be done", "Answer that this experiment cannot be done?", (body) =>
+      post("/api/diagnoses/{diagnosis}/confirm", { path, body: { ...body, round, confirmed: false } }).then(again),
+    ),
+  ];
+}
+
+/**
+ * @param {string} serial
+ * @param {() => Promise<void>} again
+ */
+const startButton = (serial, again) =>
+  button("Diagnose", async () => {
+    const answers = await dialog(
+      "Run experiments until one missing effect is left?",
+      [{ name: "hours", label: "Hours on the bench, at most", value: "24" }],
+      {
+        text: "The newest version is judged by all its recordings together. On a real bench each experiment waits for your confirmation.",
+        confirm: "Diagnose",
+      },
+    );
+    if (!answers) return;
+    await post("/api/units/{serial}/diagnoses", { path: { serial }, body: { hours: Number(answers.hours) } });
+    await again();
+  });

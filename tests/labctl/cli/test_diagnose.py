@@ -1,0 +1,56 @@
+"""`labctl diagnose`, as it is typed: an ambiguous campaign, one experiment on the simulated bench, one name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.lab import Lab
+
+RECIPE = """name = "few-rates"
+temperatures_c = [20, 26, 32]
+rates_dps = [-90, -60, -30, 0, 30, 60, 90]
+positions = ["z"]
+[soak]
+hold_s = 120
+max_drift_c = 1.0
+drift_window_s = 60
+[acquire]
+duration_s = 10
+settle_s = 2
+"""
+#: All that the simulated unit has beside what is hidden in it.
+MODEL = "bias,scale_factor,bias_temperature,scale_factor_temperature,sine_response,scale_factor_even"
+UNIT = "FOG-0001"
+
+
+@pytest.fixture(scope="module")
+def ambiguous(tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    """Return a lab with a unit that has a dead band, which the rates of its campaign do not distinguish."""
+    lab = Lab(tmp_path_factory.mktemp("diagnose"))
+    (lab.folder / "few.toml").write_text(RECIPE)
+    lab.run("campaign", "start", str(lab.folder / "few.toml"), "--hide", "dead_band=0.86")
+    lab.run("fit", UNIT, "--effects", MODEL)
+    return lab
+
+
+def test_one_experiment_names_the_cause(ambiguous: Lab, tmp_path: Path) -> None:
+    lab = ambiguous.copy(tmp_path)
+    output = lab.run("diagnose", UNIT, "--hours", "4").output
+    assert "round 1, 0.0 h: ambiguous: dead_band" in output
+    assert "next: 0.2 h: more rates in the top third: it distinguishes dead_band from" in output
+    assert "round 2, 0.2 h: missing: dead_band" in output
+    assert "One cause is left: dead_band, after 0.2 h on the bench." in output
+    assert f"labctl improve {UNIT} --version 1 --add dead_band" in output
+    again = lab.json("diagnose", UNIT)  # begins with all recordings, and has nothing left to do
+    assert (again["outcome"], again["recordings"], len(again["rounds"])) == ("one_cause", [1, 2], 1)
+    assert lab.json("campaign", "list")[0]["recipe"] == "diagnosis-1-round-1"
+
+
+def test_without_hours_for_an_experiment_nothing_runs(ambiguous: Lab, tmp_path: Path) -> None:
+    lab = ambiguous.copy(tmp_path)
+    answer = lab.json("diagnose", UNIT, "--hours", "0.1")
+    assert (answer["outcome"], answer["spent_hours"]) == ("hours_spent", 0.0)
+    assert len(lab.json("campaign", "list")) == 1
+    assert "no open diagnosis" in lab.run("diagnose", UNIT, "--end", status=2).stderr

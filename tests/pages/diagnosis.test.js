@@ -1,0 +1,36 @@
+// The rounds of a diagnosis: which suspects have a column, and what stands in the cells.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { diagnosisState, lineOfRound, suspectColumns } from "../../labctl/web/static/js/unit/diagnosis_rounds.js";
+
+const ROUND = {
+  spent_hours: 2.14,
+  verdict: /** @type {const} */ ("ambiguous"),
+  named: ["thermal_lag", "warm_up"],
+  suspects: { warm_up: 0.61, run_shift: 0.001 },
+  why: "2.1 h: the rates in random order",
+  came_text: "",
+};
+
+test("effects that a verdict names come first, then the most probable", () => {
+  assert.deepEqual(suspectColumns([ROUND]), ["thermal_lag", "warm_up", "run_shift"]);
+  const many = Object.fromEntries(Array.from({ length: 9 }, (_, place) => [`effect_${place}`, place / 10]));
+  assert.equal(suspectColumns([{ named: [], suspects: many }])[0], "effect_8");
+  assert.equal(suspectColumns([{ named: [], suspects: many }]).length, 5);
+});
+
+test("a suspect that is not listed has no probability, one far below 1 % has 0", () => {
+  const line = lineOfRound(ROUND, ["thermal_lag", "warm_up", "run_shift"]);
+  assert.deepEqual(line.probabilities, ["–", "0.61", "0"]);
+  assert.deepEqual([line.hours, line.verdict], ["2.1", "ambiguous: thermal_lag, warm_up"]);
+  assert.equal(lineOfRound({ ...ROUND, came_text: "measured" }, []).experiment, `${ROUND.why}. measured`);
+});
+
+test("what waits for a person is marked, and so is an end without a cause", () => {
+  assert.equal(diagnosisState({ state: "awaiting_confirmation", outcome: null }).kind, "warn");
+  assert.equal(diagnosisState({ state: "measuring", outcome: null }).kind, "");
+  assert.equal(diagnosisState({ state: "done", outcome: "one_cause" }).kind, "good");
+  assert.deepEqual(diagnosisState({ state: "done", outcome: "hours_spent" }), { text: "hours spent", kind: "warn" });
+});
