@@ -75,7 +75,7 @@ def evaluate(
         raise
     columns = residual_columns(criticised.data, criticised.residuals, measured.points, measured.row.id, criticised.base)
     serial, version = calibration.serial, calibration.version
-    experiments = _experiments(store, measured.row.campaign, criticised)
+    experiments = _experiments(store, recordings, criticised)
     criticism = answer_of(serial, version, measured.recordings, criticised, experiments)
     criticism = criticism.model_copy(update={"text": [*criticism.text, *held_sentences(model)]})
     return (
@@ -90,13 +90,13 @@ def evaluate(
     )
 
 
-def _experiments(store: Store, campaign: int | None, criticism: Criticism) -> list[Experiment]:
+def _experiments(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism) -> list[Experiment]:
     if not criticism.verdict.indistinguishable:
         return []
     report_stage("checking experiments")
     from labctl.services.criticism.next_experiment import experiments_for  # noqa: PLC0415  it loads the drivers
 
-    return experiments_for(store, campaign, criticism)
+    return experiments_for(store, rows, criticism)
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:
