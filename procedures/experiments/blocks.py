@@ -124,7 +124,13 @@ def _from_switching_on(recipe: Recipe) -> Changes:
     soak = {**recipe.soak.model_dump(), "hold_s": 0.0, "drift_window_s": 10.0, "max_drift_c": 20.0}
     repeats = max(round(3600.0 / (lasts_s * len(rates))), 2)
     return _at_one(
-        recipe, rates, positions=[recipe.positions[0]], soak=soak, repeats=repeats, warm_up_s=0.0, **_one_session(recipe)
+        recipe,
+        rates,
+        positions=[recipe.positions[0]],
+        soak=soak,
+        repeats=repeats,
+        warm_up_s=0.0,
+        **_one_session(recipe),
     )
 
 
@@ -208,4 +214,3 @@ BLOCKS: tuple[Block, ...] = (
     Block("top_rates", "more rates in the top third, at one temperature", _top),
     Block("near_rest", "small rates of both signs, at one temperature", _near_rest),
 )  # fmt: skip
-

@@ -113,7 +113,7 @@ class AxisForecast:
         It is averaged over the shapes. What is shifts between runs there cannot count for an effect.
         """
         shapes = self.shapes_of(effect)
-        gains = [np.sum((s.before.T @ self._b_before[s.columns]) ** 2) for s in shapes]
+        gains = [np.array(np.sum((s.before.T @ self._b_before[s.columns]) ** 2)) for s in shapes]
         each = [s.log_bf(gain, s.before, self.g[0]) for s, gain in zip(shapes, gains, strict=True)]
         return float(logsumexp(each) - np.log(len(each))) if each else None
 
@@ -159,7 +159,7 @@ class Outcomes:
         return self._known[effect]
 
     def evidence(self, effect: str) -> Array | None:
-        """Return the log evidence for an effect by both recordings, (n,) nats; None where it does not touch the axis."""
+        """Return the log evidence for an effect by both recordings, (n,) nats; None where it is not on the axis."""
         each = self._shapes(effect)
         return np.asarray(logsumexp(each, axis=0) - np.log(len(each))) if len(each) else None
 
@@ -192,9 +192,8 @@ def forecast_axis(
     catalogue: Mapping[str, Effect],
 ) -> AxisForecast:  # fmt: skip
     """Return the forecast of one axis: `data` are those of `comparison` and behind them the planned ones."""
-    full = design_of(data, comparison.model, axis, catalogue)
-    options = [option for option in full.options if not option.smooth]
-    design = Design(full.base, full.precision, options, full.present, full.t_s, full.run)
+    design = design_of(data, comparison.model, axis, catalogue, smooth=False)
+    options = design.options
     measured = len(comparison.data)
     white, scale = _noise(comparison, planned, axis, len(data.present))
     blocks, _ = factors(comparison.axes[axis].best.noise, white, design.t_s, design.run)

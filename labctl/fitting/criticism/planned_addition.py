@@ -134,7 +134,7 @@ def _white_var(one: ReducedRecording, two: ReducedRecording) -> dict[str, Array]
 
 
 def variance_of(measured: ReducedRecording, planned: ReducedRecording, variance: Array) -> Array:
-    """Return the white variance of planned means, (k,), from that of measured ones, (m,): it falls with their duration."""
+    """Return the white variance of planned means, (k,), from that of measured ones, (m,), by their durations."""
     lasted, lasts = (each.nodes.durations_s().reshape(len(each), -1).sum(axis=1) for each in (measured, planned))
     return np.asarray(float(np.median(variance * lasted)) / np.maximum(lasts, 1e-9))
 

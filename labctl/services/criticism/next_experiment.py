@@ -29,16 +29,28 @@ SHOWN = 4
 MIN_ANSWERED = 0.05
 #: Time that a campaign takes of bench and person before its first step, h.
 SET_UP_H = 0.25
+#: Below this there is nothing to learn, bit.
+MIN_OPEN_BIT = 0.01
+#: An experiment is also planned with its rates run so many times as often, where it is shorter than this, h: the soaks
+#: and mountings are the same, and a weak effect needs the readings.
+LONGER, LONGEST_TO_REPEAT_H = 4, 6.0
 #: Effects named in the sentence that explains a choice; the rest is counted.
 NAMED = 3
 
 
 @dataclass(frozen=True)
-class Foreseen:
-    """One experiment on a bench, and what it is expected to say."""
+class Planned:
+    """One experiment on a bench."""
 
     block: Block
     plan: Plan
+    text: str  #: what is done, in words
+
+
+@dataclass(frozen=True)
+class Foreseen(Planned):
+    """One experiment on a bench, and what it is expected to say."""
+
     forecast: Forecast
     hours: float  #: expected duration, h
     person_h: float  #: of a person at the bench, h
@@ -67,29 +79,37 @@ def experiments_for(store: Store, rows: Sequence[RecordingRow], criticism: Criti
 
 def ranked_experiments(question: OpenQuestion, recipe: Recipe, bench: BenchFile) -> list[Foreseen]:
     """Return the experiments that are made of a recipe, can be run on a bench and answer something, best first."""
+    if question.entropy_bit < MIN_OPEN_BIT:
+        return []
     foreseen = []
-    for block, plan in plans_of(recipe, bench):
+    for each in plans_of(recipe, bench):
+        plan = each.plan
         try:
             expected = forecast(question, reduce_recording(walked(plan, bench), outliers=False))
         except (LabctlError, ValueError):
             continue
-        visits = len(visits_s(plan, bench))
-        mountings = sum(isinstance(step, Mount) for step in plan.steps) - 1
-        foreseen.append(
-            Foreseen(block, plan, expected, plan.expected_s / 3600, visits * MOUNTING_S / 3600, max(mountings, 0))
-        )
+        person_h = len(visits_s(plan, bench)) * MOUNTING_S / 3600
+        mountings = max(sum(isinstance(step, Mount) for step in plan.steps) - 1, 0)
+        hours = plan.expected_s / 3600
+        foreseen.append(Foreseen(each.block, plan, each.text, expected, hours, person_h, mountings))
     enough = MIN_ANSWERED * question.entropy_bit
     useful = [e for e in foreseen if e.forecast.information_bit > max(enough, 2 * e.forecast.u_bit)]
     return sorted(useful, key=lambda e: -e.bit_per_h)
 
 
-def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[tuple[Block, Plan]]:
-    """Yield every installed experiment that can be made of a recipe and run on a bench, with its plan."""
+def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
+    """Yield every installed experiment that can be made of a recipe and run on a bench, short ones also longer."""
+    limits = limits_of(bench)
     for block in all_blocks():
         try:
             changed = block.changed(recipe)
-            if changed is not None:
-                yield block, make_plan(changed, limits_of(bench), clip=True)
+            if changed is None:
+                continue
+            plan = make_plan(changed, limits, clip=True)
+            yield Planned(block, plan, block.text)
+            if plan.expected_s < 3600 * LONGEST_TO_REPEAT_H:
+                longer = plan.recipe.model_copy(update={"repeats": LONGER * plan.recipe.repeats})
+                yield Planned(block, make_plan(longer, limits), f"{block.text}; rates {LONGER} times as often")
         except (LabctlError, ProcedureError, ValueError):  # not on this bench
             continue
 
@@ -100,7 +120,7 @@ def _described(foreseen: Foreseen, question: OpenQuestion, recipe: Recipe, of: i
     leader = question.ids[0]
     return {
         "separates": [leader, *(name for name in expected.told_apart if name != leader)],
-        "do": foreseen.block.text,
+        "do": foreseen.text,
         "why": _why(foreseen, question, of),
         "block": foreseen.block.id,
         "needs": list(foreseen.block.needs),
