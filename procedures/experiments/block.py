@@ -13,6 +13,7 @@ Changes = Mapping[str, object] | None
 #: What an experiment does not take over from the recipe: it is no calibration.
 NOT_TAKEN: Mapping[str, object] = {
     "fit": None, "verification": None, "profiles": (), "indexing": None, "inverted": None, "power_cycle": None,
+    "ramp": None,
     "replicates": {}, "repeats": 1,
 }  # fmt: skip
 

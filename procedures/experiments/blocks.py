@@ -13,6 +13,8 @@ from procedures.recipe.recipe import Recipe
 SHORT_SOAK_S = 1200.0
 #: Temperatures of a loop, and of an experiment with several temperatures, at most.
 LOOP_C, SEVERAL_C = 7, 4
+#: A slow ramp, K/min, and the least span of a ramp, K.
+SLOW_C_PER_MIN, MIN_RAMP_K = 0.25, 5.0
 #: Rates near rest, over the largest.
 NEAR_REST = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 #: Shares of the largest rate that are close to each other in its top third.
@@ -165,6 +167,22 @@ def _slow_loop(recipe: Recipe) -> Changes:
     return None if loop is None else {**loop, "soak": recipe.soak.model_dump()}
 
 
+def _ramp(*, rates: Callable[[Recipe], list[float]], slow: bool) -> Callable[[Recipe], Changes]:
+    def change(recipe: Recipe) -> Changes:
+        low_c, high_c = min(recipe.temperatures_c), max(recipe.temperatures_c)
+        if high_c - low_c < MIN_RAMP_K:
+            return None
+        ramp: dict[str, object] = {"from_c": low_c, "to_c": high_c, "rates_dps": rates(recipe), "back": True}
+        if slow:
+            ramp["c_per_min"] = SLOW_C_PER_MIN
+        return {
+            "temperatures_c": [low_c], "rates_dps": few_rates(recipe), "positions": [recipe.positions[0]],
+            "ramp": ramp, **_short(recipe),
+        }  # fmt: skip
+
+    return change
+
+
 def _first_again(recipe: Recipe) -> Changes:
     ends = spread_c(recipe, 2)
     if len(ends) < 2:
@@ -210,6 +228,9 @@ BLOCKS: tuple[Block, ...] = (
     Block("loop_at_rest", "a loop of temperatures at rest", _loop(0.0)),
     Block("loop", "a loop of temperatures at rest and at the largest rate", _loop(1.0)),
     Block("slow_loop", "the same loop with the soaks of the recipe", _slow_loop),
+    Block("ramp_at_rest", "at rest while the temperature rises and falls", _ramp(rates=lambda _: [0.0], slow=False)),
+    Block("ramp", "a few rates while the temperature rises and falls", _ramp(rates=few_rates, slow=False)),
+    Block("slow_ramp", "a few rates while the temperature rises and falls slowly", _ramp(rates=few_rates, slow=True)),
     Block("first_again", "the lowest temperature, the highest, and the lowest again, at a few rates", _first_again),
     Block("top_rates", "more rates in the top third, at one temperature", _top),
     Block("near_rest", "small rates of both signs, at one temperature", _near_rest),
