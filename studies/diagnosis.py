@@ -29,6 +29,7 @@ from labctl.recording import Recording
 from labctl.services.criticism.next_experiment import plans_of, ranked_experiments
 from labctl.services.simulation.plan_simulation import hidden_recording
 from procedures.planning.plan import Plan
+from procedures.recipe.recipe import Recipe
 from studies.campaigns import MODELS, OUTSIDE, Protocol, protocol
 from studies.effect_sizes import sizes
 from studies.report_tables import markdown, share
@@ -76,47 +77,52 @@ class Known:
     hours: float = 0.0
     rounds: int = 0
     done: list[str] = field(default_factory=list)
+    recipes: list[Recipe] = field(default_factory=list)  #: of the experiments
+    foreseen: list[float] = field(default_factory=list)  #: probability that each leaves one cause
 
-    def with_plan(self, plan: Plan, text: str) -> Known:
+    def with_plan(self, plan: Plan, text: str, names_one: float | None = None) -> Known:
         """Return what is known after one more plan was measured, all recordings criticised together."""
         parts = {**self.parts, len(self.parts) + 1: self.unit.measure(plan, len(self.parts) + 1)}
         found = criticise(joined_recording(parts), self.model, full=False)
         hours = self.hours + plan.expected_s / 3600
-        return Known(self.unit, parts, self.model, found, hours, self.rounds + 1, [*self.done, text])
+        foreseen = [*self.foreseen, *([] if names_one is None else [names_one])]
+        done, recipes = [*self.done, text], [*self.recipes, plan.recipe]
+        return Known(self.unit, parts, self.model, found, hours, self.rounds + 1, done, recipes, foreseen)
 
 
-#: What is measured next, and in words; None where there is nothing to choose.
-Policy = Callable[[Known, np.random.Generator], tuple[Plan, str] | None]
+#: What is measured next, in words, and the probability that it leaves one cause; None: there is nothing to choose.
+Choice = tuple[Plan, str, float | None] | None
+Policy = Callable[[Known, np.random.Generator], Choice]
 
 
-def by_information(known: Known, _: np.random.Generator) -> tuple[Plan, str] | None:
+def by_information(known: Known, _: np.random.Generator) -> Choice:
     """Choose the experiment with the most expected information per hour that the hours left allow."""
     question = open_question(known.found)
     if question is None:
         return None
     recipe, bench = known.unit.protocol.plan.recipe, known.unit.protocol.bench
-    for each in ranked_experiments(question, recipe, bench):
+    for each in ranked_experiments(question, recipe, bench, known.recipes):
         if known.hours + each.hours <= MAX_HOURS:
             bit, one = each.forecast.information_bit, each.forecast.names_one
-            return each.plan, f"{each.block.id} {each.hours:.1f} h {bit:.2f} bit {one:.2f}"
+            return each.plan, f"{each.block.id} {each.hours:.1f} h {bit:.2f} bit {one:.2f}", one
     return None
 
 
-def at_random(known: Known, rng: np.random.Generator) -> tuple[Plan, str] | None:
+def at_random(known: Known, rng: np.random.Generator) -> Choice:
     """Choose one of the experiments that the hours left allow."""
     recipe, bench = known.unit.protocol.plan.recipe, known.unit.protocol.bench
     left = [each for each in plans_of(recipe, bench) if known.hours + each.plan.expected_s / 3600 <= MAX_HOURS]
     if not left:
         return None
     chosen = left[int(rng.integers(len(left)))]
-    return chosen.plan, chosen.text
+    return chosen.plan, chosen.text, None
 
 
-def again(known: Known, _: np.random.Generator) -> tuple[Plan, str] | None:
+def again(known: Known, _: np.random.Generator) -> Choice:
     """Choose the standard campaign once more, the first one whatever it takes."""
     plan = known.unit.protocol.plan
     fits = known.rounds == 0 or known.hours + plan.expected_s / 3600 <= MAX_HOURS
-    return (plan, "again") if fits else None
+    return (plan, "again", None) if fits else None
 
 
 POLICIES: dict[str, Policy] = {"information": by_information, "random": at_random, "again": again}
@@ -133,6 +139,7 @@ class Outcome:
     form: str
     groups: tuple[tuple[str, ...], ...]
     done: tuple[str, ...]
+    foreseen: tuple[float, ...]  #: probability that each experiment leaves one cause alone
 
 
 def units(name: str, z: str) -> Iterator[Unit]:
@@ -175,7 +182,7 @@ def outcome(known: Known, policy: str) -> Outcome:
     right = single and truth is not None and groups[0][0] in names(truth)
     wrong = (single and not right) if truth is not None else bool(groups)
     alone = right if truth is not None else verdict.form == "adequate"
-    return Outcome(policy, alone, wrong, known.hours, verdict.form, groups, tuple(known.done))
+    return Outcome(policy, alone, wrong, known.hours, verdict.form, groups, tuple(known.done), tuple(known.foreseen))
 
 
 def cell(name: str, z: str, policies: Sequence[str]) -> list[list[str]]:
@@ -195,12 +202,24 @@ def cell(name: str, z: str, policies: Sequence[str]) -> list[list[str]]:
 def _row(name: str, z: str, policy: str, found: list[Outcome]) -> list[str]:
     extra = [each.hours for each in found if each.done]
     hours = f"{np.median(extra):.1f} ({len(extra)})" if extra else "-"
-    return [name, z, policy, share(o.alone for o in found), share(o.wrong for o in found), hours]
+    last = [o for o in found if o.foreseen]
+    rounds = sum(len(o.foreseen) for o in last)
+    met = f"{sum(sum(o.foreseen) for o in last):.1f} / {sum(o.form == 'missing' for o in last)} of {rounds}"
+    shares = share(o.alone for o in found), share(o.wrong for o in found)
+    return [name, z, policy, *shares, hours, met if last else "-"]
 
 
 def run() -> str:
     """Print each cell as it is done, and return the table."""
-    head = ["protocol", "z", "policy", "named alone %", "wrong name %", "median extra h (units with any)"]
+    head = [
+        "protocol",
+        "z",
+        "policy",
+        "named alone %",
+        "wrong name %",
+        "median extra h (units with any)",
+        "one cause: foreseen / seen",
+    ]
     rows = []
     for name in PROTOCOLS:
         for z in Z_LEVELS:

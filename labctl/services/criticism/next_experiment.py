@@ -72,18 +72,26 @@ def experiments_for(store: Store, rows: Sequence[RecordingRow], criticism: Criti
     base = None if question is None else _recipe_of(store, rows, criticism)
     if question is None or base is None:
         return []
-    recipe, bench = base
-    foreseen = ranked_experiments(question, recipe, bench)
+    recipe, bench, done = base
+    foreseen = ranked_experiments(question, recipe, bench, done)
     return [_described(each, question, recipe, len(foreseen)) for each in foreseen[:SHOWN]]
 
 
-def ranked_experiments(question: OpenQuestion, recipe: Recipe, bench: BenchFile) -> list[Foreseen]:
-    """Return the experiments that are made of a recipe, can be run on a bench and answer something, best first."""
+def ranked_experiments(
+    question: OpenQuestion, recipe: Recipe, bench: BenchFile, done: Sequence[Recipe] = ()
+) -> list[Foreseen]:
+    """Return the experiments that are made of a recipe, can be run on a bench and answer something, best first.
+
+    One that was `done` already is left out: what it did not say then, although it was expected to, the shapes of the
+    catalogue do not describe well enough to be asked again.
+    """
     if question.entropy_bit < MIN_OPEN_BIT:
         return []
-    foreseen = []
+    foreseen, known = [], [_what(each) for each in done]
     for each in plans_of(recipe, bench):
         plan = each.plan
+        if _what(plan.recipe) in known:
+            continue
         try:
             expected = forecast(question, reduce_recording(walked(plan, bench), outliers=False))
         except (LabctlError, ValueError):
@@ -95,6 +103,11 @@ def ranked_experiments(question: OpenQuestion, recipe: Recipe, bench: BenchFile)
     enough = MIN_ANSWERED * question.entropy_bit
     useful = [e for e in foreseen if e.forecast.information_bit > max(enough, 2 * e.forecast.u_bit)]
     return sorted(useful, key=lambda e: -e.bit_per_h)
+
+
+def _what(recipe: Recipe) -> dict[str, object]:
+    """Return what is done in a recipe, whatever it is called."""
+    return recipe.model_dump(exclude={"name", "description", "seed", "fit"})
 
 
 def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
@@ -154,8 +167,11 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
 
 def _recipe_of(
     store: Store, rows: Sequence[RecordingRow], criticism: Criticism
-) -> tuple[Recipe, BenchFile] | None:  # fmt: skip
-    """Return the largest recipe of the recordings' campaigns, or one like the recording, and the newest bench."""
+) -> tuple[Recipe, BenchFile, list[Recipe]] | None:  # fmt: skip
+    """Return the largest recipe of the recordings' campaigns, the newest bench, and the recipes of all of them.
+
+    Without a campaign a recipe like the recording, and the bench that fits it best.
+    """
     recipes, bench = [], None
     for row in rows:
         if row.campaign is not None:
@@ -166,10 +182,10 @@ def _recipe_of(
             except ValueError:
                 continue
     if recipes and bench is not None:
-        return max(recipes, key=_points), bench
+        return max(recipes, key=_points), bench, recipes
     try:
         recipe = _recipe_like(criticism)
-        return recipe, load_bench(bench_for(recipe))
+        return recipe, load_bench(bench_for(recipe)), recipes
     except (LabctlError, ProcedureError, ValueError):
         return None
 
