@@ -32,8 +32,8 @@ class Block:
 
         Raises ValueError where the changes make no recipe.
         """
-        changes = self.change(recipe)
-        if recipe.turns is not None or changes is None:
+        changes = None if recipe.turns is not None else self.change(recipe)
+        if changes is None:
             return None
         return Recipe.model_validate({**recipe.model_dump(), **NOT_TAKEN, **changes})
 
