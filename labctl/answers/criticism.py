@@ -191,7 +191,7 @@ class Experiment(TypedDict):
     information_bit: float
     """Expected information in the identity of the cause, bit; at most `open_bit`, up to the error of the forecast."""
     open_bit: float
-    """Entropy of the probabilities of the effects in question now, bit: what there is to learn."""
+    """Entropy of the probabilities of the effects in question now, bit: what remains to be learned."""
     hours: float
     """Expected duration, h; soaks, ramps of the chamber and mountings by a person are in it."""
     person_h: float

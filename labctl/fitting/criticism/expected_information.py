@@ -36,7 +36,7 @@ MAX_HYPOTHESES = 8
 DRAWS, MIN_DRAWS = 120, 12
 #: No outcome counts as stronger than this against the truth, nats: beyond it the forecast is not good enough.
 MAX_LOSS = 7.0
-#: Two effects are told apart where the rival falls behind in at least this share of outcomes.
+#: Two effects are distinguished where the rival falls behind in at least this share of outcomes.
 USUALLY = 0.5
 
 
@@ -75,7 +75,9 @@ class Forecast:
     u_bit: float  #: standard error of it by the number of outcomes drawn
     names_one: float  #: probability that the verdict on all recordings then names one cause
     names_wrong: float  #: probability that it then names one that is not the truth
-    told_apart: tuple[str, ...]  #: ids of the effects that are told from the likeliest one, where that is the truth
+    distinguished: tuple[
+        str, ...
+    ]  #: ids of the effects that are distinguished from the likeliest one, where that is the truth
 
 
 def open_question(found: Criticism) -> OpenQuestion | None:
@@ -156,9 +158,9 @@ def forecast(question: OpenQuestion, planned: ReducedRecording, seed: int = 1) -
             }
     means = np.array([float(each.mean()) for each in gained])
     variance = sum(w**2 * float(each.var(ddof=1)) / len(each) for w, each in zip(weights, gained, strict=True))
-    told = tuple(name for name, share in behind.items() if share >= USUALLY)
+    distinguished = tuple(name for name, share in behind.items() if share >= USUALLY)
     nat = float(np.log(2.0))
-    return Forecast(float(p @ means) / nat, float(np.sqrt(variance)) / nat, one, wrong, told)
+    return Forecast(float(p @ means) / nat, float(np.sqrt(variance)) / nat, one, wrong, distinguished)
 
 
 def _evidence(

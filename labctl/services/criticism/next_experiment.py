@@ -132,7 +132,7 @@ def _described(foreseen: Foreseen, question: OpenQuestion, recipe: Recipe, of: i
     expected = foreseen.forecast
     leader = question.ids[0]
     return {
-        "separates": [leader, *(name for name in expected.told_apart if name != leader)],
+        "separates": [leader, *(name for name in expected.distinguished if name != leader)],
         "do": foreseen.text,
         "why": _why(foreseen, question, of),
         "block": foreseen.block.id,
@@ -153,7 +153,7 @@ def _described(foreseen: Foreseen, question: OpenQuestion, recipe: Recipe, of: i
 def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     """Return the sentence that explains a choice."""
     expected, leader = foreseen.forecast, question.ids[0]
-    told = [name for name in expected.told_apart if name != leader]
+    told = [name for name in expected.distinguished if name != leader]
     first = (
         f"{foreseen.hours:.1f} h on the bench are expected to give {expected.information_bit:.2f} of the "
         f"{question.entropy_bit:.2f} bit that are missing to know which of {len(question.ids)} effects it is: "

@@ -6967,7 +6967,7 @@ export interface components {
             information_bit: number;
             /**
              * Open Bit
-             * @description Entropy of the probabilities of the effects in question now, bit: what there is to learn.
+             * @description Entropy of the probabilities of the effects in question now, bit: what remains to be learned.
              */
             open_bit: number;
             /**

@@ -77,10 +77,10 @@ def test_the_experiment_that_shows_the_difference_has_the_information() -> None:
     assert top.information_bit > 0.5 * question.entropy_bit
     assert top.information_bit <= question.entropy_bit + 2 * top.u_bit
     assert abs(at_rest.information_bit) < 0.02
-    assert (at_rest.names_one, at_rest.told_apart) == (0.0, ())
+    assert (at_rest.names_one, at_rest.distinguished) == (0.0, ())
     assert top.names_one > 0.5
     assert top.names_wrong < 0.05
-    assert {"saturation", "missed_steps"} & set(top.told_apart)
+    assert {"saturation", "missed_steps"} & set(top.distinguished)
 
 
 def test_a_forecast_is_the_same_again() -> None:
