@@ -8,13 +8,14 @@ mean follows from c and from the base's coefficients, which the first recording 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from labctl.fitting.criticism.candidate_shape import slices_of
+from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
+from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.elimination import stack
 from labctl.fitting.criticism.evidence.gains import MIN_REMAINING
@@ -22,7 +23,7 @@ from labctl.fitting.criticism.evidence.noise_grid import factors, whiten
 from labctl.fitting.criticism.model_comparison import Comparison, design_of
 from labctl.fitting.criticism.planned_addition import variance_of
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.effects import Effect
+from labctl.fitting.effects import Effect, Term
 from labctl.fitting.numeric.arrays import Array
 
 #: Directions of a base that are seen with less than this share (squared) are taken as not seen.
@@ -193,7 +194,8 @@ def forecast_axis(
 ) -> AxisForecast:  # fmt: skip
     """Return the forecast of one axis: `data` are those of `comparison` and behind them the planned ones."""
     design = design_of(data, comparison.model, axis, catalogue, smooth=False)
-    options = design.options
+    options = [*design.options, *_rivals_at_same_parameters(data, design, comparison, axis, catalogue)]
+    design = replace(design, options=options)
     measured = len(comparison.data)
     white, scale = _noise(comparison, planned, axis, len(data.present))
     blocks, _ = factors(comparison.axes[axis].best.noise, white, design.t_s, design.run)
@@ -213,6 +215,37 @@ def forecast_axis(
         _Whitened(rows(design.base), rows(columns), first, np.sqrt(design.precision), alone, np.sqrt(own.precision)),
         y,
     )
+
+
+def _rivals_at_same_parameters(
+    data: ReducedRecording, design: Design, comparison: Comparison, axis: str, catalogue: Mapping[str, Effect]
+) -> list[CandidateShape]:
+    """Return further shapes of each effect: with the nonlinear parameters at which another effect is tried.
+
+    A criticism refines the shape of rivals. On grids of their own, two effects with a time constant each would differ
+    by their grids alone.
+    """
+    terms = [option.term for option in design.options if option.term is not None]
+    tried = {_shape_key(term) for term in terms}
+    shapes = []
+    for term in terms:
+        kind = catalogue[term.effect]
+        ranges = {parameter.name: (parameter.low, parameter.high) for parameter in kind.parameters}
+        for other in terms:
+            if other.effect == term.effect or not ranges or set(other.parameters) != set(term.parameters):
+                continue
+            moved = replace(term, parameters=other.parameters)
+            inside = all(ranges[name][0] <= value <= ranges[name][1] for name, value in moved.parameters.items())
+            if not inside or _shape_key(moved) in tried:
+                continue
+            tried.add(_shape_key(moved))
+            if (shape := option_of(data, axis, comparison.model.reference, kind, moved)) is not None:
+                shapes.append(shape)
+    return shapes
+
+
+def _shape_key(term: Term) -> tuple[object, ...]:
+    return term.effect, term.order, *sorted((name, f"{value:.4g}") for name, value in term.parameters.items())
 
 
 def _grown(base: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
