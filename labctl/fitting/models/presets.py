@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from labctl.answers.effects import PresetJson
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.joined import recordings_in
 from labctl.fitting.data.temperature.levels import level_means
 from labctl.fitting.effects import Reference, Term, parse_term
 from labctl.fitting.models.error_model import ErrorModel
@@ -55,8 +54,6 @@ def _nodes(data: FitData, points: int, name: str) -> tuple[float, ...]:
     return tuple(float(t) for t in means)
 
 
-#: A table keeps a node where a data set was measured within this, K.
-NODE_WITHIN_C = 1.0
 #: Temperatures that a parabola in temperature needs, and their span, deg C.
 PARABOLA_TEMPERATURES, PARABOLA_SPAN_C = 3, 2.0
 ALIGNED = (Term("bias"), Term("scale_factor"), Term("misalignment"))
@@ -215,22 +212,12 @@ def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ..
 
     def build(data: FitData) -> tuple[ErrorModel, Rows]:
         table = model.temperature
-        if isinstance(table, LagrangeTable) and not _keeps_nodes(data, table):
+        if isinstance(table, LagrangeTable):
             table = LagrangeTable(_nodes(data, table.points, model.name), table.points)
         terms = (*kept_terms, *(replace(term, steady=True) for term in add))
         return replace(model.forward(), name=name, terms=terms, temperature=table, held=held), _all(data)
 
     return Preset(name, build, isinstance(model.temperature, LagrangeTable))
-
-
-def _keeps_nodes(data: FitData, table: LagrangeTable) -> bool:
-    """Return whether several recordings together have the nodes of a table, and temperatures between them.
-
-    One of them was measured while the temperature moved; the nodes are those of the others.
-    """
-    if data.levels is not None or len(recordings_in(data.channels.columns)) < 2:
-        return False
-    return all(float(np.min(np.abs(data.temperature_c - node_c))) <= NODE_WITHIN_C for node_c in table.nodes_c)
 
 
 def holding(preset: Preset, held: Held, reference: Reference | None = None) -> Preset:
