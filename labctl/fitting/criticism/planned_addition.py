@@ -18,7 +18,9 @@ from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.joined import APART_S, COUNTED, WITH_TABLE_RATE
 from labctl.fitting.data.temperature.history import TemperatureHistory
+from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import RECORDING, WITHIN_S
 
@@ -55,7 +57,20 @@ def with_planned(measured: ReducedRecording, planned: ReducedRecording, model: E
         steps=one.steps,
         static=one.static,
     )
+    _refuse_between_nodes(together, model)
     return _with_predicted(together, len(measured), model)
+
+
+def _refuse_between_nodes(together: ReducedRecording, model: ErrorModel) -> None:
+    """Raise BadInput where a model with a table over the temperature cannot be fitted, which needs levels."""
+    if not isinstance(model.temperature, LagrangeTable):
+        return
+    temperature_c = together.at_sets(together.nodes.temperature_c(together.info.axes[0]))
+    if temperature_levels(temperature_c) is None:
+        raise BadInput(
+            f"model {model.name} has a table over the temperature, and the planned data sets lie between its "
+            "temperatures; plan them at these temperatures"
+        )
 
 
 def _padded(data: ReducedRecording, coordinates: int, nodes: int) -> ReducedRecording:

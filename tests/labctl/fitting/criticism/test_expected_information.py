@@ -101,3 +101,13 @@ def test_a_recording_of_changing_rates_is_not_joined() -> None:
     )  # fmt: skip
     with pytest.raises(BadInput, match="cannot be fitted together"):
         with_planned(data, moved, _question().comparison.model)
+
+
+def test_a_ramp_is_not_joined_beside_a_table_over_the_temperature() -> None:
+    first = single_axis(3)
+    table, _ = preset_for("yang2018", []).build(fit_data_of(first))
+    surface, _ = preset_for("ojeda2000", []).build(fit_data_of(first))
+    measured = reduce_recording(first, outliers=False)
+    assert len(with_planned(measured, _planned("ramp_at_rest"), surface)) > len(measured)
+    with pytest.raises(BadInput, match="plan them at these temperatures"):
+        with_planned(measured, _planned("ramp_at_rest"), table)
