@@ -168,22 +168,39 @@ class NotTestable(TypedDict):
 
 
 class Experiment(TypedDict):
-    """A changed recipe that would separate effects which the recording cannot."""
+    """A changed recipe that is expected to say which effect is missing, where the recordings cannot."""
 
     separates: list[str]
-    """Ids of the effects that it separates: the leading one, then those that are distinguished from it."""
+    """Ids of the effects that it separates: the likeliest one, then those that it is distinguished from if it is it."""
     do: str
     """The change of the recipe in words."""
+    why: str
+    """Why it was chosen, in one sentence."""
+    block: str
+    """Id of the building block that it is made of."""
+    needs: list[str]
+    """What the bench needs for it besides table and chamber, in words."""
     recipe: dict[str, JsonValue]
     """The changed recipe."""
     toml: str
     """The changed recipe as a TOML file."""
     power: float
-    """Probability that the experiment decides between the leading effect and its nearest rival, 0 to 1."""
+    """Probability that the verdict on all recordings then names one cause alone (exact aliases are one), 0 to 1."""
+    names_wrong: float
+    """Probability that it then names one cause alone that is not the true one, 0 to 1."""
+    information_bit: float
+    """Expected information in the identity of the cause, bit; at most `open_bit`, up to the error of the forecast."""
+    open_bit: float
+    """Entropy of the probabilities of the effects in question now, bit: what remains to be learned."""
     hours: float
-    """Expected duration, h."""
+    """Expected duration, h; soaks, ramps of the chamber and mountings by a person are in it."""
+    person_h: float
+    """Time of a person at the bench, h; 0 where the bench turns and switches the units."""
+    mountings: int
+    """How often a unit is mounted anew, after the first mounting."""
     per_hour: float
-    """Least chi2 (at most 40) by which a rival fails to explain the leading effect, per hour, 1/h."""
+    """Expected information per hour, bit/h, by which experiments are ranked; set-up and a person's time are added to
+    the hours."""
 
 
 class Undistinguished(TypedDict):

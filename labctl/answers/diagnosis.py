@@ -81,12 +81,12 @@ class ChosenExperiment(ResponseModel):
     do: str = Field(description="The experiment in words.")
     toml: str = Field(description="Its recipe, as a TOML file.")
     power: float = Field(
-        description="Probability, before the experiment, that it decides between the leading effect and its nearest "
-        "rival, 0 to 1."
+        description="Probability, before the experiment, that the verdict then names one cause alone (exact aliases "
+        "are one), 0 to 1."
     )
     hours: float = Field(description="Expected time on the bench, h.")
     per_hour: float = Field(
-        description="Least chi2 (at most 40) by which a rival fails to explain the leading effect, per hour, 1/h."
+        description="Expected information in the identity of the cause per hour of bench and person, bit/h."
     )
 
 

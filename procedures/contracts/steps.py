@@ -68,12 +68,13 @@ class Mount(StepBase):
 
 
 class MoveChamber(StepBase):
-    """A new set point for the chamber; ends when the air has arrived in the band."""
+    """A new set point for the chamber; ends when the air has arrived in the band, without `wait` at once."""
 
     kind: Literal["move_chamber"] = "move_chamber"
     temperature_c: float
     band_c: float
     timeout_s: float
+    wait: bool = True  #: without: what follows is done while the temperature moves
 
 
 class Soak(StepBase):

@@ -124,8 +124,12 @@ def mounting_text(position: str) -> str:
 
 
 def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
-    """Write the set point and wait until the air is in the band. Raises SoakFailed when it does not arrive in time."""
+    """Write the set point and, where the step says so, wait until the air is in the band.
+
+    Raises SoakFailed when it does not arrive in time.
+    """
     context.soaked = None
+    context.monitor.air_moves = not step.wait
     set_c = context.bench.chamber.set_temperature_c(step.temperature_c)
     half_step_c = context.bench.chamber.limits.resolution_c / 2
     if abs(set_c - step.temperature_c) > half_step_c + 1e-6:
@@ -133,6 +137,8 @@ def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
             f"{context.bench.chamber.name}: set point {set_c:g} deg C was read back instead of "
             f"{step.temperature_c:g} deg C; check the panel of the chamber"
         )
+    if not step.wait:
+        return {"setpoint_c": set_c}
     began_s = context.clock.now_s() - context.paused_s
     for _ in polls(context):
         off_c = abs(context.monitor.chamber_c - step.temperature_c)

@@ -82,7 +82,8 @@ class BenchSnapshot:
     attended: bool = False  #: a person was asked to do something at the bench
     gyro_c: Mapping[str, float] = field(default_factory=dict)  #: by the units' own thermometers
     silent_s: Mapping[str, float] = field(default_factory=dict)  #: device -> time since its last answer
-    taking_readings: bool = False  #: the air is meant to be at its set point
+    taking_readings: bool = False  #: the air is meant to be at its set point, unless it moves
+    air_moves: bool = False  #: the air is meant to be on its way to its set point
     asked_dps: float = 0.0
     rate_dps: float = 0.0
     counts: Mapping[str, ReadingCounts] = field(default_factory=dict)

@@ -152,14 +152,14 @@ def _chamber_deviation(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedVa
     is_foreign = any(each.is_beyond for each in _foreign_change(guards, now))
     if is_foreign and guards.rules.action_of("foreign_change") != "warn":
         return  # the air follows what others have set: what is done about that also ends the data set
-    if now.taking_readings:
+    if now.taking_readings and not now.air_moves:
         text = f"the air left its set point of {now.setpoint_c:g} deg C while readings were taken"
         off_c = abs(now.chamber_c - now.setpoint_c)
         yield _at_most(guards.chamber, off_c, guards.rules.chamber_deviation_c, "deg C", "air off its set point", text)
 
 
 def _unit_off_air(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
-    if now.chamber_c is None or not now.taking_readings:
+    if now.chamber_c is None or not now.taking_readings or now.air_moves:
         return
     text = f"its own thermometer differs from the air, {now.chamber_c:.1f} deg C, by"
     for name, temperature_c in now.gyro_c.items():

@@ -156,6 +156,7 @@ class BenchMonitor:
         self.ended_counts: Mapping[str, ReadingCounts] = {}  #: of the data set that ended last
         self._taking_readings = self._attended = False
         self._next_poll_s = 0.0
+        self.air_moves = False  #: readings are taken while the temperature moves: the air is off its set point
         self.run = 0  #: powered session; 0 while the units are off
 
     def begin(self) -> None:
@@ -326,6 +327,7 @@ class BenchMonitor:
             gyro_c=self._gyro_c,
             silent_s=self.links.silent_s(t_s),
             taking_readings=self._taking_readings,
+            air_moves=self.air_moves,
             asked_dps=self._spin.asked_dps if self._spin else 0.0,
             rate_dps=self._spin.rate_dps if self._spin else 0.0,
             counts=self._counts,

@@ -36,7 +36,9 @@ _TEXTS: Mapping[type[Step], Callable[[Any], str]] = {
     ),
     Turn: lambda step: f"{step.turn_deg:+g} deg by hand, {step.position} up",
     Soak: lambda step: f"soak at {step.temperature_c:g} deg C for {step.hold_s / 60:g} min",
-    MoveChamber: lambda step: f"chamber to {step.temperature_c:g} deg C",
+    MoveChamber: lambda step: (
+        f"chamber to {step.temperature_c:g} deg C{'' if step.wait else ', while readings are taken'}"
+    ),
     Mount: lambda step: f"turn the units: {Position.of(step.position).in_words}",
     PowerOn: lambda step: f"switch the units on, session {step.run}",
     PowerOff: lambda step: f"switch the units off, session {step.run}",

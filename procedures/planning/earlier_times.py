@@ -94,7 +94,7 @@ def _ways(done: Sequence[DoneStep]) -> Iterator[tuple[float, float]]:
     moves = [(each, each.step) for each in done if isinstance(each.step, MoveChamber)]
     for (before, from_), (after, to) in pairwise(moves):
         way_c = to.temperature_c - from_.temperature_c
-        if before.campaign == after.campaign and abs(way_c) > to.band_c:
+        if to.wait and before.campaign == after.campaign and abs(way_c) > to.band_c:
             yield way_c, after.took_s
 
 

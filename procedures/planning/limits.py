@@ -161,6 +161,7 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
     courses = [limits.course_complaint(profile.course) for profile in recipe.profiles]
     beyond += _courses_beyond(recipe, courses)
     values["profiles"] = tuple(each for each, text in zip(values["profiles"], courses, strict=True) if not text)
+    empty += _ramp_complaints(recipe, limits)
     handling = recipe.mounting.handling_c
     if handling is not None and (text := limits.temperature_complaint(handling)):
         empty.append(f"mounting.handling_c {handling:g}: {text}")
@@ -169,6 +170,24 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
     if beyond and not clip:
         raise PlanRefused(recipe.name, beyond, ADVICE)
     return (Recipe.model_validate(values), tuple(beyond)) if beyond else (recipe, ())
+
+
+def _ramp_complaints(recipe: Recipe, limits: BenchLimits) -> list[str]:
+    """Return which limits a ramp of the temperature exceeds: it is run whole or not at all."""
+    ramp = recipe.ramp
+    if ramp is None:
+        return []
+    ends = {"from_c": ramp.from_c, "to_c": ramp.to_c}
+    complaints = [
+        f"ramp.{name} {end_c:g}: {text}"
+        for name, end_c in ends.items()
+        if (text := limits.temperature_complaint(end_c))
+    ]
+    if ramp.c_per_min is not None and ramp.c_per_min > limits.ramp_c_per_min:
+        complaints.append(
+            f"ramp.c_per_min {ramp.c_per_min:g}: faster than the {limits.ramp_c_per_min:g} K/min of the chamber"
+        )
+    return complaints
 
 
 def _courses_beyond(recipe: Recipe, complaints: list[str | None]) -> list[str]:
@@ -185,8 +204,7 @@ def _point_lists(recipe: Recipe) -> list[tuple[str, str]]:
     for name in ("indexing", "inverted"):
         if getattr(recipe, name) is not None:
             lists += [(name, "temperatures_c"), (name, "rates_dps")]
-    if recipe.power_cycle is not None:
-        lists += [("power_cycle", "rates_dps")]
+    lists += [(name, "rates_dps") for name in ("power_cycle", "ramp") if getattr(recipe, name) is not None]
     return lists
 
 

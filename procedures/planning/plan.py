@@ -88,12 +88,17 @@ class Plan(BaseModel):
         home: tuple[Step, ...] = (Home(), *[step for step in before if isinstance(step, MeasureClock)][:1])
         if isinstance(self.steps[index], Home | MeasureClock):
             return (Home(),)
-        if isinstance(self.steps[index], MoveChamber):
-            return home
-        move = next((step for step in reversed(before) if isinstance(step, MoveChamber)), None)
+        moves = [step for step in before if isinstance(step, MoveChamber)]
+        begin = next((step for step in reversed(moves) if step.wait), None)
+        this = self.steps[index]
+        if isinstance(this, MoveChamber):
+            return home if this.wait or begin is None else (*home, begin)
+        move = moves[-1] if moves else None
         soak = None
-        if not isinstance(self.steps[index], Acquire | Rest):
+        if not isinstance(this, Acquire | Rest):
             return (*home, *((move,) if move else ()))
+        if move is not None and not move.wait:  # from where the ramp began to where it was; its temperature is logged
+            return (*home, *((begin,) if begin else ()), move)
         for step in reversed(before):
             if isinstance(step, Mount | MoveChamber | PowerOn | PowerOff):
                 break
@@ -139,6 +144,8 @@ def _unset(step: Step) -> set[str]:
     """Return the names that plans of before a later version do not have, where the step does not use them."""
     if isinstance(step, MeasureClock) and not step.runs_s:
         return {"runs_s"}
+    if isinstance(step, MoveChamber) and step.wait:
+        return {"wait"}
     if not isinstance(step, Acquire):
         return set()
     return {name for name in ("verification", "course") if not getattr(step, name)}
@@ -175,6 +182,10 @@ def _refuse_endless(recipe: Recipe) -> None:
         data_sets += len(recipe.positions) * len(recipe.inverted.temperatures_c) * len(recipe.inverted.rates_dps)
     if recipe.power_cycle is not None:
         data_sets += recipe.power_cycle.count * len(recipe.power_cycle.rates_dps)
+    if (ramp := recipe.ramp) is not None:
+        each_s = recipe.acquire.duration_s + recipe.acquire.settle_s
+        way_s = 60.0 * abs(ramp.to_c - ramp.from_c) / (ramp.c_per_min or 1.0)
+        data_sets += math.ceil(len(recipe.positions) * ramp.legs * way_s / each_s)
     if (verify := recipe.verification) is not None:
         data_sets += len(verify.positions or recipe.positions) * verify.temperatures * verify.rates
     if recipe.turns is not None:

@@ -25,6 +25,7 @@ from procedures.planning.limits import BenchLimits
 from procedures.planning.point_order import Level, MountingBlock, order_points, verification_blocks
 from procedures.planning.turn_steps import turn_steps
 from procedures.recipe.recipe import Recipe
+from procedures.recipe.rules import Ramp
 
 # What is expected of things that have no limit to compute with; only the forecast depends on them.
 ROOM_C = 25.0
@@ -90,6 +91,29 @@ class _StepWriter:
             self.acquire(level, verification=block.verification)
             self.check_home(level)
             self.measure_clock_again()
+        if self.recipe.ramp is not None and not block.verification and block.position in self.recipe.positions:
+            self.ramp(self.recipe.ramp)
+
+    def ramp(self, rules: Ramp) -> None:
+        """Soak at one temperature, and run rates while the chamber goes to another, and back where that is asked."""
+        self.move_chamber(rules.from_c)
+        self.soak(rules.from_c)
+        for to_c in (rules.to_c, rules.from_c)[: rules.legs]:
+            from_c, way_c = self.air_c, to_c - self.air_c
+            lasts_s = self._move_s(way_c, self.recipe.soak.band_c)
+            if is_slow := rules.c_per_min is not None and rules.c_per_min < self.limits.ramp_c_per_min:
+                lasts_s = 60.0 * abs(way_c) / (rules.c_per_min or 1.0)
+            passed_s, number = 0.0, 0
+            while passed_s < lasts_s:
+                rate_dps = rules.rates_dps[number % len(rules.rates_dps)]
+                next_s = passed_s + self._set_s(rate_dps)
+                if is_slow or number == 0:
+                    share = min(next_s / lasts_s, 1.0) if is_slow else 1.0
+                    self.move_chamber(round(from_c + share * way_c, 2), wait=False)
+                self.acquire(Level(self.air_c, (rate_dps,)))
+                passed_s, number = next_s, number + 1
+            self.air_c = to_c
+        self.check_home(Level(self.air_c, rules.rates_dps))
 
     def measure_clock(self, runs: int) -> None:
         """Time the step clock at the largest rate of the recipe, where the table does that."""
@@ -145,8 +169,17 @@ class _StepWriter:
         warm_up_s = self.recipe.warm_up_s
         self.steps.append(PowerOn(run=self.run, wait_s=warm_up_s, expected_s=warm_up_s))
 
-    def move_chamber(self, temperature_c: float) -> None:
+    def move_chamber(self, temperature_c: float, *, wait: bool = True) -> None:
+        """Write a move of the chamber; without `wait` the next step begins at once."""
         rules = self.recipe.soak
+        if not wait:
+            self.air_c = temperature_c
+            self.steps.append(
+                MoveChamber(
+                    temperature_c=temperature_c, band_c=rules.band_c, timeout_s=rules.move_timeout_s, wait=False
+                )
+            )
+            return
         way_c = abs(temperature_c - self.air_c)
         ramp_c_per_min = self.limits.ramp_c_per_min
         expected_s = self._move_s(temperature_c - self.air_c, rules.band_c)
@@ -189,7 +222,6 @@ class _StepWriter:
             self.datasets += 1
             real_dps = self.limits.real_rate_dps(rate_dps)
             duration_s = planned_duration_s(self.recipe, real_dps)
-            ramps_s = 2 * abs(real_dps) / self.limits.max_acceleration_dps2
             self.steps.append(
                 Acquire(
                     dataset=self.datasets,
@@ -200,10 +232,16 @@ class _StepWriter:
                     mounting=self.mounting,
                     settle_s=self.recipe.acquire.settle_s,
                     duration_s=duration_s,
-                    expected_s=self.recipe.acquire.settle_s + duration_s + ramps_s,
+                    expected_s=self._set_s(rate_dps),
                     verification=verification,
                 )
             )
+
+    def _set_s(self, rate_dps: float) -> float:
+        """Return how long a data set at a rate is expected to take, s."""
+        real_dps = self.limits.real_rate_dps(rate_dps)
+        ramps_s = 2 * abs(real_dps) / self.limits.max_acceleration_dps2
+        return self.recipe.acquire.settle_s + planned_duration_s(self.recipe, real_dps) + ramps_s
 
     def follow(self) -> None:
         """Take a data set of each course of the rate."""

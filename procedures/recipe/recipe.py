@@ -25,6 +25,7 @@ from procedures.recipe.rules import (
     OnFailure,
     Position,
     PowerCycle,
+    Ramp,
     Replicates,
     ResumeRules,
     SoakRules,
@@ -41,7 +42,7 @@ LONGEST_KEY = 80
 #: What a recipe of turns by hand has no use for: no table and no chamber is driven.
 _OF_RATES = (
     "temperatures_c", "rates_dps", "order", "temperature_order", "rate_order", "repeats", "soak", "acquire",
-    "replicates", "indexing", "inverted", "power_cycle", "profiles", "verification",
+    "replicates", "indexing", "inverted", "power_cycle", "ramp", "profiles", "verification",
 )  # fmt: skip
 
 
@@ -72,6 +73,7 @@ class Recipe(Table):
     indexing: Indexing | None = None
     inverted: Inverted | None = None
     power_cycle: PowerCycle | None = None
+    ramp: Ramp | None = None
     verification: Verification | None = None  #: absent: nothing is measured beside what is fitted
     mounting: Mounting = Mounting()
     profiles: tuple[Profile, ...] = ()  #: courses of the rate, run at the start of each level

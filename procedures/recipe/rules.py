@@ -97,6 +97,32 @@ class Indexing(Table):
         return self
 
 
+class Ramp(Table):
+    """Each position once more while the temperature moves, after its levels, in the same powered session.
+
+    The chamber is soaked at `from_c` and then goes to `to_c`; data sets are taken one after the other on the way, their
+    rates in the listed order again and again. Slower than the chamber can, it goes in small steps, one before each data
+    set.
+    """
+
+    from_c: Number
+    to_c: Number
+    rates_dps: tuple[Number, ...] = Field(min_length=1)
+    c_per_min: Number | None = Field(default=None, gt=0)  #: absent: as fast as the chamber can
+    back: Yes = False  #: and back to `from_c` in the same way
+
+    @property
+    def legs(self) -> int:
+        """How often the temperature goes through the range."""
+        return 2 if self.back else 1
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> Ramp:
+        if self.from_c == self.to_c:
+            raise ValueError("from_c and to_c are the same, so that nothing moves; give two temperatures")
+        return self
+
+
 class PowerCycle(Table):
     """The unit switched off and on again at the temperature of the last level, and measured again."""
 

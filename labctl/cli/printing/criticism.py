@@ -71,8 +71,9 @@ def print_criticism(answer: CriticismResponse) -> None:
         console.print(rows)
     for experiment in answer.experiments:
         console.print(
-            f"to distinguish {', '.join(experiment['separates'])}: {experiment['do']} "
-            f"({experiment['hours']:.0f} h, {100 * experiment['power']:.0f} % sure to)",
+            f"to distinguish {', '.join(experiment['separates'])}: {experiment['do']} ({experiment['hours']:.1f} h, "
+            f"{experiment['information_bit']:.2f} of {experiment['open_bit']:.2f} bit expected, one cause named with a "
+            f"probability of {100 * experiment['power']:.0f} %)",
         )
     for sentence in _not_testable(answer):
         console.print(sentence, style="dim", soft_wrap=prints_all)

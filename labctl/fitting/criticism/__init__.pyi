@@ -12,6 +12,12 @@ from labctl.fitting.criticism.effect_size import (
     size_in_noise_units as size_in_noise_units,
     size_reference as size_reference,
 )
+from labctl.fitting.criticism.expected_information import (
+    Forecast as Forecast,
+    OpenQuestion as OpenQuestion,
+    forecast as forecast,
+    open_question as open_question,
+)
 from labctl.fitting.criticism.laws.consequences import consequences as consequences
 from labctl.fitting.criticism.laws.proposals import (
     Breaking as Breaking,
@@ -20,19 +26,15 @@ from labctl.fitting.criticism.laws.proposals import (
     coefficients_of_law as coefficients_of_law,
     laws_of as laws_of,
 )
-from labctl.fitting.criticism.reduction import ReducedRecording as ReducedRecording
+from labctl.fitting.criticism.reduction import (
+    ReducedRecording as ReducedRecording,
+    reduce_recording as reduce_recording,
+)
 from labctl.fitting.criticism.residuals import (
     Residuals as Residuals,
     has_one_rising_leg as has_one_rising_leg,
     where_it_fails as where_it_fails,
     worst_data_sets as worst_data_sets,
-)
-from labctl.fitting.criticism.separation import (
-    LeadingSignal as LeadingSignal,
-    SEPARATED_CHI2 as SEPARATED_CHI2,
-    leading_signal as leading_signal,
-    separation_chi2 as separation_chi2,
-    separation_power as separation_power,
 )
 from labctl.fitting.criticism.suspects import Suspect as Suspect
 from labctl.fitting.criticism.thermal_family import ThermalFamily as ThermalFamily, hint_of_added as hint_of_added

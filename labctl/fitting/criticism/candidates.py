@@ -136,9 +136,14 @@ def _turning(data: ReducedRecording, axis: str) -> list[Column]:
 
 
 def options_of(
-    data: ReducedRecording, axis: str, reference: Reference, catalogue: Mapping[str, Effect] = CATALOGUE
+    data: ReducedRecording,
+    axis: str,
+    reference: Reference,
+    catalogue: Mapping[str, Effect] = CATALOGUE,
+    *,
+    smooth: bool = True,
 ) -> list[CandidateShape]:
-    """Return every shape of every testable effect on one axis, and a smooth function of every channel."""
+    """Return every shape of every testable effect on one axis, and with `smooth` a smooth function of every channel."""
     span, absent = span_of(data), untestable_channels(data, catalogue)
     turning = bool(np.any(data.nodes.table_rate_dps()))
     shaped_options = []
@@ -149,7 +154,7 @@ def options_of(
             continue
         options = (option_of(data, axis, reference, kind, term) for term in kind.options(span))
         shaped_options += [option for option in options if option is not None]
-    return shaped_options + channel_options(data, axis)
+    return shaped_options + (channel_options(data, axis) if smooth else [])
 
 
 def option_of(

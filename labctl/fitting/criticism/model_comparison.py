@@ -160,9 +160,14 @@ class Comparison:
 
 
 def design_of(
-    data: ReducedRecording, model: ErrorModel, axis: str, catalogue: Mapping[str, Effect] = CATALOGUE
+    data: ReducedRecording,
+    model: ErrorModel,
+    axis: str,
+    catalogue: Mapping[str, Effect] = CATALOGUE,
+    *,
+    smooth: bool = True,
 ) -> Design:
-    """Return the design of one axis: all that does not depend on its output."""
+    """Return the design of one axis: all that does not depend on its output; without `smooth` of the effects alone."""
     base, precision = base_of(data, model, axis)
     catalogue = {name: kind for name, kind in catalogue.items() if not (kind.exact and name in model.effect_ids)}
     nodes = data.nodes
@@ -172,10 +177,9 @@ def design_of(
     run = data.at_sets(np.asarray(nodes["run"] if "run" in nodes else np.ones(len(nodes)), dtype=np.float64))
     level = constant_coordinates(base, data)
     without_prior = base[:, :, precision == 0]
-    options = [
-        orthogonalised(centred(option, level), without_prior)
-        for option in (*options_of(data, axis, model.reference, catalogue), *thermometer_options(data, model, axis))
-    ]
+    shaped = options_of(data, axis, model.reference, catalogue, smooth=smooth)
+    shaped += thermometer_options(data, model, axis) if smooth else []
+    options = [orthogonalised(centred(option, level), without_prior) for option in shaped]
     return Design(base, precision, options, data.present, t_s, np.rint(run).astype(np.int64))
 
 

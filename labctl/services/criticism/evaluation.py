@@ -76,7 +76,7 @@ def evaluate(
         raise
     columns = residual_columns(criticised.data, criticised.residuals, measured.points, measured.row.id, criticised.base)
     serial, version = calibration.serial, calibration.version
-    experiments = _experiments(store, measured.widest.campaign, criticised)  # not of a short experiment that came later
+    experiments = _experiments(store, recordings, criticised)
     criticism = answer_of(serial, version, measured.recordings, criticised, experiments)
     laws, law_test = proposed_laws(criticised)
     said = [*criticism.text, *law_sentences(laws, law_test), *held_sentences(model)]
@@ -93,13 +93,13 @@ def evaluate(
     )
 
 
-def _experiments(store: Store, campaign: int | None, criticism: Criticism) -> list[Experiment]:
+def _experiments(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism) -> list[Experiment]:
     if not criticism.verdict.indistinguishable:
         return []
     report_stage("checking experiments")
     from labctl.services.criticism.next_experiment import experiments_for  # noqa: PLC0415  it loads the drivers
 
-    return experiments_for(store, campaign, criticism)
+    return experiments_for(store, rows, criticism)
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:

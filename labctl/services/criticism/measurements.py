@@ -54,11 +54,6 @@ class Measurements:
         return self.rows[-1]
 
     @property
-    def widest(self) -> RecordingRow:
-        """The recording with the most data sets; of several such the newest."""
-        return max(self.rows, key=lambda row: (row.datasets, row.id))
-
-    @property
     def recordings(self) -> tuple[int, ...]:
         """The numbers of all of them, rising."""
         return tuple(row.id for row in self.rows)

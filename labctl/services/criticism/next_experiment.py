@@ -1,8 +1,9 @@
-"""The next experiment: which changed recipe would separate the effects that a criticism could not, per hour."""
+"""The next experiment: which changed recipe is expected to say most, per bench hour, about which effect is missing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import tomli_w
@@ -10,126 +11,188 @@ import tomli_w
 from instruments.bench_config import BenchFile
 from labctl.answers.criticism import Experiment
 from labctl.errors import LabctlError
-from labctl.fitting.criticism import (
-    SEPARATED_CHI2,
-    Criticism,
-    LeadingSignal,
-    leading_signal,
-    separation_chi2,
-    separation_power,
-)
-from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.criticism import Criticism, Forecast, OpenQuestion, forecast, open_question, reduce_recording
+from labctl.services.planning.attendance import visits_s
 from labctl.services.planning.loading import bench_for, limits_of, load_bench
-from labctl.services.simulation.visibility import planned_schedule
-from labctl.store import Store
+from labctl.services.simulation.walks import walked
+from labctl.store import RecordingRow, Store
 from procedures.contracts.errors import ProcedureError
-from procedures.planning.plan import make_plan
+from procedures.contracts.steps import Mount
+from procedures.experiments.block import Block, all_blocks
+from procedures.planning.plan import Plan, make_plan
+from procedures.planning.step_writer import MOUNTING_S
 from procedures.recipe.recipe import Recipe, recipe_document
 
-#: At most this many rivals are separated from the leader, and this many experiments are shown.
-PAIRS, SHOWN = 6, 4
-#: More separation (chi2) than this does not count: the answer is as good as certain.
-MAX_CHI2 = 40.0
+#: This many experiments are shown.
+SHOWN = 4
+#: An experiment that is expected to answer less than this share of the question is none.
+MIN_ANSWERED = 0.05
+#: Time that a campaign takes of bench and person before its first step, h.
+SET_UP_H = 0.25
+#: Below this there is nothing to learn, bit.
+MIN_OPEN_BIT = 0.01
+#: An experiment is also planned with its rates run so many times as often, where it is shorter than this, h: the soaks
+#: and mountings are the same, and a weak effect needs the readings.
+LONGER, LONGEST_TO_REPEAT_H = 4, 6.0
+#: Effects named in the sentence that explains a choice; the rest is counted.
+NAMED = 3
 
 
-def experiments_for(store: Store, campaign: int | None, criticism: Criticism) -> list[Experiment]:
-    """Return changed recipes that would separate what a verdict could not distinguish, best first.
+@dataclass(frozen=True)
+class Planned:
+    """One experiment on a bench."""
 
-    `campaign` is the recording's, if it has one. First come the recipes that separate the leader from most rivals,
-    among them those with the largest separation per hour.
+    block: Block
+    plan: Plan
+    text: str  #: what is done, in words
+
+
+@dataclass(frozen=True)
+class Foreseen(Planned):
+    """One experiment on a bench, and what it is expected to say."""
+
+    forecast: Forecast
+    hours: float  #: expected duration, h
+    person_h: float  #: of a person at the bench, h
+    mountings: int  #: after the first
+
+    @property
+    def bit_per_h(self) -> float:
+        """Expected information per hour of the bench, set-up and a person's time counted."""
+        return self.forecast.information_bit / (self.hours + SET_UP_H + self.person_h)
+
+
+def experiments_for(store: Store, rows: Sequence[RecordingRow], criticism: Criticism) -> list[Experiment]:
+    """Return changed recipes that are expected to say which effect is missing, the most information per hour first.
+
+    `rows` are the recordings that were criticised. Nothing where the verdict leaves nothing open, or where no
+    experiment that the bench can run would add anything.
     """
-    if criticism.comparison is None or not criticism.verdict.indistinguishable:
+    question = open_question(criticism)
+    base = None if question is None else _recipe_of(store, rows, criticism)
+    if question is None or base is None:
         return []
-    base = _recipe_of(store, campaign, criticism)
-    if base is None:
-        return []
-    recipe, bench = base
-    effects = {c.id for c in criticism.comparison.candidates if not c.smooth}
-    leader, *others = criticism.verdict.indistinguishable
-    signal = leading_signal(criticism.comparison, leader)
-    rivals = [name for name in others[:PAIRS] if name in effects]
-    floor_dps = {axis: float(np.median(residuals.floor_dps)) for axis, residuals in criticism.residuals.items()}
-    tried = (
-        _experiment(text, changes, recipe, bench, signal, rivals, criticism.comparison.model, floor_dps)
-        for text, changes in menu(recipe)
-    )
-    ranked = [experiment for experiment in tried if experiment is not None]
-    return sorted(ranked, key=lambda e: (-len(e["separates"]), -e["per_hour"]))[:SHOWN]
+    recipe, bench, done = base
+    foreseen = ranked_experiments(question, recipe, bench, done)
+    return [_described(each, question, recipe, len(foreseen)) for each in foreseen[:SHOWN]]
 
 
-def _experiment(
-    text: str, changes: Mapping[str, object], recipe: Recipe, bench: BenchFile, signal: LeadingSignal,
-    rivals: list[str], model: ErrorModel, floor_dps: Mapping[str, float],
-) -> Experiment | None:  # fmt: skip
-    """Return a changed recipe with what it separates; None where it cannot be run on the bench or separates nothing."""
-    try:
-        changed = Recipe.model_validate({**recipe.model_dump(), **changes})
-        plan = make_plan(changed, limits_of(bench), clip=True)
-        schedule = planned_schedule(plan, bench, model)
-    except (LabctlError, ProcedureError, ValueError):
-        return None
-    chi2 = {rival: separation_chi2(schedule, signal, rival, floor_dps) for rival in rivals}
-    separated = [rival for rival, value in chi2.items() if value > SEPARATED_CHI2]
-    if not separated:
-        return None
-    least = min(chi2[rival] for rival in separated)
-    hours = plan.expected_s / 3600
-    document = recipe_document(changed) | {"name": f"{recipe.name}-next"}
+def ranked_experiments(
+    question: OpenQuestion, recipe: Recipe, bench: BenchFile, done: Sequence[Recipe] = ()
+) -> list[Foreseen]:
+    """Return the experiments that are made of a recipe, can be run on a bench and answer something, best first.
+
+    One that was `done` already is left out: what it did not say then, although it was expected to, the shapes of the
+    catalogue do not describe well enough to be asked again.
+    """
+    if question.entropy_bit < MIN_OPEN_BIT:
+        return []
+    foreseen, known = [], [_what(each) for each in done]
+    for each in plans_of(recipe, bench):
+        plan = each.plan
+        if _what(plan.recipe) in known:
+            continue
+        try:
+            expected = forecast(question, reduce_recording(walked(plan, bench), outliers=False))
+        except (LabctlError, ValueError):
+            continue
+        person_h = len(visits_s(plan, bench)) * MOUNTING_S / 3600
+        mountings = max(sum(isinstance(step, Mount) for step in plan.steps) - 1, 0)
+        hours = plan.expected_s / 3600
+        foreseen.append(Foreseen(each.block, plan, each.text, expected, hours, person_h, mountings))
+    enough = MIN_ANSWERED * question.entropy_bit
+    useful = [e for e in foreseen if e.forecast.information_bit > max(enough, 2 * e.forecast.u_bit)]
+    return sorted(useful, key=lambda e: -e.bit_per_h)
+
+
+def _what(recipe: Recipe) -> dict[str, object]:
+    """Return what is done in a recipe, whatever it is called."""
+    return recipe.model_dump(exclude={"name", "description", "seed", "fit"})
+
+
+def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
+    """Yield every installed experiment that can be made of a recipe and run on a bench, short ones also longer."""
+    limits = limits_of(bench)
+    for block in all_blocks():
+        try:
+            changed = block.changed(recipe)
+            if changed is None:
+                continue
+            plan = make_plan(changed, limits, clip=True)
+            yield Planned(block, plan, block.text)
+            if plan.expected_s < 3600 * LONGEST_TO_REPEAT_H:
+                longer = plan.recipe.model_copy(update={"repeats": LONGER * plan.recipe.repeats})
+                yield Planned(block, make_plan(longer, limits), f"{block.text}; rates {LONGER} times as often")
+        except (LabctlError, ProcedureError, ValueError):  # not on this bench
+            continue
+
+
+def _described(foreseen: Foreseen, question: OpenQuestion, recipe: Recipe, of: int) -> Experiment:
+    document = recipe_document(foreseen.plan.recipe) | {"name": f"{recipe.name}-next"}
+    expected = foreseen.forecast
+    leader = question.ids[0]
     return {
-        "separates": [signal.term.effect, *separated],
-        "do": text,
+        "separates": [leader, *(name for name in expected.distinguished if name != leader)],
+        "do": foreseen.text,
+        "why": _why(foreseen, question, of),
+        "block": foreseen.block.id,
+        "needs": list(foreseen.block.needs),
         "recipe": document,
         "toml": tomli_w.dumps(document),
-        "power": separation_power(least),
-        "hours": hours,
-        "per_hour": min(least, MAX_CHI2) / hours,
+        "power": min(max(expected.names_one, 0.0), 1.0),
+        "names_wrong": min(max(expected.names_wrong, 0.0), 1.0),
+        "information_bit": expected.information_bit,
+        "open_bit": question.entropy_bit,
+        "hours": foreseen.hours,
+        "person_h": foreseen.person_h,
+        "mountings": foreseen.mountings,
+        "per_hour": foreseen.bit_per_h,
     }
 
 
-def menu(recipe: Recipe) -> list[tuple[str, dict[str, object]]]:
-    """Return the changes of a recipe that may separate effects, each with its description."""
-    temperatures = sorted(recipe.temperatures_c)
-    middle = temperatures[len(temperatures) // 2]
-    few = sorted({0.0, *(s * abs(r) for r in _spread(recipe.rates_dps) for s in (1, -1))})
-    short: dict[str, object] = {"temperatures_c": [middle], "rates_dps": few}
-    inside: dict[str, object] = {"mounting": {**recipe.mounting.model_dump(), "repower_each": False}}
-    up_and_down: dict[str, object] = {
-        "inverted": {"temperatures_c": [middle], "rates_dps": [0.0, *few[:2], *few[-2:]]},
-        **inside,
-    }
-    return [
-        ("each position also upside down, in one powered run, at one temperature", {**short, **up_and_down}),
-        ("each position also upside down, in one powered run", up_and_down),
-        ("a power cycle at constant temperature", {**short, "power_cycle": {"off_s": 600.0, "rates_dps": few}}),
-        ("the temperatures up and down", {"temperature_order": "up_down"}),
-        ("the rates in random order", {"rate_order": "random"}),
-        ("random rates, temperatures up and down", {"rate_order": "random", "temperature_order": "up_down"}),
-        ("the first temperature repeated at the end", {"replicates": {"first_temperature_again": True}}),
-        ("more rates in the top third", {"rates_dps": _top(recipe.rates_dps), "temperatures_c": [middle]}),
-    ]
+def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
+    """Return the sentence that explains a choice."""
+    expected, leader = foreseen.forecast, question.ids[0]
+    told = [name for name in expected.distinguished if name != leader]
+    first = (
+        f"{foreseen.hours:.1f} h on the bench are expected to give {expected.information_bit:.2f} of the "
+        f"{question.entropy_bit:.2f} bit that are missing to know which of {len(question.ids)} effects it is: "
+        f"{foreseen.bit_per_h:.2g} bit/h with set-up and a person's time"
+    )
+    rank = f", the order of the {of} experiments that this bench can run" if of > 1 else ""
+    listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
+    pair = f"; if it is {leader}, this distinguishes it from {listed}" if told else ""
+    return f"{first}{rank}{pair}; the probability that one cause is then named alone is {expected.names_one:.2f}."
 
 
-def _spread(rates: tuple[float, ...]) -> list[float]:
-    sizes = sorted({abs(rate) for rate in rates if rate})
-    return [sizes[len(sizes) // 2], sizes[-1]] if sizes else []
+def _recipe_of(
+    store: Store, rows: Sequence[RecordingRow], criticism: Criticism
+) -> tuple[Recipe, BenchFile, list[Recipe]] | None:  # fmt: skip
+    """Return the largest recipe of the recordings' campaigns, the newest bench, and the recipes of all of them.
 
-
-def _top(rates: tuple[float, ...]) -> list[float]:
-    most = max(abs(rate) for rate in rates)
-    sizes = [round(float(share) * most, 3) for share in (0.3, 0.5, *np.arange(0.66, 1.001, 0.04))]
-    return [0.0, *(sign * size for size in sizes for sign in (1, -1))]
-
-
-def _recipe_of(store: Store, campaign: int | None, criticism: Criticism) -> tuple[Recipe, BenchFile] | None:
-    """Return the recipe of the recording's campaign, or one like the recording, and its bench; None without either."""
+    Without a campaign a recipe like the recording, and the bench that fits it best.
+    """
+    recipes, bench = [], None
+    for row in rows:
+        if row.campaign is not None:
+            campaign = store.campaigns.get(row.campaign)
+            try:
+                recipes.append(Recipe.model_validate(dict(campaign.recipe)))
+                bench = BenchFile.model_validate(dict(campaign.bench))
+            except ValueError:
+                continue
+    if recipes and bench is not None:
+        return max(recipes, key=_points), bench, recipes
     try:
-        if campaign is not None:
-            row = store.campaigns.get(campaign)
-            return Recipe.model_validate(dict(row.recipe)), BenchFile.model_validate(dict(row.bench))
         recipe = _recipe_like(criticism)
-        return recipe, load_bench(bench_for(recipe))
+        return recipe, load_bench(bench_for(recipe)), recipes
     except (LabctlError, ProcedureError, ValueError):
         return None
+
+
+def _points(recipe: Recipe) -> int:
+    """Return how many different points a recipe measures."""
+    return len(set(recipe.temperatures_c)) * len(set(recipe.rates_dps)) * len(set(recipe.positions))
 
 
 def _recipe_like(criticism: Criticism) -> Recipe:

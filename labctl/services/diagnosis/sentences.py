@@ -10,17 +10,14 @@ from labctl.answers.diagnosis import ChosenExperiment
 
 def choice(experiment: Experiment, of: int) -> str:
     """Return why an experiment is chosen."""
-    best = f"the best of the {of} experiments that are left" if of > 1 else "the only experiment that is left"
-    return (
-        f"{hours(experiment['hours'])}: {experiment['do']}: it distinguishes {pair(experiment['separates'])} with "
-        f"{percent(experiment['power'])} power ({experiment['per_hour']:.2g} chi2 per bench hour, {best})"
-    )
+    left = f"of the {of} experiments that are left" if of > 1 else "the only experiment that is left"
+    return f"{experiment['do']}, {left}: {experiment['why']}"
 
 
 def expected(experiment: ChosenExperiment) -> str:
     """Return what is expected of an experiment."""
     return (
-        f"expected: {pair(experiment.separates)} distinguished with {percent(experiment.power)} power in "
+        f"expected: one cause named alone with a probability of {percent(experiment.power)}, in "
         f"{hours(experiment.hours)}"
     )
 
@@ -94,12 +91,6 @@ def hours(value: float) -> str:
 def percent(share: float) -> str:
     """Write a probability; one below 1 is never written as 100 %."""
     return f"{min(100 * share, 99.0 if share < 1 else 100.0):.0f} %"
-
-
-def pair(separates: Sequence[str]) -> str:
-    """Write the leading effect and its rivals."""
-    leader, *rivals = separates
-    return f"{leader} from {', '.join(rivals)}" if rivals else leader
 
 
 def _either(named: Sequence[str]) -> str:

@@ -92,6 +92,8 @@ class _Walk:
         if not isinstance(step, MoveChamber):
             return step.expected_s
         way_c, self._air_c = abs(step.temperature_c - self._air_c), step.temperature_c
+        if not step.wait:
+            return 0.0
         return counted_move_s(way_c, self._ramp_c_per_min, step.band_c)
 
     def _log(self, from_s: float, until_s: float) -> None:

@@ -7330,12 +7330,12 @@ export interface components {
         };
         /**
          * Experiment
-         * @description A changed recipe that would separate effects which the recording cannot.
+         * @description A changed recipe that is expected to say which effect is missing, where the recordings cannot.
          */
         Experiment: {
             /**
              * Separates
-             * @description Ids of the effects that it separates: the leading one, then those that are distinguished from it.
+             * @description Ids of the effects that it separates: the likeliest one, then those that it is distinguished from if it is it.
              */
             separates: string[];
             /**
@@ -7343,6 +7343,21 @@ export interface components {
              * @description The change of the recipe in words.
              */
             do: string;
+            /**
+             * Why
+             * @description Why it was chosen, in one sentence.
+             */
+            why: string;
+            /**
+             * Block
+             * @description Id of the building block that it is made of.
+             */
+            block: string;
+            /**
+             * Needs
+             * @description What the bench needs for it besides table and chamber, in words.
+             */
+            needs: string[];
             /**
              * Recipe
              * @description The changed recipe.
@@ -7357,17 +7372,42 @@ export interface components {
             toml: string;
             /**
              * Power
-             * @description Probability that the experiment decides between the leading effect and its nearest rival, 0 to 1.
+             * @description Probability that the verdict on all recordings then names one cause alone (exact aliases are one), 0 to 1.
              */
             power: number;
             /**
+             * Names Wrong
+             * @description Probability that it then names one cause alone that is not the true one, 0 to 1.
+             */
+            names_wrong: number;
+            /**
+             * Information Bit
+             * @description Expected information in the identity of the cause, bit; at most `open_bit`, up to the error of the forecast.
+             */
+            information_bit: number;
+            /**
+             * Open Bit
+             * @description Entropy of the probabilities of the effects in question now, bit: what remains to be learned.
+             */
+            open_bit: number;
+            /**
              * Hours
-             * @description Expected duration, h.
+             * @description Expected duration, h; soaks, ramps of the chamber and mountings by a person are in it.
              */
             hours: number;
             /**
+             * Person H
+             * @description Time of a person at the bench, h; 0 where the bench turns and switches the units.
+             */
+            person_h: number;
+            /**
+             * Mountings
+             * @description How often a unit is mounted anew, after the first mounting.
+             */
+            mountings: number;
+            /**
              * Per Hour
-             * @description Least chi2 (at most 40) by which a rival fails to explain the leading effect, per hour, 1/h.
+             * @description Expected information per hour, bit/h, by which experiments are ranked; set-up and a person's time are added to the hours.
              */
             per_hour: number;
         };

@@ -73,7 +73,7 @@ def test_it_goes_on_until_one_cause_is_left(location: str) -> None:
     assert "500" in refused.came_text
     assert "it is not proposed again" in refused.came_text
     assert refused.campaign is None
-    assert first.came_text.startswith("expected: thermal_lag from warm_up distinguished with 96 % power in 1.0 h; ")
+    assert first.came_text.startswith("expected: one cause named alone with a probability of 96 %, in 1.0 h; ")
     assert "verdict then: ambiguous" in first.came_text
     assert answer.spent_hours == pytest.approx(last.spent_hours)
     assert 0 < last.spent_hours < 24

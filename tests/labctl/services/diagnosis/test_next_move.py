@@ -49,8 +49,8 @@ def test_the_best_experiment_is_chosen_and_explained() -> None:
     assert isinstance(move, Measure)
     assert move.experiment.do == RANDOM["do"]
     assert move.why == (
-        "2.1 h: the rates in random order: it distinguishes thermal_lag from warm_up with 96 % power (9.5 chi2 per "
-        "bench hour, the best of the 2 experiments that are left)"
+        "the rates in random order, of the 2 experiments that are left: 2.1 h on the bench are expected to say which "
+        "of 2 effects it is."
     )
 
 

@@ -335,7 +335,7 @@ function experimentList(criticism) {
           h(
             "p",
             { class: "muted small" },
-            `It distinguishes ${each.separates.map(idText).join(", ")} with a probability of ${percent(each.power)}.`,
+            each.why,
           ),
           each.toml
             ? h("a", { class: "button tiny", href: `/campaigns/new?toml=${encodeURIComponent(each.toml)}` }, "Plan it")

@@ -1,0 +1,216 @@
+"""Expected information of a planned recording: what it would add to the knowledge of which effect is missing.
+
+The suspects of a criticism are hypotheses with posterior probabilities. Each in turn is taken as the truth, with its
+shape and size drawn from their posterior distribution; what the planned recording then gives is drawn too, and the
+evidence of both recordings together (base coefficients and drifts of the new session free) gives the probabilities
+after it. The mean of log2(probability of the truth after / before) is the expected information in the identity of the
+cause, in bit (Lindley 1956; Box and Hill 1967, of which it is what their bound bounds). Everything is linear and normal
+for one shape, so an outcome is a draw of the inner products of the shapes with the data, and no reading is simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from labctl.fitting.criticism.criticism import Criticism
+from labctl.fitting.criticism.joint_evidence import AxisForecast, Outcomes, forecast_axis
+from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
+from labctl.fitting.criticism.planned_addition import with_planned
+from labctl.fitting.criticism.ranking import Candidate, are_exact
+from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.criticism.verdict import ALIKE, ENOUGH, FAR, INDISTINGUISHABLE_CHI2, LEAD
+from labctl.fitting.effects import CATALOGUE, Effect
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.blas_threads import single_threaded
+
+#: Suspects that are less likely than this are left out, unless the verdict names them.
+MIN_PROBABILITY = 0.01
+#: Hypotheses at most, the likeliest.
+MAX_HYPOTHESES = 8
+#: Outcomes that are drawn for each experiment, about, and at least for each hypothesis.
+DRAWS, MIN_DRAWS = 120, 12
+#: No outcome counts as stronger than this against the truth, nats: beyond it the forecast is not good enough.
+MAX_LOSS = 7.0
+#: Two effects are distinguished where the rival falls behind in at least this share of outcomes.
+USUALLY = 0.5
+
+
+@dataclass(frozen=True)
+class OpenQuestion:
+    """Which of several effects is missing, beside a model and all else that was found."""
+
+    comparison: Comparison  #: of the effects in question alone
+    catalogue: Mapping[str, Effect]
+    candidates: tuple[Candidate, ...]  #: the hypotheses, likeliest first
+    log_odds: Array  #: (h,) posterior, nats, up to a constant
+    nodes: NDArray[np.int64]  #: (h,) number of the cause: effects with the same columns on every schedule are one
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """The ids of the hypotheses."""
+        return tuple(candidate.id for candidate in self.candidates)
+
+    @property
+    def probabilities(self) -> Array:
+        """The posterior probability of each hypothesis, (h,)."""
+        return np.asarray(np.exp(self.log_odds - logsumexp(self.log_odds)))
+
+    @property
+    def entropy_bit(self) -> float:
+        """What is not known of which cause it is, in bit; exact aliases are one."""
+        p = np.bincount(self.nodes, weights=self.probabilities)
+        return float(-np.sum(p[p > 0] * np.log2(p[p > 0])))
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a planned recording is expected to say."""
+
+    information_bit: float  #: expected information in the identity of the cause
+    u_bit: float  #: standard error of it by the number of outcomes drawn
+    names_one: float  #: probability that the verdict on all recordings then names one cause
+    names_wrong: float  #: probability that it then names one that is not the truth
+    distinguished: tuple[
+        str, ...
+    ]  #: ids of the effects that are distinguished from the likeliest one, where that is the truth
+
+
+def open_question(found: Criticism) -> OpenQuestion | None:
+    """Return what a criticism leaves open: its first group of effects that cannot be distinguished; None for none."""
+    group = found.verdict.indistinguishable
+    if found.beside_missing is None or not group:
+        return None
+    comparison = found.beside_missing
+    others = [names[0] for names in found.verdict.groups if names != group]
+    terms = [found.verdict.terms[name] for name in others if name in found.verdict.terms]
+    if terms:
+        model = comparison.model.with_added(terms)
+        comparison = compare_beside(comparison, model)
+    known = {c.id: c for c in comparison.candidates if not c.smooth and np.isfinite(c.log_bf)}
+    of_group = [known[name] for name in group if name in known]
+    if len(of_group) < 2:
+        return None
+    lead = max(c.log_bf for c in of_group)
+    near = [
+        c for name, c in known.items()
+        if name not in group and name not in others and c.physical and c.log_bf > lead + np.log(MIN_PROBABILITY)
+    ]  # fmt: skip
+    # shapes are compared on a grid, so that the verdict does not let small differences of the evidence decide
+    odds = {c.id: max(c.log_bf, lead - LEAD) for c in of_group} | {c.id: c.log_bf for c in near}
+    chosen = sorted((*of_group, *near), key=lambda c: -odds[c.id])[:MAX_HYPOTHESES]
+    ids = [c.id for c in chosen]
+    return OpenQuestion(
+        _restricted(comparison, ids), {name: CATALOGUE[name] for name in ids if name in CATALOGUE},
+        tuple(chosen), np.array([odds[name] for name in ids]), _nodes(ids),
+    )  # fmt: skip
+
+
+def _nodes(ids: Sequence[str]) -> NDArray[np.int64]:
+    """Return the number of the cause of each effect, (h,)."""
+    numbers: list[int] = []
+    for i, name in enumerate(ids):
+        same = (numbers[k] for k in range(i) if name in CATALOGUE and ids[k] in CATALOGUE[name].aliases)
+        numbers.append(next(same, i))
+    return np.unique(numbers, return_inverse=True)[1].astype(np.int64)
+
+
+def _restricted(comparison: Comparison, ids: Sequence[str]) -> Comparison:
+    """Return a comparison whose designs have the shapes of some effects only; its evidence is not theirs any more."""
+    designs = {
+        axis: replace(design, options=[o for o in design.options if not o.smooth and o.candidate in ids])
+        for axis, design in comparison.designs.items()
+    }
+    return replace(comparison, designs=designs)
+
+
+@single_threaded
+def forecast(question: OpenQuestion, planned: ReducedRecording, seed: int = 1) -> Forecast:
+    """Return what a planned recording is expected to add to a question. Raises BadInput where it cannot be joined."""
+    comparison = question.comparison
+    data = with_planned(comparison.data, planned, comparison.model)
+    axes = {
+        axis: forecast_axis(data, comparison, planned, axis, question.catalogue) for axis in comparison.designs
+    }  # fmt: skip
+    rng = np.random.default_rng(seed)
+    p = question.probabilities
+    gained, weights, one, wrong, behind = [], [], 0.0, 0.0, {}
+    for h, probability in enumerate(p.tolist()):
+        n = max(MIN_DRAWS, round(DRAWS * probability))
+        outcomes = {axis: forecast_of.draw(question.ids[h], n, rng) for axis, forecast_of in axes.items()}
+        before_it, after_it = _evidence(question, axes, outcomes, n)
+        log_odds = question.log_odds + after_it - before_it
+        log_p = log_odds - logsumexp(log_odds, axis=1, keepdims=True)
+        of_cause = logsumexp(log_p[:, question.nodes == question.nodes[h]], axis=1)
+        before = np.log(p[question.nodes == question.nodes[h]].sum())
+        gained.append(np.maximum(of_cause, before - MAX_LOSS) - before)
+        weights.append(probability)
+        alone = [_named_alone(question, axes, outcomes, after_it[k], k) for k in range(n)]
+        one += probability * float(np.mean([name is not None for name in alone]))
+        wrong += probability * float(np.mean([name is not None and name != question.nodes[h] for name in alone]))
+        if h == int(np.argmax(p)):
+            behind = {
+                name: float(np.mean(log_odds[:, k] < log_odds[:, h] - LEAD)) for k, name in enumerate(question.ids)
+            }
+    means = np.array([float(each.mean()) for each in gained])
+    variance = sum(w**2 * float(each.var(ddof=1)) / len(each) for w, each in zip(weights, gained, strict=True))
+    distinguished = tuple(name for name, share in behind.items() if share >= USUALLY)
+    nat = float(np.log(2.0))
+    return Forecast(float(p @ means) / nat, float(np.sqrt(variance)) / nat, one, wrong, distinguished)
+
+
+def _evidence(
+    question: OpenQuestion, axes: Mapping[str, AxisForecast], outcomes: Mapping[str, Outcomes], n: int
+) -> tuple[Array, NDArray[np.float64]]:
+    """Return the log evidence of each hypothesis over all axes, nats: by the first recording (h,), by both (n, h)."""
+    before, after = np.zeros(len(question.ids)), np.zeros((n, len(question.ids)))
+    for k, name in enumerate(question.ids):
+        of_axes = [(axes[axis].evidence_before(name), outcomes[axis].evidence(name)) for axis in axes]
+        present = [(old, new) for old, new in of_axes if old is not None and new is not None]
+        if present:
+            before[k] = _over_axes(np.array([[old] for old, _ in present]))[0]
+            after[:, k] = _over_axes(np.stack([new for _, new in present]))
+    return before, after
+
+
+def _over_axes(per_axis: NDArray[np.float64]) -> Array:
+    """Return the log evidence of an effect over all axes, (n,), as the ranking has it: on all of them, or on one."""
+    axes = len(per_axis)
+    if axes == 1:
+        return np.asarray(per_axis[0])
+    joint = per_axis.sum(axis=0) - np.log(2.0)
+    return np.asarray(logsumexp(np.vstack([joint, per_axis - np.log(2.0 * axes)]), axis=0))
+
+
+def _named_alone(
+    question: OpenQuestion, axes: Mapping[str, AxisForecast], outcomes: Mapping[str, Outcomes],
+    log_bf: Array, k: int,
+) -> int | None:  # fmt: skip
+    """Return the number of the cause that the verdict names alone in outcome `k`; None where it names none, or more.
+
+    The rules are those of the verdict (`verdict.alias_group`).
+    """
+    h = int(np.argmax(log_bf))
+    if log_bf[h] < ENOUGH:
+        return None
+    leader = question.candidates[h]
+    fitted = {axis: outcomes[axis].fitted(leader.id, k) for axis in axes}
+    size = sum(each.size for each in fitted.values() if each is not None)
+    for j, rival in enumerate(question.candidates):
+        if question.nodes[j] == question.nodes[h]:
+            continue
+        if log_bf[j] > log_bf[h] - LEAD:
+            return None
+        if log_bf[j] <= 0 or size <= 0:
+            continue
+        parts = [axes[axis].reproduced(each, rival.id, outcomes[axis], k) for axis, each in fitted.items() if each]
+        share, directions = sum(part for part, _ in parts) / size, sum(more for _, more in parts)
+        if share > ALIKE and directions <= 0 and not are_exact(leader, rival):
+            return None
+        if log_bf[j] > log_bf[h] - FAR and (1.0 - share) * size < INDISTINGUISHABLE_CHI2:
+            return None
+    return int(question.nodes[h])

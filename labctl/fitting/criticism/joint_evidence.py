@@ -1,0 +1,299 @@
+"""Evidence on one axis of a recording and a planned one together, as a distribution over what the second may give.
+
+With the base eliminated jointly, the products b of the shapes with the data are linear in the data of both recordings.
+Those of the first are known. Given one shape with coefficients c as the truth, those of the second are normal: their
+mean follows from c and from the base's coefficients, which the first recording leaves uncertain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
+from labctl.fitting.criticism.candidates import option_of
+from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.elimination import stack
+from labctl.fitting.criticism.evidence.gains import MIN_REMAINING
+from labctl.fitting.criticism.evidence.noise_grid import factors, whiten
+from labctl.fitting.criticism.model_comparison import Comparison, design_of
+from labctl.fitting.criticism.planned_addition import variance_of
+from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.effects import Effect, Term
+from labctl.fitting.numeric.arrays import Array
+
+#: Directions of a base that are seen with less than this share (squared) are taken as not seen.
+UNSEEN = 1e-10
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One shape: its columns, and what maps their products with the data to a gain in chi2 and to coefficients."""
+
+    effect: str
+    columns: slice
+    #: (w, r): |now.T b|^2 is the gain in chi2 by the first recording, and `now @ now.T` the coefficients' covariance
+    now: NDArray[np.float64]
+    before: NDArray[np.float64]  #: the same beside the base of both recordings, in which each run's bias is free
+    after: NDArray[np.float64]  #: the same by both recordings
+
+    def log_bf(self, gain: Array, factor: NDArray[np.float64], g: float) -> Array:
+        """Return the log Bayes factor of gains in chi2 with the unit-information prior, as `evidence` has it."""
+        return np.asarray(0.5 * gain * g / (1 + g) - 0.5 * factor.shape[1] * np.log1p(g))
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The signal of an effect as it is fitted in one outcome: its shape, coefficients and size in chi2."""
+
+    shape: Shape
+    coefficients: Array
+    size: float
+
+
+class AxisForecast:
+    """One axis of both recordings."""
+
+    def __init__(self, design: Design, measured: int, whitened: _Whitened, y: Array) -> None:
+        self.g = float(measured), float(len(design.t_s))
+        first, second = whitened.first, ~whitened.first
+        base, columns = whitened.base, whitened.columns
+        _, alone = _orthonormal(whitened.alone, whitened.prior_alone)
+        alone = alone[: len(y)]
+        remaining_now = columns[first] - alone @ (alone.T @ columns[first])
+        b_now = remaining_now.T @ y
+        seen, beside = _orthonormal(base[first], whitened.prior)
+        beside = beside[: len(y)]
+        left_now = columns[first] - beside @ (beside.T @ columns[first])
+        _, both = _orthonormal(base, whitened.prior)
+        inner = both[: len(base)].T @ columns
+        remaining = columns - both[: len(base)] @ inner
+        self.gram = remaining.T @ columns
+        gram_now = remaining_now.T @ columns[first]
+        norms_now, norms = (columns[first] ** 2).sum(axis=0), (columns**2).sum(axis=0)
+        self.shapes = [
+            Shape(
+                option.candidate,
+                place,
+                _factor(gram_now, norms_now, place),
+                _factor(left_now.T @ columns[first], norms_now, place),
+                _factor(self.gram, norms, place),
+            )
+            for option, place in zip(design.options, slices_of(design.options), strict=True)
+        ]
+        moved = remaining[second].T @ base[second]  # (K, kb): what the base's coefficients do to the products
+        through = moved @ seen  # base's coefficients are normal with covariance seen @ seen.T, given the first part
+        of_base = seen.T @ base[first].T
+        self._known = remaining[first].T @ y + through @ (of_base @ y)
+        self._response = remaining[second].T @ columns[second] - through @ (of_base @ columns[first])
+        self._root = _root(remaining[second].T @ remaining[second] + through @ through.T)
+        self._b_now, self._b_before = b_now, left_now.T @ y
+        self._of: dict[str, list[Shape]] = {}
+        for shape in self.shapes:
+            self._of.setdefault(shape.effect, []).append(shape)
+
+    def shapes_of(self, effect: str) -> list[Shape]:
+        """Return the shapes of an effect that the first recording shows; none where it does not touch the axis."""
+        return [shape for shape in self._of.get(effect, []) if shape.now.shape[1]]
+
+    def _now(self, effect: str) -> Array:
+        """Return the log Bayes factor of each shape of an effect by the first recording, (s,) nats."""
+        gains = [float(np.sum((s.now.T @ self._b_now[s.columns]) ** 2)) for s in self.shapes_of(effect)]
+        each = [
+            s.log_bf(np.array(gain), s.now, self.g[0]) for s, gain in zip(self.shapes_of(effect), gains, strict=True)
+        ]
+        return np.array(each, dtype=np.float64)
+
+    def evidence_before(self, effect: str) -> float | None:
+        """Return the log evidence for an effect by the first recording beside the base of both; None for no shape.
+
+        It is averaged over the shapes. What is shifts between runs there cannot count for an effect.
+        """
+        shapes = self.shapes_of(effect)
+        gains = [np.array(np.sum((s.before.T @ self._b_before[s.columns]) ** 2)) for s in shapes]
+        each = [s.log_bf(gain, s.before, self.g[0]) for s, gain in zip(shapes, gains, strict=True)]
+        return float(logsumexp(each) - np.log(len(each))) if each else None
+
+    def draw(self, effect: str, n: int, rng: np.random.Generator) -> Outcomes:
+        """Return n outcomes where an effect is the cause, its shape and size as the first recording leaves them."""
+        k = len(self._known)
+        products = np.tile(self._known, (n, 1)) + rng.standard_normal((n, k)) @ self._root.T
+        shapes, now = self.shapes_of(effect), self._now(effect)
+        if shapes:
+            chosen = rng.choice(len(shapes), n, p=np.exp(now - logsumexp(now)))
+            shrunk = self.g[0] / (1 + self.g[0])
+            for i, shape in enumerate(shapes):
+                rows = np.flatnonzero(chosen == i)
+                mean = shrunk * shape.now @ (shape.now.T @ self._b_now[shape.columns])
+                free = rng.standard_normal((len(rows), shape.now.shape[1])) @ (np.sqrt(shrunk) * shape.now.T)
+                products[rows] += (mean + free) @ self._response[:, shape.columns].T
+        return Outcomes(self, products)
+
+    def reproduced(self, fitted: Fitted, rival: str, outcomes: Outcomes, k: int) -> tuple[float, int]:
+        """Return the part of a fitted signal, in chi2, that a rival's best shape reproduces, and how many more
+        directions the rival has."""
+        best = outcomes.best(rival, k)
+        if best is None:
+            return 0.0, -fitted.shape.after.shape[1]
+        inner = self.gram[best.columns, fitted.shape.columns] @ fitted.coefficients
+        return float(np.sum((best.after.T @ inner) ** 2)), best.after.shape[1] - fitted.shape.after.shape[1]
+
+
+class Outcomes:
+    """Outcomes of one axis: products of the shapes with the data of both recordings, (n, K)."""
+
+    def __init__(self, axis: AxisForecast, products: NDArray[np.float64]) -> None:
+        self._axis, self._products = axis, products
+        self._known: dict[str, NDArray[np.float64]] = {}
+
+    def _shapes(self, effect: str) -> NDArray[np.float64]:
+        """Return the log Bayes factor of each shape of an effect by both recordings, (s, n) nats."""
+        if effect not in self._known:
+            self._known[effect] = np.array([
+                s.log_bf(((self._products[:, s.columns] @ s.after) ** 2).sum(axis=1), s.after, self._axis.g[1])
+                for s in self._axis.shapes_of(effect)
+            ])  # fmt: skip
+        return self._known[effect]
+
+    def evidence(self, effect: str) -> Array | None:
+        """Return the log evidence for an effect by both recordings, (n,) nats; None where it is not on the axis."""
+        each = self._shapes(effect)
+        return np.asarray(logsumexp(each, axis=0) - np.log(len(each))) if len(each) else None
+
+    def best(self, effect: str, k: int) -> Shape | None:
+        """Return the shape of an effect with the most evidence in outcome `k`."""
+        each = self._shapes(effect)
+        return self._axis.shapes_of(effect)[int(np.argmax(each[:, k]))] if len(each) else None
+
+    def fitted(self, effect: str, k: int) -> Fitted | None:
+        """Return the signal of an effect as it is fitted in outcome `k`, in its best shape."""
+        best = self.best(effect, k)
+        if best is None:
+            return None
+        inner = best.after.T @ self._products[k, best.columns]
+        return Fitted(best, best.after @ inner, float(inner @ inner))
+
+
+@dataclass(frozen=True)
+class _Whitened:
+    base: NDArray[np.float64]  #: (rows, kb)
+    columns: NDArray[np.float64]  #: (rows, K) of all shapes
+    first: NDArray[np.bool_]  #: (rows,) whether a row is of the first recording
+    prior: Array  #: (kb,) root of the prior precision
+    alone: NDArray[np.float64]  #: (rows of the first, ka): the base of the first recording by itself
+    prior_alone: Array  #: (ka,)
+
+
+def forecast_axis(
+    data: ReducedRecording, comparison: Comparison, planned: ReducedRecording, axis: str,
+    catalogue: Mapping[str, Effect],
+) -> AxisForecast:  # fmt: skip
+    """Return the forecast of one axis: `data` are those of `comparison` and behind them the planned ones."""
+    design = design_of(data, comparison.model, axis, catalogue, smooth=False)
+    options = [*design.options, *_rivals_at_same_parameters(data, design, comparison, axis, catalogue)]
+    design = replace(design, options=options)
+    measured = len(comparison.data)
+    white, scale = _noise(comparison, planned, axis, len(data.present))
+    blocks, _ = factors(comparison.axes[axis].best.noise, white, design.t_s, design.run)
+
+    def rows(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate([whiten(blocks, values[0]), stack(values, scale, design.present)])
+
+    columns = np.concatenate([o.rows for o in options], axis=2) if options else np.zeros((*design.present.shape, 0))
+    is_first = np.broadcast_to(np.arange(len(data)) < measured, design.present.shape)
+    first = np.concatenate([is_first[0], is_first[1:][design.present[1:]]])
+    y = rows(data.error_dps(axis)[:, :, None])[:, 0][first]
+    own = comparison.designs[axis]
+    alone = rows(_grown(own.base, design.present.shape))[first]
+    return AxisForecast(
+        design,
+        measured,
+        _Whitened(rows(design.base), rows(columns), first, np.sqrt(design.precision), alone, np.sqrt(own.precision)),
+        y,
+    )
+
+
+def _rivals_at_same_parameters(
+    data: ReducedRecording, design: Design, comparison: Comparison, axis: str, catalogue: Mapping[str, Effect]
+) -> list[CandidateShape]:
+    """Return further shapes of each effect: with the nonlinear parameters at which another effect is tried.
+
+    A criticism refines the shape of rivals. On grids of their own, two effects with a time constant each would differ
+    by their grids alone.
+    """
+    terms = [option.term for option in design.options if option.term is not None]
+    tried = {_shape_key(term) for term in terms}
+    shapes = []
+    for term in terms:
+        kind = catalogue[term.effect]
+        ranges = {parameter.name: (parameter.low, parameter.high) for parameter in kind.parameters}
+        for other in terms:
+            if other.effect == term.effect or not ranges or set(other.parameters) != set(term.parameters):
+                continue
+            moved = replace(term, parameters=other.parameters)
+            inside = all(ranges[name][0] <= value <= ranges[name][1] for name, value in moved.parameters.items())
+            if not inside or _shape_key(moved) in tried:
+                continue
+            tried.add(_shape_key(moved))
+            if (shape := option_of(data, axis, comparison.model.reference, kind, moved)) is not None:
+                shapes.append(shape)
+    return shapes
+
+
+def _shape_key(term: Term) -> tuple[object, ...]:
+    return term.effect, term.order, *sorted((name, f"{value:.4g}") for name, value in term.parameters.items())
+
+
+def _grown(base: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return the base (R, m, k) of a recording with zeros in the coordinates and data sets that it does not have."""
+    grown = np.zeros((*shape, base.shape[2]))
+    grown[: base.shape[0], : base.shape[1]] = base
+    return grown
+
+
+def _noise(
+    comparison: Comparison, planned: ReducedRecording, axis: str, coordinates: int
+) -> tuple[Array, NDArray[np.float64]]:
+    """Return the white variance of each mean, (m + k,), and the scale of the other coordinates, (R, m + k)."""
+    white, scale = comparison.white_var[axis], comparison.scales[axis]
+    planned_white = variance_of(comparison.data, planned, white)
+    ratio = np.ones(coordinates)
+    ratio[: len(scale)] = np.median(scale / np.sqrt(white), axis=1)
+    grown = np.concatenate([scale, np.repeat(np.sqrt(white)[None, :], coordinates - len(scale), axis=0)])
+    return (
+        np.concatenate([white, planned_white]),
+        np.concatenate([grown, ratio[:, None] * np.sqrt(planned_white)[None, :]], axis=1),
+    )
+
+
+def _orthonormal(base: NDArray[np.float64], prior: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the root (kb, r) of the covariance of the base's coefficients, and an orthonormal basis of its columns.
+
+    The basis, (rows + kb, r), has the prior as rows of its own below. Directions that are not seen have no part.
+    """
+    whole = np.concatenate([base, np.diag(prior)])
+    size = np.linalg.norm(whole, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh((whole / size).T @ (whole / size))
+    kept = values > UNSEEN * max(float(values[-1]), 1e-300) if len(values) else np.zeros(0, dtype=bool)
+    root = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
+    return root, whole @ root
+
+
+def _factor(gram: NDArray[np.float64], squared_norms: Array, place: slice) -> NDArray[np.float64]:
+    """Return the factor (w, r) of the inverse of a shape's part of a Gram matrix, in the directions that are seen."""
+    size = np.sqrt(np.maximum(squared_norms[place], 1e-300))
+    values, vectors = np.linalg.eigh(gram[place, place] / np.outer(size, size))
+    kept = values > MIN_REMAINING
+    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / size[:, None])
+
+
+def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a root (K, K) of a covariance that may be singular."""
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    return np.asarray(size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

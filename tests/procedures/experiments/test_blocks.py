@@ -1,0 +1,71 @@
+"""The building blocks of experiments: each makes a recipe that runs, and others can add their own."""
+
+from __future__ import annotations
+
+import pytest
+
+from instruments.plugins import PluginError
+from labctl.services.planning.loading import limits_of, load_bench, load_recipe
+from procedures.contracts.steps import Acquire, MoveChamber
+from procedures.experiments.block import NOT_TAKEN, Block, _checked, all_blocks
+from procedures.experiments.blocks import BLOCKS
+from procedures.planning.limits import BenchLimits
+from procedures.planning.plan import make_plan
+from procedures.recipe.recipe import Recipe, parse_recipe, recipe_document
+
+
+def test_labctls_own_blocks_are_found_by_their_entry_point() -> None:
+    assert all_blocks()[: len(BLOCKS)] == BLOCKS
+    assert len({block.id for block in BLOCKS}) == len(BLOCKS)
+
+
+@pytest.mark.parametrize(
+    ("recipe", "bench"), [("ojeda2000", "single-axis-sim"), ("table1-x-table2", "triaxial-sim"), ("informative", None)]
+)
+def test_each_block_makes_a_plan_within_the_limits_that_differs_from_the_recipe(recipe: str, bench: str | None) -> None:
+    whole = load_recipe(recipe)
+    limits = limits_of(load_bench(bench or "triaxial-sim"))
+    made = {block.id: block.changed(whole) for block in BLOCKS}
+    assert sum(changed is None for changed in made.values()) <= 1
+    for name, changed in made.items():
+        if changed is None:
+            continue
+        plan = make_plan(changed, limits, clip=True)
+        assert plan.datasets > 0, name
+        assert changed != whole, name
+        assert changed.fit is None, name
+        assert Recipe.model_validate(recipe_document(changed)) == changed, name
+
+
+def test_a_recipe_at_rest_is_not_turned_and_one_of_turns_by_hand_not_changed() -> None:
+    night, by_hand = load_recipe("static-night"), load_recipe("by-hand")
+    at_rest = {block.id: changed for block in BLOCKS if (changed := block.changed(night)) is not None}
+    assert "top_rates" not in at_rest
+    assert not any(any(changed.rates_dps) for changed in at_rest.values())
+    assert all(block.changed(by_hand) is None for block in BLOCKS)
+
+
+def test_ramps_take_their_data_sets_while_the_chamber_moves(limits: BenchLimits) -> None:
+    slow = next(block for block in BLOCKS if block.id == "slow_ramp").changed(load_recipe("quick-triaxial"))
+    assert slow is not None
+    steps = make_plan(slow, limits).steps
+    moving = [n for n, step in enumerate(steps) if isinstance(step, MoveChamber) and not step.wait]
+    assert len(moving) > 50
+    assert all(isinstance(steps[n + 1], Acquire) for n in moving)
+
+
+def test_what_a_recipe_measures_beside_its_points_is_not_taken_over() -> None:
+    recipe = parse_recipe(
+        'name = "r"\ntemperatures_c = [20, 30, 40]\nrates_dps = [0, 10]\npositions = ["z"]\nrepeats = 5\n'
+        "[verification]\n[power_cycle]\nrates_dps = [0]\n"
+    )
+    few = next(block for block in BLOCKS if block.id == "top_rates").changed(recipe)
+    assert few is not None
+    assert (few.verification, few.power_cycle, few.repeats) == (None, None, NOT_TAKEN["repeats"])
+
+
+def test_what_is_no_block_is_refused() -> None:
+    own = Block("mine", "something else", lambda recipe: {"repeats": 2})
+    assert _checked(own) == (own,)
+    with pytest.raises((TypeError, PluginError), match="is not a Block"):
+        _checked([own, "mine"])
