@@ -23,6 +23,7 @@ LONG = (
     "tests/system/test_frozen_postgresql", "tests/system/test_two_processes", "tests/labctl/corpus/",
     "tests/labctl/api/test_openapi", "tests/labctl/fitting/criticism/", "tests/blind/",
     "tests/labctl/services/campaigns/test_resume", "tests/labctl/services/criticism/test_next_experiment",
+    "tests/labctl/services/certificates/test_verified_conformity", "tests/labctl/services/test_certification",
 )  # fmt: skip
 
 
