@@ -20,14 +20,37 @@ def ask(
     `streams` are the open files that are its input, output and error output. A command ends with the process that asked
     for it.
     """
+    with begin(address, arguments, folder, environment, streams)[1] as line:
+        return read(line)
+
+
+def begin(
+    address: str,
+    arguments: Sequence[str],
+    folder: str,
+    environment: Mapping[str, str],
+    streams: Sequence[int],
+    open_files: int | None = None,
+) -> tuple[int, socket.socket]:
+    """Begin a command; returns its process, and the line that its exit status comes on.
+
+    The command ends with that line. `open_files` is all that it may open.
+    """
     request = {"arguments": list(arguments), "folder": folder, "environment": dict(environment)}
-    with socket.socket(socket.AF_UNIX) as line:
-        line.connect(address)
-        socket.send_fds(line, [b"\n"], list(streams))
-        line.sendall(json.dumps(request).encode() + b"\n")
-        answer = line.makefile().readline()
-    if not answer:
-        raise ConnectionError("the command server ended")
+    line = socket.socket(socket.AF_UNIX)
+    line.connect(address)
+    socket.send_fds(line, [b"\n"], list(streams))
+    line.sendall(json.dumps({**request, "open_files": open_files}).encode() + b"\n")
+    return read(line), line
+
+
+def read(line: socket.socket) -> int:
+    """Return the next number from the command server; nothing of what follows is read."""
+    answer = b""
+    while not answer.endswith(b"\n"):
+        if not (piece := line.recv(1)):
+            raise ConnectionError("the command server ended")
+        answer += piece
     return int(answer)
 
 

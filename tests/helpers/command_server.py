@@ -1,7 +1,8 @@
 """Runs `labctl` in processes of its own that are forked from one that has loaded it.
 
 Each of them is a process as any other: with its own arguments, folder, environment, files and end. What it is spared is
-a second of processor time to load the libraries. Tests of the start itself, and of signals, start `python -m labctl`.
+a second of processor time to load the libraries, and a service three. Tests of the start itself, and of signals to a
+command, start `python -m labctl`.
 """
 
 from __future__ import annotations
@@ -10,19 +11,22 @@ import gc
 import importlib
 import json
 import os
+import resource
 import select
 import signal
 import socket
 import sys
 from typing import Any, TextIO, cast
 
+from tests.helpers import spare_processes
 from tests.helpers.built_command import build_once, built
 from tests.helpers.paths import ROOT
 
 #: What commands of labctl load when they are called.
 MODULES = (
     "blosc2", "pyarrow.csv", "pyarrow.parquet", "alembic.command", "labctl.cli.app", "labctl.cli.printing.criticism",
-    "labctl.plots", "labctl.services.commands.computed", "labctl.services.commands.open",
+    "labctl.plots", "labctl.processes.bench_process", "labctl.processes.supervisor", "labctl.processes.web_process",
+    "labctl.services.commands.computed", "labctl.services.commands.open",
     "labctl.services.commands.registry", "labctl.services.criticism.evaluation",
     "labctl.services.criticism.next_experiment", "labctl.services.lab_service", "labctl.services.simulation.visibility",
 )  # fmt: skip
@@ -83,6 +87,7 @@ def _forks(line: socket.socket, running: dict[int, socket.socket]) -> bool:
             other.close()
         _become(request, streams)
         return True
+    line.sendall(b"%d\n" % pid)
     running[pid] = line
     for stream in streams:
         os.close(stream)
@@ -99,6 +104,8 @@ def _become(request: dict[str, Any], streams: list[int]) -> None:
     inherited = {str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)}
     os.environ.clear()
     os.environ.update(request["environment"])
+    if open_files := request["open_files"]:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (open_files, open_files))
     own = [place for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place]
     sys.path[:] = [request["folder"], *own, *(place for place in sys.path if place not in inherited)]
     importlib.invalidate_caches()
@@ -111,6 +118,8 @@ def _opened(number: int, mode: str) -> TextIO:
 
 if __name__ == "__main__":
     serve(sys.argv[1])
+    if sys.argv[1:2] == ["serve"]:
+        spare_processes.provide()
     from labctl.cli import main
 
     main()

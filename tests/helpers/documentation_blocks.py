@@ -17,7 +17,7 @@ from sybil import Document, Example, Lexeme, Region, Sybil
 from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser, SkipParser
 
-from tests.helpers.forked_commands import shell_command
+from tests.helpers.forked_commands import ForkedCommand, shell_command
 from tests.helpers.paths import ROOT
 from tests.helpers.processes import WAIT_S
 from tests.helpers.signal_defaults import default_signals
@@ -75,11 +75,8 @@ class Playground:
         assert done.returncode == 0, f"{where}: exit {done.returncode}\n{source}\n{done.stdout}\n{done.stderr}"
 
     def _serve(self, options: list[str]) -> None:
-        with default_signals():
-            command = [sys.executable, "-m", "labctl", "serve", *options, "--port", "0", "--json"]
-            self._service = subprocess.Popen(
-                command, cwd=self.folder, env=self.environment, stdout=subprocess.PIPE, text=True
-            )
+        command = ["serve", *options, "--port", "0", "--json"]
+        self._service = ForkedCommand(command, stderr=None, folder=self.folder, environment=self.environment)
         assert self._service.stdout is not None
         self.url = json.loads(self._service.stdout.readline())["url"]
 

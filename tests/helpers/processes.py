@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 import httpx
 
 from labctl.store import holder_of, is_url, open_store
-from tests.helpers.forked_commands import run_labctl
+from tests.helpers.forked_commands import ForkedCommand, run_labctl
 from tests.helpers.signal_defaults import default_signals
 from tests.helpers.waiting import before_next_request
 
@@ -35,6 +35,15 @@ def begin(command: list[str], log: Path | None = None) -> subprocess.Popen[str]:
     with default_signals(), contextlib.ExitStack() as opened:
         stderr = subprocess.PIPE if log is None else opened.enter_context(log.open("ab"))
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True)
+
+
+def begin_loaded(
+    arguments: Sequence[str], log: Path | None = None, open_files: int | None = None
+) -> subprocess.Popen[str]:
+    """Start `labctl` as `begin` does, in a process that is forked from one that has loaded it."""
+    with contextlib.ExitStack() as opened:
+        stderr = subprocess.PIPE if log is None else opened.enter_context(log.open("ab"))
+        return ForkedCommand(arguments, stderr=stderr, open_files=open_files)
 
 
 def first_line(process: subprocess.Popen[str]) -> str:
@@ -66,12 +75,15 @@ class ServiceProcess:
         open_files: int | None = None,
         log: Path | None = None,
         shell: str = "",
+        loads: bool = False,
     ) -> None:
         self.database = database
         command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json", *options]
-        limit = [] if open_files is None else ["prlimit", f"--nofile={open_files}:{open_files}"]
-        before = ["/bin/sh", "-c", f'{shell}; exec "$0" "$@"'] if shell else []
-        self.process = begin([*before, *limit, *labctl(database, *command)], log)
+        if shell or loads:
+            before = ["/bin/sh", "-c", f'{shell}; exec "$0" "$@"'] if shell else []
+            self.process = begin([*before, *labctl(database, *command)], log)
+        else:
+            self.process = begin_loaded([*command, "--database", str(database)], log, open_files)
         reported = json.loads(first_line(self.process))
         self.url = reported["url"]
         self.bench_pid, self.web_pid = reported["bench_pid"], reported["web_pid"]
@@ -134,13 +146,19 @@ class ServiceProcess:
 
 @contextmanager
 def running(
-    database: Path | str, *options: str, open_files: int | None = None, log: Path | None = None, shell: str = ""
+    database: Path | str,
+    *options: str,
+    open_files: int | None = None,
+    log: Path | None = None,
+    shell: str = "",
+    loads: bool = False,
 ) -> Iterator[ServiceProcess]:
     """Serve a database while the block runs; `open_files` is all that the process may open.
 
-    `log` is the file that standard error goes to; `shell` is done by the shell that becomes the service.
+    `log` is the file that standard error goes to; `shell` is done by the shell that becomes the service. With either a
+    shell or `loads`, its processes load their modules; otherwise they are forked from one that has loaded them.
     """
-    made = ServiceProcess(database, *options, open_files=open_files, log=log, shell=shell)
+    made = ServiceProcess(database, *options, open_files=open_files, log=log, shell=shell, loads=loads)
     try:
         yield made
     finally:

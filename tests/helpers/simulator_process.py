@@ -6,7 +6,6 @@ import json
 import os
 import queue
 import subprocess
-import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import tomli_w
 
 from instruments.bench_config import read_bench
-from tests.helpers.processes import WAIT_S, begin, first_line, kill, labctl
+from tests.helpers.processes import WAIT_S, begin, begin_loaded, first_line, kill, labctl
 
 #: Time-outs are seconds of the bench. The faster it runs, the shorter the stall of a busy machine that breaks a link.
 SPEED = 4.0
@@ -27,9 +26,9 @@ temperatures_c = [25]
 rates_dps = [-{rate}, {rate}]
 positions = ["z"]
 [soak]
-hold_s = 10
+hold_s = 1
 max_drift_c = 2.0
-drift_window_s = 10
+drift_window_s = 1
 timeout_s = 1800
 [acquire]
 duration_s = 20000
@@ -53,8 +52,8 @@ class Simulator:
         near, pipe = folder / "near.toml", folder / "log"
         near.write_text(bench_toml())
         os.mkfifo(pipe)
-        command = [sys.executable, "-m", "labctl", "simulator", str(near), "--out", str(self.bench)]
-        self.process = begin([*command, "--speed", str(SPEED), "--log", str(pipe), "--json"])
+        command = ["simulator", str(near), "--out", str(self.bench), "--speed", str(SPEED)]
+        self.process = begin_loaded([*command, "--log", str(pipe), "--json"])
         self.heard: list[dict[str, Any]] = []
         self._table: queue.Queue[dict[str, Any]] = queue.Queue()
         self._reader = threading.Thread(target=self._read, args=(pipe,), daemon=True)
@@ -83,13 +82,16 @@ class Simulator:
             driver.terminate()
         return "\n".join(text for driver in self._drivers for text in driver.communicate(timeout=WAIT_S))
 
-    def drive(self, rate_dps: int, database: str) -> subprocess.Popen[str]:
-        """Start a campaign that turns the table for longer than the test lasts."""
+    def drive(self, rate_dps: int, database: str, *, loads: bool = False) -> subprocess.Popen[str]:
+        """Start a campaign that turns the table for longer than the test lasts.
+
+        With `loads` its process loads its modules; otherwise it is forked from one that has loaded them.
+        """
         recipe = self.folder / f"drive-{rate_dps}.toml"
         recipe.write_text(RECIPE.format(rate=rate_dps))
         clear = ("--clear-confirmed-by", "a test")  # what is far is not known to be simulated
-        arguments = ("campaign", "start", str(recipe), "--bench", str(self.bench), "--json", *clear)
-        driver = begin(labctl(self.folder / database, *arguments))
+        command = labctl(self.folder / database, "campaign", "start", str(recipe), "--bench", str(self.bench), "--json")
+        driver = begin([*command, *clear]) if loads else begin_loaded([*command[3:], *clear])
         self._drivers.append(driver)
         return driver
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -31,15 +32,22 @@ FORMAT = Format("Broken", "text/csv", "csv", lambda calibration: {}["x"])
 class Outside:
     """A folder of a user's: the files of one section, its package installed, a database of its own."""
 
-    def __init__(self, folder: Path, section: str) -> None:
-        self.folder, self.site = folder, folder / "site"
+    def __init__(self, folder: Path, section: str, kept: Path, installed: dict[str, Path]) -> None:
+        """`installed` are the packages that pip has installed for all tests, each kept in a folder of `kept`."""
+        self.folder, self.site, self.kept, self.installed = folder, folder / "site", kept, installed
         self.section = sections()[section]
         write_files(self.section, folder)
 
     def install(self, package: str) -> None:
-        """Install a package of this folder by pip, as the how-to does, into a folder of its own."""
-        options = ["--no-build-isolation", "--no-deps", "--target", str(self.site)]
-        subprocess.run([*PIP, *options, f"./{package}"], cwd=self.folder, check=True, capture_output=True)
+        """Install a package of this folder by pip, as the how-to does, into a folder of its own.
+
+        What pip has installed for another test, from the same files of the page, is copied.
+        """
+        if package not in self.installed:
+            options = ["--no-build-isolation", "--no-deps", "--target", str(self.site)]
+            subprocess.run([*PIP, *options, f"./{package}"], cwd=self.folder, check=True, capture_output=True)
+            self.installed[package] = Path(shutil.copytree(self.site, self.kept / package))
+        shutil.copytree(self.installed[package], self.site, dirs_exist_ok=True)
 
     def labctl(self, line: str, status: int = 0) -> subprocess.CompletedProcess[str]:
         """Run a command line of labctl in this folder; it must end with this exit status."""
@@ -65,9 +73,16 @@ class Outside:
         return json.loads(self.labctl(f"{line} --json", status).stdout)
 
 
+@pytest.fixture(scope="module")
+def installed() -> dict[str, Path]:
+    return {}
+
+
 @pytest.fixture
-def outside(tmp_path: Path) -> Callable[[str], Outside]:
-    return lambda section: Outside(tmp_path, section)
+def outside(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, installed: dict[str, Path]
+) -> Callable[[str], Outside]:
+    return lambda section: Outside(tmp_path, section, tmp_path_factory.mktemp("kept"), installed)
 
 
 def test_the_examples_are_what_the_page_says() -> None:

@@ -20,7 +20,7 @@ SAFE = "campaign 1 was stopped; bench single-axis-sim is safe"
 @pytest.fixture
 def campaign(simulator: Simulator) -> subprocess.Popen[str]:
     """Return the process of a campaign whose table has begun to turn."""
-    process = simulator.drive(FIRST_DPS, DATABASE)
+    process = simulator.drive(FIRST_DPS, DATABASE, loads=True)
     simulator.wait_for("!1m1")
     return process
 

@@ -16,7 +16,7 @@ import httpx
 import pytest
 
 from labctl.store import holder_of
-from tests.helpers.processes import WAIT_S, ServiceProcess, begin, first_line, labctl, running
+from tests.helpers.processes import WAIT_S, ServiceProcess, begin_loaded, first_line, running
 from tests.helpers.waiting import before_next_request
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
@@ -42,6 +42,11 @@ def holder(service: ServiceProcess) -> int:
     found = holder_of(str(service.database))
     assert found is not None
     return found.pid
+
+
+def serve(service: ServiceProcess, *options: str) -> subprocess.Popen[str]:
+    """Start another service on the same database."""
+    return begin_loaded(["serve", "--json", *SPEED, *options, "--database", str(service.database)])
 
 
 def is_replaced(service: ServiceProcess) -> bool:
@@ -103,7 +108,7 @@ def test_processes_that_stand_still_are_replaced_by_the_next_service(service: Se
     service.process.kill()
     service.process.wait()
     at = str(service.http.base_url.port)  # the web process that stood still has given the address back
-    heir = begin(labctl(service.database, "serve", "--port", at, "--json", *SPEED, "--bench", "single-axis-sim"))
+    heir = serve(service, "--port", at, "--bench", "single-axis-sim")
     try:
         reported = json.loads(first_line(heir))
         assert reported["bench_pid"] != service.bench_pid
@@ -126,12 +131,9 @@ def test_a_bench_process_outlives_its_supervisor_and_the_next_service_takes_char
     campaign = started(service)
     service.process.kill()
     service.process.wait()
-    command = ["serve", "--port", "0", "--json", *SPEED, "--bench"]
-    other = subprocess.run(
-        labctl(service.database, *command, "triaxial-sim"), capture_output=True, text=True, check=False, timeout=WAIT_S
-    )
-    assert (other.returncode, "drives bench single-axis-sim at speed 10" in other.stderr) == (2, True)
-    heir = begin(labctl(service.database, *command, "single-axis-sim"))
+    other = service.run("serve", "--port", "0", "--json", *SPEED, "--bench", "triaxial-sim", status=2)
+    assert "drives bench single-axis-sim at speed 10" in other.stderr
+    heir = serve(service, "--port", "0", "--bench", "single-axis-sim")
     try:
         reported = json.loads(first_line(heir))
         assert reported["bench_pid"] == service.bench_pid

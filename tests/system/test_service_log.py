@@ -15,8 +15,9 @@ import pytest
 from labctl.answers.admin import KeyRequest, Role
 from labctl.services.admin.api_keys import create_key
 from labctl.store import open_store
+from tests.helpers.forked_commands import run_labctl
 from tests.helpers.log_records import Record
-from tests.helpers.processes import WAIT_S, ServiceProcess, end_of, labctl, running
+from tests.helpers.processes import WAIT_S, ServiceProcess, end_of, running
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
@@ -110,8 +111,8 @@ def test_a_command_logs_only_when_it_is_asked_to(tmp_path: Path) -> None:
     def run(level: str | None, status: int) -> subprocess.CompletedProcess[str]:
         environment = {name: value for name, value in os.environ.items() if name != "LABCTL_LOG_LEVEL"}
         environment |= {} if level is None else {"LABCTL_LOG_LEVEL": level}
-        command = labctl(tmp_path / "lab.sqlite", "campaign", "start", "short", "--json")
-        ended = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=WAIT_S)
+        command = ["campaign", "start", "short", "--json", "--database", str(tmp_path / "lab.sqlite")]
+        ended = run_labctl(command, environment=environment)
         assert ended.returncode == status, ended.stderr
         return ended
 

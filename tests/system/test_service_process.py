@@ -35,11 +35,14 @@ def service(tmp_path: Path) -> Iterator[ServiceProcess]:
 
 @pytest.fixture(scope="module")
 def lasting_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceProcess]:
-    """A service for the tests that neither end it nor run a campaign, and leave nothing that another asks for."""
+    """A service for the tests that neither end it nor run a campaign, and leave nothing that another asks for.
+
+    Its processes are those of a user: they load their modules.
+    """
     folder = tmp_path_factory.mktemp("lasting")
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("XDG_CACHE_HOME", str(folder))
-        with running(folder / "lab.sqlite") as made:
+        with running(folder / "lab.sqlite", loads=True) as made:
             yield made
 
 

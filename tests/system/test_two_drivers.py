@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 
 import pytest
 
+from tests.helpers.forked_commands import run_labctl
 from tests.helpers.processes import WAIT_S
 from tests.helpers.simulator_process import FIRST_DPS, SECOND_DPS, Simulator
 
@@ -34,8 +33,8 @@ def test_the_second_is_refused_and_takes_over_when_the_first_is_killed(simulator
     first.wait(timeout=WAIT_S)
     assert "labctl campaign abort 1" in simulator.refused("lab.sqlite")  # a person decides about what was left
     for decided in (["campaign", "abort", "1"], ["bench", "clear", "single-axis-sim", "--by", "Ada"]):
-        command = [sys.executable, "-m", "labctl", *decided, "--database", str(simulator.folder / "lab.sqlite")]
-        subprocess.run(command, check=True, capture_output=True)
+        done = run_labctl([*decided, "--database", str(simulator.folder / "lab.sqlite")])
+        assert done.returncode == 0, done.stderr
     second = simulator.drive(SECOND_DPS, "lab.sqlite")
     simulator.wait_for(speed_command(SECOND_DPS))
     simulator.wait_for("!1m1")

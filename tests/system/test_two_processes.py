@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +16,7 @@ from instruments.bench_config import read_bench
 from labctl.answers.campaigns import BENCH_CHECKS, StartRequest
 from labctl.services.campaigns.execution import run_here
 from labctl.store import open_store
+from tests.helpers.processes import begin_loaded
 
 #: A unit counts as silent after 2 s of the bench, half a second of real time: a machine that is busy otherwise stalls
 #: for less.
@@ -25,13 +24,13 @@ SPEED = 4.0
 RECIPE = """
 format = "labctl-recipe/1"
 name = "two-processes"
-temperatures_c = [25, 26]
+temperatures_c = [25, 25.5]
 rates_dps = [-40, 0, 40]
 positions = ["z"]
 [soak]
-hold_s = 30
+hold_s = 10
 max_drift_c = 2.0
-drift_window_s = 30
+drift_window_s = 10
 timeout_s = 1800
 [acquire]
 duration_s = 10
@@ -57,9 +56,8 @@ def bench_file(folder: Path) -> Path:
 def far_bench(tmp_path: Path) -> Iterator[Path]:
     """The same bench on real pseudo-terminals and a real TCP port, in a process of its own."""
     bench = tmp_path / "far.toml"
-    command = [sys.executable, "-m", "labctl", "simulator", str(bench_file(tmp_path))]
-    command += ["--out", str(bench), "--speed", str(SPEED), "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as simulator:
+    command = ["simulator", str(bench_file(tmp_path)), "--out", str(bench), "--speed", str(SPEED), "--json"]
+    with begin_loaded(command) as simulator:
         try:
             assert simulator.stdout is not None
             said = json.loads(simulator.stdout.readline())
@@ -86,7 +84,7 @@ def test_the_same_data_sets_within_noise(far_bench: Path, tmp_path: Path) -> Non
     assert (one.state, two.state) == ("done", "done"), (one.reason, two.reason)
     near, far = data_sets(here, one.id), data_sets(there, two.id)
     assert len(near["n"]) == len(far["n"]) == 6
-    for name in ("position", "run", "mounting"):
+    for name in ("position", "run", "mounting", "chamber_setpoint_c"):
         assert np.array_equal(near[name], far[name]), name
     assert np.all(np.diff(far["dataset"]) > 0)  # one that a stall of a busy machine ended is taken again, as the next
     assert far["table_rate_dps"] == pytest.approx(near["table_rate_dps"], rel=1e-12)

@@ -97,11 +97,8 @@ def foreign(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Foreign]
 def test_a_campaign_from_end_to_end(foreign: Foreign) -> None:
     recipe, database = foreign.folder / "recipe.toml", foreign.folder / "x.db"
     recipe.write_text(RECIPE)
-    run = subprocess.run(
-        [sys.executable, "-m", "labctl", "campaign", "start", str(recipe), "--bench", str(foreign.bench), "--json",
-         "--clear-confirmed-by", "a test", "--database", str(database)],
-        capture_output=True, text=True, timeout=WAIT_S, check=False,
-    )  # fmt: skip
+    command = ["campaign", "start", str(recipe), "--bench", str(foreign.bench), "--json"]
+    run = run_labctl([*command, "--clear-confirmed-by", "a test", "--database", str(database)])
     assert run.returncode == 0, run.stderr
     left = foreign.end()
     assert left["rate_dps"] == 0.0
