@@ -5249,7 +5249,7 @@ export interface components {
             toml: string;
             /**
              * Power
-             * @description Probability, before the experiment, that it decides between the leading effect and its nearest rival, 0 to 1.
+             * @description Probability, before the experiment, that the verdict then names one cause alone (exact aliases are one), 0 to 1.
              */
             power: number;
             /**
@@ -5259,7 +5259,7 @@ export interface components {
             hours: number;
             /**
              * Per Hour
-             * @description Least chi2 (at most 40) by which a rival fails to explain the leading effect, per hour, 1/h.
+             * @description Expected information in the identity of the cause per hour of bench and person, bit/h.
              */
             per_hour: number;
         };

@@ -332,11 +332,7 @@ function experimentList(criticism) {
           "div",
           { class: "notice" },
           h("p", {}, each.do, each.hours ? ` (${number(each.hours, 2)} h)` : ""),
-          h(
-            "p",
-            { class: "muted small" },
-            each.why,
-          ),
+          h("p", { class: "muted small" }, each.why),
           each.toml
             ? h("a", { class: "button tiny", href: `/campaigns/new?toml=${encodeURIComponent(each.toml)}` }, "Plan it")
             : null,
