@@ -23,6 +23,7 @@ STUDIES = (
     "accelerometer_temperature",
     "joint_recordings",
     "criticism",
+    "laws",
     "rest_loops",
     "scale_loops",
     "rest_verdicts",
