@@ -2,8 +2,8 @@
 
 Twenty laws that the catalogue has not (`studies.foreign_laws`) are added in turn to the outputs of simulated units, so
 large that what the published model cannot absorb has chi2 = z^2 over all data sets, each at the noise floor of its
-mean, for z = 10, 30, 100 and 300. A law of which less than 3 % is visible beside the model is left out. Every recording is criticised and laws are proposed whatever the verdict; in use they are
-proposed where the verdict is *unexplained*.
+mean, for z = 10, 30, 100 and 300. A law of which less than 3 % is visible beside the model is left out. Every recording
+is criticised, and laws are proposed whatever the verdict; in use they are proposed where the verdict is *unexplained*.
 
 The error of a proposal is what it models minus the hidden law over the hidden law (root mean squares), each without the
 part that the model absorbs: on the data sets that it is fitted to, and on another recording of the same unit on another
