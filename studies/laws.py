@@ -56,7 +56,7 @@ MIN_VISIBLE = 0.03
 GOOD = 0.1
 #: What is left of the other recording is clearly worse from this ratio on.
 CLEARLY = 1.01
-#: The channels that a law may depend on: outside their ranges it is not held against the truth.
+#: The channels that a law may depend on: outside their ranges it is not compared with the truth.
 LIMITING = (
     "table_rate_dps", "temperature_c", "chamber_c", "supply_v", "humidity_pct", "power_s", "t_s",
 )  # fmt: skip
@@ -163,7 +163,7 @@ def _rms(parts: Iterable[Array]) -> float:
 
 @dataclass(frozen=True)
 class Witness:
-    """The data sets of one recording with the hidden law in each, against which proposals are held."""
+    """The data sets of one recording with the hidden law in each, with which proposals are compared."""
 
     data: FitData
     hidden_dps: Mapping[str, Array]
@@ -241,7 +241,7 @@ def with_law(case: Case, day: int) -> Recording:
 
 
 def outcome(case: Case) -> Outcome | None:
-    """Hide a law, criticise, and hold what is proposed against the truth; None where the model absorbs the law."""
+    """Hide a law, criticise, and compare what is proposed with the truth; None where the model absorbs the law."""
     if case.law and unit_size(case.schedule, case.seed, case.law)[1] < MIN_VISIBLE:
         return None
     recording = with_law(case, 0)
