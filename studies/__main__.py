@@ -24,6 +24,7 @@ STUDIES = (
     "joint_recordings",
     "criticism",
     "diagnosis",
+    "laws",
     "rest_loops",
     "scale_loops",
     "rest_verdicts",

@@ -37,6 +37,10 @@ MAX_CHANNELS = 2
 ALIKE = 0.9995
 #: A law is not proposed that has this much less evidence than the best, nats.
 FAR_BEHIND = 12.0
+#: Two channels moved together where the correlation of their ranks is beyond this.
+MOVED_TOGETHER = 0.9
+#: Between the rates of the data sets a law adds no more than this many times what it adds at them.
+ASTRAY = 1.5
 #: More formulas than this no model has.
 MAX_NAMES = 40
 #: Shares of the rates of the data sets at which laws are compared: between them and, where the unit can, beyond.
@@ -133,11 +137,42 @@ def breaking(laws: Sequence[Law], found: Criticism) -> Breaking | None:
 
 
 def _channels(found: Criticism) -> list[str]:
-    """Return the rate, and the first channels that the residual follows; the temperature where it follows none."""
-    follows = [name for name in found.verdict.depends_on if name != TABLE_RATE]
+    """Return the rate, and the first channels that the residual follows; the temperature where it follows none.
+
+    A channel that moved with the temperature is left out: the schedule does not say which of the two it is.
+    """
+    follows = [
+        name for name in found.verdict.depends_on if name != TABLE_RATE and not _moved_with_temperature(found, name)
+    ]
     if TEMPERATURE not in follows[:MAX_CHANNELS]:
         follows = [*follows[: MAX_CHANNELS - 1], TEMPERATURE]
     return [TABLE_RATE, *follows[:MAX_CHANNELS]]
+
+
+def _moved_with_temperature(found: Criticism, name: str) -> bool:
+    """Return whether a channel rose and fell with the temperature, or against it, over the data sets."""
+    data = found.fit_data
+    if name == TEMPERATURE or name not in data.channels or not data.channels.history.thermometer:
+        return False
+    values = np.asarray(data.channels[name], dtype=np.float64)
+    ranks = np.argsort(np.argsort(np.stack([values, data.temperature_c]), axis=1), axis=1)
+    one, other = ranks - ranks.mean(axis=1, keepdims=True)
+    return bool(abs(one @ other) > MOVED_TOGETHER * np.linalg.norm(one) * np.linalg.norm(other))
+
+
+def _goes_astray(found: Criticism, base: FitResult, fit: FitResult) -> bool:
+    """Return whether a fit leaves what it has at the data sets by far between their rates: it was not measured there."""
+    data = found.fit_data
+    for axis in data.outputs:
+        rate_dps = data.true_rate_dps(axis)
+        at_sets = fit.fitted.error_dps(data.channels, axis) - base.fitted.error_dps(data.channels, axis)
+        most = ASTRAY * float(np.abs(at_sets).max(initial=0.0))
+        for share in (share for share in BETWEEN if share <= 1.0):
+            channels = data.channels.with_rates({**data.channels.rates, axis: share * rate_dps})
+            between = fit.fitted.error_dps(channels, axis) - base.fitted.error_dps(channels, axis)
+            if float(np.abs(between).max(initial=0.0)) > most:
+                return True
+    return False
 
 
 def _fitted(found: Criticism, comparison: Comparison, base: FitResult, state: State) -> Law | None:
@@ -150,7 +185,7 @@ def _fitted(found: Criticism, comparison: Comparison, base: FitResult, state: St
         fit = fit_preset(found.fit_data, changed(base.fitted.model, terms))
     except LabctlError:  # what is exported could not be inverted, or the means do not determine it
         return None
-    if _is_worse(base, fit):
+    if _is_worse(base, fit) or _goes_astray(found, base, fit):
         return None
     kinds = tuple(part.shape.kind for part in state.parts)
     taken = {axis: values - fit.residual_dps[axis] for axis, values in base.residual_dps.items()}

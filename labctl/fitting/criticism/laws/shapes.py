@@ -29,6 +29,8 @@ WIDTHS = (0.1, 0.25, 0.6)
 #: Waves over half the range.
 WAVES = tuple(round(float(np.pi * n), 2) for n in np.arange(0.5, 6.1, 0.25))
 GROWTHS = (-1.5, -4.0, 1.5, 4.0)
+#: Phase of a wave from one value to the next at most, rad: three quarters of what values at equal distances distinguish.
+FASTEST_PHASE = 0.75 * np.pi
 #: A constant stays within these factors of where it began.
 MOST_CHANGE = 3.0
 
@@ -42,6 +44,7 @@ class Shape:
     constants: Mapping[str, float] = field(default_factory=dict)
     places: frozenset[str] = frozenset()  #: constants that are places, and may move to 0 and beyond
     nodes: int = 1  #: how long it is to write
+    least: Mapping[str, float] = field(default_factory=dict)  #: what a constant may not fall below
 
     def formulas(self, constants: Mapping[str, float] | None = None) -> tuple[str, ...]:
         """Return the formulas with constants in place of their names."""
@@ -110,6 +113,7 @@ class Scale:
     text: str
     centre: float
     half: float
+    gap: float = 0.0  #: largest distance between neighbouring values, over `half`
 
 
 def scales_of(data: ReducedRecording, channels: Sequence[str]) -> dict[str, Scale]:
@@ -121,7 +125,8 @@ def scales_of(data: ReducedRecording, channels: Sequence[str]) -> dict[str, Scal
     for name in channels:
         if name == TABLE_RATE and fastest > 0:
             largest = _rounded(fastest)
-            scales[name] = Scale(name, f"({OWN_RATE}/{largest:g})", 0.0, largest)
+            rates = np.abs(np.concatenate([data.nodes.rate_dps(str(each)) for each in data.info.axes]))
+            scales[name] = Scale(name, f"({OWN_RATE}/{largest:g})", 0.0, largest, _gap(rates / largest))
         elif name in known and name in (*data.nodes.columns, TEMPERATURE):
             scales[name] = _scale(name, _values(data, name, axis))
     return scales
@@ -138,7 +143,25 @@ def _scale(name: str, values: Array) -> Scale:
     half = _rounded((high - low) / 2)
     centre = float(f"{round((low + high) / 2 / half, 2) * half:.{DIGITS + 2}g}")
     inner = name if centre == 0 else f"({name} {'-' if centre > 0 else '+'} {abs(centre):.10g})"
-    return Scale(name, f"({inner}/{half:g})", centre, half)
+    return Scale(name, f"({inner}/{half:g})", centre, half, _gap(values / half))
+
+
+def _gap(values: Array) -> float:
+    """Return the largest distance between neighbouring values, to a hundredth."""
+    return float(np.diff(np.unique(np.round(values, 2))).max(initial=0.0))
+
+
+def _seen(shape: Shape, gap: float) -> Shape | None:
+    """Return a shape that values with such gaps between them show: no narrower, and no faster, than they resolve.
+
+    Between the values a narrower one would say what was not measured.
+    """
+    width, wave = shape.constants.get("w"), "wave" in shape.kind
+    if width is None or "exponential" in shape.kind:
+        return shape
+    if wave:
+        return shape if width * gap <= FASTEST_PHASE else None
+    return replace(shape, least={"w": gap}) if width >= gap else None
 
 
 def _rounded(value: float) -> float:
@@ -150,11 +173,11 @@ def library(scales: Mapping[str, Scale]) -> list[Shape]:
     rate = scales.get(TABLE_RATE)
     found: list[Shape] = []
     if rate is not None:
-        found += [shape.of(rate.text) for shape in _of_rate()]
+        found += [shape.of(rate.text) for shape in _of_rate(rate)]
     for scale in scales.values():
         if scale is rate:
             continue
-        of_channel = [_named(shape, scale) for shape in OF_CHANNEL]
+        of_channel = [_named(shape, scale) for each in OF_CHANNEL if (shape := _seen(each, scale.gap)) is not None]
         found += of_channel
         if rate is None:
             continue
@@ -165,18 +188,19 @@ def library(scales: Mapping[str, Scale]) -> list[Shape]:
         ]
         found += [
             shape.of(rate.text).times(factor.format(u=scale.text), f"times {words} {scale.name}")
-            for shape in _of_rate()
+            for shape in _of_rate(rate)
             for factor, words in (("{u}", "the"), ("{u}**2", "the square of the"))
         ]
     found += _of_two([scale for scale in scales.values() if scale is not rate])
     return list({shape.formulas(): shape for shape in found}.values())
 
 
-def _of_rate() -> Iterator[Shape]:
-    for shape in OF_SPEED:
-        yield shape
-        yield replace(shape.times("sign({u})", ""), kind=f"{shape.kind}, odd")
-    yield from WAVES_OF_RATE
+def _of_rate(rate: Scale) -> Iterator[Shape]:
+    for each in OF_SPEED:
+        if (shape := _seen(each, rate.gap)) is not None:
+            yield shape
+            yield replace(shape.times("sign({u})", ""), kind=f"{shape.kind}, odd")
+    yield from (shape for each in WAVES_OF_RATE if (shape := _seen(each, rate.gap)) is not None)
 
 
 def _named(shape: Shape, scale: Scale) -> Shape:
@@ -203,5 +227,6 @@ def bounds_of(shape: Shape) -> dict[str, tuple[float, float]]:
             limits[name] = (max(value - 0.15, 0.02), value + 0.15)
         else:
             factor = 1.3 if "wave" in shape.kind else MOST_CHANGE
-            limits[name] = (min(value / factor, value * factor), max(value / factor, value * factor))
+            low, high = sorted((value / factor, value * factor))
+            limits[name] = (max(low, shape.least.get(name, low)), high)
     return limits
