@@ -161,7 +161,7 @@ def _moved_with_temperature(found: Criticism, name: str) -> bool:
 
 
 def _goes_astray(found: Criticism, base: FitResult, fit: FitResult) -> bool:
-    """Return whether a fit leaves what it has at the data sets by far between their rates: it was not measured there."""
+    """Return whether a fit adds far more between the rates of the data sets, where nothing was measured."""
     data = found.fit_data
     for axis in data.outputs:
         rate_dps = data.true_rate_dps(axis)

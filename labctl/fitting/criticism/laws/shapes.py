@@ -29,7 +29,7 @@ WIDTHS = (0.1, 0.25, 0.6)
 #: Waves over half the range.
 WAVES = tuple(round(float(np.pi * n), 2) for n in np.arange(0.5, 6.1, 0.25))
 GROWTHS = (-1.5, -4.0, 1.5, 4.0)
-#: Phase of a wave from one value to the next at most, rad: three quarters of what values at equal distances distinguish.
+#: Phase of a wave from one value to the next at most, rad: three quarters of what equal distances distinguish.
 FASTEST_PHASE = 0.75 * np.pi
 #: A constant stays within these factors of where it began.
 MOST_CHANGE = 3.0
