@@ -163,10 +163,8 @@ from labctl.answers.criticism import (
     Experiment as Experiment,
     FailingRange as FailingRange,
     LackOfFit as LackOfFit,
-    LawTest as LawTest,
     NotTestable as NotTestable,
     OutputStep as OutputStep,
-    ProposedLaw as ProposedLaw,
     Remainder as Remainder,
     ResidualMap as ResidualMap,
     SlowProcess as SlowProcess,
@@ -278,6 +276,7 @@ from labctl.answers.kept_answers import (
     KeptVersion as KeptVersion,
 )
 from labctl.answers.ladder import LadderResponse as LadderResponse, LadderRow as LadderRow
+from labctl.answers.laws import LawTest as LawTest, ProposedLaw as ProposedLaw
 from labctl.answers.live import (
     LiveCoefficientResponse as LiveCoefficientResponse,
     LiveEnd as LiveEnd,

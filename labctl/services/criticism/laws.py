@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from labctl.answers.criticism import LawTest, ProposedLaw
+from labctl.answers.laws import LawTest, ProposedLaw
 from labctl.fitting.criticism import Breaking, Criticism, Law, breaking, coefficients_of_law, consequences, laws_of
 from labctl.progress import report_stage
 
