@@ -93,6 +93,8 @@ def _print_laws(answer: CriticismResponse) -> None:
         errors = f"{format_number(law['rms_after_dps'])} deg/s, held-out {format_number(law['heldout_rms_after_dps'])}"
         text = f"{100 * law['probability']:.0f} %: {'; '.join(law['formulas'])}: {errors}"
         console.print(text, soft_wrap=not console.is_terminal)
+    if answer.law_test is not None:
+        console.print(f"to distinguish the first two: {answer.law_test['do']}", soft_wrap=not console.is_terminal)
     first = answer.laws[0]
     for sentence in first["follows"]:
         console.print(f"If it is the first: {sentence}", style="dim", soft_wrap=not console.is_terminal)

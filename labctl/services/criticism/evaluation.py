@@ -18,7 +18,7 @@ from labctl.fitting.models.inversion import NotConverged
 from labctl.progress import report_stage
 from labctl.services.criticism.answer import answer_of, with_warnings
 from labctl.services.criticism.decimated_readings import Decimated
-from labctl.services.criticism.laws import law_sentences, proposed_laws
+from labctl.services.criticism.laws import proposed_laws
 from labctl.services.criticism.measurements import Measurements, refuse_unmeasured
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.verification.of_version import verify
@@ -79,7 +79,7 @@ def evaluate(
     experiments = _experiments(store, recordings, criticised)
     criticism = answer_of(serial, version, measured.recordings, criticised, experiments)
     laws, law_test = proposed_laws(criticised)
-    said = [*criticism.text, *law_sentences(laws, law_test), *held_sentences(model)]
+    said = [*criticism.text, *held_sentences(model)]
     criticism = criticism.model_copy(update={"text": said, "laws": laws, "law_test": law_test})
     return (
         with_warnings(criticism.model_copy(update={"applied": applied}), warnings),

@@ -51,22 +51,3 @@ def _test(place: Breaking | None, found: Criticism) -> LawTest | None:
         "difference_dps": place.difference_dps,
         "do": f"measure at {at}: there the two likeliest laws differ most, by {place.difference_dps:.3g} deg/s{times}",
     }
-
-
-def law_sentences(laws: list[ProposedLaw], test: LawTest | None) -> list[str]:
-    """Return the likeliest law in words, and what would tell it from the next; nothing without a law."""
-    if not laws:
-        return []
-    first = laws[0]
-    axis, equation = next(iter(first["equations"].items()))
-    of_axis = f" on axis {axis}" if len(first["equations"]) > 1 else ""
-    others = f", or {len(laws) - 1} other{'s' if len(laws) > 2 else ''}" if len(laws) > 1 else ""
-    law = (
-        f"A law describes it, which names no cause{of_axis}: {equation} deg/s{others}; with it the residual is "
-        f"{_dps(first['rms_after_dps'])}, at parts left out of the fit {_dps(first['heldout_rms_after_dps'])}."
-    )
-    return [law] if test is None else [law, f"To distinguish the laws, {test['do']}."]
-
-
-def _dps(value: float | None) -> str:
-    return "not known" if value is None else f"{value:.3g} deg/s"
