@@ -17,7 +17,7 @@ from tests.helpers.extending_page import PAGE, commands_of, files_of, sections, 
 from tests.helpers.forked_commands import run_labctl
 from tests.helpers.paths import EXAMPLES, ROOT
 
-GYRO, EFFECT, EXPORT, IMPORTER, RECIPE = sections()
+GYRO, EFFECT, EXPORT, _EXPERIMENT, IMPORTER, RECIPE = sections()
 PACKAGES = {GYRO: "acme-gyro", EFFECT: "acme-humidity", EXPORT: "acme-table", IMPORTER: "acme-log"}
 PIP = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-index"]
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Coroutine
+from typing import Any
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -36,7 +37,7 @@ def test_a_server_that_ends_leaves_no_broken_transfer() -> None:
         assert (begun + rest_of(client)).endswith(LAST_CHUNK)
 
 
-def test_a_client_that_leaves_ends_its_stream() -> None:
+def test_a_client_that_leaves_ends_its_stream(in_a_loop: Callable[[Coroutine[Any, Any, Any]], Any]) -> None:
     ended = asyncio.Event()
 
     async def watched() -> AsyncIterator[bytes]:
@@ -60,4 +61,4 @@ def test_a_client_that_leaves_ends_its_stream() -> None:
         await EventStream(watched())({"type": "http"}, receive, send)
         assert ended.is_set()
 
-    asyncio.run(leave())
+    in_a_loop(leave())

@@ -18,9 +18,8 @@ from labctl.services import forked
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.criticism.decimated_readings import read_recording_of
-from labctl.services.criticism.measurements import Measurements
 from labctl.services.recordings.loading import points_of
-from labctl.store import RecordingRow, open_store
+from labctl.store import open_store
 from labctl.store.repositories.recordings import Recordings
 from tests.helpers.simulated_recordings import single_axis
 
@@ -108,14 +107,3 @@ def test_readings_that_a_fork_has_read_give_the_same_criticism(tmp_path: Path, m
                 answers.append(criticise_unit(store, "FOG-0001", 1, None))
             assert calls["iter_datasets"] == (2 if forks else 3)  # the inspection reads them too, twice
     assert answers[0] == answers[1]
-
-
-def test_experiments_are_changes_of_the_widest_of_several_recordings(tmp_path: Path) -> None:
-    """Not of a short one that came later; of equal ones of the newest."""
-    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
-        rows = [
-            RecordingRow(number, "G", number, "gyro", "samples", {}, datetime(2026, 1, 5, tzinfo=UTC), datasets, 0)
-            for number, datasets in ((1, 27), (2, 27), (3, 6))
-        ]
-        assert Measurements(store, tuple(rows)).widest.id == 2
-        assert Measurements(store, tuple(rows[2:])).widest.id == 3
