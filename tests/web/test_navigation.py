@@ -93,7 +93,8 @@ def test_an_address_without_a_page_gets_one_that_says_so(
     expect(page.get_by_role("main")).to_contain_text(
         "is not in this database" if address.startswith("/units/%") else "There is no page"
     )
-    faults.clear()  # the browser reports the 404 that the page is about
+    page.wait_for_load_state("networkidle")
+    faults.clear()  # the browser reports each 404 of what the page is about
 
 
 def test_a_program_gets_a_problem_document_for_an_address_without_anything(service: Service) -> None:

@@ -14,6 +14,7 @@ from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.calibration import Calibration
 from labctl.exports import FORMATS, Format
+from labctl.services import units
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
@@ -113,6 +114,15 @@ def test_an_unknown_uncertainty_has_its_reason(client: TestClient) -> None:
         assert set(cell["unknown"]) == {"coefficients", "model", "repeatability"}
 
 
+@pytest.fixture
+def formats_read_again() -> Iterator[None]:
+    """Forget the formats that a request of this process has listed, before a test that installs one and after it."""
+    units._formats.cache_clear()
+    yield
+    units._formats.cache_clear()
+
+
+@pytest.mark.usefixtures("formats_read_again")
 def test_a_unit_names_every_format_of_the_registry(fog: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     register(monkeypatch, FORMATS, "text", Format("Plain text", "text/plain", "txt", Calibration.to_bytes))
     formats = {each["id"]: each for each in fog.get("/api/units/OSU-FOG-2024").json()["formats"]}
