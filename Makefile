@@ -14,7 +14,7 @@ demo: install
 
 test: $(VENV)/.tested
 	@scripts/install-test-dependencies
-	@$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
+	@$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
 
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .

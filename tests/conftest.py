@@ -8,7 +8,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,6 @@ from tests.helpers import memory_folder
 from tests.helpers.built_command import build_once
 from tests.helpers.cortex_m import INSTALL_CORTEX_M, has_cortex_m
 from tests.helpers.leftovers import leftover_tasks, leftover_threads
-from tests.helpers.mixed_scheduling import MixedScheduling, place_of
 from tests.helpers.signal_defaults import default_signals
 
 #: The same examples every time and on every machine; a busy machine is slow, not wrong.
@@ -124,15 +123,35 @@ def in_a_loop() -> Callable[[Coroutine[Any, Any, Any]], Any]:
     return run
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Have the tests that wait run beside those that compute."""
-    return MixedScheduling(config, log) if config.getvalue("dist") == "loadfile" else None
+#: Tests that mostly wait: for a browser, a process, a serial line.
+WAITING = ("tests/system/", "tests/web/", "tests/test_docs_")
+#: Tests that compute for longest, 10 to 60 s of processor time a file: early, so that none is left alone at the end.
+LONG = (
+    "tests/labctl/corpus/", "tests/labctl/fitting/criticism/", "tests/labctl/services/campaigns/test_resume",
+    "tests/labctl/services/criticism/test_next_experiment", "tests/blind/",
+)  # fmt: skip
+#: So many files of other tests come between two that wait: these then wait while the other workers compute. With them
+#: all at the begin, all workers waited at once; the last one comes well before the end.
+BETWEEN = 8
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Return the files of tests in the order in which workers take them."""
+    waiting = [name for name in names if name.startswith(WAITING)]
+    others = sorted(
+        (name for name in names if not name.startswith(WAITING)), key=lambda name: not name.startswith(LONG)
+    )
+    order = []
+    for number, name in enumerate(waiting):
+        order += [name, *others[BETWEEN * number : BETWEEN * (number + 1)]]
+    return [*order, *others[BETWEEN * len(waiting) :]]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Have the files that take longest first; leave out what this machine cannot do, and say so."""
-    items.sort(key=lambda item: place_of(item.nodeid))
+    """Have the tests that wait beside those that compute; leave out what this machine cannot do, and say so."""
+    files = dict.fromkeys(item.nodeid.partition("::")[0] for item in items)
+    place = {name: number for number, name in enumerate(in_order(files))}
+    items.sort(key=lambda item: place[item.nodeid.partition("::")[0]])
     for marker, is_there, reason in (
         ("needs_cc", shutil.which("cc") is not None, "no C compiler (on Debian: apt-get install gcc libc6-dev)"),
         ("needs_cortex_m", has_cortex_m(), f"no compiler and emulator for ARM ({INSTALL_CORTEX_M})"),

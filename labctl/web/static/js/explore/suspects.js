@@ -7,7 +7,6 @@ import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { heldOutName } from "./first_models.js";
-import { whatIf } from "./what_if.js";
 
 /** @import { Criticism, Effect, Suspect } from "../../../types/api.js" */
 /** @import { Child } from "../../../types/pages.js" */
@@ -119,7 +118,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
       "What if",
       async () => {
         const others = speaking.filter((each) => each !== suspect);
-        const explained = await explain(suspect.effect);
+        const [explained, { whatIf }] = await Promise.all([explain(suspect.effect), import("./what_if.js")]);
         setChildren(open, whatIf({ state, suspect, others, explained, explain }));
         scrollTo(open, "nearest");
       },

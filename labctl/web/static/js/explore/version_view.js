@@ -8,8 +8,6 @@ import { option, toggleGroup } from "../core/fields.js";
 import { idText } from "../core/format.js";
 import { navigate } from "../core/router.js";
 import { jointCard } from "../joint/card.js";
-import { showTour } from "../tour/tour.js";
-import { askCertification } from "../unit/certification.js";
 import { asked as askedFor } from "./chosen_recordings.js";
 import { errorComparison } from "./compare/error_comparison.js";
 import { axisNames, inDatasetOrder } from "./dataset_rows.js";
@@ -75,7 +73,7 @@ export function versionView(given) {
     .then(([criticism, catalogue]) => {
       setChildren(place, finish?.element ?? null, sections(given, criticism, catalogue.effects));
       finish?.settle(nextSteps(given, criticism));
-      if (query.tour) showTour(place, signal);
+      if (query.tour) import("../tour/tour.js").then(({ showTour }) => showTour(place, signal));
       else if (location.hash) document.getElementById(location.hash.slice(1))?.scrollIntoView();
     })
     .catch(
@@ -143,6 +141,7 @@ function nextSteps({ unit, calibration }, criticism) {
   const { version } = calibration;
   const certify = async () => {
     await navigate(`/units/${encodeURIComponent(serial)}?version=${version}`);
+    const { askCertification } = await import("../unit/certification.js"); // no weight of a first visit
     await askCertification(serial, version);
   };
   return [
