@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from labctl.answers.laws import LawTest, ProposedLaw
 from labctl.fitting.criticism import Breaking, Criticism, Law, breaking, coefficients_of_law, consequences, laws_of
 from labctl.progress import report_stage
 
-#: Verdicts that leave something without a name.
-WITHOUT_NAME = frozenset({"unexplained"})
-
 
 def proposed_laws(found: Criticism) -> tuple[list[ProposedLaw], LawTest | None]:
     """Return laws for what has no name, and where the two likeliest differ most; none beside a name."""
-    if found.verdict.form not in WITHOUT_NAME or found.comparison is None:
+    if found.verdict.form != "unexplained":
         return [], None
     report_stage("searching a law")
     laws = laws_of(found)
@@ -25,7 +24,7 @@ def _law(law: Law, found: Criticism) -> ProposedLaw:
         "formulas": list(law.formulas),
         "kinds": list(law.kinds),
         "equations": {
-            axis: " + ".join(f"{of_axis[term.effect]['value']:.4g} * {term.formula}" for term in law.terms)
+            axis: _sum([(of_axis[term.effect]["value"], term.formula) for term in law.terms])
             for axis, of_axis in coefficients.items()
         },
         "coefficients": coefficients,
@@ -35,6 +34,12 @@ def _law(law: Law, found: Criticism) -> ProposedLaw:
         "heldout_rms_after_dps": law.fit.error.heldout_rms_dps,
         "follows": consequences(law, found),
     }
+
+
+def _sum(terms: Sequence[tuple[float, str]]) -> str:
+    """Return a sum of formulas with their coefficients."""
+    first, *others = (f"{'-' if value < 0 else '+'} {abs(value):.4g} * {formula}" for value, formula in terms)
+    return " ".join([first.removeprefix("+ ").replace("- ", "-", 1), *others])
 
 
 def _test(place: Breaking | None, found: Criticism) -> LawTest | None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from labctl.fitting.criticism.criticism import Criticism
-from labctl.fitting.criticism.laws.proposals import Law
+from labctl.fitting.criticism.laws.proposals import Law, added_dps, at_rates
 from labctl.fitting.criticism.laws.shapes import TEMPERATURE
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.formula import RATES, Formula
@@ -17,26 +17,48 @@ from labctl.fitting.numeric.arrays import Array
 SYMMETRIC = 0.02
 #: Beyond the fastest rate by this share, and beyond the temperatures by so much, K.
 FASTER, BEYOND_K = 0.25, 10.0
+#: Data sets this near to the warmest or coldest are at the end of the range, K.
+SAME_C = 0.5
 
 
 def consequences(law: Law, found: Criticism) -> list[str]:
-    """Return what else would follow from a law, one sentence each, on the axis on which it is largest."""
-    data = found.fit_data
-    values = {axis: _of(law, data.channels, axis) for axis in data.outputs}
-    axis = max(values, key=lambda name: float(np.ptp(values[name])))
-    said = [_symmetry(law, data.channels, axis)] if _has_rate(law) else ["It does not depend on the rate."]
-    rates = np.abs(data.true_rate_dps(axis))
-    fastest = float(rates.max())
-    if _has_rate(law) and (1 + FASTER) * fastest <= (data.info.max_rate_dps or np.inf):
-        row = int(np.argmax(rates))
-        faster = _at_rates(data.channels, axis, 1 + FASTER)
-        said.append(
-            f"At {(1 + FASTER) * fastest:.4g} deg/s, which was not measured, it would be "
-            f"{_of(law, faster, axis)[row]:.3g} deg/s (at {fastest:.4g} deg/s it is {values[axis][row]:.3g})."
-        )
+    """Return what else would follow from a law, one sentence each, on the axis on which it adds most."""
+    data, base = found.fit_data, found.base
+    if base is None:
+        return []
+    channels = data.channels
+    added = {axis: added_dps(law.fit, base, channels, axis) for axis in data.outputs}
+    axis = max(added, key=lambda name: float(np.abs(added[name]).max()))
+    if not _has_rate(law):
+        said = ["It does not depend on the rate."]
+    else:
+        said = [_symmetry(law, channels, axis)]
+        row = int(np.argmax(np.abs(channels.rate_dps(axis))))
+        fastest_dps = float(abs(channels.rate_dps(axis)[row]))
+        if (1 + FASTER) * fastest_dps <= (data.info.max_rate_dps or np.inf):
+            then = added_dps(law.fit, base, at_rates(channels, axis, 1 + FASTER), axis)
+            said.append(_beyond(f"{(1 + FASTER) * fastest_dps:.4g} deg/s", then, added[axis], row))
     if any(TEMPERATURE in text for text in law.formulas):
-        said += [_beyond(law, data.channels, axis, sign, data.temperature_c, values[axis]) for sign in (1, -1)]
+        for sign, end in ((1, "warmest"), (-1, "coldest")):
+            row = _row_at_end(sign * data.temperature_c, added[axis])
+            warm_c = data.temperature_c + sign * BEYOND_K
+            moved = replace(channels, columns={**channels.columns, TEMPERATURE: warm_c})
+            at = f"{warm_c[row]:.4g} deg C, {BEYOND_K:g} K beyond the {end} data set"
+            said.append(_beyond(at, added_dps(law.fit, base, moved, axis), added[axis], row))
     return said
+
+
+def _beyond(where: str, then: Array, now: Array, row: int) -> str:
+    return (
+        f"At {where}, where nothing was measured, it would add {then[row]:.3g} deg/s to what the model expects; at the "
+        f"nearest data set it adds {now[row]:.3g} deg/s."
+    )
+
+
+def _row_at_end(rising: Array, added: Array) -> int:
+    """Return the data set at the end of a range at which most is added."""
+    at_end = np.flatnonzero(rising > rising.max() - SAME_C)
+    return int(at_end[np.argmax(np.abs(added[at_end]))])
 
 
 def _of(law: Law, channels: Channels, axis: str) -> Array:
@@ -55,13 +77,9 @@ def _has_rate(law: Law) -> bool:
     return any(name in text for text in law.formulas for name in RATES)
 
 
-def _at_rates(channels: Channels, axis: str, share: float) -> Channels:
-    return channels.with_rates({**channels.rates, axis: share * channels.rate_dps(axis)})
-
-
 def _symmetry(law: Law, channels: Channels, axis: str) -> str:
-    there, back = (_of(law, _at_rates(channels, axis, share), axis) for share in (1.0, -1.0))
-    at_rest = _of(law, _at_rates(channels, axis, 0.0), axis)
+    there, back = (_of(law, at_rates(channels, axis, share), axis) for share in (1.0, -1.0))
+    at_rest = _of(law, at_rates(channels, axis, 0.0), axis)
     size = max(float(np.abs(there).max()), 1e-300)
     rest = float(np.abs(at_rest).max())
     if float(np.abs(there + back).max()) < SYMMETRIC * size:
@@ -70,17 +88,3 @@ def _symmetry(law: Law, channels: Channels, axis: str) -> str:
         there_at_rest = f"up to {rest:.3g} deg/s" if rest > SYMMETRIC * size else "0"
         return f"It is the same in both directions of the rate; at rest it is {there_at_rest}."
     return "It differs between the directions of the rate by more than its sign."
-
-
-def _beyond(law: Law, channels: Channels, axis: str, sign: int, temperature_c: Array, values: Array) -> str:
-    row = int(np.argmax(sign * temperature_c))
-    end_c = float(temperature_c[row])
-    same = np.flatnonzero(np.abs(temperature_c - end_c) < 0.5)
-    row = int(same[np.argmax(np.abs(values[same]))])
-    columns = {**channels.columns, TEMPERATURE: temperature_c + sign * BEYOND_K}
-    moved = _of(law, replace(channels, columns=columns), axis)
-    words = "above the warmest" if sign > 0 else "below the coldest"
-    return (
-        f"{BEYOND_K:g} K {words} data set it would be {moved[row]:.3g} deg/s in place of {values[row]:.3g} "
-        f"({float(channels.rate_dps(axis)[row]):.4g} deg/s, {end_c:.4g} deg C)."
-    )

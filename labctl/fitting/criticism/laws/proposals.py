@@ -19,6 +19,7 @@ from labctl.fitting.criticism.laws.search import Search, State
 from labctl.fitting.criticism.laws.shapes import TABLE_RATE, TEMPERATURE, library, scales_of
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.search.held_out import held_out_rises
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.formula import Formula
 from labctl.fitting.estimation.fit import fit_preset
@@ -126,7 +127,7 @@ def breaking(laws: Sequence[Law], found: Criticism) -> Breaking | None:
     for axis in data.outputs:
         rate_dps = data.true_rate_dps(axis)
         for share in BETWEEN:
-            channels = data.channels.with_rates({**data.channels.rates, axis: share * rate_dps})
+            channels = at_rates(data.channels, axis, share)
             first, second = (law.fit.fitted.error_dps(channels, axis) for law in laws[:2])
             apart = np.where(np.abs(share * rate_dps) <= limit_dps, np.abs(first - second), 0.0)
             row = int(np.argmax(apart))
@@ -160,16 +161,26 @@ def _moved_with_temperature(found: Criticism, name: str) -> bool:
     return bool(abs(one @ other) > MOVED_TOGETHER * np.linalg.norm(one) * np.linalg.norm(other))
 
 
+def added_dps(fit: FitResult, base: FitResult, channels: Channels, axis: str) -> Array:
+    """Return what a fit with a law expects beyond the fit of the model alone, (n,) deg/s of one output.
+
+    What of the law the coefficients of the model take up is in none of the two.
+    """
+    return fit.fitted.error_dps(channels, axis) - base.fitted.error_dps(channels, axis)
+
+
+def at_rates(channels: Channels, axis: str, share: float) -> Channels:
+    """Return channels with a share of the rates about one axis."""
+    return channels.with_rates({**channels.rates, axis: share * channels.rate_dps(axis)})
+
+
 def _goes_astray(found: Criticism, base: FitResult, fit: FitResult) -> bool:
     """Return whether a fit adds far more between the rates of the data sets, where nothing was measured."""
-    data = found.fit_data
-    for axis in data.outputs:
-        rate_dps = data.true_rate_dps(axis)
-        at_sets = fit.fitted.error_dps(data.channels, axis) - base.fitted.error_dps(data.channels, axis)
-        most = ASTRAY * float(np.abs(at_sets).max(initial=0.0))
+    channels = found.fit_data.channels
+    for axis in found.fit_data.outputs:
+        most = ASTRAY * float(np.abs(added_dps(fit, base, channels, axis)).max(initial=0.0))
         for share in (share for share in BETWEEN if share <= 1.0):
-            channels = data.channels.with_rates({**data.channels.rates, axis: share * rate_dps})
-            between = fit.fitted.error_dps(channels, axis) - base.fitted.error_dps(channels, axis)
+            between = added_dps(fit, base, at_rates(channels, axis, share), axis)
             if float(np.abs(between).max(initial=0.0)) > most:
                 return True
     return False

@@ -18,7 +18,7 @@ from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence_of
 from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.noise_grid import Noise
-from labctl.fitting.criticism.laws.shapes import TABLE_RATE, TEMPERATURE, Shape, bounds_of
+from labctl.fitting.criticism.laws.shapes import TABLE_RATE, TEMPERATURE, Shape
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.formula import Formula
@@ -28,15 +28,17 @@ from labctl.progress import report_stage
 #: Terms at most, and how many beginnings are followed.
 MAX_TERMS, BEAM = 4, 3
 #: A term is added where it brings so much evidence, nats, beyond the price of its length.
-LEAST = 3.0
+MIN_WORTH = 3.0
 #: Price of each symbol of a formula, nats.
 PER_SYMBOL = 0.7
 #: Of the terms of the library, the best of so many kinds have their constants moved.
 REFINED = 8
 #: Calls for moving the constants of one term.
-MOST_CALLS = 25
+MAX_CALLS = 25
 #: A noise that is less likely than this beside the model is left out of the search.
-LEAST_WEIGHT = 0.02
+MIN_WEIGHT = 0.02
+#: Coordinates of formulas that are kept, at most, to be used again.
+MAX_KEPT = 20_000
 NAME = "law"
 NUMBER = re.compile(r"[0-9.]+")
 WORD = re.compile(r"[a-z_][a-z0-9_]*")
@@ -64,12 +66,12 @@ class State:
 
 
 class Search:
-    """The evidence for formulas beside a model and terms that were added."""
+    """A search for laws beside the model of a comparison."""
 
     def __init__(self, comparison: Comparison, shapes: Sequence[Shape]) -> None:
         self._comparison = comparison
-        self._shapes = [shape for shape in shapes if all(self._rows(text) is not None for text in shape.formulas())]
         self._kept: dict[tuple[str, str], NDArray[np.float64]] = {}
+        self._shapes = [shape for shape in shapes if self._is_finite(shape)]
         self._others = frozenset(comparison.data.nodes.columns) - {TEMPERATURE, TABLE_RATE}
         # that one of so many shapes fits by chance is in the price of each term
         self._price = float(np.log(max(len(self._shapes), 1)))
@@ -99,7 +101,7 @@ class Search:
             strongest = max(axes, key=lambda axis: float(axes[axis][index]))
             part = self._refined(begun, self._shapes[index], strongest)
             gained = float(self._evidence(begun.formulas, [part.formulas])[0]) - self._price_of(part.shape)
-            if gained > LEAST:
+            if gained > MIN_WORTH:
                 found.append(self._pruned(State((*begun.parts, part), begun.score + gained)))
         return found
 
@@ -109,7 +111,7 @@ class Search:
             others = tuple(each for each in state.parts if each is not part)
             beside = [text for each in others for text in each.formulas]
             worth = float(self._evidence(beside, [part.formulas])[0]) - self._price_of(part.shape)
-            if worth < LEAST:
+            if worth < MIN_WORTH:
                 state = State(others, state.score - worth)
         return state
 
@@ -125,7 +127,7 @@ class Search:
         names = list(shape.constants)
         if not names:
             return Part(shape, shape.formulas())
-        bounds, noises = bounds_of(shape), self._likely((*begun.formulas, *shape.formulas()), axis)
+        noises = self._likely((*begun.formulas, *shape.formulas()), axis)
 
         def unlikely(values: Array) -> float:
             constants = dict(zip(names, map(float, values), strict=True))
@@ -134,8 +136,8 @@ class Search:
 
         start = np.array([shape.constants[name] for name in names])
         best = minimize(
-            unlikely, start, method="Nelder-Mead", bounds=[bounds[name] for name in names],
-            options={"maxfev": MOST_CALLS, "xatol": 1e-3, "fatol": 0.05},
+            unlikely, start, method="Nelder-Mead", bounds=[shape.bounds[name] for name in names],
+            options={"maxfev": MAX_CALLS, "xatol": 1e-3, "fatol": 0.05},
         )  # fmt: skip
         moved = replace(shape, constants=dict(zip(names, map(float, best.x), strict=True)))
         return Part(moved, moved.formulas())
@@ -144,7 +146,7 @@ class Search:
         """Return the noises of an axis that are likely beside the model and formulas."""
         found = self._on_axis(axis, beside, (), self._comparison.axes[axis].noises)
         pairs = zip(found.noises, found.weights, strict=True)
-        return [noise for noise, weight in pairs if weight >= LEAST_WEIGHT] or [found.best.noise]
+        return [noise for noise, weight in pairs if weight >= MIN_WEIGHT] or [found.best.noise]
 
     def _evidence(self, beside: Sequence[str], tried: Sequence[tuple[str, ...]]) -> Array:
         """Return the log Bayes factor of each option beside the model and formulas, over all axes, nats."""
@@ -179,25 +181,26 @@ class Search:
         of = next((name for name in WORD.findall(texts[0]) if name in self._others), TABLE_RATE)
         return CandidateShape(of, None, rows, texts, ("deg/s",) * len(texts))
 
+    def _is_finite(self, shape: Shape) -> bool:
+        """Return whether a shape has a value at every row, on every axis."""
+        try:
+            for axis in self._comparison.designs:
+                for text in shape.formulas():
+                    self._columns(axis, text)
+        except BadInput:
+            return False
+        return True
+
     def _columns(self, axis: str, text: str) -> NDArray[np.float64]:
+        """Return the coordinates of a formula, (R, m, 1). Raises BadInput where it is not finite everywhere."""
         key = axis, text
         if key not in self._kept:
-            rows = self._rows(text, axis)
-            assert rows is not None
-            if len(self._kept) > 20000:
+            data, reference = self._comparison.data, self._comparison.model.reference
+            (column,) = Formula(NAME, text).columns(data.nodes, axis, Term(NAME), reference)
+            if len(self._kept) >= MAX_KEPT:
                 self._kept.clear()
-            self._kept[key] = rows
+            self._kept[key] = data.rows_of(column.values[:, None])
         return self._kept[key]
-
-    def _rows(self, text: str, axis: str | None = None) -> NDArray[np.float64] | None:
-        """Return the coordinates of a formula, (R, m, 1); None where it is not finite everywhere."""
-        data = self._comparison.data
-        axis = axis or str(data.info.axes[0])
-        try:
-            column, *_ = Formula(NAME, text).columns(data.nodes, axis, Term(NAME), self._comparison.model.reference)
-        except BadInput:
-            return None
-        return data.rows_of(column.values[:, None])
 
 
 def _different(states: Sequence[State]) -> list[State]:

@@ -1,13 +1,14 @@
 """The shapes that a law is made of: functions of one channel or the rate, and products of both, as formulas.
 
-A shape is a formula with named constants, so that a search may move them. Channels enter as (channel - centre) / half
+A shape is a formula with named constants, so that a search may move them: `k` is a place, `w` a width, `f` a frequency
+(rad), `g` a growth. Channels enter as (channel - centre) / half
 of their range, the rate as rate / largest rate: constants are then shares of what was measured, and a coefficient is
 the size of the error in deg/s.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -31,20 +32,21 @@ WAVES = tuple(round(float(np.pi * n), 2) for n in np.arange(0.5, 6.1, 0.25))
 GROWTHS = (-1.5, -4.0, 1.5, 4.0)
 #: Phase of a wave from one value to the next at most, rad: three quarters of what equal distances distinguish.
 FASTEST_PHASE = 0.75 * np.pi
-#: A constant stays within these factors of where it began.
-MOST_CHANGE = 3.0
+#: A width and a growth stay within this factor of where they began, a frequency within that; a place moves so far.
+MAX_FACTOR, MAX_FREQUENCY_FACTOR, MAX_MOVE, MAX_MOVE_OF_RATE = 3.0, 1.3, 0.25, 0.15
+#: Least size of a rate at which a knee, a step or a bump stands.
+MIN_PLACE_OF_RATE = 0.02
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A formula of `{u}`, what it is a function of, and of named constants; or of several formulas with one phase."""
+    """A formula of `{u}`, what it is a function of, and of named constants; or a sine and a cosine of one frequency."""
 
     kind: str  #: in words
     texts: tuple[str, ...]  #: one formula, or a sine and a cosine
     constants: Mapping[str, float] = field(default_factory=dict)
-    places: frozenset[str] = frozenset()  #: constants that are places, and may move to 0 and beyond
     nodes: int = 1  #: how long it is to write
-    least: Mapping[str, float] = field(default_factory=dict)  #: what a constant may not fall below
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)  #: constant -> where it may move to
 
     def formulas(self, constants: Mapping[str, float] | None = None) -> tuple[str, ...]:
         """Return the formulas with constants in place of their names."""
@@ -57,7 +59,7 @@ class Shape:
 
     def times(self, factor: str, words: str) -> Shape:
         """Return the shape times a formula."""
-        texts = tuple(factor if text == "1" else f"{factor} * {text}" for text in self.texts)
+        texts = tuple(f"{factor} * {text}" for text in self.texts)
         return replace(self, kind=f"{self.kind} {words}".strip(), texts=texts, nodes=self.nodes + 1)
 
 
@@ -66,22 +68,15 @@ def _number(value: float) -> str:
     return f"({text})" if value < 0 else text
 
 
-ONE = Shape("", ("1",), nodes=0)
 #: Of a channel.
 OF_CHANNEL = (
     Shape("line", ("{u}",)),
     *(Shape(f"power {k}", (f"{{u}}**{k}",)) for k in (2, 3, 4)),
-    *(Shape("knee", ("(abs({u} - {k}) + {u} - {k})",), {"k": k}, frozenset("k"), 2) for k in PLACES),
-    *(
-        Shape("step", ("tanh(({u} - {k})/{w})",), {"k": k, "w": w}, frozenset("k"), 3)
-        for k, w in product(PLACES, WIDTHS)
-    ),
-    *(
-        Shape("bump", ("exp(-(({u} - {k})/{w})**2)",), {"k": k, "w": w}, frozenset("k"), 3)
-        for k, w in product(PLACES, WIDTHS)
-    ),
-    *(Shape("exponential", ("exp({w}*{u})",), {"w": w}, nodes=2) for w in GROWTHS),
-    *(Shape("wave", ("sin({w}*{u})", "cos({w}*{u})"), {"w": w}, nodes=3) for w in WAVES),
+    *(Shape("knee", ("(abs({u} - {k}) + {u} - {k})",), {"k": k}, 2) for k in PLACES),
+    *(Shape("step", ("tanh(({u} - {k})/{w})",), {"k": k, "w": w}, 3) for k, w in product(PLACES, WIDTHS)),
+    *(Shape("bump", ("exp(-(({u} - {k})/{w})**2)",), {"k": k, "w": w}, 3) for k, w in product(PLACES, WIDTHS)),
+    *(Shape("exponential", ("exp({g}*{u})",), {"g": g}, nodes=2) for g in GROWTHS),
+    *(Shape("wave", ("sin({f}*{u})", "cos({f}*{u})"), {"f": f}, nodes=3) for f in WAVES),
 )
 #: Of the size of the rate, the same for both directions; times its sign they are odd.
 OF_SPEED = (
@@ -100,20 +95,18 @@ OF_SPEED = (
     ),
 )
 WAVES_OF_RATE = (
-    *(Shape("odd wave", ("sin({w}*{u})",), {"w": w}, nodes=2) for w in WAVES),
-    *(Shape("even wave", ("cos({w}*{u})",), {"w": w}, nodes=2) for w in WAVES),
+    *(Shape("odd wave", ("sin({f}*{u})",), {"f": f}, nodes=2) for f in WAVES),
+    *(Shape("even wave", ("cos({f}*{u})",), {"f": f}, nodes=2) for f in WAVES),
 )
 
 
 @dataclass(frozen=True)
 class Scale:
-    """A channel as it enters a formula: its centre and half its range, rounded."""
+    """A channel as it enters a formula: less its centre, over half its range; the rate over the largest."""
 
     name: str
     text: str
-    centre: float
-    half: float
-    gap: float = 0.0  #: largest distance between neighbouring values, over `half`
+    gap: float  #: largest distance between neighbouring values, in the same unit
 
 
 def scales_of(data: ReducedRecording, channels: Sequence[str]) -> dict[str, Scale]:
@@ -126,7 +119,7 @@ def scales_of(data: ReducedRecording, channels: Sequence[str]) -> dict[str, Scal
         if name == TABLE_RATE and fastest > 0:
             largest = _rounded(fastest)
             rates = np.abs(np.concatenate([data.nodes.rate_dps(str(each)) for each in data.info.axes]))
-            scales[name] = Scale(name, f"({OWN_RATE}/{largest:g})", 0.0, largest, _gap(rates / largest))
+            scales[name] = Scale(name, f"({OWN_RATE}/{largest:g})", _gap(rates / largest))
         elif name in known and name in (*data.nodes.columns, TEMPERATURE):
             scales[name] = _scale(name, _values(data, name, axis))
     return scales
@@ -143,7 +136,7 @@ def _scale(name: str, values: Array) -> Scale:
     half = _rounded((high - low) / 2)
     centre = float(f"{round((low + high) / 2 / half, 2) * half:.{DIGITS + 2}g}")
     inner = name if centre == 0 else f"({name} {'-' if centre > 0 else '+'} {abs(centre):.10g})"
-    return Scale(name, f"({inner}/{half:g})", centre, half, _gap(values / half))
+    return Scale(name, f"({inner}/{half:g})", _gap(values / half))
 
 
 def _gap(values: Array) -> float:
@@ -151,17 +144,27 @@ def _gap(values: Array) -> float:
     return float(np.diff(np.unique(np.round(values, 2))).max(initial=0.0))
 
 
-def _seen(shape: Shape, gap: float) -> Shape | None:
-    """Return a shape that values with such gaps between them show: no narrower, and no faster, than they resolve.
+def _seen(shapes: Iterable[Shape], scale: Scale) -> Iterator[Shape]:
+    """Yield the shapes that the values of a channel show, with the bounds of their constants.
 
-    Between the values a narrower one would say what was not measured.
+    None is narrower than the distance of the values, and no wave faster than they resolve: between them it would say
+    what was not measured.
     """
-    width, wave = shape.constants.get("w"), "wave" in shape.kind
-    if width is None or "exponential" in shape.kind:
-        return shape
-    if wave:
-        return shape if width * gap <= FASTEST_PHASE else None
-    return replace(shape, least={"w": gap}) if width >= gap else None
+    for shape in shapes:
+        if shape.constants.get("w", np.inf) >= scale.gap and shape.constants.get("f", 0.0) * scale.gap <= FASTEST_PHASE:
+            yield replace(shape, bounds={name: _bounds(name, value, scale) for name, value in shape.constants.items()})
+
+
+def _bounds(name: str, value: float, scale: Scale) -> tuple[float, float]:
+    """Return where a constant may move to."""
+    if name == "k" and scale.name == TABLE_RATE:
+        return max(value - MAX_MOVE_OF_RATE, MIN_PLACE_OF_RATE), value + MAX_MOVE_OF_RATE
+    if name == "k":
+        return value - MAX_MOVE, value + MAX_MOVE
+    factor = MAX_FREQUENCY_FACTOR if name == "f" else MAX_FACTOR
+    low, high = sorted((value / factor, value * factor))
+    fastest = FASTEST_PHASE / scale.gap if scale.gap else np.inf
+    return (max(low, scale.gap) if name == "w" else low), (min(high, fastest) if name == "f" else high)
 
 
 def _rounded(value: float) -> float:
@@ -177,7 +180,7 @@ def library(scales: Mapping[str, Scale]) -> list[Shape]:
     for scale in scales.values():
         if scale is rate:
             continue
-        of_channel = [_named(shape, scale) for each in OF_CHANNEL if (shape := _seen(each, scale.gap)) is not None]
+        of_channel = [_named(shape, scale) for shape in _seen(OF_CHANNEL, scale)]
         found += of_channel
         if rate is None:
             continue
@@ -196,11 +199,10 @@ def library(scales: Mapping[str, Scale]) -> list[Shape]:
 
 
 def _of_rate(rate: Scale) -> Iterator[Shape]:
-    for each in OF_SPEED:
-        if (shape := _seen(each, rate.gap)) is not None:
-            yield shape
-            yield replace(shape.times("sign({u})", ""), kind=f"{shape.kind}, odd")
-    yield from (shape for each in WAVES_OF_RATE if (shape := _seen(each, rate.gap)) is not None)
+    for shape in _seen(OF_SPEED, rate):
+        yield shape
+        yield replace(shape.times("sign({u})", ""), kind=f"{shape.kind}, odd")
+    yield from _seen(WAVES_OF_RATE, rate)
 
 
 def _named(shape: Shape, scale: Scale) -> Shape:
@@ -215,18 +217,3 @@ def _of_two(scales: Sequence[Scale]) -> list[Shape]:
         for one, other in pairs
         for a, b in (("", ""), ("**2", ""), ("", "**2"), ("**2", "**2"))
     ]
-
-
-def bounds_of(shape: Shape) -> dict[str, tuple[float, float]]:
-    """Return constant -> where it may move to, from where it stands."""
-    limits = {}
-    for name, value in shape.constants.items():
-        if name in shape.places:
-            limits[name] = (value - 0.25, value + 0.25)
-        elif name == "k":
-            limits[name] = (max(value - 0.15, 0.02), value + 0.15)
-        else:
-            factor = 1.3 if "wave" in shape.kind else MOST_CHANGE
-            low, high = sorted((value / factor, value * factor))
-            limits[name] = (max(low, shape.least.get(name, low)), high)
-    return limits
