@@ -21,6 +21,7 @@ from zipfile import BadZipFile
 
 from platformdirs import user_cache_path
 
+from instruments.plugins import installed
 from labctl.answers.base import ResponseModel
 from labctl.services.single_flight import single_flight
 from labctl.store.connection.private_files import make_private_folder
@@ -173,8 +174,12 @@ class RecentResults(Generic[ResultT]):
 
 @lru_cache(maxsize=1)
 def code_digest() -> str:
-    """Return a digest of the code that computes results, and of the libraries it calculates with."""
+    """Return a digest of the code that computes results, of its libraries, and of what other packages add.
+
+    An effect or an experiment of another package changes what a criticism answers.
+    """
     digest = hashlib.sha256(" ".join(version(name) for name in LIBRARIES).encode())
+    digest.update("\n".join(map(str, installed())).encode())
     for source in _sources():
         digest.update(source.read_bytes())
     return digest.hexdigest()

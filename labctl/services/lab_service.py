@@ -116,16 +116,16 @@ class LabService:
         self._hooks.enter_context(shutdown_hook(self.end_soon))
         remove_abandoned()
         self.bench_access.start()
-        self._drafts.start()
-        self._diagnoses.start()
+        self._drafts.background.start()
+        self._diagnoses.background.start()
 
     def _draft(self, campaign: int) -> DraftsResponse:
         return self.execute(MAKE_DRAFTS, ToCampaign(campaign, DraftsRequest()))
 
     def end_soon(self) -> None:
         """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
-        self._drafts.end_soon()
-        self._diagnoses.end_soon()
+        self._drafts.background.end_soon()
+        self._diagnoses.background.end_soon()
         self.bench_access.end_soon()
         self.computation.end_soon()
 
@@ -136,11 +136,11 @@ class LabService:
         self._closed = True
         with self._hooks:
             self.left = self.bench_access.close()
-            self._drafts.end_soon()
-            self._diagnoses.end_soon()
+            self._drafts.background.end_soon()
+            self._diagnoses.background.end_soon()
             self.computation.close()
-            self._drafts.close()
-            self._diagnoses.close()
+            self._drafts.background.close()
+            self._diagnoses.background.close()
             self.fetches.write()
             self.store.close()
 

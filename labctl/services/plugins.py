@@ -15,12 +15,12 @@ from labctl.exports import FORMATS
 from labctl.fitting.effects.catalogue import FAMILIES
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.importers import IMPORTERS
-from procedures.experiments.block import BLOCKS
+from procedures.experiments import GROUP as EXPERIMENTS
 
 
 def list_plugins() -> list[PluginResponse]:
     """Return every plug-in of every group, labctl's own parts too; all of them are imported."""
-    groups = (DRIVERS, *simulation_plugins(), FAMILIES, FORMATS, IMPORTERS, BLOCKS)
+    groups = (DRIVERS, *simulation_plugins(), FAMILIES, FORMATS, IMPORTERS, EXPERIMENTS)
     return [
         PluginResponse(
             group=plugin.group, name=plugin.name, distribution=plugin.distribution, version=plugin.version,

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from labctl.answers.verification import VerificationResponse
 
 
+#: Of the experiments so many are printed, the best; JSON has all.
+SHOWN_EXPERIMENTS = 3
 #: From dark to bright: residual over floor in the small map.
 SHADES = " ·░▒▓█"
 
@@ -69,7 +71,7 @@ def print_criticism(answer: CriticismResponse) -> None:
                 ", ".join(others[:3]),
             )  # fmt: skip
         console.print(rows)
-    for experiment in answer.experiments:
+    for experiment in answer.experiments[:SHOWN_EXPERIMENTS]:
         console.print(
             f"to distinguish {', '.join(experiment['separates'])}: {experiment['do']} ({experiment['hours']:.1f} h, "
             f"{experiment['information_bit']:.2f} of {experiment['open_bit']:.2f} bit expected, one cause named with a "

@@ -75,9 +75,7 @@ class Forecast:
     u_bit: float  #: standard error of it by the number of outcomes drawn
     names_one: float  #: probability that the verdict on all recordings then names one cause
     names_wrong: float  #: probability that it then names one that is not the truth
-    distinguished: tuple[
-        str, ...
-    ]  #: ids of the effects that are distinguished from the likeliest one, where that is the truth
+    distinguished: tuple[str, ...]  #: ids of the effects that fall behind the likeliest one, where that is the truth
 
 
 def open_question(found: Criticism) -> OpenQuestion | None:

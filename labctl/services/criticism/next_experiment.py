@@ -18,13 +18,13 @@ from labctl.services.simulation.walks import walked
 from labctl.store import RecordingRow, Store
 from procedures.contracts.errors import ProcedureError
 from procedures.contracts.steps import Mount
-from procedures.experiments.block import Block, all_blocks
+from procedures.experiments import Block, all_blocks
 from procedures.planning.plan import Plan, make_plan
 from procedures.planning.step_writer import MOUNTING_S
 from procedures.recipe.recipe import Recipe, recipe_document
 
-#: This many experiments are shown.
-SHOWN = 4
+#: At most so many experiments are given: what a bench cannot do leaves others to try.
+SHOWN = 12
 #: An experiment that is expected to answer less than this share of the question is none.
 MIN_ANSWERED = 0.05
 #: Time that a campaign takes of bench and person before its first step, h.

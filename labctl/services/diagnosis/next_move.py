@@ -15,9 +15,6 @@ from labctl.answers.diagnosis import ChosenExperiment, DiagnosisOutcome, Experim
 from labctl.canonical_json import canonical
 from labctl.services.diagnosis import sentences
 
-#: The same experiment is measured so often; what it has not distinguished by then it does not distinguish.
-MAX_RUNS = 2
-
 
 @dataclass(frozen=True)
 class DoneExperiment:
@@ -89,27 +86,24 @@ def _experiment(progress: Progress, criticism: CriticismResponse) -> Measure | E
     if not offered:
         return End("indistinguishable", sentences.none_offered(named))
     came = _results(progress.done)
-    possible = [each for each in offered if "cannot_be_done" not in came.get(experiment_key(each["toml"]), ())]
+    possible = [each for each in offered if came.get(experiment_key(each["toml"])) != "cannot_be_done"]
     if not possible:
         return End("cannot_be_done", sentences.none_can_be_done(named, len(offered)))
-    useful = [each for each in possible if len(came.get(experiment_key(each["toml"]), ())) < MAX_RUNS]
+    # what an experiment has not distinguished it does not distinguish
+    useful = [each for each in possible if experiment_key(each["toml"]) not in came]
     if not useful:
-        return End("indistinguishable", sentences.all_were_run(named, len(possible), MAX_RUNS))
+        return End("indistinguishable", sentences.all_were_run(named, len(possible)))
     affordable = [each for each in useful if each["hours"] * progress.pace <= progress.left_hours]
     if not affordable:
         shortest_hours = progress.pace * min(each["hours"] for each in useful)
         return End("hours_spent", sentences.hours_spent(named, progress.hours, progress.left_hours, shortest_hours))
-    # the criticism gives the best first; one that has been measured comes behind all that have not
-    ranked = sorted(affordable, key=lambda each: len(came.get(experiment_key(each["toml"]), ())))
-    return Measure(_chosen(ranked[0]), sentences.choice(ranked[0], len(ranked)))
+    best = affordable[0]  # the criticism gives them in the order of what they are worth
+    return Measure(_chosen(best), sentences.choice(best))
 
 
-def _results(done: Sequence[DoneExperiment]) -> Mapping[str, list[ExperimentResult]]:
+def _results(done: Sequence[DoneExperiment]) -> Mapping[str, ExperimentResult]:
     """Return what came of each experiment, by its key."""
-    came: dict[str, list[ExperimentResult]] = {}
-    for each in done:
-        came.setdefault(experiment_key(each.toml), []).append(each.came)
-    return came
+    return {experiment_key(each.toml): each.came for each in done}
 
 
 def experiment_key(toml: str) -> str:

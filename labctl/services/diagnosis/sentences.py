@@ -8,10 +8,9 @@ from labctl.answers.criticism import Experiment
 from labctl.answers.diagnosis import ChosenExperiment
 
 
-def choice(experiment: Experiment, of: int) -> str:
+def choice(experiment: Experiment) -> str:
     """Return why an experiment is chosen."""
-    left = f"of the {of} experiments that are left" if of > 1 else "the only experiment that is left"
-    return f"{experiment['do']}, {left}: {experiment['why']}"
+    return f"{experiment['do']}: {experiment['why']}"
 
 
 def expected(experiment: ChosenExperiment) -> str:
@@ -64,9 +63,10 @@ def none_offered(named: Sequence[str]) -> str:
     return f"No experiment on this bench distinguishes {_either(named)}."
 
 
-def all_were_run(named: Sequence[str], experiments: int, runs: int) -> str:
+def all_were_run(named: Sequence[str], experiments: int) -> str:
     """Return that all experiments were measured and did not distinguish what is left."""
-    return f"Each of the {experiments} experiments was measured {runs} times and does not distinguish {_either(named)}."
+    how_many = "The only experiment was" if experiments == 1 else f"Each of the {experiments} experiments was"
+    return f"{how_many} measured and does not distinguish {_either(named)}."
 
 
 def none_can_be_done(named: Sequence[str], experiments: int) -> str:

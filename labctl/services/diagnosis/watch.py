@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import threading
 from collections import Counter
 from collections.abc import Callable
 from contextlib import nullcontext
 
 from instruments.clock import Clock
-from labctl.acting_user import ITSELF, acting
 from labctl.errors import BenchSilent, Conflict, StoreError, TooBusy
 from labctl.log import get_logger
+from labctl.services.background import BackgroundWork
 from labctl.services.diagnosis.advance import DiagnosisRunner, Laboratory
 from labctl.services.diagnosis.begin import MOVING
 from labctl.store import Store
 
 log = get_logger()
 
-POLL_S = 1.0
 #: A move that fails is tried so often; then the diagnosis waits for a person.
 TRIES = 3
 #: What passes by itself: the move is made later.
@@ -32,45 +30,19 @@ class DiagnosisWatch:
         self._store, self._clock, self._bench = store, clock, bench
         self._runner = DiagnosisRunner(lambda: nullcontext(store), laboratory, clock.utc)
         self._tries: Counter[int] = Counter()
-        self._trouble = ""
-        self._over = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    def start(self) -> None:
-        """Go on with what an earlier process left, and from now on with what is asked for."""
-        self._thread = threading.Thread(target=self._watch, name="diagnoses", daemon=True)
-        self._thread.start()
-
-    def end_soon(self) -> None:
-        """Begin nothing more; returns at once."""
-        self._over.set()
-
-    def close(self) -> None:
-        """Begin nothing more; returns when the thread has ended."""
-        self.end_soon()
-        if self._thread is not None:
-            self._thread.join()
-
-    def _watch(self) -> None:
-        with acting(ITSELF):  # no request asked for the moves
-            while not self._over.wait(self._clock.wall_s(POLL_S)):
-                try:
-                    self.tick()
-                    self._trouble = ""
-                except Exception as error:  # noqa: BLE001  the thread has to survive, or no diagnosis goes on any more
-                    self._note(error)
+        self.background = BackgroundWork("diagnoses", "diagnosis.waits", clock, self.tick)
 
     def tick(self) -> None:
         """Make the moves that can be made now. Raises StoreError where the database cannot be read."""
         bench = self._bench()
         for row in [] if bench is None else self._store.diagnoses.moving(bench):
             try:
-                while not self._over.is_set() and self._runner.advance(row.id):
+                while not self.background.is_over and self._runner.advance(row.id):
                     self._tries.pop(row.id, None)
             except PASSING as error:
-                self._note(error)
+                self.background.note(error)
             except Exception as error:  # noqa: BLE001  of whatever kind: tried again, then written down
-                if not self._over.is_set():  # else the computation was ended with the service
+                if not self.background.is_over:  # else the computation was ended with the service
                     self._failed(row.id, error)
 
     def _failed(self, diagnosis: int, error: Exception) -> None:
@@ -81,10 +53,3 @@ class DiagnosisWatch:
         if self._tries[diagnosis] >= TRIES:
             self._tries.pop(diagnosis)
             self._store.diagnoses.halt(diagnosis, MOVING, "failed", reason, self._clock.utc())
-
-    def _note(self, error: Exception) -> None:
-        """Log what keeps diagnoses from going on, when it changes."""
-        text = f"{type(error).__name__}: {error}"
-        if text != self._trouble:
-            log.warning("diagnosis.waits", error=text)
-        self._trouble = text

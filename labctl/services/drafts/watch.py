@@ -6,21 +6,19 @@ service on the bench makes it.
 
 from __future__ import annotations
 
-import threading
 from collections import Counter
 from collections.abc import Callable
 
 from instruments.clock import Clock
-from labctl.acting_user import ITSELF, acting
 from labctl.errors import BenchSilent, LabctlError, StoreError, TooBusy
 from labctl.log import get_logger
+from labctl.services.background import BackgroundWork
 from labctl.services.drafts.make import fail_draft
 from labctl.store import Store
 from procedures.recipe.fit_rules import FitRules
 
 log = get_logger()
 
-POLL_S = 1.0
 #: A computation that ended without a result, for want of memory or time, is tried so often.
 TRIES = 3
 #: What passes by itself: the draft stays due.
@@ -37,50 +35,20 @@ class DraftWatch:
         a campaign, in another process where there is one."""
         self._store, self._clock, self._bench, self._make = store, clock, bench, make
         self._tries: Counter[int] = Counter()
-        self._trouble = ""
-        self._over = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    def start(self) -> None:
-        """Make what an earlier process left, and from now on what becomes due."""
-        self._thread = threading.Thread(target=self._watch, name="drafts", daemon=True)
-        self._thread.start()
-
-    def end_soon(self) -> None:
-        """Begin nothing more; returns at once."""
-        self._over.set()
-
-    def close(self) -> None:
-        """Begin nothing more; returns when the thread has ended."""
-        self.end_soon()
-        if self._thread is not None:
-            self._thread.join()
-
-    def _watch(self) -> None:
-        with acting(ITSELF):  # no request asked for it
-            self._tick_on()  # what an earlier process left
-            while not self._over.wait(self._clock.wall_s(POLL_S)):
-                self._tick_on()
-
-    def _tick_on(self) -> None:
-        try:
-            self.tick()
-            self._trouble = ""
-        except Exception as error:  # noqa: BLE001  the thread has to survive, or no draft is made any more
-            self._note(error)
+        self.background = BackgroundWork("drafts", "draft.waits", clock, self.tick)
 
     def tick(self) -> None:
         """Make the drafts that are due. Raises StoreError where the database cannot be read."""
         for campaign in self._store.drafts.outstanding(self._bench()):
-            if self._over.is_set():
+            if self.background.is_over:
                 return
             try:
                 self._make(campaign)
             except PASSING as error:
-                self._note(error)
+                self.background.note(error)
                 return
             except Exception as error:  # noqa: BLE001  of whatever kind: tried again, then written down
-                if self._over.is_set():  # the computation was ended with the service
+                if self.background.is_over:  # the computation was ended with the service
                     return
                 self._failed(campaign, error)
 
@@ -95,10 +63,3 @@ class DraftWatch:
         for draft in self._store.drafts.of_campaign(campaign):
             if draft.state in {"due", "fitted"}:
                 fail_draft(self._store, draft, rules, reason, self._clock.utc())
-
-    def _note(self, error: Exception) -> None:
-        """Log what keeps drafts from being made, when it changes."""
-        text = f"{type(error).__name__}: {error}"
-        if text != self._trouble:
-            log.warning("draft.waits", error=text)
-        self._trouble = text

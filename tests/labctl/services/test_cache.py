@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from instruments.plugins import Plugin, installed
 from labctl.answers.base import ResponseModel
 from labctl.answers.certification import CertificationResponse
 from labctl.answers.ladder import LadderResponse
@@ -78,6 +79,20 @@ def test_other_code_answers_anew(
 ) -> None:
     ask(version=1)
     monkeypatch.setattr(result_cache, "code_digest", lambda: "changed")
+    ask(version=1)
+    assert work.times == 2
+
+
+def test_another_package_with_an_effect_answers_anew(
+    work: Work, ask: Callable[..., LadderResponse], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ask(version=1)
+    other = Plugin("labctl.effects", "acme", "acme:EFFECT", "acme-effects", "0.1")
+    with monkeypatch.context() as patched:
+        patched.setattr(result_cache, "installed", lambda: (*installed(), other))
+        result_cache.code_digest.cache_clear()
+        ask(version=1)
+    result_cache.code_digest.cache_clear()
     ask(version=1)
     assert work.times == 2
 

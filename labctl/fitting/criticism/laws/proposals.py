@@ -164,7 +164,7 @@ def _moved_with_temperature(found: Criticism, name: str) -> bool:
 def added_dps(fit: FitResult, base: FitResult, channels: Channels, axis: str) -> Array:
     """Return what a fit with a law expects beyond the fit of the model alone, (n,) deg/s of one output.
 
-    What of the law the coefficients of the model take up is in none of the two.
+    The part of the law that coefficients of the model can describe counts as theirs.
     """
     return fit.fitted.error_dps(channels, axis) - base.fitted.error_dps(channels, axis)
 

@@ -23,7 +23,7 @@ from labctl.fitting.data.joined import joined_recording
 from labctl.fitting.models.presets import preset_for
 from labctl.services.planning.loading import limits_of, load_bench
 from labctl.services.simulation.walks import walked
-from procedures.experiments.block import all_blocks
+from procedures.experiments import all_blocks
 from procedures.planning.plan import make_plan
 from tests.helpers.simulated_recordings import plan_on, single_axis
 

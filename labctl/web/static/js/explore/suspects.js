@@ -185,7 +185,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
       ? h(
           "p",
           { class: "muted" },
-          "Odds against one effect alone, before the number of effects tried is counted. None of these is distinguished from noise: what each would explain is in its row.",
+          "The odds are those of each effect added alone. How many effects were tried is not counted in them; counted, none of these is distinguished from noise.",
         )
       : null,
     speaking.length

@@ -176,7 +176,7 @@ const unknownCauses = ({ undistinguished }) =>
     h(
       "p",
       {},
-      `The error is corrected; the cause is not known: ${[effect, ...others].map(idText).join(" or ")}. Another experiment tells.`,
+      `The error is corrected; the cause is not known: ${[effect, ...others].map(idText).join(" or ")}. Another experiment distinguishes them.`,
     ),
   );
 

@@ -7,8 +7,7 @@ import pytest
 from instruments.plugins import PluginError
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from procedures.contracts.steps import Acquire, MoveChamber
-from procedures.experiments.block import NOT_TAKEN, Block, _checked, all_blocks
-from procedures.experiments.blocks import BLOCKS
+from procedures.experiments import BLOCKS, NOT_TAKEN, Block, _checked, all_blocks
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import make_plan
 from procedures.recipe.recipe import Recipe, parse_recipe, recipe_document
