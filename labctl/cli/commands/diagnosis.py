@@ -157,7 +157,7 @@ def ask_experiment(answer: DiagnosisResponse, proposed: DiagnosisRound) -> Reply
     from labctl.services.benches.start_confirmation import QUESTIONS
 
     stderr.print(
-        f"Experiment of round {proposed.number} on bench {answer.bench}: {proposed.why}. Type yes to run it, the "
+        f"Experiment of round {proposed.number} on bench {answer.bench}: {proposed.why} Type yes to run it, the "
         "reason why it cannot be done, or nothing to leave it for later."
     )
     line = sys.stdin.readline().strip()
