@@ -137,6 +137,7 @@ class Client:
         due_within: str | None = None,
         calibration: UnitState | None = None,
         verdict: CriticismVerdict | None = None,
+        batch: str = "",
         search: str = "",
         limit: int | None = None,
     ) -> list[UnitResponse]:
@@ -144,9 +145,12 @@ class Client:
 
         With `due_within`, such as "30d", those that are due within that span or overdue, the earliest date first; with
         `calibration` those whose version in force is such, with `verdict` those that were certified with it, with
-        `search` those whose serial number, model or technology holds it.
+        `batch` those of a batch, with `search` those whose serial number, model, technology, batch or supplier holds
+        it.
         """
-        query = _query(due_within=due_within, calibration=calibration, verdict=verdict, search=search, limit=limit)
+        query = _query(
+            due_within=due_within, calibration=calibration, verdict=verdict, batch=batch, search=search, limit=limit
+        )
         return self._connection.get_list(f"/api/units{query}", UnitResponse)
 
     def unit(self, serial: str) -> UnitResponse:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from labctl.answers.base import ResponseModel
+from labctl.answers.base import Request, ResponseModel
 from labctl.answers.common_fields import (
     TECHNOLOGY,
     BenchName,
@@ -15,6 +15,7 @@ from labctl.answers.common_fields import (
     MaxError,
     MeanError,
     OutputAxis,
+    Person,
     RecipeName,
     RecordingNumber,
     RmsError,
@@ -52,6 +53,8 @@ class UnitResponse(ResponseModel):
     serial: Serial
     model: UnitModel
     technology: str | None = Field(description=TECHNOLOGY)
+    batch: str = Field(default="", description="Batch of the manufacturer; empty: not stated.")
+    supplier: str = Field(default="", description="Supplier of the unit; empty: not stated.")
     recordings: list[int] = Field(description="Numbers of the unit's recordings.")
     calibrations: list[int] = Field(description="Numbers of the unit's calibration versions.")
     certified_version: int | None = Field(description="Number of the version in force; null: none.")
@@ -81,6 +84,24 @@ class UnitResponse(ResponseModel):
         "without `due_within`.",
     )
     formats: list[ExportFormatResponse] = Field(description="Formats in which the unit's calibrations are available.")
+
+
+class BatchRequest(Request):
+    """State the batch of some units."""
+
+    batch: str = Field(max_length=100, description="Batch of the manufacturer; empty: no batch is stated any more.")
+    serials: list[Serial] = Field(min_length=1, max_length=10_000, description="Serial numbers of the units.")
+    supplier: str | None = Field(
+        default=None, max_length=200, description="Supplier of the units; null: what is stated stays."
+    )
+    by: Person = Field(min_length=1, max_length=200)
+
+
+class BatchResponse(ResponseModel):
+    """A batch of units."""
+
+    batch: str = Field(description="Batch of the manufacturer; empty: of the units without one.")
+    units: int = Field(description="Number of its units in the database.")
 
 
 class AppliedVersion(ResponseModel):

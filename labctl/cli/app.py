@@ -14,6 +14,7 @@ from labctl.cli.command_log import log_of_command
 from labctl.cli.commands import (
     accelerometer,
     audit,
+    batches,
     bench,
     calibrations,
     campaign,
@@ -68,6 +69,7 @@ app.add_typer(certificate.app, name="certificate")
 app.add_typer(standards.app, name="standards")
 app.add_typer(sensors.app, name="sensors")
 app.add_typer(environment.app, name="environment")
+app.add_typer(batches.app, name="batches")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,

@@ -8,7 +8,14 @@ from functools import cache
 from typing import get_args
 
 from labctl.answers.common_fields import CriticismVerdict
-from labctl.answers.units import ExportFormatResponse, RecalibrationResponse, UnitResponse, UnitState
+from labctl.answers.units import (
+    BatchRequest,
+    BatchResponse,
+    ExportFormatResponse,
+    RecalibrationResponse,
+    UnitResponse,
+    UnitState,
+)
 from labctl.errors import BadInput
 from labctl.exports import export_formats
 from labctl.services.calibrations.due import campaign_of
@@ -31,19 +38,20 @@ def list_units(
     within: timedelta | None = None,
     calibration: str | None = None,
     verdict: str | None = None,
+    batch: str | None = None,
 ) -> Page[UnitResponse, str]:
-    """Return units by serial number, as many as are asked for: all, those in a state, or those with a verdict.
+    """Return units by serial number, as many as are asked for: all, those in a state, with a verdict, of a batch.
 
     `within` a span those that are due (`units_due`). Raises BadInput for a state or a verdict that there is not.
     """
     if within is not None:
-        if calibration or verdict:
-            raise BadInput("due_within is given together with calibration or verdict; give one of them")
+        if calibration or verdict or batch:
+            raise BadInput("due_within is given together with calibration, verdict or batch; give one of them")
         return units_due(store, now, within, request)
     for name, value, choices in (("calibration", calibration, UnitState), ("verdict", verdict, CriticismVerdict)):
         if value is not None and value not in get_args(choices):
             raise BadInput(f"{name} {value!r}: choose one of {', '.join(get_args(choices))}")
-    page = store.units.page(request, UnitFilter(now, calibration, verdict))
+    page = store.units.page(request, UnitFilter(now, calibration, verdict, batch or None))
     return Page(_answers(store, now, page.rows), page.total, page.next_after)
 
 
@@ -78,6 +86,19 @@ def unit(store: Store, serial: str, now: datetime) -> UnitResponse:
     )
 
 
+def batches(store: Store) -> list[BatchResponse]:
+    """Return every batch that a unit is of, by name."""
+    return [BatchResponse(batch=row.batch, units=row.units) for row in store.units.batches()]
+
+
+def set_batch(store: Store, asked: BatchRequest, at: datetime) -> BatchResponse:
+    """State the batch of some units, all or none. Raises NotFound for a unit that is absent."""
+    store.units.set_batch(list(dict.fromkeys(asked.serials)), asked.batch, asked.supplier, asked.by, at)
+    of_batch = PageRequest("", 1, None)
+    total = store.units.page(of_batch, UnitFilter(at, batch=asked.batch)).total
+    return BatchResponse(batch=asked.batch, units=total)
+
+
 def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]:
     """Return how many units are overdue, and how many are or will be within a span."""
     dates = [act.due_at for act in store.certifications.in_force().values() if act.due_at is not None]
@@ -103,6 +124,8 @@ def _answer(
         serial=found.serial,
         model=found.model,
         technology=found.technology,
+        batch=found.batch,
+        supplier=found.supplier,
         recordings=held.recordings,
         calibrations=held.versions,
         certified_version=act.version if act else None,

@@ -26,6 +26,8 @@ class Unit:
     model: str
     technology: str | None
     first_seen_at: datetime
+    batch: str = ""  #: of the manufacturer; empty: not stated
+    supplier: str = ""  #: empty: not stated
 
 
 @dataclass(frozen=True)

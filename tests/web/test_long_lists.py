@@ -150,3 +150,25 @@ def test_an_address_of_what_is_not_there_says_so(
     expect(page.get_by_role("main")).to_contain_text(said)
     assert page.locator(".plot").count() == 0
     faults.clear()  # the browser reports the 404 that the page is about
+
+
+@pytest.mark.usefixtures("many")
+def test_the_batch_of_a_unit_is_stated_on_its_page_and_filters_the_list(
+    visit: Callable[..., Page], service: Service
+) -> None:
+    from playwright.sync_api import expect
+
+    service.post("/api/batches", {"batch": "26-W12", "serials": ["G001", "G002"], "by": "Q"})
+    page = visit("/units/G003")
+    page.get_by_role("button", name="State batch").click()
+    page.get_by_label("Batch", exact=True).fill("26-W12")
+    page.get_by_label("Supplier").fill("ACME")
+    page.get_by_label("Who").fill("Q")
+    page.get_by_role("button", name="State", exact=True).click()
+    expect(page.get_by_text("VG-35 · FOG · batch 26-W12 · ACME")).to_be_visible()
+    page = visit("/units")
+    page.get_by_label("Batch", exact=True).select_option("26-W12")
+    expect(page.get_by_role("main").locator("tbody tr")).to_have_count(3)
+    assert page.url.endswith("/units?batch=26-W12")
+    page.reload()
+    expect(page.get_by_text("3 of 3 units found")).to_be_visible()

@@ -8,14 +8,15 @@ from fastapi import APIRouter, Query, Request, Response
 
 from labctl.answers.common_fields import CriticismVerdict
 from labctl.answers.datasheet import DatasheetResponse
-from labctl.answers.units import TrendResponse, UnitResponse, UnitState
+from labctl.answers.units import BatchRequest, BatchResponse, TrendResponse, UnitResponse, UnitState
 from labctl.api.computation import while_connected
-from labctl.api.dependencies import ServiceDep
+from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.paging import AfterSerial, Limit, Search, in_parts
 from labctl.services.calibrations.due import span
+from labctl.services.commands.registry import SET_BATCH
 from labctl.services.criticism.trend import trend_unit
 from labctl.services.datasheet.sheet import datasheet
-from labctl.services.units import list_units, unit
+from labctl.services.units import batches, list_units, unit
 from labctl.store.paging import PageRequest
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
@@ -36,19 +37,33 @@ def units(
     verdict: Annotated[
         CriticismVerdict | None, Query(description="Only units whose version in force was certified with this verdict.")
     ] = None,
+    batch: Annotated[str, Query(max_length=100, description="Only units of this batch.")] = "",
     search: Search = "",
     limit: Limit = None,
     after: AfterSerial = None,
 ) -> list[UnitResponse]:
-    """Every unit that was measured or imported, by serial number; `search` in serial number, model and technology.
+    """Every unit that was measured or imported, by serial number; `search` in serial number, model, technology,
+    batch and supplier.
 
-    With `due_within`, which takes neither `calibration` nor `verdict`, those whose certification ends within that span
-    or has ended, the earliest date first.
+    With `due_within`, which takes none of `calibration`, `verdict` and `batch`, those whose certification ends within
+    that span or has ended, the earliest date first.
     `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
     """
     now, wanted = service.clock.utc(), PageRequest(search, limit, after)
     within = None if due_within is None else span(due_within)
-    return in_parts(request, response, list_units(service.store, now, wanted, within, calibration, verdict))
+    return in_parts(request, response, list_units(service.store, now, wanted, within, calibration, verdict, batch))
+
+
+@router.get("/batches", summary="All batches")
+def all_batches(service: ServiceDep) -> list[BatchResponse]:
+    """Every batch that a unit is of, by name."""
+    return batches(service.store)
+
+
+@command_route(router, SET_BATCH, "State the batch of units")
+def state_batch(request: BatchRequest, service: ServiceDep) -> BatchResponse:
+    """State the batch of some units, and their supplier: of all that are named, or of none where one is absent."""
+    return service.execute(SET_BATCH, request)
 
 
 @router.get("/units/{serial}", summary="One unit")

@@ -36,6 +36,7 @@ def units(
             help="Only units whose version in force was certified with this verdict, such as adequate.",
         ),
     ] = None,
+    batch: Annotated[str, typer.Option("--batch", metavar="BATCH", help="Only units of this batch.")] = "",
     search: Search = "",
     limit: Limit = None,
     as_json: Json = False,
@@ -52,13 +53,13 @@ def units(
         within = None if due_within is None else span(due_within)
         now = SystemClock().utc()
         with open_readonly(database) as store:
-            page = list_units(store, now, PageRequest(search, limit), within, calibration, verdict)
+            page = list_units(store, now, PageRequest(search, limit), within, calibration, verdict, batch)
     found = page.rows
     if as_json:
         print_json(found)
         return
     if not found:
-        chosen = due_within or calibration or verdict or search
+        chosen = due_within or calibration or verdict or batch or search
         nothing = "no such unit is there" if chosen else "no unit has been measured or imported yet"
         console.print("no unit is due" if due_within else nothing)
         return

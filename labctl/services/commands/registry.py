@@ -19,6 +19,7 @@ from labctl.answers.certification import (
 from labctl.answers.drafts import DraftsRequest, DraftsResponse
 from labctl.answers.recordings import ExampleRequest, ImportResponse, SimulatedRecordingResponse, SimulatedRequest
 from labctl.answers.schedule import ScheduledResponse
+from labctl.answers.units import BatchRequest, BatchResponse
 from labctl.services.admin import api_keys
 from labctl.services.calibrations import certification, fitting, revision
 from labctl.services.campaigns.bench_status import clear_bench
@@ -61,6 +62,7 @@ from labctl.services.commands.standards import (
 from labctl.services.drafts.make import make_drafts
 from labctl.services.recordings import examples, importers, transfer
 from labctl.services.schedule import queue
+from labctl.services.units import set_batch
 
 
 def _import_recording(context: CommandContext, asked: RecordingFolder) -> ImportResponse:
@@ -132,6 +134,10 @@ def _create_key(context: CommandContext, asked: KeyRequest) -> NewKeyResponse:
 
 def _revoke_key(context: CommandContext, asked: ToKey[ReasonRequest]) -> KeyResponse:
     return api_keys.revoke_key(context.store, asked.name, asked.body.reason, context.now())
+
+
+def _set_batch(context: CommandContext, asked: BatchRequest) -> BatchResponse:
+    return set_batch(context.store, asked, context.now())
 
 
 def _note_backup(context: CommandContext, asked: BackupNote) -> NoContent:
@@ -227,6 +233,7 @@ CLEAR_BENCH = Command(
 )
 CREATE_KEY = Command(method="POST", path="/api/keys", handler=_create_key, responses={201: NewKeyResponse})
 REVOKE_KEY = Command(method="POST", path="/api/keys/{name}/revoke", handler=_revoke_key, responses={200: KeyResponse})
+SET_BATCH = Command(method="POST", path="/api/batches", handler=_set_batch, responses={200: BatchResponse})
 NOTE_BACKUP = Command(method="POST", path="/api/backups", handler=_note_backup, responses={204: NoContent})
 
 _ELSEWHERE: tuple[Command[Any, Any], ...] = (

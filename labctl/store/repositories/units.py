@@ -11,10 +11,13 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from labctl.acting_user import acting_key
 from labctl.errors import NotFound
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.paging import Page, PageRequest, parts_of, rows_to_read
 from labctl.store.records import CertificationRow, ServedCalibration, Unit, UnitHoldings, Withdrawal
+from labctl.store.repositories.audit import append
 from labctl.store.repositories.records_by_name import record_of, records_of
 from labctl.store.schema import tables
 
@@ -65,6 +68,7 @@ class UnitFilter:
     now: datetime
     calibration: str | None = None  #: in_force, overdue or none
     verdict: str | None = None
+    batch: str | None = None  #: exactly this one
 
     @property
     def condition(self) -> sa.ColumnElement[bool]:
@@ -73,7 +77,7 @@ class UnitFilter:
         newest = of_unit.correlate(tables.units).scalar_subquery()
         act = tables.certifications.alias()
         in_force = sa.exists().where(act.c.id == newest, act.c.act == "certify")
-        conditions = []
+        conditions = [] if self.batch is None else [tables.units.c.batch == self.batch]
         if self.calibration is not None:
             overdue = in_force.where(act.c.due_at <= self.now)
             by_state = {"in_force": in_force, "overdue": overdue, "none": sa.not_(in_force)}
@@ -81,6 +85,14 @@ class UnitFilter:
         if self.verdict is not None:
             conditions.append(in_force.where(act.c.verdict == self.verdict))
         return sa.and_(sa.true(), *conditions)
+
+
+@dataclass(frozen=True)
+class BatchRow:
+    """A batch of units, and how many are of it."""
+
+    batch: str
+    units: int
 
 
 class Units:
@@ -130,10 +142,10 @@ class Units:
             return records_of(Unit, rows)
 
     def page(self, request: PageRequest[str], wanted: UnitFilter | None = None) -> Page[Unit, str]:
-        """Return units by serial number; searched are serial number, model and technology."""
+        """Return units by serial number; searched are serial number, model, technology, batch and supplier."""
         c = tables.units.c
         filtered = sa.true() if wanted is None else wanted.condition
-        matching = sa.and_(SEEN, request.matching((c.serial, c.model, c.technology)), filtered)
+        matching = sa.and_(SEEN, request.matching((c.serial, c.model, c.technology, c.batch, c.supplier)), filtered)
         query = sa.select(tables.units).where(matching).order_by(c.serial).limit(rows_to_read(request))
         if request.after is not None:
             query = query.where(c.serial > request.after)
@@ -141,6 +153,39 @@ class Units:
             total = connection.scalar(sa.select(sa.func.count()).select_from(tables.units).where(matching)) or 0
             units = records_of(Unit, connection.execute(query))
         return Page.of(units, lambda unit: unit.serial, request, total)
+
+    def batches(self) -> list[BatchRow]:
+        """Return every batch that a unit is of, by name, with the number of its units."""
+        c = tables.units.c
+        query = sa.select(c.batch, sa.func.count().label("units")).where(SEEN, c.batch != "").group_by(c.batch)
+        with self._database.reading() as connection:
+            return [BatchRow(row.batch, row.units) for row in connection.execute(query.order_by(c.batch))]
+
+    @transaction
+    def set_batch(self, serials: Sequence[str], batch: str, supplier: str | None, by: str, at: datetime) -> None:
+        """State the batch of some units, and their supplier where one is given. Raises NotFound for one that is absent.
+
+        Every change of a unit is in the audit trail with what was stated before; a unit that has the values already
+        is left as it is.
+        """
+        c = tables.units.c
+        with self._database.writing() as connection:
+            stated: dict[str, sa.Row[Any]] = {}
+            for some in parts_of(serials):
+                found = sa.select(c.serial, c.batch, c.supplier).where(SEEN, c.serial.in_(some))
+                stated |= {row.serial: row for row in connection.execute(found)}
+            if missing := [serial for serial in serials if serial not in stated]:
+                raise NotFound(
+                    f"{len(missing)} of {len(serials)} units are not in this database, first {missing[0]!r}; no batch "
+                    f"was stated: import or measure them first, or leave them out"
+                )
+            for serial, row in stated.items():
+                new = {"batch": batch, "supplier": row.supplier if supplier is None else supplier}
+                old = {"batch": row.batch, "supplier": row.supplier}
+                if new == old:
+                    continue
+                connection.execute(sa.update(tables.units).where(c.serial == serial).values(**new))
+                append(connection, at, "unit batch", serial, {**new, "before": old}, who=acting_key() or by)
 
     def holdings(self, serials: Sequence[str]) -> dict[str, UnitHoldings]:
         """Return the numbers of recordings, newest first, and of versions, rising, of each of some units."""

@@ -13,4 +13,7 @@ units = sa.Table(
     sa.Column("model", sa.String(200), nullable=False),
     sa.Column("technology", sa.String(20)),
     sa.Column("first_seen_at", Instant, nullable=False),
+    sa.Column("batch", sa.String(100), nullable=False, default="", server_default=""),
+    sa.Column("supplier", sa.String(200), nullable=False, default="", server_default=""),
+    sa.Index(None, "batch"),
 )

@@ -72,6 +72,7 @@ export type Trend = Schema<"TrendResponse">;
 export type TrendPoint = Schema<"TrendPoint">;
 export type TurnColumns = Schema<"TurnColumns">;
 export type Uncertainty = Schema<"UncertaintyResponse">;
+export type Batch = Schema<"BatchResponse">;
 export type Unit = Schema<"UnitResponse">;
 export type Validity = Schema<"Validity">;
 export type Visibility = Schema<"Visibility">;

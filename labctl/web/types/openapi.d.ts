@@ -549,15 +549,40 @@ export interface paths {
         };
         /**
          * All units
-         * @description Every unit that was measured or imported, by serial number; `search` in serial number, model and technology.
+         * @description Every unit that was measured or imported, by serial number; `search` in serial number, model, technology,
+         *     batch and supplier.
          *
-         *     With `due_within`, which takes neither `calibration` nor `verdict`, those whose certification ends within that span
-         *     or has ended, the earliest date first.
+         *     With `due_within`, which takes none of `calibration`, `verdict` and `batch`, those whose certification ends within
+         *     that span or has ended, the earliest date first.
          *     `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
          */
         get: operations["units_api_units_get"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/batches": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * All batches
+         * @description Every batch that a unit is of, by name.
+         */
+        get: operations["all_batches_api_batches_get"];
+        put?: never;
+        /**
+         * State the batch of units
+         * @description State the batch of some units, and their supplier: of all that are named, or of none where one is absent.
+         */
+        post: operations["state_batch_api_batches_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -3380,6 +3405,48 @@ export interface components {
              * @description SHA-256 of the file's content, as `sha256sum` prints it.
              */
             sha256: string;
+        };
+        /**
+         * BatchRequest
+         * @description State the batch of some units.
+         */
+        BatchRequest: {
+            /**
+             * Batch
+             * @description Batch of the manufacturer; empty: no batch is stated any more.
+             */
+            batch: string;
+            /**
+             * Serials
+             * @description Serial numbers of the units.
+             */
+            serials: string[];
+            /**
+             * Supplier
+             * @description Supplier of the units; null: what is stated stays.
+             */
+            supplier?: string | null;
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
+            by: string;
+        };
+        /**
+         * BatchResponse
+         * @description A batch of units.
+         */
+        BatchResponse: {
+            /**
+             * Batch
+             * @description Batch of the manufacturer; empty: of the units without one.
+             */
+            batch: string;
+            /**
+             * Units
+             * @description Number of its units in the database.
+             */
+            units: number;
         };
         /**
          * BenchCheckResponse
@@ -14391,6 +14458,18 @@ export interface components {
              */
             technology: string | null;
             /**
+             * Batch
+             * @description Batch of the manufacturer; empty: not stated.
+             * @default
+             */
+            batch: string;
+            /**
+             * Supplier
+             * @description Supplier of the unit; empty: not stated.
+             * @default
+             */
+            supplier: string;
+            /**
              * Recordings
              * @description Numbers of the unit's recordings.
              */
@@ -15906,6 +15985,8 @@ export interface operations {
                 calibration?: ("in_force" | "overdue" | "none") | null;
                 /** @description Only units whose version in force was certified with this verdict. */
                 verdict?: ("adequate" | "missing" | "ambiguous" | "unexplained" | "insufficient_data") | null;
+                /** @description Only units of this batch. */
+                batch?: string;
                 /** @description Only rows that hold this text, in any case; empty: all rows. */
                 search?: string;
                 /** @description Largest number of rows; default: all. The header Link names the next part. */
@@ -15926,6 +16007,59 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["UnitResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    all_batches_api_batches_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BatchResponse"][];
+                };
+            };
+        };
+    };
+    state_batch_api_batches_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BatchRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BatchResponse"];
                 };
             };
             /** @description Validation Error */

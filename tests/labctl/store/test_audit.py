@@ -249,6 +249,9 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
         "simulate", lambda c: c.post("/api/recordings/simulated", json={"recipe": "short", "serial": "SIM"}),
     ),
     "/api/recordings/example": ("import", lambda c: c.post("/api/recordings/example", json={"name": "osu-fog"})),
+    "/api/batches": (
+        "unit batch", lambda c: c.post("/api/batches", json={"batch": "A", "serials": ["SIM"], "by": "A"}),
+    ),
     "/api/units/{serial}/calibrations": ("fit", lambda c: c.post(UNIT, json={"effects": ["bias", "scale_factor"]})),
     "/api/units/{serial}/calibrations/{version}/improve": (
         "improve", lambda c: c.post(f"{UNIT}/1/improve", json={"remove": ["scale_factor"]}),

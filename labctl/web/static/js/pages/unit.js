@@ -6,6 +6,7 @@ import { card, emptyState, pageHeader, cardWithHeader, loadInto } from "../core/
 import { draftsCard } from "../campaigns/drafts.js";
 import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
+import { batchButton, unitLine } from "../unit/batch.js";
 import { certificationTable, waitingNotice } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
 import { certificateTable } from "../unit/certificate_state.js";
@@ -41,9 +42,10 @@ export async function page({ params, signal }) {
     { class: "page", "data-source": `unit ${unit.serial}` },
     pageHeader(
       unit.serial,
-      [unit.model, unit.technology?.toUpperCase()].filter(Boolean).join(" · "),
+      unitLine(unit),
       h("a", { class: "button primary", href: explore }, "Explore"),
       h("a", { class: "button", href: `/live?unit=${encodeURIComponent(unit.serial)}` }, "Calibrate live"),
+      batchButton(unit),
     ),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
     waitingNotice(waiting),

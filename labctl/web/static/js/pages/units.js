@@ -1,13 +1,13 @@
 // The page of all units, by serial number.
 
-import { getPart } from "../core/http/api.js";
+import { get, getPart } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { day } from "../core/format.js";
+import { count, day } from "../core/format.js";
 import { chip, emptyState, pageHeader, table } from "../core/components.js";
 import { longList } from "../core/long_list.js";
 import { VERDICTS, verdictChip } from "../unit/certification.js";
 
-/** @import { Unit } from "../../../types/api.js" */
+/** @import { Batch, Unit } from "../../../types/api.js" */
 /** @import { PageContext } from "../../../types/pages.js" */
 
 /** @type {readonly [string, string][]} */
@@ -17,11 +17,18 @@ const CALIBRATIONS = [
   ["none", "none in force"],
 ];
 
+/**
+ * @param {Batch} batch
+ * @returns {[string, string]}
+ */
+const batchOption = ({ batch, units }) => [batch, `${batch} (${count(units)})`];
+
 /** @param {PageContext} context */
 export async function page({ query, signal }) {
+  const batches = await get("/api/batches", { signal });
   const list = await longList({
     what: "units",
-    hint: "Serial number, model or technology.",
+    hint: "Serial number, model, technology, batch or supplier.",
     search: query.search,
     filters: [
       { name: "calibration", label: "Calibration", options: CALIBRATIONS, value: query.calibration },
@@ -31,6 +38,9 @@ export async function page({ query, signal }) {
         options: Object.entries(VERDICTS).map(([value, [text]]) => [value, text]),
         value: query.verdict,
       },
+      ...(batches.length
+        ? [{ name: "batch", label: "Batch", options: batches.map(batchOption), value: query.batch }]
+        : []),
     ],
     read: (part) => getPart("/api/units", { query: part, signal }),
     draw: unitTable,
@@ -58,6 +68,7 @@ const unitTable = (units) =>
       },
       { title: "Model", cell: (unit) => unit.model },
       { title: "Technology", cell: (unit) => unit.technology?.toUpperCase() ?? "–" },
+      { title: "Batch", cell: (unit) => unit.batch || "–" },
       { title: "Recordings", number: true, cell: (unit) => unit.recordings.length },
       { title: "Versions", number: true, cell: (unit) => unit.calibrations.length },
       {

@@ -1,0 +1,41 @@
+// The batch and the supplier of a unit, and the dialog that states them.
+
+import { post } from "../core/http/api.js";
+import { button, toast } from "../core/components.js";
+import { dialog } from "../core/dialog.js";
+import { show } from "../core/router.js";
+
+/** @import { Unit } from "../../../types/api.js" */
+
+/**
+ * What the unit is, in one line: model, technology, batch and supplier, as far as they are stated.
+ * @param {Unit} unit
+ */
+export const unitLine = (unit) =>
+  [unit.model, unit.technology?.toUpperCase(), unit.batch && `batch ${unit.batch}`, unit.supplier]
+    .filter(Boolean)
+    .join(" · ");
+
+/**
+ * The button that asks for the batch.
+ * @param {Unit} unit
+ */
+export const batchButton = (unit) => button("State batch", () => askBatch(unit));
+
+/** @param {Unit} unit */
+async function askBatch(unit) {
+  const answers = await dialog(
+    `Batch of ${unit.serial}`,
+    [
+      { name: "batch", label: "Batch", value: unit.batch, required: false, hint: "Empty: no batch is stated." },
+      { name: "supplier", label: "Supplier", value: unit.supplier, required: false },
+      { name: "by", label: "Who" },
+    ],
+    { text: "Lists of units are filtered by batch. The change is written to the audit trail.", confirm: "State" },
+  );
+  if (!answers) return;
+  const { batch, supplier, by } = answers;
+  await post("/api/batches", { body: { batch, supplier, by, serials: [unit.serial] } });
+  toast("good", batch ? `${unit.serial} is of batch ${batch}.` : `No batch of ${unit.serial} is stated.`);
+  await show();
+}
