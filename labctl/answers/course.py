@@ -12,7 +12,7 @@ class CourseResponse(ResponseModel):
     """Temperatures of a campaign over its time, as lists of equal length."""
 
     campaign: CampaignNumber
-    samples: int = Field(description="Number of times at which the environment was logged.")
+    samples: int = Field(description="Number of times at which the environment was logged, from the asked time on.")
     t_s: list[float] = Field(
         description="Times, s since the start of the campaign; fewer than `samples` where those are too many to show: "
         "the first and last and, of each span between, the ones at which the temperature was lowest and highest."

@@ -37,6 +37,37 @@ def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visi
     assert "level=error" in page.url
     expect(page.get_by_role("region", name="Events")).to_contain_text("No event of this kind")
     assert_course_is_scrubbed(service, page)
+    assert_channels_are_chosen(service, page)
+
+
+def assert_channels_are_chosen(service: Service, page: Page) -> None:
+    """What is drawn is what the service has of the chosen channels in the chosen time, and the address says both."""
+    from playwright.sync_api import expect
+
+    (serial,) = service.get("/api/campaigns/1")["recordings"]
+    sets, course = service.get("/api/recordings/1/datasets"), service.get("/api/campaigns/1/course?points=4000")
+    page.get_by_role("link", name="Choose channels").click()
+    card = page.get_by_role("region", name="Channels")
+    expect(card.locator(".plot .main-svg").first).to_be_visible()
+    for name in ("set point of the chamber, deg C", "table rate, deg/s", f"{serial}, own temperature, deg C"):
+        card.get_by_label(name).uncheck()
+    expect(card).to_contain_text("2 of ")
+    drawn = "() => Object.fromEntries((document.querySelector('.plot')?.data ?? []).map((t) => [t.name, t]))"
+    page.wait_for_function(f"Object.keys(({drawn})()).length === 2")
+    traces = page.evaluate(drawn)
+    means = traces[f"{serial}, gyro output z (means)"]
+    assert sorted(means["y"]) == sorted(sets["channels"]["gyro_z"]["mean"])
+    assert means["x"] == sorted(means["x"])
+    assert traces["chamber"]["y"] == course["chamber_c"]
+    card.get_by_label("Time").select_option("300")
+    end_s = max(course["t_s"][-1], *service.get("/api/campaigns/1/plan")["timeline"]["started_s"])
+    page.wait_for_function(f"(({drawn})().chamber?.y.length ?? Infinity) < {len(course['t_s'])}")
+    later = [value for t_s, value in zip(course["t_s"], course["chamber_c"], strict=True) if t_s >= end_s - 300]
+    assert page.evaluate(drawn)["chamber"]["y"] == later
+    assert "last=300" in page.url
+    page.reload()
+    expect(card).to_contain_text("2 of ")
+    page.wait_for_function(f"Object.keys(({drawn})()).length === 2")
 
 
 def assert_course_is_scrubbed(service: Service, page: Page) -> None:

@@ -73,9 +73,10 @@ def course(
     campaign: int,
     service: ServiceDep,
     points: Annotated[int, Query(ge=10, le=20_000, description="About as many times at most.")] = 1200,
+    from_s: Annotated[float, Query(ge=0, description="First time, s since the start of the campaign.")] = 0.0,
 ) -> CourseResponse:
     """Temperatures of chamber and units while the campaign ran, also while it runs."""
-    return campaign_course(service.store, campaign, points)
+    return campaign_course(service.store, campaign, points, from_s)
 
 
 for _act in CAMPAIGN_ACTS:

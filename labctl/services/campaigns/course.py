@@ -12,11 +12,12 @@ Column = NDArray[np.float64]
 Logged = dict[str, NDArray[np.generic]]  #: columns of one unit
 
 
-def campaign_course(store: Store, campaign: int, points: int) -> CourseResponse:
-    """Return at most about `points` samples of the environment of a campaign. Raises NotFound."""
+def campaign_course(store: Store, campaign: int, points: int, from_s: float = 0.0) -> CourseResponse:
+    """Return at most about `points` samples of the environment of a campaign from a time, s, on. Raises NotFound."""
     row = store.campaigns.get(campaign)
     units = {serial: store.recordings.environment(recording) for serial, recording in sorted(row.recordings.items())}
     logged = {serial: columns for serial, columns in units.items() if columns}
+    logged = {serial: _since(columns, from_s) for serial, columns in logged.items()}
     times = [np.asarray(columns["t_s"], dtype=np.float64) for columns in logged.values()]
     t_s = np.unique(np.concatenate([np.zeros(0), *times]))
     # units that are switched on are logged together: the air of any of them is that of all
@@ -28,6 +29,11 @@ def campaign_course(store: Store, campaign: int, points: int) -> CourseResponse:
         setpoint_c=_listed(air["chamber_setpoint_c"][shown]),
         units_c={serial: _listed(values[shown]) for serial, values in own.items()},
     )  # fmt: skip
+
+
+def _since(columns: Logged, from_s: float) -> Logged:
+    kept = columns["t_s"].astype(np.float64) >= from_s
+    return {name: values[kept] for name, values in columns.items()}
 
 
 def _merged(

@@ -5911,7 +5911,7 @@ export interface components {
             campaign: number;
             /**
              * Samples
-             * @description Number of times at which the environment was logged.
+             * @description Number of times at which the environment was logged, from the asked time on.
              */
             samples: number;
             /**
@@ -16714,6 +16714,8 @@ export interface operations {
             query?: {
                 /** @description About as many times at most. */
                 points?: number;
+                /** @description First time, s since the start of the campaign. */
+                from_s?: number;
             };
             header?: never;
             path: {

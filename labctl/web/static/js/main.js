@@ -39,6 +39,11 @@ route(
   "Campaign",
   withPlots(() => import("./pages/campaign.js")),
 );
+route(
+  "/campaigns/:id/channels",
+  "Channels",
+  withPlots(() => import("./pages/channels.js")),
+);
 route("/units", "Units", () => import("./pages/units.js"));
 route(
   "/units/:serial",

@@ -45,6 +45,15 @@ def test_of_many_samples_no_peak_is_left_out() -> None:
     assert answer.setpoint_c == [None] * len(answer.t_s)
 
 
+def test_the_newest_part_begins_at_the_time_that_is_asked_for() -> None:
+    t_s = np.arange(0.0, 1000.0)
+    store = store_of({"A": {"t_s": t_s, "chamber_c": t_s}, "B": {"t_s": t_s[:500], "temperature_c": t_s[:500]}})
+    answer = campaign_course(store, 1, points=2000, from_s=990.0)
+    assert (answer.samples, answer.t_s) == (10, list(range(990, 1000)))
+    assert answer.chamber_c == answer.t_s
+    assert answer.units_c["B"] == [None] * 10
+
+
 def test_a_unit_turned_by_hand_has_no_chamber_and_a_new_campaign_no_course() -> None:
     by_hand = campaign_course(store_of({"A": {"t_s": np.array([1.0, 2.0]), "temperature_c": np.ones(2)}}), 1, points=10)
     assert (by_hand.chamber_c, by_hand.units_c) == ([None, None], {"A": [1.0, 1.0]})

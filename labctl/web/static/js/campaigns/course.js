@@ -106,7 +106,12 @@ export function courseCard(course, plan, datasets, moved) {
   return h(
     "section",
     { class: "card stack", "aria-label": "Course" },
-    h("h2", {}, "Course"),
+    h(
+      "div",
+      { class: "row space-between" },
+      h("h2", {}, "Course"),
+      h("a", { class: "button tiny", href: `/campaigns/${course.campaign}/channels` }, "Choose channels"),
+    ),
     picture,
     slider,
     readings,
