@@ -81,7 +81,11 @@ class FitRequest(Request):
 class ImproveRequest(Request):
     """How to change the effects of a version; the changed model is fitted again and becomes the next version."""
 
-    add: list[str] = Field(default_factory=list, description="Ids of effects to add; `name:2` sets polynomial order 2.")
+    add: list[str] = Field(
+        default_factory=list,
+        description="Ids of effects to add; `name:2` sets polynomial order 2, "
+        "`name@parameter=value` its shape, which is otherwise found from the data.",
+    )
     remove: list[str] = Field(default_factory=list, description="Ids of the version's effects to remove.")
     formula: list[str] = Field(default_factory=list, description="Your own effects to add, each as 'name: expression'.")
     version: int | None = Field(

@@ -31,6 +31,10 @@ class ParameterJson(TypedDict):
     """The symbol as MathML; empty for a switch."""
     meaning: str
     """What the parameter is; empty: an effect of another package does not say."""
+    optional: bool
+    """Whether a stated shape may leave it out; a switch always may."""
+    refined: bool
+    """Whether a stated value only begins the fit, which finds the parameter as a coefficient."""
 
 
 class SymbolJson(TypedDict):

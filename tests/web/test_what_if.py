@@ -37,7 +37,7 @@ def opened(service: Service, visit: Callable[..., Page]) -> tuple[Page, Locator]
 
 
 def rms_shown(panel: Locator) -> float:
-    found = RMS.search(panel.locator("output").inner_text())
+    found = RMS.search(panel.locator("output").first.inner_text())
     assert found
     return float(found.group(1))
 
@@ -52,12 +52,12 @@ def test_the_slider_moves_between_the_fits_without_and_with_the_effect(
     before = service.get(f"{unit}/criticism")
     after = service.post(f"{unit}/preview", {"add": ["sine_response"]})
     assert rms_shown(panel) == float(f"{after['error']['rms_dps']:.3g}")
-    slider = panel.get_by_role("slider")
+    slider = panel.get_by_role("slider", name="Size of")
     slider.fill("0")
-    expect(panel.locator("output")).to_contain_text("0 % of the fitted size")
+    expect(panel.locator("output").first).to_contain_text("0 % of the fitted size")
     assert rms_shown(panel) == float(f"{before['error']['rms_dps']:.3g}")
     slider.fill("0.5")
-    expect(panel.locator("output")).to_contain_text("50 % of the fitted size")
+    expect(panel.locator("output").first).to_contain_text("50 % of the fitted size")
     drawn = np.array(figure(page, "What would be left.")["data"][0]["y"])
     middle = (np.array(before["views"]["sets"]["residual_dps"]["z"]) + np.array(after["residuals"]["residual_dps"])) / 2
     assert np.abs(drawn - middle).max() < 1e-5
@@ -85,3 +85,30 @@ def test_a_second_effect_lies_over_it_and_their_parting_rates_become_a_plan(
     assert path == "/campaigns/new"
     assert plan.datasets == 3 * len(rates)
     assert [min(rates), max(rates)] == pytest.approx([min(marked), max(marked)], rel=1e-3)
+
+
+def test_another_shape_is_fitted_again_by_the_service_and_the_fitted_one_comes_back(
+    opened: tuple[Page, Locator], service: Service
+) -> None:
+    from playwright.sync_api import expect
+
+    page, panel = opened
+    expect(panel.get_by_role("slider")).to_have_count(1)  # K of the sine is found by the fit, whatever is stated
+    learn = page.get_by_role("region", name="Which effects are missing")
+    learn.get_by_role("listitem").filter(has_text="saturation").get_by_role("button", name="What if").click()
+    panel = page.get_by_role("region", name="What if: saturation")
+    best = rms_shown(panel)
+    knee = panel.get_by_role("slider", name="rate above which")
+    knee.fill("36.4")
+    knee.dispatch_event("change")
+    expect(panel).to_contain_text("Fitted again with this shape.")
+    stated = float(panel.locator("label", has_text="Shape:").locator("span.muted").inner_text().split()[0])
+    assert 60 < stated < 80
+    expected = service.post(
+        "/api/units/OSU-FOG-2024/calibrations/1/preview", {"add": [f"saturation@knee_dps={stated}"]}
+    )
+    assert rms_shown(panel) == pytest.approx(expected["error"]["rms_dps"], rel=0.01) != best
+    drawn = np.array(figure(page, "What would be left.")["data"][0]["y"])
+    assert np.abs(drawn - np.array(expected["residuals"]["residual_dps"])).max() < 0.01
+    panel.get_by_role("button", name="Fitted shape").click()
+    expect(panel.locator("output").first).to_contain_text(f"{best} deg/s RMS left")

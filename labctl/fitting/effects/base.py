@@ -36,6 +36,8 @@ class Parameter:
     logarithmic: bool = False
     symbol: str = ""  #: in the equation of its effect; "": a switch, which chooses a case there
     meaning: str = ""
+    optional: bool = False  #: whether a term may leave it out
+    refined: bool = False  #: whether it only begins the fit, which finds it as a coefficient
 
     def grid(self, points: int) -> Array:
         """Return `points` values across the range."""

@@ -6,7 +6,8 @@ An entry point is one class of effect, or several in a row; labctl's own stand i
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -114,7 +115,42 @@ def kind_of(term: Term) -> Effect:
 
 
 def parse_term(text: str) -> Term:
-    """Read `name` or `name:order`; raises BadInput when the effect has no such order."""
+    """Read `name`, `name:order` or, with a stated shape, `name@parameter=value@parameter=value`.
+
+    Raises BadInput for an effect without such an order or parameter, and for a value outside the parameter's range.
+    """
+    head, *stated = text.split("@")
+    term = _ordered(head)
+    return replace(term, parameters=_stated(effect(term.effect), stated)) if stated else term
+
+
+def _stated(kind: Effect, texts: Sequence[str]) -> dict[str, float]:
+    """Return parameters of an effect from texts `name=value`: all that it has."""
+    parameters = {parameter.name: parameter for parameter in kind.parameters}
+    values: dict[str, float] = {}
+    for text in texts:
+        name, _, value_text = (part.strip() for part in text.partition("="))
+        if name not in parameters:
+            choices = ", ".join(parameters) or "it has none"
+            raise BadInput(f"effect {kind.id!r} has no parameter {name!r}; its parameters: {choices}")
+        parameter = parameters[name]
+        try:
+            value = float(value_text)
+        except ValueError:
+            value = float("nan")
+        if not parameter.low <= value <= parameter.high:
+            raise BadInput(
+                f"effect {kind.id!r}: {name} = {value_text!r} is not a number from {parameter.low:g} to "
+                f"{parameter.high:g} {parameter.unit}; give one in that range"
+            )
+        values[name] = value
+    needed = [parameter.name for parameter in kind.parameters if parameter.symbol and not parameter.optional]
+    if missing := [name for name in needed if name not in values]:
+        raise BadInput(f"effect {kind.id!r}: the value of {missing[0]} is missing; give all of {', '.join(needed)}")
+    return values
+
+
+def _ordered(text: str) -> Term:
     name, _, order_text = text.partition(":")
     kind = effect(name.strip())
     if not order_text:

@@ -47,6 +47,8 @@ def parameters_of(effect: Effect) -> list[ParameterJson]:
             "symbol": p.symbol,
             "symbol_mathml": symbol_mathml(p.symbol) if p.symbol else "",
             "meaning": p.meaning,
+            "optional": p.optional,
+            "refined": p.refined,
         }
         for p in effect.parameters
     ]

@@ -67,7 +67,9 @@ class TimeDelay(_Responding):
     sentence = "The output is delayed: while the rate changes, it is off by the delay times the angular acceleration."
     name = DELAY
     parameters = (
-        Parameter("delay_s", "s", 2e-4, 0.1, logarithmic=True, symbol="delta", meaning="delay of the output"),
+        Parameter(
+            "delay_s", "s", 2e-4, 0.1, logarithmic=True, symbol="delta", meaning="delay of the output", refined=True
+        ),
     )
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.03), "piezo": (0.0, 0.03)}
     experiment = (
@@ -97,7 +99,14 @@ class Bandwidth(_Responding):
     name = TIME_CONSTANT
     parameters = (
         Parameter(
-            "time_constant_s", "s", 2e-4, 0.1, logarithmic=True, symbol="tau", meaning="time constant of the output"
+            "time_constant_s",
+            "s",
+            2e-4,
+            0.1,
+            logarithmic=True,
+            symbol="tau",
+            meaning="time constant of the output",
+            refined=True,
         ),
     )
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.05)}

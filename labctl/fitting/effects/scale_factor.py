@@ -194,6 +194,7 @@ class SineResponse(Effect):
             1.0,
             logarithmic=True,
             symbol="K",
+            refined=True,
             meaning="optical phase per rate, at which the law is linearised while effects compete",
         ),
     )

@@ -106,6 +106,7 @@ class Lag(Effect):
             LONGEST_S,
             logarithmic=True,
             symbol="tau_2",
+            optional=True,
             meaning="time constant of a second element; left out: there is none",
         ),
         Parameter(
@@ -115,6 +116,7 @@ class Lag(Effect):
             LONGEST_S,
             logarithmic=True,
             symbol="tau_c",
+            optional=True,
             meaning="time constant while the element is warmer than the thermometer; left out: the same",
         ),
         Parameter(

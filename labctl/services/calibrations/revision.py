@@ -173,8 +173,9 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     _refuse_what_changes_nothing(terms, model, request, row.version)
     base, _ = changed(model, (), tuple(request.remove)).build(context)
     add = tuple(_shaped(measured, base, term) for term in terms)
+    is_open = bool(terms) and not any(term.parameters for term in terms)
     before = fit_preset(context, changed(model))
-    after = fit_preset(context, with_shapes(context, changed(model, add, tuple(request.remove)), all_of_them=bool(add)))
+    after = fit_preset(context, with_shapes(context, changed(model, add, tuple(request.remove)), all_of_them=is_open))
     hint = hint_of_added(context, base, [term.effect for term in add])
     return _Change(row, measured, before, after, None if hint is None else hint.with_shapes(after.shapes))
 
@@ -190,8 +191,10 @@ def _terms(texts: Sequence[str]) -> list[Term]:
 
 
 def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
-    """Return a term with the order and the nonlinear parameters that fit the recording best."""
+    """Return a term with the order and the nonlinear parameters that fit the recording best, or that it states."""
     kind = kind_of(term)
+    if term.parameters:
+        return replace(term, steady=True)
     if term.order is not None or not (kind.parameters or kind.max_order):
         return term
     shape = best_shapes(

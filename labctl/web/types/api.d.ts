@@ -54,6 +54,7 @@ export type LiveState = Schema<"LiveStateResponse">;
 export type LogPreview = Schema<"LogPreview">;
 export type Motion = Schema<"MotionResponse">;
 export type Output = Schema<"OutputResponse">;
+export type Parameter = Schema<"ParameterJson">;
 export type Plan = Schema<"PlannedResponse">;
 export type Prompt = Schema<"PromptResponse">;
 export type Turn = Schema<"TurnResponse">;

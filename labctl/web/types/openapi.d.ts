@@ -8232,7 +8232,7 @@ export interface components {
         ImproveRequest: {
             /**
              * Add
-             * @description Ids of effects to add; `name:2` sets polynomial order 2.
+             * @description Ids of effects to add; `name:2` sets polynomial order 2, `name@parameter=value` its shape, which is otherwise found from the data.
              */
             add?: string[];
             /**
@@ -10831,6 +10831,16 @@ export interface components {
              * @description What the parameter is; empty: an effect of another package does not say.
              */
             meaning: string;
+            /**
+             * Optional
+             * @description Whether a stated shape may leave it out; a switch always may.
+             */
+            optional: boolean;
+            /**
+             * Refined
+             * @description Whether a stated value only begins the fit, which finds the parameter as a coefficient.
+             */
+            refined: boolean;
         };
         /**
          * PictureResponse

@@ -188,6 +188,12 @@ def test_too_little_data_says_how_much_more(
         (None, ["bais"], "effect 'bais' is not in the catalogue; did you mean bias"),
         (None, ["bias:2"], "has no polynomial order"),
         (None, ["scale_factor_odd:9"], "is not a whole number; give one from 3 to 5"),
+        (None, ["bias@knee_dps=3"], "'bias' has no parameter 'knee_dps'; its parameters: it has none"),
+        (None, ["saturation@knee=3"], "has no parameter 'knee'; its parameters: knee_dps"),
+        (None, ["saturation@knee_dps=1e6"], "knee_dps = '1e6' is not a number from 20 to 400 deg/s"),
+        (None, ["saturation@knee_dps=nan"], "knee_dps = 'nan' is not a number from 20 to 400 deg/s"),
+        (None, ["saturation@knee_dps"], "knee_dps = '' is not a number"),
+        (None, ["vibration_rectification@width=0.3"], "the value of centre_dps is missing"),
         (None, [], "give the model to fit"),
     ],
 )

@@ -119,7 +119,8 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
       async () => {
         const others = speaking.filter((each) => each !== suspect);
         const [explained, { whatIf }] = await Promise.all([explain(suspect.effect), import("./what_if.js")]);
-        setChildren(open, whatIf({ state, suspect, others, explained, explain }));
+        const { parameters = [] } = effects.find(({ id }) => id === suspect.effect) ?? {};
+        setChildren(open, whatIf({ state, suspect, parameters, others, explained, explain }));
         scrollTo(open, "nearest");
       },
       { kind: "tiny" },

@@ -10,9 +10,10 @@ import { channelTitle, scaled, shownText } from "./dataset_rows.js";
 import { channelOf } from "./preview_result.js";
 import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap, selectedRows } from "./residual_map.js";
+import { shapeSliders } from "./what_if_shape.js";
 import { leftWith, levelMeans, partingLevels, partingRecipe, rmsOf } from "./what_if_numbers.js";
 
-/** @import { Suspect } from "../../../types/api.js" */
+/** @import { Parameter, Suspect } from "../../../types/api.js" */
 /** @import { Figure, PlotTrace } from "../../../types/pages.js" */
 /** @import { ExploreState } from "./state.js" */
 /** @import { Values } from "./what_if_numbers.js" */
@@ -27,25 +28,35 @@ const LEVEL_DIGITS = 2;
 const levelOf = (value) => Number(value.toPrecision(LEVEL_DIGITS));
 
 /**
+ * @typedef {object} Shown
+ * @property {number} share of the fitted size
+ * @property {Values} explained deg/s, what a fit with the effect in the chosen shape takes off
+ * @property {boolean} isFitted whether the shape is the fitted one
+ * @property {{ name: string, explained: Values } | null} beside the effect that lies over it
+ * @property {readonly number[]} parts levels at which the two part
+ */
+
+/**
  * @typedef {object} Given
  * @property {ExploreState} state
  * @property {Suspect} suspect
+ * @property {readonly Parameter[]} parameters of the effect, with the range of each
  * @property {readonly Suspect[]} others the other suspects, one of which may lie over it
  * @property {Values} explained deg/s, what a fit with the suspect takes off, one for each data set
- * @property {(effect: string) => Promise<Values>} explain the same of another effect
+ * @property {(term: string) => Promise<Values>} explain the same of another effect, or of this one in another shape
  */
 
 /**
  * The part of the page for one suspect.
  * @param {Given} given
  */
-export function whatIf({ state, suspect, others, explained, explain }) {
+export function whatIf({ state, suspect, parameters, others, explained, explain }) {
   const rows = selectedRows(state);
   const channel = channelOf(rows.channels);
   const x = scaled(channel, rows.channels[channel]);
-  /** @type {{ share: number, beside: { name: string, explained: Values } | null, parts: readonly number[] }} */
-  const shown = { share: 1, beside: null, parts: [] };
-  const left = () => leftWith(rows.residual, explained, shown.share);
+  /** @type {Shown} */
+  const shown = { share: 1, explained, isFitted: true, beside: null, parts: [] };
+  const left = () => leftWith(rows.residual, shown.explained, shown.share);
   const figures = [
     explainedFigure({
       name: idText(suspect.effect),
@@ -53,7 +64,6 @@ export function whatIf({ state, suspect, others, explained, explain }) {
       channel,
       state,
       shown,
-      explained,
       band: bandOf(suspect, state),
     }),
     leftFigure({ x, channel, state, left }),
@@ -62,7 +72,7 @@ export function whatIf({ state, suspect, others, explained, explain }) {
   const words = h("output", { class: "what-if-words" });
   const parting = h("div", {});
   const follow = () => {
-    setChildren(words, sizeWords(suspect, state, shown.share, left()));
+    setChildren(words, sizeWords(suspect, state, shown, left()));
     for (const each of figures) each.redraw();
   };
   const slider = h("input", {
@@ -77,17 +87,23 @@ export function whatIf({ state, suspect, others, explained, explain }) {
       follow();
     },
   });
+  const part = () => {
+    shown.parts = shown.beside ? partingOf(state, x, shown.explained, shown.beside.explained) : [];
+    setChildren(parting, shown.beside ? partingNotice(state, suspect, shown.beside.name, channel, shown.parts) : null);
+  };
+  const shape = shapeSliders(suspect, parameters, async (term) => {
+    shown.explained = term ? await explain(term) : explained;
+    shown.isFitted = term === null;
+    part();
+    follow();
+  });
   const beside = selectField(
     "Lay another effect over it",
     [option("", "none"), ...others.map((each) => option(each.effect, idText(each.effect)))],
     "",
     async (value) => {
       shown.beside = value ? { name: idText(value), explained: await explain(value) } : null;
-      shown.parts = shown.beside ? partingOf(state, x, explained, shown.beside.explained) : [];
-      setChildren(
-        parting,
-        shown.beside ? partingNotice(state, suspect, shown.beside.name, channel, shown.parts) : null,
-      );
+      part();
       follow();
     },
   );
@@ -96,6 +112,7 @@ export function whatIf({ state, suspect, others, explained, explain }) {
     "section",
     { class: "what-if stack", "aria-label": `What if: ${idText(suspect.effect)}` },
     h("div", { class: "row" }, h("label", { class: "field what-if-slider" }, "Size", slider), words),
+    shape,
     h("div", { class: "columns" }, figures),
     h("div", { class: "row" }, others.length ? beside : null),
     parting,
@@ -106,17 +123,17 @@ export function whatIf({ state, suspect, others, explained, explain }) {
  * The size in words, and what is left with it.
  * @param {Suspect} suspect
  * @param {ExploreState} state
- * @param {number} share
+ * @param {Shown} shown
  * @param {Values} left
  */
-function sizeWords(suspect, state, share, left) {
-  const coefficients = Object.entries(suspect.coefficients[state.axis] ?? {});
+function sizeWords(suspect, state, { share, isFitted }, left) {
+  const coefficients = isFitted ? Object.entries(suspect.coefficients[state.axis] ?? {}) : [];
   const sizes = coefficients.map(([name, { value, unit }]) =>
     coefficients.length > 1 ? null : `${idText(name)} ${withUncertainty(share * value, null, unit)}`,
   );
   const size = [`${percent(share)} of the fitted size`, ...sizes].filter(Boolean).join(", ");
   const of = shownText(state.criticism) ?? `${left.length} data sets`;
-  return `${size}: ${number(rmsOf(left))} deg/s RMS left on axis ${state.axis}, over ${of}. The shape stays that of the fit.`;
+  return `${size}: ${number(rmsOf(left))} deg/s RMS left on axis ${state.axis}, over ${of}${isFitted ? "" : "; the size and all else are fitted again with this shape"}.`;
 }
 
 /**
@@ -131,20 +148,28 @@ function bandOf(suspect, state) {
 }
 
 /**
+ * A line through the means of levels, times a factor.
+ * @param {readonly { x: number, mean: number }[]} levels
+ * @param {number} factor
+ */
+const levelLine = (levels, factor) => ({
+  x: levels.map((level) => level.x),
+  y: levels.map((level) => factor * level.mean),
+});
+
+/**
  * The residual, and the part of it that the effect (and the other one) would explain.
  * @param {object} given
  * @param {string} given.name
  * @param {Values} given.x
  * @param {string} given.channel
  * @param {ExploreState} given.state
- * @param {{ share: number, beside: { name: string, explained: Values } | null, parts: readonly number[] }} given.shown
- * @param {Values} given.explained
+ * @param {Shown} given.shown
  * @param {number | null} given.band
  * @returns {Figure}
  */
-function explainedFigure({ name, x, channel, state, shown, explained, band }) {
+function explainedFigure({ name, x, channel, state, shown, band }) {
   const rows = selectedRows(state);
-  const levels = levelMeans(x, explained, levelOf);
   /**
    * @param {number} factor
    * @param {object} more
@@ -153,8 +178,7 @@ function explainedFigure({ name, x, channel, state, shown, explained, band }) {
   const line = (factor, more) => ({
     type: "scatter",
     mode: "lines",
-    x: levels.map((level) => level.x),
-    y: levels.map((level) => factor * level.mean),
+    ...levelLine(levelMeans(x, shown.explained, levelOf), factor),
     hoverinfo: "skip",
     ...more,
   });
@@ -174,7 +198,7 @@ function explainedFigure({ name, x, channel, state, shown, explained, band }) {
         hovertemplate: "%{x:.5g}: %{y:.3g} deg/s<extra></extra>",
       },
     ];
-    if (band !== null)
+    if (band !== null && shown.isFitted)
       data.push(
         line(share * (1 - band), { ...shade, name: "band, from" }),
         line(share * (1 + band), {

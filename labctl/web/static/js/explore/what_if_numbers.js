@@ -90,3 +90,33 @@ duration_s = 60
 settle_s = 5
 `;
 }
+
+/** @typedef {{ low: number, high: number }} Range of a parameter of a shape */
+
+/**
+ * Where a value is on a slider, 0 to 1: by ratios where the range has only positive values.
+ * @param {Range} range
+ * @param {number} value
+ */
+export function sliderAt({ low, high }, value) {
+  const share = low > 0 ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+  return Math.min(1, Math.max(0, share));
+}
+
+/**
+ * The value at a place of a slider, to four digits and never outside the range.
+ * @param {Range} range
+ * @param {number} share 0 to 1
+ */
+export function valueAt({ low, high }, share) {
+  const value = low > 0 ? low * (high / low) ** share : low + share * (high - low);
+  return Math.min(high, Math.max(low, Number(value.toPrecision(4))));
+}
+
+/**
+ * An effect in a stated shape, as requests write it.
+ * @param {string} effect
+ * @param {Record<string, number>} parameters
+ */
+export const termOf = (effect, parameters) =>
+  [effect, ...Object.entries(parameters).map(([name, value]) => `${name}=${value}`)].join("@");
