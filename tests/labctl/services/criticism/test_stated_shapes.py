@@ -54,6 +54,8 @@ def test_what_is_left_with_a_stated_knee_is_that_of_plain_least_squares(store: S
     rate, output = (np.asarray(columns[name], dtype=float) for name in ("table_rate_dps", "gyro_z"))
     beyond = np.sign(rate) * np.maximum(np.abs(rate) - knee, 0.0)
     design = np.column_stack([np.ones_like(rate), rate, beyond])
-    left = output - design @ np.linalg.lstsq(design, output, rcond=None)[0]
+    coefficients = np.linalg.lstsq(design, output, rcond=None)[0]
+    slope = coefficients[1] + coefficients[2] * (np.abs(rate) > knee)  # V per deg/s: the output is a voltage
+    left = (output - design @ coefficients) / slope
     answer = preview(store, f"saturation@knee_dps={knee}")
     assert answer.error.rms_dps == pytest.approx(np.sqrt(np.mean(left**2)), rel=0.01)
