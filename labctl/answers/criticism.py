@@ -200,8 +200,8 @@ class Experiment(TypedDict):
     mountings: int
     """How often a unit is mounted anew, after the first mounting."""
     per_hour: float
-    """Expected information per hour, bit/h, by which experiments are ranked; set-up and a person's time are added to
-    the hours."""
+    """Expected information per hour, bit/h; set-up and a person's time are added to the hours. Experiments are ordered
+    by the probability per hour that the cause is named alone and rightly, where that is at least 5 %, then by this."""
 
 
 class Undistinguished(TypedDict):

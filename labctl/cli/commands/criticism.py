@@ -118,7 +118,10 @@ def written(sources: list[str] | None) -> list[Formula]:
 
 def improve(
     serial: Serial,
-    add: Annotated[list[str] | None, typer.Option("--add", metavar="EFFECT", help="Effect to add; `name@parameter=value` in this shape.")] = None,
+    add: Annotated[
+        list[str] | None,
+        typer.Option("--add", metavar="EFFECT", help="Effect to add; `name@parameter=value` in this shape."),
+    ] = None,
     remove: Annotated[list[str] | None, typer.Option("--remove", metavar="EFFECT", help="Effect to remove.")] = None,
     formula: FormulaOption = None,
     version: VersionOption = None,

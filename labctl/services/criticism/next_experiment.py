@@ -1,4 +1,4 @@
-"""The next experiment: which changed recipe is expected to say most, per bench hour, about which effect is missing."""
+"""The next experiment: which changed recipe is expected to decide, per bench hour, which effect is missing."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ from procedures.recipe.recipe import Recipe, recipe_document
 SHOWN = 12
 #: An experiment that is expected to answer less than this share of the question is none.
 MIN_ANSWERED = 0.05
+#: Below this probability an experiment is not expected to name the cause, and is ranked by its information.
+MIN_NAMING = 0.05
 #: Time that a campaign takes of bench and person before its first step, h.
 SET_UP_H = 0.25
 #: Below this there is nothing to learn, bit.
@@ -57,13 +59,33 @@ class Foreseen(Planned):
     mountings: int  #: after the first
 
     @property
+    def cost_h(self) -> float:
+        """Hours of the bench, set-up and a person's time counted."""
+        return self.hours + SET_UP_H + self.person_h
+
+    @property
     def bit_per_h(self) -> float:
         """Expected information per hour of the bench, set-up and a person's time counted."""
-        return self.forecast.information_bit / (self.hours + SET_UP_H + self.person_h)
+        return self.forecast.information_bit / self.cost_h
+
+    @property
+    def naming(self) -> float:
+        """The probability that the verdict then names the cause alone, and rightly."""
+        return max(self.forecast.names_one - self.forecast.names_wrong, 0.0)
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """What experiments are ordered by, best last: the naming of the cause per hour, then information per hour.
+
+        Probabilities may say which cause it is long before a verdict may: a verdict also asks whether the rival
+        reproduces what was measured. So an experiment that lets the verdict decide comes before one that only moves
+        the probabilities; where none is expected to decide, information is what leads on.
+        """
+        return (self.naming / self.cost_h if self.naming >= MIN_NAMING else 0.0, self.bit_per_h)
 
 
 def experiments_for(store: Store, rows: Sequence[RecordingRow], criticism: Criticism) -> list[Experiment]:
-    """Return changed recipes that are expected to say which effect is missing, the most information per hour first.
+    """Return changed recipes that are expected to say which effect is missing, best first (`Foreseen.rank`).
 
     `rows` are the recordings that were criticised. Nothing where the verdict leaves nothing open, or where no
     experiment that the bench can run would add anything.
@@ -102,7 +124,7 @@ def ranked_experiments(
         foreseen.append(Foreseen(each.block, plan, each.text, expected, hours, person_h, mountings))
     enough = MIN_ANSWERED * question.entropy_bit
     useful = [e for e in foreseen if e.forecast.information_bit > max(enough, 2 * e.forecast.u_bit)]
-    return sorted(useful, key=lambda e: -e.bit_per_h)
+    return sorted(useful, key=lambda e: e.rank, reverse=True)
 
 
 def _what(recipe: Recipe) -> dict[str, object]:
@@ -150,6 +172,10 @@ def _described(foreseen: Foreseen, question: OpenQuestion, recipe: Recipe, of: i
     }
 
 
+#: What experiments are ordered by, in words: whether one is expected to decide.
+_ORDER = {True: "the probability that one cause is then named alone", False: "expected information"}
+
+
 def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     """Return the sentence that explains a choice."""
     expected, leader = foreseen.forecast, question.ids[0]
@@ -159,7 +185,8 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
         f"{question.entropy_bit:.2f} bit that are missing to know which of {len(question.ids)} effects it is: "
         f"{foreseen.bit_per_h:.2g} bit/h with set-up and a person's time"
     )
-    rank = f", the order of the {of} experiments that this bench can run" if of > 1 else ""
+    order = _ORDER[foreseen.rank[0] > 0]
+    rank = f"; {of} experiments that this bench can run are ordered by {order} per hour" if of > 1 else ""
     listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
     pair = f"; if it is {leader}, this distinguishes it from {listed}" if told else ""
     return f"{first}{rank}{pair}; the probability that one cause is then named alone is {expected.names_one:.2f}."
