@@ -10,8 +10,8 @@ from pathlib import Path
 from pydantic import JsonValue
 from rich.console import Console
 
-from instruments.bench_config import SimulationSettings
-from instruments.clock import VirtualClock
+from instruments.bench_config import BenchFile, SimulationSettings
+from instruments.clock import Clock, VirtualClock
 from labctl.answers.calibrations import FitRequest, FitResponse
 from labctl.answers.campaigns import CampaignResponse
 from labctl.cli.progress_bar import CampaignProgress
@@ -59,8 +59,11 @@ class DemoRunner:
             update={"noise_seed": noise_seed, "hidden": hidden or {}}
         )
         gyros = settings.gyros if serial is None else (settings.gyros[0].model_copy(update={"serial": serial}),)
-        settings = settings.model_copy(update={"simulation": simulation, "gyros": gyros})
-        prepared = prepare(self.store, recipe, settings, VirtualClock(), clip=False, fit=False)
+        return self.run(recipe, settings.model_copy(update={"simulation": simulation, "gyros": gyros}), VirtualClock())
+
+    def run(self, recipe: str, settings: BenchFile, clock: Clock) -> CampaignResponse:
+        """Run a recipe on a bench, with progress and time left."""
+        prepared = prepare(self.store, recipe, settings, clock, clip=False, fit=False)
         row = self.store.campaigns.get(prepared.id)
         with CampaignProgress(quiet=self.quiet, title=f"campaign {prepared.id}") as bar:
 

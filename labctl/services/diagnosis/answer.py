@@ -80,5 +80,7 @@ def _next(row: DiagnosisRow, rounds: list[RoundRow]) -> str:
     if row.state in {"stopped", "failed"}:
         return f"`labctl diagnose {row.serial}` continues it; `labctl diagnose {row.serial} --end` ends it for good"
     if row.outcome in {"one_cause", "several_causes"}:
-        return f"`labctl improve {row.serial} --version {row.version} --add {','.join(rounds[-1].named)}`"
+        of = ",".join(map(str, rounds[-1].recordings))
+        effects = ",".join(rounds[-1].named)
+        return f"`labctl improve {row.serial} --version {row.version} --recording {of} --add {effects}`"
     return ""

@@ -115,7 +115,8 @@ def chosen_rows(
 ) -> tuple[RecordingRow, ...]:
     """Return the recordings asked for, several or one, rising; else the unit's newest that can be fitted.
 
-    Raises BadInput where both are given and differ, and what `newest_row` raises.
+    Where that one belongs to a diagnosis, all recordings of the diagnosis: an experiment measures a few points, which
+    say something beside the recordings that it was chosen for, and rarely determine a model alone. Raises BadInput where both are given and differ, and what `newest_row` raises.
     """
     numbers = sorted(set(recordings))
     if recording is not None and numbers and numbers != [recording]:
@@ -127,10 +128,29 @@ def chosen_rows(
         raise BadInput(
             f"{len(numbers)} recordings were given, but at most {MAX_TOGETHER} can be fitted together; name fewer"
         )
+    if not numbers and recording is None:
+        newest = newest_row(store, serial, None, to_fit=True)
+        numbers = _of_diagnosis(store, newest)
+        if len(numbers) < 2:
+            return (newest,)
     if len(numbers) < 2:
-        newest = numbers[0] if numbers else recording
-        return (newest_row(store, serial, newest, other_unit=other_unit, to_fit=True),)
+        one = numbers[0] if numbers else recording
+        return (newest_row(store, serial, one, other_unit=other_unit, to_fit=True),)
     return tuple(newest_row(store, serial, number, other_unit=other_unit) for number in numbers)
+
+
+def _of_diagnosis(store: Store, newest: RecordingRow) -> list[int]:
+    """Return the recordings of the newest diagnosis with an experiment that a recording belongs to, rising."""
+    for diagnosis in store.diagnoses.of_unit(newest.serial):
+        measured = [
+            each.recording
+            for each in store.diagnoses.rounds(diagnosis.id)
+            if each.recording is not None and each.came == "measured"
+        ]
+        together = sorted({*diagnosis.recordings, *measured})
+        if measured and newest.id in together:
+            return together[-MAX_TOGETHER:]
+    return []
 
 
 def is_to_verify(store: Store, row: RecordingRow) -> bool:

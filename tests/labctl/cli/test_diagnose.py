@@ -43,10 +43,19 @@ def test_one_experiment_names_the_cause(ambiguous: Lab, tmp_path: Path) -> None:
     assert "if it is dead_band, this distinguishes it from scale_factor_odd, saturation, missed_steps" in output
     assert "round 2, 0.2 h: missing: dead_band" in output
     assert "One cause is left: dead_band, after 0.2 h on the bench." in output
-    assert f"labctl improve {UNIT} --version 1 --add dead_band" in output
     again = lab.json("diagnose", UNIT)  # begins with all recordings, and has nothing left to do
     assert (again["outcome"], again["recordings"], len(again["rounds"])) == ("one_cause", [1, 2], 1)
     assert lab.json("campaign", "list")[0]["recipe"] == "diagnosis-1-round-1"
+    proposed = output.split("next: `labctl ")[-1].split("`")[0]
+    assert proposed == f"improve {UNIT} --version 1 --recording 1,2 --add dead_band"
+    improved = lab.json(*proposed.split())
+    assert (improved["version"], improved["recordings"]) == (2, [1, 2])
+    # the recording of an experiment alone is seven rates at one temperature: beside it are those it was made for
+    judged = lab.json("criticise", UNIT)
+    assert (judged["recordings"], judged["verdict"]) == ([1, 2], "adequate")
+    assert lab.json("fit", UNIT, "--effects", MODEL)["recordings"] == [1, 2]
+    lab.run("campaign", "start", str(lab.folder / "few.toml"), "--simulated-start", "2027-01-01T08:00:00Z")
+    assert lab.json("criticise", UNIT, status=None)["recording"] == 3  # a campaign after the diagnosis stands alone
 
 
 def test_without_hours_for_an_experiment_nothing_runs(ambiguous: Lab, tmp_path: Path) -> None:
