@@ -116,7 +116,9 @@ def chosen_rows(
     """Return the recordings asked for, several or one, rising; else the unit's newest that can be fitted.
 
     Where that one belongs to a diagnosis, all recordings of the diagnosis: an experiment measures a few points, which
-    say something beside the recordings that it was chosen for, and rarely determine a model alone. Raises BadInput where both are given and differ, and what `newest_row` raises.
+    say something beside the recordings that it was chosen for, and rarely determine a model alone.
+
+    Raises BadInput where both are given and differ, and what `newest_row` raises.
     """
     numbers = sorted(set(recordings))
     if recording is not None and numbers and numbers != [recording]:
