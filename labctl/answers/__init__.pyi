@@ -18,6 +18,7 @@ from labctl.answers.admin import (
     KeyRequest as KeyRequest,
     KeyResponse as KeyResponse,
     MigrationResponse as MigrationResponse,
+    MoveResponse as MoveResponse,
     NewKeyResponse as NewKeyResponse,
     PluginResponse as PluginResponse,
     Role as Role,

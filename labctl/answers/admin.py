@@ -169,6 +169,18 @@ class MigrationResponse(ResponseModel):
     sha256: str | None = Field(default=None, description="SHA-256 of that copy; null: no copy was made.")
 
 
+class MoveResponse(ResponseModel):
+    """A database that was brought into another one."""
+
+    source: str = Field(description="Path or URL of the database that was read; it is as it was.")
+    target: str = Field(description="Path or URL of the database that has its rows now.")
+    tables: int = Field(description="Number of tables.")
+    rows: int = Field(description="Number of rows, each compared with the source after it was written.")
+    kept: int = Field(description="Rows that an earlier move, which was interrupted, had brought.")
+    sha256: str = Field(description="SHA-256 of all rows as both databases store them.")
+    check: CheckResponse = Field(description="Check of the target after the move.")
+
+
 class SealKeyResponse(ResponseModel):
     """A key that signs manifests; the private key is never shown."""
 

@@ -106,6 +106,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "backup": database.backup,
     "check": database.check,
     "migrate": database.migrate,
+    "move-database": database.move_database,
 }
 for name, command in COMMANDS.items():
     app.command(name)(command)

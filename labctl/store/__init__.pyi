@@ -13,6 +13,7 @@ from labctl.store.integrity.migration import (
     migrate_database as migrate_database,
     needs_migration as needs_migration,
 )
+from labctl.store.integrity.move import Moved as Moved, move_database as move_database
 from labctl.store.manifests.chain import ChainHead as ChainHead
 from labctl.store.manifests.signatures import PublicKey as PublicKey, read_public_key as read_public_key
 from labctl.store.records import (

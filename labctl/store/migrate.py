@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 FOLDER = Path(__file__).parent / "migrations"
 KNOWN = frozenset(path.stem.partition("_")[0] for path in (FOLDER / "versions").glob("[0-9]*.py"))
 HEAD = max(KNOWN)
+#: Where a database stands that `labctl move-database` has not filled yet.
+MOVING = "moving"
 STANDS_AT = sa.table("alembic_version", sa.column("version_num"))
 
 
@@ -41,6 +43,10 @@ def revision_of(connection: sa.Connection) -> str | None:
 
 def refuse_unknown(revision: str | None, location: str) -> None:
     """Raise StoreError when a database stands at a step that this code does not know."""
+    if revision == MOVING:
+        raise StoreError(
+            f"{location}: `labctl move-database` into this database has not ended; run it again with the same databases"
+        )
     if revision is not None and revision not in KNOWN:
         raise StoreError(
             f"{location}: the schema of the database is number {revision!r}, but this version of labctl knows "

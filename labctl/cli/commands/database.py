@@ -104,6 +104,36 @@ def _of_manifests(answer: CheckResponse) -> list[str]:
     return [f"{answer.manifests} manifests, {signed}{unsealed}; anchor {answer.anchor}"]
 
 
+def move_database(
+    source: Annotated[str, typer.Argument(metavar="FROM", help="Path or URL of the database to read.")],
+    target: Annotated[str, typer.Argument(metavar="TO", help="Path of a new file, or URL of an empty database.")],
+    as_json: Json = False,
+) -> None:
+    """Bring a database from SQLite to PostgreSQL or back; every row is compared, and an interrupted move goes on.
+
+    The source stays as it is. End its service first; afterwards start services on the target.
+    """
+    from instruments.clock import SystemClock
+    from labctl.services.admin.maintenance import move
+
+    def said(table: str, done: int, total: int) -> None:
+        status.update(f"{table} {done} of {total}" if total else table)
+
+    with one_clear_line(), stderr.status("moving") as status:
+        answer = move(source, target, SystemClock().utc(), None if as_json else said)
+    if as_json:
+        print_json(answer)
+    else:
+        earlier = f", {answer.kept} of them by an earlier move" if answer.kept else ""
+        text = f"{answer.target}: {answer.rows} rows of {answer.tables} tables as in {answer.source}{earlier}"
+        console.print(f"{text}; sha256 {answer.sha256}", soft_wrap=True)
+        console.print(f"next: `labctl serve --database {answer.target}`; {answer.source} is not used any more")
+    for finding in answer.check.findings:
+        stderr.print(f"labctl: {answer.target}: {finding.part}: {finding.text}")
+    if answer.check.findings:
+        raise typer.Exit(1)
+
+
 def migrate(
     without_copy: Annotated[
         bool,

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from datetime import datetime
 from pathlib import Path
 
-from labctl.answers.admin import BackupNote, BackupResponse, CheckResponse, DamageResponse, MigrationResponse
+from labctl.answers.admin import (
+    BackupNote,
+    BackupResponse,
+    CheckResponse,
+    DamageResponse,
+    MigrationResponse,
+    MoveResponse,
+)
 from labctl.config import default_database
 from labctl.errors import BadInput, LabctlError
 from labctl.services.recordings.live_folders import kept_beside
@@ -16,7 +24,9 @@ from labctl.store import (
     copy_database,
     is_url,
     migrate_database,
+    move_database,
     needs_migration,
+    open_store,
     parse_anchor,
     read_public_key,
     shown,
@@ -75,6 +85,21 @@ def migrate(database: str | None, *, copy: bool = True) -> MigrationResponse:
         bytes=None if done.copy is None else done.copy.bytes,
         sha256=None if done.copy is None else done.copy.sha256,
     )
+
+
+def move(source: str, target: str, at: datetime, progress: Progress | None = None) -> MoveResponse:
+    """Bring a database into another one, compare every row, check the new one, and enter the move into its audit trail.
+
+    Raises BadInput, Conflict, OldSchema, StoreError.
+    """
+    moved = move_database(source, target, progress or (lambda *_: None))
+    with open_store(target, write=True) as store:
+        detail = {"from": shown(source), "rows": moved.rows, "sha256": moved.sha256}
+        store.audit.record(at, "database move", shown(target), detail)
+    return MoveResponse(
+        source=shown(source), target=shown(target), tables=moved.tables, rows=moved.rows, kept=moved.kept,
+        sha256=moved.sha256, check=check_database(target),
+    )  # fmt: skip
 
 
 def migrate_before_service(location: str) -> MigrationResponse | None:

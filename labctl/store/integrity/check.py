@@ -159,6 +159,8 @@ class _Check:
             return True
         if revision is None:
             self.find("schema", "this is not a labctl database, or its content is lost: there are no tables")
+        elif revision == migrate.MOVING:
+            self.find("schema", "`labctl move-database` into this database has not ended; run it again")
         else:
             hint = (
                 f"run `labctl migrate --database {shown(self._location)}`"

@@ -7474,7 +7474,7 @@ export interface components {
             mountings: number;
             /**
              * Per Hour
-             * @description Expected information per hour, bit/h, by which experiments are ranked; set-up and a person's time are added to the hours.
+             * @description Expected information per hour, bit/h; set-up and a person's time are added to the hours. Experiments are ordered by the probability per hour that the cause is named alone and rightly, where that is at least 5 %, then by this.
              */
             per_hour: number;
         };
