@@ -62,6 +62,24 @@ def move_database(source: str, target: str, progress: Progress = lambda *_: None
         return Moved(len(tables.metadata.sorted_tables), moved.rows, moved.kept, moved.digest.hexdigest())
 
 
+def snapshot_to_file(source: str, file: Path) -> None:
+    """Write a database on a server, as it is at one instant, into an empty SQLite file; others go on writing to it.
+
+    Leases stay behind: no process drives a bench from the copy. Raises OldSchema, BadInput, StoreError.
+    """
+    with ExitStack() as stack:
+        old = stack.enter_context(closing(Database(source, write=False, as_it_is=True)))
+        _refuse_other_schema(old, source)
+        new = stack.enter_context(closing(Database(str(file), write=True, as_it_is=True)))
+        reading = stack.enter_context(_snapshot(old))
+        _begin(new, str(file))
+        copied = _Move(reading, new, lambda *_: None)
+        for table in tables.metadata.sorted_tables:
+            if table is not tables.leases:
+                copied.bring(table)
+        _end(new)
+
+
 def _refuse_pair(source: str, target: str) -> None:
     if not is_url(source) and not Path(source).is_file():
         raise BadInput(f"{source}: there is no such file; name the database to move from")
@@ -90,6 +108,7 @@ def _snapshot(database: Database) -> Iterator[sa.Connection]:
         if connection.dialect.name != "sqlite":
             connection.execution_options(isolation_level="REPEATABLE READ")
         with connection.begin():
+            migrate.revision_of(connection)  # a server takes its snapshot with the first query
             yield connection
 
 

@@ -21,7 +21,7 @@ from labctl.store.connection.private_files import FILE
 PREFIX = ".labctl-backup-"
 COPY = "copy.sqlite"
 #: All that SQLite may make of one database.
-_NAMES = frozenset({COPY, *(f"{COPY}{end}" for end in ("-wal", "-shm", "-journal"))})
+_NAMES = frozenset({COPY, *(f"{COPY}{end}" for end in ("-wal", "-shm", "-journal", ".lock", ".seal", ".anchor"))})
 
 
 @contextmanager

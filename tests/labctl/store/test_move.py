@@ -173,3 +173,29 @@ def test_the_command_checks_the_target_and_enters_the_move(source: str, url: str
         answer["rows"],
         answer["sha256"],
     )
+
+
+def test_a_backup_of_a_server_is_one_file_of_one_instant_and_is_moved_back(
+    source: str, cluster: Cluster, url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    move_database(source, url)
+    lease = {"bench_name": "b", "owner": "o", "host": "lab7", "machine": "m", "pid": 42, "since": AT, "beat": 1}
+    with open_store(url, write=True) as store:
+        with store._database.writing() as connection:
+            connection.execute(sa.insert(tables.leases).values(**lease, beat_at=AT, expires_at=AT))
+        bring = move._Move.bring
+
+        def beside_a_writer(moved: Any, table: sa.Table) -> None:
+            store.audit.record(AT, "noted", "while the backup is made", {})
+            bring(moved, table)
+
+        monkeypatch.setattr(move._Move, "bring", beside_a_writer)
+        done = CliRunner().invoke(app, ["backup", str(tmp_path / "copy.sqlite"), "--database", url, "--json"])
+        monkeypatch.undo()
+    answer = json.loads(done.stdout)
+    assert (answer["findings"], answer["noted"]) == ([], True)
+    assert [path.name for path in tmp_path.glob("copy*")] == ["copy.sqlite"]
+    assert not list(tmp_path.glob(".labctl-backup-*"))
+    before, copied = raw(source), raw(str(tmp_path / "copy.sqlite"))
+    assert copied == before  # nothing of what was written meanwhile, and no lease
+    assert move_database(str(tmp_path / "copy.sqlite"), cluster.new_database()).rows > 100
