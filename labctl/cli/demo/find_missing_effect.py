@@ -25,13 +25,19 @@ from labctl.services.diagnosis.experiment_bench import simulated_day
 from labctl.store import CampaignRow
 
 SERIAL = "FOG-0002"
-HIDDEN = {"saturation": -0.003}
+HIDDEN = {"saturation": -0.001}
 #: Largest time of the experiments on the bench, h.
 HOURS = 6.0
 
 
 def play(demo: DemoRunner, real_serial: str) -> None:
     """Show it on both gyros; every sentence about a gyro comes from its criticism alone."""
+    simulated_gyro(demo)
+    real_gyro(demo, real_serial)
+
+
+def simulated_gyro(demo: DemoRunner) -> None:
+    """Hide an effect, and have experiments find it."""
     demo.title("(e) Which effect is missing? A gyro with a hidden effect")
     campaign = demo.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
     demo.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])
@@ -45,6 +51,10 @@ def play(demo: DemoRunner, real_serial: str) -> None:
         "experiments": sum(each.came == "measured" for each in found.rounds), "hours": found.spent_hours,
         "verdict_after": after.verdict,
     }  # fmt: skip
+
+
+def real_gyro(demo: DemoRunner, real_serial: str) -> None:
+    """Begin with a simple model of the real gyro, and add what its criticism names first."""
     demo.title("The real gyro's recording, criticised in the same way from a simple model on")
     demo.fit(real_serial, "bias_scale", demo.store.recordings.of_unit(real_serial)[0].id)
     answer = criticise_unit(demo.store, real_serial, None, None, [])
@@ -74,7 +84,7 @@ def _diagnose(demo: DemoRunner) -> DiagnosisResponse:
             text = f"{each.verdict}: {', '.join(each.named)}" if each.named else each.verdict
             demo.say(f"after {each.spent_hours:.1f} h of experiments: {text}")
             if each.experiment is not None:
-                demo.say(f"  next: {each.experiment.do}; {each.why}")
+                demo.say(f"  next: {each.why}")
         rounds = len(answer.rounds)
     demo.say(answer.why)
     return answer
