@@ -15,12 +15,14 @@ def test_an_experiment_names_the_hidden_effect_and_the_error_falls_to_the_floor(
         demo = DemoRunner(store, tmp_path, console, quiet=True)
         simulated_gyro(demo)
         told = cast("dict[str, Any]", demo.figures["hidden"])
-        (answer,) = [row.answer for row in store.calibrations.of_unit(SERIAL) if row.version == 2]
+        (answer,) = [
+            cast("dict[str, Any]", row.answer) for row in store.calibrations.of_unit(SERIAL) if row.version == 2
+        ]
     assert told["verdict"] == "ambiguous"
     assert {*HIDDEN} < {*told["named_at_first"]}
     assert told["named"] == [*HIDDEN]
     assert 1 <= told["experiments"] <= 3
     assert 0 < told["hours"] <= 2.0
     assert told["verdict_after"] == "adequate"
-    error, before = (cast("dict[str, float]", answer[name]) for name in ("error", "before"))
+    error, before = answer["error"], answer["before"]
     assert error["rms_dps"] < error["noise_floor_dps"] < before["rms_dps"]
