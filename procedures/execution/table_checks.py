@@ -209,7 +209,9 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
             f"{check.limit_steps:g} steps, because homings from one place scatter (u = {check.u_steps:.1f} steps)"
         )
         context.recorder.event(warning("home_uncertain", f"{text}; {QUIETEN}", table.name))
-    if check.is_doubtful or check.is_missing:
+    if check.explained:
+        context.recorder.event(warning("home_doubtful", f"{table.name}: {check.explained}; {QUIETEN}", table.name))
+    elif check.is_doubtful or check.is_missing:
         text = (
             f"{table.name}: home seems {check.missed_steps:g} steps from where it was left, limit "
             f"{check.limit_steps:g} steps, but a late reply explains it (u = {check.u_steps:.1f} steps"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 from unittest.mock import create_autospec
@@ -63,6 +64,16 @@ def test_a_reply_that_this_computer_heard_late_is_no_missed_step() -> None:
     (event,) = [each for each in events if each.startswith("home_doubtful")]
     assert "this computer ran labctl late by up to 0.29 s meanwhile" in event
     assert "partial 7" not in events
+
+
+def test_a_reply_that_was_late_by_the_controllers_own_word_ends_no_campaign() -> None:
+    events: list[str] = []
+    late = replace(FOUND, explained="home seems 58.8 steps from where it was left, but the reply was late")
+    assert check_home(context_of(0.0, events, late), step())["missed_steps"] == 58.8
+    (event,) = [each for each in events if not each.startswith("home_uncertain")]
+    assert event.startswith(
+        "home_doubtful: table: home seems 58.8 steps from where it was left, but the reply was late;"
+    )
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.2])
