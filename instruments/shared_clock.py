@@ -30,8 +30,8 @@ log = logging.getLogger(__name__)
 LATE_CLOCK_S, LATE_S = 0.06, 0.012
 #: A thread that attends reads the clock this often in that time.
 LOOKS = 3
-#: The process of a thread that is later than `DOUBTED_S` may have ended. From `GIVEN_UP_S` on a thread that is halted, or
-#: waits for something else than this computer, is not waited for, and from `MAX_HELD_UP_S` on none at all.
+#: The process of a thread that is later than `DOUBTED_S` may have ended. From `GIVEN_UP_S` on no thread is waited for
+#: that is halted, or waits for something else than this computer, and from `MAX_HELD_UP_S` on none at all.
 DOUBTED_S, GIVEN_UP_S, MAX_HELD_UP_S = 0.25, 5.0, 120.0
 #: States of a thread that this computer holds up: it waits for a processor, or for the kernel (proc(5)).
 HELD_UP = ("R", "D")

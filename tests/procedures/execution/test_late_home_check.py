@@ -71,9 +71,7 @@ def test_a_reply_that_was_late_by_the_controllers_own_word_ends_no_campaign() ->
     late = replace(FOUND, explained="home seems 58.8 steps from where it was left, but the reply was late")
     assert check_home(context_of(0.0, events, late), step())["missed_steps"] == 58.8
     (event,) = [each for each in events if not each.startswith("home_uncertain")]
-    assert event.startswith(
-        "home_doubtful: table: home seems 58.8 steps from where it was left, but the reply was late;"
-    )
+    assert event.startswith(f"home_doubtful: table: {late.explained};")
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.2])
