@@ -313,10 +313,10 @@ class ArrickC4:
     def _timed_home(self, learned: checks.Homing | None = None) -> checks.TimedHome:
         """Home, and time it. Where by the homing as it was `learned` steps are missing, ask if the table still moves.
 
-        A reply may come late, but a table that has to move is not at home: what was missed is shown by its state.
+        A reply may come late, but a table that still moves so long after the command was sent is not at home.
         """
-        begun_s, stood_s, ended_s = self._clock.now_s(), None, None
         self._begin_homing()
+        begun_s, stood_s, ended_s, moved = self._clock.now_s(), None, None, False
         if learned is not None:
             with suppress(NoReply):
                 self._end_homing(begun_s + learned.doubtful_s(self.settings) - self._clock.now_s())
@@ -324,11 +324,12 @@ class ArrickC4:
             self._command(lines.STATE)
             state, ended_s = self._link.read_state()
             stood_s = self._clock.now_s() - begun_s if state == lines.IDLE else None
+            moved = state.isdigit() and state != lines.IDLE
         if ended_s is None:
             self._end_homing(HOME_S)
             ended_s = self._clock.now_s()
         self._at_home()
-        return checks.TimedHome(ended_s - begun_s, stood_s)
+        return checks.TimedHome(ended_s - begun_s, stood_s, moved)
 
     def _program(self, move: Move) -> None:
         """Set ramp and speed by the templates of the bench file; each is written on change only."""

@@ -80,6 +80,7 @@ class TimedHome:
     #: When the controller answered that the table stands, asked where steps would be missing beyond doubt. None: it was
     #: not asked, did not answer, or said that the table still moves.
     stood_s: float | None = None
+    moved: bool = False  #: whether it answered that the table still moves
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class Homing:
         """Return how many steps away from home a homing began; fewer than none where it ended sooner than from home."""
         found = self._check((homing.took_s - self.from_home_s) / self.step_s, settings)
         if homing.stood_s is None or found.missed_steps <= found.doubt_steps:
-            return found
+            return replace(found, is_shown=homing.moved)
         late_s = homing.took_s - homing.stood_s
         why = (
             f"the reply that the homing has ended came {late_s:.2f} s after the controller said that the table stands"

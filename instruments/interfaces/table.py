@@ -97,6 +97,7 @@ class HomeCheck:
     step_deg: float
     step_s: float  #: by how much each step away makes the homing longer
     learning: bool = False  #: whether they were missed in the turns that the check itself makes to learn from
+    is_shown: bool = False  #: the controller said that the table still moved: no late reply explains them
     explained: str = ""  #: what shows that a reply was only late, for a person; empty: nothing does
 
     @property

@@ -27,7 +27,7 @@ def open_port(
         "write_timeout": max(timeout_s, MIN_WRITE_S), "inter_byte_timeout": inter_byte_timeout_s, "exclusive": True,
     }  # fmt: skip
     by_rts = line.rs485 is not None and line.rs485.by == "rts"
-    port: Any = unopened(url, switches_direction=by_rts, **settings)
+    port: Any = unopened(url, settings, switches_direction=by_rts)
     if line.dtr is not None:
         port.dtr = line.dtr
     if line.rts is not None:

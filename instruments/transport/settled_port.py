@@ -8,8 +8,9 @@ instrument that answered seems silent. A poll of an empty port returns only afte
 from __future__ import annotations
 
 import select
+from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any, cast
+from typing import cast
 
 import serial
 from serial.rs485 import RS485
@@ -50,7 +51,7 @@ class SettledRS485(RS485, SettledSerial):  # type: ignore[misc]  # its type depe
     """The same with the direction of an RS-485 line switched in every write."""
 
 
-def unopened(url: str, *, switches_direction: bool = False, **settings: Any) -> serial.Serial:
+def unopened(url: str, settings: Mapping[str, object], *, switches_direction: bool = False) -> serial.Serial:
     """Return a port of a system's name or a pyserial address that is not open; `settings` are those of pyserial.
 
     `switches_direction`: the direction of an RS-485 line is switched by RTS.

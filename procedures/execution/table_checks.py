@@ -198,7 +198,7 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
     if check is None:
         return {}
     late_steps = context.monitor.stalls.speed * late_s / check.step_s
-    if check.is_missing and late_steps < check.missed_steps - check.limit_steps:
+    if check.is_missing and (check.is_shown or late_steps < check.missed_steps - check.limit_steps):
         reason = _missing_text(table.name, check, step.temperature_c)
         for number in since:
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)

@@ -223,6 +223,7 @@ def test_missed_steps_are_no_late_reply(stand: Make, answer: str) -> None:
         device._execute = lambda command, t_s: None if command == "!1rs" else execute(command, t_s)
     found = s.bench.table.check_home(waiting(s))
     assert (found.missed_steps, found.is_missing, found.explained) == (40, True, "")
+    assert found.is_shown is bool(answer)
 
 
 def test_a_homing_that_ends_while_the_controller_is_asked_is_doubtful(stand: Make) -> None:

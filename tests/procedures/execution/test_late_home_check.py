@@ -82,6 +82,13 @@ def test_steps_that_no_late_reply_explains_are_missing(late_s: float) -> None:
     assert events == ["partial 7"]
 
 
+def test_a_table_that_still_moved_has_missed_steps_however_late_this_computer_ran() -> None:
+    events: list[str] = []
+    with pytest.raises(TableStopped, match=r"home is 58\.8 steps"):
+        check_home(context_of(0.5, events, replace(FOUND, is_shown=True)), step())
+    assert events == ["partial 7"]
+
+
 def test_turns_that_were_timed_late_are_made_again_before_the_homing_is_learned() -> None:
     events: list[str] = []
     learning = HomeCheck(8.4, 1.3, 2.0, 0.225, STEP_S, learning=True)
