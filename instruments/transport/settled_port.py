@@ -10,7 +10,7 @@ from __future__ import annotations
 import select
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import cast
+from typing import Any
 
 import serial
 from serial.rs485 import RS485
@@ -56,8 +56,12 @@ def unopened(url: str, settings: Mapping[str, object], *, switches_direction: bo
 
     `switches_direction`: the direction of an RS-485 line is switched by RTS.
     """
+    made: Any
     if "://" in url and not switches_direction:
-        return cast("serial.Serial", serial.serial_for_url(url, do_not_open=True, **settings))
-    port = SettledRS485(**settings) if switches_direction else SettledSerial(**settings)
+        made = serial.serial_for_url
+        port: serial.Serial = made(url, do_not_open=True, **settings)
+        return port
+    made = SettledRS485 if switches_direction else SettledSerial
+    port = made(**settings)
     port.port = url
     return port
