@@ -185,7 +185,7 @@ class ArrickC4:
             return None
         turn = self.settings.steps_per_turn
         self._turn_by(round(self._steps / turn) * turn - round(self._steps), wait)
-        timed = self._timed_home(self._homing)
+        timed, is_first = self._timed_home(self._homing), self._homing is None
         if self._homing is not None:
             home_check = self._homing.check(timed, self.settings)
             if home_check.missed_steps >= -home_check.doubt_steps:
@@ -194,7 +194,7 @@ class ArrickC4:
                 return home_check
             self._homing = None  # it was learned while replies were late
         first = self._learn_homing(timed, wait)
-        if first is None or self._homing is None or first.learning or not first.is_missing:
+        if not is_first or first is None or self._homing is None or first.learning or not first.is_missing:
             return first
         self._turn_by(turn, wait)  # a reply may have been late: when to ask for the state was not known
         again = self._homing.check(self._timed_home(self._homing), self.settings)

@@ -132,7 +132,12 @@ class Homing:
 
 
 def only_once(check: HomeCheck, once: HomeCheck) -> HomeCheck:
-    """Return a check with what an earlier measurement showed that was repeated, and did not show it again."""
+    """Return a check with what an earlier measurement showed that was repeated, and did not show it again.
+
+    A check that shows missed steps itself stays as it is.
+    """
+    if check.is_missing:
+        return check
     where = "in a turn from which the homing is learned" if once.learning else "before the first check"
     late_s = once.step_s * once.missed_steps * (2 if once.learning else 1)
     text = (

@@ -263,6 +263,23 @@ def test_a_late_reply_before_the_first_check_is_found_by_a_turn_that_is_made_aga
     assert (again.missed_steps, again.explained) == (0, "")
 
 
+@pytest.mark.parametrize("which", [(), (1,)])
+def test_steps_missed_before_a_homing_that_is_learned_anew_are_found(stand: Make, which: tuple[int, ...]) -> None:
+    """It was learned while replies were late; one may be late again while it is learned."""
+    s = stand(table=CHECKED)
+    table, device = s.bench.table, simulated(s)
+    table.home()
+    finish = device._finish
+    delay_replies(s, 0.5)
+    table.check_home(waiting(s))
+    device._finish = finish
+    device.missed_steps = 40
+    turned(table, 50.0)
+    missing_in_moves(s, *which)
+    found = table.check_home(waiting(s))
+    assert (found.missed_steps, found.is_missing) == (40, True)
+
+
 def delay_replies(stand: Any, late_s: float) -> None:
     """Let the reply that ends a homing come later than the controller sends it."""
     device = simulated(stand)
