@@ -30,8 +30,11 @@ log = logging.getLogger(__name__)
 LATE_CLOCK_S, LATE_S = 0.06, 0.012
 #: A thread that attends reads the clock this often in that time.
 LOOKS = 3
-#: The process of a thread that is later than `DOUBTED_S` may have ended; from `GIVEN_UP_S` on none is waited for.
-DOUBTED_S, GIVEN_UP_S = 0.25, 5.0
+#: The process of a thread that is later than `DOUBTED_S` may have ended. From `GIVEN_UP_S` on no thread is waited for
+#: that is halted, or waits for something else than this computer, and from `MAX_HELD_UP_S` on none at all.
+DOUBTED_S, GIVEN_UP_S, MAX_HELD_UP_S = 0.25, 5.0, 120.0
+#: States of a thread that this computer holds up: it waits for a processor, or for the kernel (proc(5)).
+HELD_UP = ("R", "D")
 #: Longest wait of a sleep until it reads the clock again, s of real time.
 STEP_S = 0.05
 #: Clock seconds that count as no time: rounding.
@@ -40,9 +43,10 @@ TINY_S = 1e-9
 # The file: 64-bit values in the order of this computer. Real time is that of the monotonic clock, the same for all
 # processes.
 MAGIC, SPEED, UNTIL, COUNTED, END, FIRST_PLACE = range(6)  # END: where the places that were ever taken end
-THREADS = 120  #: places for threads that attend: the process (0: a free place), and when the thread read the clock last
-SIZE = 8 * (FIRST_PLACE + 2 * THREADS)
-WRITTEN = int.from_bytes(b"labclk01", "big")
+THREADS = 120  #: places for threads that attend
+PROCESS, THREAD, LOOKED, PLACE = range(4)  # of a place: 0 where it is free; the system's number; when it read the clock
+SIZE = 8 * (FIRST_PLACE + PLACE * THREADS)
+WRITTEN = int.from_bytes(b"labclk02", "big")
 #: Tries to read a count that its owner is writing, which takes it about a microsecond.
 TRIES = 1000
 
@@ -50,11 +54,13 @@ TRIES = 1000
 class ClockFile:
     """A mapped file. The owner of the clock alone writes the count, each thread its own place: no reader waits.
 
+    `held_up` says of a thread, by the system's number, whether this computer holds it up.
     Raises OSError for a file that cannot be opened or is none of a clock.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, held_up: Callable[[int], bool] | None = None) -> None:
         self.path = path
+        self._held_up = held_up or is_held_up
         self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
         try:
             size = os.fstat(self._descriptor).st_size
@@ -71,12 +77,12 @@ class ClockFile:
             raise OSError(f"{path} is not the file of a clock of this release of labctl")
 
     @classmethod
-    def made(cls, speed: float, now_s: float) -> ClockFile:
+    def made(cls, speed: float, now_s: float, held_up: Callable[[int], bool] | None = None) -> ClockFile:
         """Make the file of a clock that begins at real time `now_s`."""
         descriptor, name = tempfile.mkstemp(prefix="labctl-clock-")
         with os.fdopen(descriptor, "wb") as file:
             file.write(WRITTEN.to_bytes(8, sys.byteorder) + bytes(SIZE - 8))
-        made = cls(Path(name))
+        made = cls(Path(name), held_up)
         made._times[SPEED] = speed
         made.write_count(now_s, 0.0)
         return made
@@ -109,14 +115,15 @@ class ClockFile:
         self._times[UNTIL] = until_s
 
     def take_place(self, now_s: float) -> int:
-        """Return a place for a thread that attends from `now_s` on; raises OSError where there is none."""
+        """Return a place for this thread, which attends from `now_s` on; raises OSError where there is none."""
         fcntl.flock(self._descriptor, fcntl.LOCK_EX)
         try:
-            for place in range(FIRST_PLACE, FIRST_PLACE + 2 * THREADS, 2):
+            for place in range(FIRST_PLACE, FIRST_PLACE + PLACE * THREADS, PLACE):
                 if not self._numbers[place]:
                     self.look(place, now_s)
-                    self._numbers[place] = os.getpid()
-                    self._numbers[END] = max(self._numbers[END], place + 2)
+                    self._numbers[place + THREAD] = threading.get_native_id()
+                    self._numbers[place + PROCESS] = os.getpid()
+                    self._numbers[END] = max(self._numbers[END], place + PLACE)
                     return place
         finally:
             fcntl.flock(self._descriptor, fcntl.LOCK_UN)
@@ -129,27 +136,36 @@ class ClockFile:
     @property
     def attending(self) -> int:
         """How many threads attend, of all processes."""
-        return sum(bool(self._numbers[place]) for place in range(FIRST_PLACE, self._numbers[END], 2))
+        return sum(bool(self._numbers[place]) for place in range(FIRST_PLACE, self._numbers[END], PLACE))
 
     def look(self, place: int, now_s: float) -> None:
         """Note that a thread read the clock at real time `now_s`."""
-        self._times[place + 1] = now_s
+        self._times[place + LOOKED] = now_s
 
-    def horizon_s(self, now_s: float) -> float:
-        """Return until when time may be counted, at most `now_s`: no thread that attends is late by then."""
-        horizon_s, allowed_s = now_s, self.late_s
-        for place in range(FIRST_PLACE, self._numbers[END], 2):
+    def horizon_s(self, now_s: float) -> tuple[float, bool]:
+        """Return until when time may be counted, at most `now_s`: no thread that attends is late by then.
+
+        And whether a thread is no longer waited for: it may be that of the owner, which then counts nothing.
+        """
+        horizon_s, allowed_s, is_one_given_up = now_s, self.late_s, False
+        for place in range(FIRST_PLACE, self._numbers[END], PLACE):
             if not (process := self._numbers[place]):
                 continue
-            looked_s = self._times[place + 1]
+            looked_s = self._times[place + LOOKED]
             late_s = now_s - looked_s
-            if looked_s + allowed_s >= horizon_s or late_s > GIVEN_UP_S:
+            if looked_s + allowed_s >= horizon_s:
                 continue
             if late_s > DOUBTED_S and not _lives(process):
                 self.leave_place(place)
-                continue
-            horizon_s = looked_s + allowed_s
-        return horizon_s
+            elif self._is_waited_for(self._numbers[place + THREAD], late_s):
+                horizon_s = looked_s + allowed_s
+            else:
+                is_one_given_up = True
+        return horizon_s, is_one_given_up
+
+    def _is_waited_for(self, thread: int, late_s: float) -> bool:
+        """Return whether the clock stands still for a thread that is so late."""
+        return late_s <= GIVEN_UP_S or (late_s <= MAX_HELD_UP_S and self._held_up(thread))
 
     def close(self) -> None:
         """Close the file; safe to call twice."""
@@ -159,6 +175,18 @@ class ClockFile:
             self._map.close()
             os.close(self._descriptor)
             self._descriptor = -1
+
+
+def is_held_up(thread: int) -> bool:
+    """Return whether a thread, by the system's number, waits for a processor or for the kernel.
+
+    One that is halted, that sleeps, that has ended, or of a system that does not tell, does not.
+    """
+    try:
+        about = Path(f"/proc/{thread}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
+    return about.rpartition(")")[2].split()[0] in HELD_UP
 
 
 def _lives(process: int) -> bool:
@@ -175,7 +203,9 @@ class SharedClock(ScaledClock):
     """The clock of a simulator at more or less than real time, in its process and in those that drive it.
 
     Its time begins when it is made, in each process, and runs alike in all. Any thread may read it and sleep. A thread
-    that is halted for longer than `GIVEN_UP_S` is not waited for, nor is one whose process has ended.
+    that is halted or sleeps for longer than `GIVEN_UP_S` is not waited for, nor is one whose process has ended. One
+    that waits for a processor, or in the kernel for received bytes to be handed on, is waited for up to
+    `MAX_HELD_UP_S`.
     """
 
     stands_in_stalls = True
@@ -189,6 +219,7 @@ class SharedClock(ScaledClock):
         self._never = threading.Condition()
         self._here = threading.local()  # its `place`: that of the present thread, where it attends
         self._counted_s = 0.0  # s of real time; never less than was returned before
+        self._read_s = -math.inf  # real time of the last reading
         self._zero_s = self._counted()
 
     @property
@@ -239,10 +270,13 @@ class SharedClock(ScaledClock):
             now_s, count = self._wall.now_s(), self._file.count()
             if count is not None:
                 until_s, counted_s = count
-                counted_s += max(self._file.horizon_s(now_s) - until_s, 0.0)
+                horizon_s, is_one_given_up = self._file.horizon_s(now_s)
+                if is_one_given_up and self._read_s > until_s:  # go on from here: until now the clock stood still
+                    until_s, counted_s = self._read_s, self._counted_s
+                counted_s += max(horizon_s - until_s, 0.0)
                 if self._owns:
                     self._file.write_count(now_s, counted_s)
-                self._counted_s = max(self._counted_s, counted_s)
+                self._counted_s, self._read_s = max(self._counted_s, counted_s), now_s
             return self._counted_s
 
 

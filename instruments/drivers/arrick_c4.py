@@ -17,7 +17,7 @@ from instruments.drivers import probes
 from instruments.drivers.arrick_c4_link import LATE_LETTERS, C4Link
 from instruments.drivers.driver import TableDriver
 from instruments.errors import MalformedReply, NoReply, RequestRejected, WrongInstrument
-from instruments.interfaces.table import COVERAGE, HomeCheck, Spin, StepClock, TableLimits, TimedRun, Wait
+from instruments.interfaces.table import HomeCheck, Spin, StepClock, TableLimits, TimedRun, Wait
 from instruments.protocols import arrick_c4_lines as lines
 from instruments.protocols.arrick_c4_moves import SPARE_S, Move, finite_move, plan_move
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
@@ -98,11 +98,8 @@ class ArrickC4:
 
         Raises RequestRejected, NoReply, LinkError.
         """
-        self._discard_late_replies()
-        self._link.initialise()
-        self._command(lines.HOME)
-        self._link.expect(lines.FINISHED, "home", HOME_S)
-        self._steps, self._active, self._counted = 0.0, None, True
+        self._begin_homing()
+        self._end_homing(HOME_S)
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
         """Turn the table at a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
@@ -188,30 +185,43 @@ class ArrickC4:
             return None
         turn = self.settings.steps_per_turn
         self._turn_by(round(self._steps / turn) * turn - round(self._steps), wait)
-        took_s = self._timed_home()
+        timed, is_first = self._timed_home(self._homing), self._homing is None
         if self._homing is not None:
-            home_check = self._homing.check(took_s, self.settings)
-            if home_check.missed_steps >= -(home_check.limit_steps + COVERAGE * home_check.u_steps):
+            home_check = self._homing.check(timed, self.settings)
+            if home_check.missed_steps >= -home_check.doubt_steps:
                 if home_check.u_steps > max(home_check.limit_steps, self._homing.least_u_steps(self.settings)):
                     self._learn_better(self._homing, wait)
                 return home_check
             self._homing = None  # it was learned while replies were late
-        return self._learn_homing(took_s, wait)
+        first = self._learn_homing(timed, wait)
+        if not is_first or first is None or self._homing is None or first.learning or not first.is_missing:
+            return first
+        self._turn_by(turn, wait)  # a reply may have been late: when to ask for the state was not known
+        again = self._homing.check(self._timed_home(self._homing), self.settings)
+        return again if again.is_missing else checks.only_once(again, first)
 
-    def _learn_homing(self, took_s: float, wait: Wait) -> HomeCheck | None:
+    def _learn_homing(self, timed: checks.TimedHome, wait: Wait) -> HomeCheck | None:
         """Learn the homing, again where it scatters so much that the check would see nothing; keeps the most certain.
 
-        Returns the check of a homing that took `took_s`, or that of the turns that it was learned from.
+        Returns the check of the homing `timed`, or that of the turns that it was learned from: where steps seem missed
+        in them twice.
         """
+        once: HomeCheck | None = None
         for _ in range(checks.LEARNING_ATTEMPTS):
-            home_check = self._learned(wait)
-            if home_check is None or isinstance(home_check, HomeCheck):
-                return home_check
-            if self._homing is None or home_check.u_steps < self._homing.u_steps:
-                self._homing = home_check
+            learned = self._learned(wait)
+            if learned is None or (isinstance(learned, HomeCheck) and once is not None):
+                return learned
+            if isinstance(learned, HomeCheck):
+                once = learned
+                continue
+            if self._homing is None or learned.u_steps < self._homing.u_steps:
+                self._homing = learned
             if self._homing.u_steps <= self.settings.home_limit_steps:
                 break
-        return None if self._homing is None else self._homing.check(took_s, self.settings)
+        if self._homing is None:
+            return once
+        home_check = self._homing.check(timed, self.settings)
+        return home_check if once is None else checks.only_once(home_check, once)
 
     def _learn_better(self, homing: checks.Homing, wait: Wait) -> None:
         """Learn a homing that scatters once more, for the next check; the more certain of the two is kept."""
@@ -224,12 +234,12 @@ class ArrickC4:
 
         None where the homing does not begin where the table is.
         """
-        at_home_s = [self._timed_home(), self._timed_home()]
+        at_home_s = [self._timed_home().took_s, self._timed_home().took_s]
         part = self.settings.steps_per_turn // checks.LEARNING_PARTS
         away, away_s = [part * n for n in checks.LEARNING_TURNS], []
         for steps in away:
             self._turn_by(steps, wait)
-            away_s.append(self._timed_home())
+            away_s.append(self._timed_home().took_s)
         homing = checks.learned_homing(at_home_s, away, away_s, checks.reply_u_s(self.settings))
         if homing.step_s <= 0:
             return None
@@ -286,11 +296,40 @@ class ArrickC4:
             rate_dps = math.copysign(min(checks.SLOW_DPS, self.limits.max_rate_dps), steps)
             self._timed_run(finite_move(self._true, rate_dps, steps), wait)
 
-    def _timed_home(self) -> float:
-        """Home; returns how long it took, s."""
-        begun_s = self._clock.now_s()
-        self.home()
-        return self._clock.now_s() - begun_s
+    def _begin_homing(self) -> None:
+        self._discard_late_replies()
+        self._link.initialise()
+        self._command(lines.HOME)
+
+    def _end_homing(self, within_s: float) -> None:
+        """Wait for the reply that the table is at home; raises RequestRejected, NoReply or LinkError."""
+        self._link.expect(lines.FINISHED, "home", within_s)
+        self._at_home()
+
+    def _at_home(self) -> None:
+        """Count from here: the table is at home."""
+        self._steps, self._active, self._counted = 0.0, None, True
+
+    def _timed_home(self, learned: checks.Homing | None = None) -> checks.TimedHome:
+        """Home, and time it. Where by the homing as it was `learned` steps are missing, ask if the table still moves.
+
+        A reply may come late, but a table that still moves so long after the command was sent is not at home.
+        """
+        self._begin_homing()
+        begun_s, stood_s, ended_s, moved = self._clock.now_s(), None, None, False
+        if learned is not None:
+            with suppress(NoReply):
+                self._end_homing(begun_s + learned.doubtful_s(self.settings) - self._clock.now_s())
+                return checks.TimedHome(self._clock.now_s() - begun_s)
+            self._command(lines.STATE)
+            state, ended_s = self._link.read_state()
+            stood_s = self._clock.now_s() - begun_s if state == lines.IDLE else None
+            moved = state.isdigit() and state != lines.IDLE
+        if ended_s is None:
+            self._end_homing(HOME_S)
+            ended_s = self._clock.now_s()
+        self._at_home()
+        return checks.TimedHome(ended_s - begun_s, stood_s, moved)
 
     def _program(self, move: Move) -> None:
         """Set ramp and speed by the templates of the bench file; each is written on change only."""

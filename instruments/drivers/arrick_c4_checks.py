@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,8 @@ LEARNING_PARTS, LEARNING_TURNS = 16, (1, 2, 3)
 SLOW_DPS = 22.5
 #: A homing that scatters by more than the limit of the check is learned so often: one may have been late, or short.
 LEARNING_ATTEMPTS = 3
+#: A reply that a homing has ended comes so much later at most than the answer that the table stands, s, or was late.
+MAX_BEHIND_S = 0.02
 POLL_S = 0.5
 NO_SPEED = (
     "no constant rate: the C4's speed command is not public; set speed_template of the table in the bench file from "
@@ -71,6 +73,17 @@ def require_plausible(device: str, run: TimedRun, move: Move) -> None:
 
 
 @dataclass(frozen=True)
+class TimedHome:
+    """One homing, in s since it began."""
+
+    took_s: float  #: until the reply that it has ended
+    #: When the controller answered that the table stands, asked where steps would be missing beyond doubt. None: it was
+    #: not asked, did not answer, or said that the table still moves.
+    stood_s: float | None = None
+    moved: bool = False  #: whether it answered that the table still moves
+
+
+@dataclass(frozen=True)
 class Homing:
     """How long the homing takes from the place that is home, and longer for each step away from it."""
 
@@ -87,9 +100,24 @@ class Homing:
         """Return the standard uncertainty of a number of steps by the latency of replies alone."""
         return math.sqrt(2.0) * reply_u_s(settings) / self.step_s
 
-    def check(self, took_s: float, settings: ArrickC4Settings) -> HomeCheck:
+    def doubtful_s(self, settings: ArrickC4Settings) -> float:
+        """Return how long a homing takes from where steps are missing beyond doubt."""
+        return self.from_home_s + self._check(0.0, settings).doubt_steps * self.step_s
+
+    def check(self, homing: TimedHome, settings: ArrickC4Settings) -> HomeCheck:
         """Return how many steps away from home a homing began; fewer than none where it ended sooner than from home."""
-        return self._check((took_s - self.from_home_s) / self.step_s, settings)
+        found = self._check((homing.took_s - self.from_home_s) / self.step_s, settings)
+        if homing.stood_s is None or found.missed_steps <= found.doubt_steps:
+            return replace(found, is_shown=homing.moved)
+        late_s = homing.took_s - homing.stood_s
+        why = (
+            f"the reply that the homing has ended came {late_s:.2f} s after the controller said that the table stands"
+            if late_s > MAX_BEHIND_S
+            else "the controller said that the table stands when it was asked whether it still homes"
+        )
+        at_most = round(min(found.missed_steps, (homing.stood_s - self.from_home_s) / self.step_s), 1)
+        text = f"home seems {found.missed_steps:g} steps from where it was left, but {why}"
+        return replace(found, missed_steps=at_most, explained=text)
 
     def check_learning(self, took_s: Sequence[float], settings: ArrickC4Settings) -> HomeCheck:
         """Return how many steps were missed in the turns, of equal spacing, that the homing was learned from."""
@@ -101,6 +129,22 @@ class Homing:
         return HomeCheck(
             round(steps, 1), self.u_steps, settings.home_limit_steps, 360.0 / settings.steps_per_turn, self.step_s
         )
+
+
+def only_once(check: HomeCheck, once: HomeCheck) -> HomeCheck:
+    """Return a check with what an earlier measurement showed that was repeated, and did not show it again.
+
+    A check that shows missed steps itself stays as it is.
+    """
+    if check.is_missing:
+        return check
+    where = "in a turn from which the homing is learned" if once.learning else "before the first check"
+    late_s = once.step_s * once.missed_steps * (2 if once.learning else 1)
+    text = (
+        f"{once.missed_steps:g} steps seemed to be missed {where}, but not when it was made again: a reply was late by "
+        f"about {late_s:.2f} s, or the table missed steps that once; no data set depends on it"
+    )
+    return replace(check, explained="; ".join(filter(None, (check.explained, text))))
 
 
 def learned_homing(at_home_s: Sequence[float], offsets: Sequence[int], took_s: Sequence[float], u_s: float) -> Homing:

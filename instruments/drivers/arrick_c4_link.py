@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import NoReturn
 
 from instruments.clock import Clock
@@ -15,6 +16,8 @@ from instruments.transport.serial import BROKEN, SerialPort
 from instruments.transport.serial_stream import line_of
 
 REPLY_S = 1.0
+#: Longest wait for the answer to the question whether the table moves, s.
+STATE_S = 0.5
 #: Replies of an earlier move that can arrive before the reply to the present command.
 LATE_LETTERS = lines.ACCEPTED + lines.FINISHED
 LINE_END = b"\r\n"
@@ -92,6 +95,20 @@ class C4Link:
                     raise NoReply(self._device, f"{self._settings.port} gave no answer in {timeout_s:.1f} s; {advice}")
         except BROKEN as error:
             self._fail(error)
+
+    def read_state(self) -> tuple[str, float | None]:
+        """Return the answer to the question for the state, and when a move ended, clock time, if its end came before.
+
+        The answer is empty where none came: a controller may not answer while it moves. Raises LinkError.
+        """
+        ended_s: float | None = None
+        with suppress(NoReply):
+            letter = self.read_letter(STATE_S)
+            if letter != lines.FINISHED:
+                return letter, None
+            ended_s = self._clock.now_s()
+            return self.read_letter(STATE_S), ended_s
+        return "", ended_s
 
     def initialise(self) -> None:
         """Send the commands of the bench file that come before any motion; once for each opening of the link.

@@ -97,11 +97,18 @@ class HomeCheck:
     step_deg: float
     step_s: float  #: by how much each step away makes the homing longer
     learning: bool = False  #: whether they were missed in the turns that the check itself makes to learn from
+    is_shown: bool = False  #: the controller said that the table still moved: no late reply explains them
+    explained: str = ""  #: what shows that a reply was only late, for a person; empty: nothing does
+
+    @property
+    def doubt_steps(self) -> float:
+        """So many steps are missing beyond doubt: the limit and `COVERAGE` standard uncertainties."""
+        return self.limit_steps + COVERAGE * self.u_steps
 
     @property
     def is_missing(self) -> bool:
-        """Whether steps were missed, beyond doubt: more than the limit by `COVERAGE` standard uncertainties."""
-        return self.missed_steps > self.limit_steps + COVERAGE * self.u_steps
+        """Whether steps were missed, beyond doubt."""
+        return self.missed_steps > self.doubt_steps and not self.explained
 
     @property
     def is_doubtful(self) -> bool:

@@ -19,6 +19,7 @@ from pymodbus.pdu import ModbusPDU
 from instruments.clock import Clock, sleep_until
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected, one_line
 from instruments.protocols.modbus_codes import ACKNOWLEDGED, BUSY, EXCEPTIONS, TCP_PREFIX_BYTES, ends_at_a_frame_end
+from instruments.transport.port_failures import silence_remedy
 from instruments.transport.rtu import NeverSilent, RtuLine
 from instruments.transport.serial import BROKEN, SerialPort
 
@@ -192,7 +193,9 @@ class ModbusLink:
             if self._received:
                 advice = self._explain()
                 raise MalformedReply(self.device, f"cannot {purpose}, {advice}") from error
-            raise NoReply(self.device, f"no answer to {purpose}; {CHECK} {self.address}") from error
+            raise NoReply(
+                self.device, f"no answer to {purpose}; check {self._silence_remedy} {self.address}"
+            ) from error
         finally:
             self._earliest_request_s = self._clock.now_s() + self._pause_s
         if reply.isError():
@@ -202,6 +205,11 @@ class ModbusLink:
                 self.device, f"cannot {purpose}, the reply belongs to another request; {CHECK} {self.address}"
             )
         return reply
+
+    @property
+    def _silence_remedy(self) -> str:
+        host = "" if self._client is None else str(self._client.comm_params.host)
+        return f"{silence_remedy(host)} and address"
 
     def _connected(self) -> Client:
         client = self._client

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import serial
-from serial.rs485 import RS485, RS485Settings
+from serial.rs485 import RS485Settings
 
 from instruments.protocols.serial_options import Rs485Options
 from instruments.transport.latency import lower_latency
 from instruments.transport.serial import PARITIES, Line, SerialPort
+from instruments.transport.settled_port import unopened
 
 #: A write may take this long, s of real time: pyserial calls one that a busy computer interrupted a failed one.
 MIN_WRITE_S = 1.0
@@ -26,12 +26,8 @@ def open_port(
         "baudrate": baudrate, "parity": PARITIES[line.parity], "stopbits": line.stop_bits, "timeout": timeout_s,
         "write_timeout": max(timeout_s, MIN_WRITE_S), "inter_byte_timeout": inter_byte_timeout_s, "exclusive": True,
     }  # fmt: skip
-    port: Any
-    if line.rs485 is not None and line.rs485.by == "rts":
-        port = RS485(**settings)
-        port.port = url
-    else:
-        port = serial.serial_for_url(url, do_not_open=True, **settings)
+    by_rts = line.rs485 is not None and line.rs485.by == "rts"
+    port: Any = unopened(url, settings, switches_direction=by_rts)
     if line.dtr is not None:
         port.dtr = line.dtr
     if line.rts is not None:

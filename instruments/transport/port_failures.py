@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 from pathlib import Path
 
 from instruments.protocols.can.address import is_can_address
@@ -16,6 +17,8 @@ PROCESSES = Path("/proc")
 PSEUDO_TERMINALS = "/dev/pts/"
 #: The end of a pseudo-terminal that its maker keeps.
 MASTERS = frozenset({"/dev/ptmx", "/dev/pts/ptmx"})
+#: A host, or the address of a port of it, that is this computer.
+LOOPBACK = re.compile(r"(\w+://)?(127\.\d+\.\d+\.\d+|localhost|\[?::1\]?)(:\d+)?$")
 
 
 def reason(error: Exception) -> str:
@@ -45,9 +48,12 @@ def remedy(url: str, error: Exception) -> str:
 def silence_remedy(url: str) -> str:
     """Return what to check where nothing comes from a port that is open: "power, cable", or the program behind it.
 
-    A pseudo-terminal has neither power nor cable: at its other end is a program of this computer, as a simulator or one
-    that hands on a port of another computer. It is late where the computer is busy.
+    `url` is a port or a host. A pseudo-terminal has neither power nor cable: at its other end is a program of this
+    computer, as a simulator or one that hands on a port of another computer; so it is with an address of this computer
+    itself. The program is late where the computer is busy.
     """
+    if LOOPBACK.match(url):
+        return "that the program at this address of this computer runs and is not held up by other programs,"
     if os.path.realpath(url).startswith(PSEUDO_TERMINALS):
         return "that the program at the other end of this pseudo-terminal runs and is not held up by other programs,"
     return "power, cable"

@@ -198,7 +198,7 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
     if check is None:
         return {}
     late_steps = context.monitor.stalls.speed * late_s / check.step_s
-    if check.is_missing and late_steps < check.missed_steps - check.limit_steps:
+    if check.is_missing and (check.is_shown or late_steps < check.missed_steps - check.limit_steps):
         reason = _missing_text(table.name, check, step.temperature_c)
         for number in since:
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
@@ -209,7 +209,9 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
             f"{check.limit_steps:g} steps, because homings from one place scatter (u = {check.u_steps:.1f} steps)"
         )
         context.recorder.event(warning("home_uncertain", f"{text}; {QUIETEN}", table.name))
-    if check.is_doubtful or check.is_missing:
+    if check.explained:
+        context.recorder.event(warning("home_doubtful", f"{table.name}: {check.explained}; {QUIETEN}", table.name))
+    elif check.is_doubtful or check.is_missing:
         text = (
             f"{table.name}: home seems {check.missed_steps:g} steps from where it was left, limit "
             f"{check.limit_steps:g} steps, but a late reply explains it (u = {check.u_steps:.1f} steps"

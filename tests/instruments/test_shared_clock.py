@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import subprocess
 import sys
 import threading
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from instruments import shared_clock
 from instruments.bench_config import BenchFile, SimulationSettings, read_bench
 from instruments.clock import ScaledClock, SystemClock, VirtualClock, attending
 from instruments.shared_clock import (
@@ -24,6 +26,7 @@ from instruments.shared_clock import (
     ClockFile,
     SharedClock,
     clock_outside,
+    is_held_up,
     served_clock,
 )
 from instruments.simulators.server import SimulationServer
@@ -31,6 +34,7 @@ from procedures.contracts.control import Control
 from procedures.execution.stoppable_clock import stoppable
 from procedures.monitoring.host_stalls import HostStalls
 from tests.helpers.virtual_wall import VirtualWall
+from tests.helpers.waiting import eventually
 
 SPEED = 30.0
 #: What is counted of a stall: until a thread is late, and between two looks before and after.
@@ -44,10 +48,11 @@ class Rig:
 
     def __init__(self) -> None:
         self.wall, self._stack = VirtualWall(), contextlib.ExitStack()
-        self.file = ClockFile.made(SPEED, self.wall.now_s())
+        self.held_up = False  #: whether this computer holds up the threads that are late
+        self.file = ClockFile.made(SPEED, self.wall.now_s(), lambda _: self.held_up)
         self._stack.callback(self.file.path.unlink)
         self.simulator = SharedClock(self.file, owns=True, wall=self.wall)
-        self.driver = SharedClock(ClockFile(self.file.path), wall=self.wall)
+        self.driver = SharedClock(ClockFile(self.file.path, lambda _: self.held_up), wall=self.wall)
         # both from one thread, in which a test also reads the clocks: their places are those of other threads
         self.looks = {"simulator": self.attend(self.simulator), "driver": self.attend(self.driver)}
 
@@ -140,6 +145,35 @@ def test_a_sleep_lasts_through_a_stall(rig: Rig) -> None:
 def test_a_thread_that_is_halted_for_good_is_not_waited_for(rig: Rig) -> None:
     rig.run(GIVEN_UP_S + 1.0, without="driver")
     assert rig.simulator.now_s() == pytest.approx(SPEED, rel=0.05)
+
+
+def test_a_thread_that_this_computer_holds_up_is_waited_for_longer(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_clock, "MAX_HELD_UP_S", longest_s := GIVEN_UP_S + 3.0)
+    rig.held_up = True
+    rig.run(1.0)
+    rig.run(longest_s - 1.0, without="simulator")
+    assert rig.both_s == pytest.approx((SPEED, SPEED), abs=SPEED * COUNTED_S)
+    rig.run(2.0, without="simulator")
+    assert rig.driver.now_s() == pytest.approx(2 * SPEED, rel=0.05)
+
+
+def test_a_thread_that_waits_for_a_processor_is_held_up_and_one_that_sleeps_or_is_halted_is_not() -> None:
+    code = "import sys; print(flush=True); sys.stdin.readline(); print(flush=True)\nwhile True: pass"
+    with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            process.stdout.readline()
+            eventually(lambda: not is_held_up(process.pid))
+            process.stdin.write(b"\n")
+            process.stdin.flush()
+            process.stdout.readline()
+            eventually(lambda: is_held_up(process.pid))
+            process.send_signal(signal.SIGSTOP)
+            eventually(lambda: not is_held_up(process.pid))
+        finally:
+            process.kill()
+    assert not is_held_up(process.pid)
 
 
 def test_a_process_that_has_ended_is_not_waited_for(rig: Rig) -> None:

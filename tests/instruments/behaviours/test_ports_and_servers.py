@@ -65,7 +65,7 @@ def test_a_port_that_cannot_be_opened(
     def refuse(*given: Any, **settings: Any) -> Any:
         raise error
 
-    monkeypatch.setattr(opened_port.serial, "serial_for_url", refuse)
+    monkeypatch.setattr(opened_port, "unopened", refuse)
     line = said_by(section, identity, port="/dev/ttyUSB7")
     assert line.startswith("table: port /dev/ttyUSB7 cannot" if section == "table" else "fog: port /dev/ttyUSB7 cannot")
     assert text in line

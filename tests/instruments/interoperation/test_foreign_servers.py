@@ -197,7 +197,9 @@ def test_a_server_for_another_unit_is_silent(wire: tuple[str, str]) -> None:
     bench = bench_with("single-axis-sim", chamber={"port": wire[0]})
     driver = WatlowF4(bench.chamber, Ports(clock), clock)  # type: ignore[arg-type]
     try:
-        with pytest.raises(LinkError, match=r"chamber: .*check power, cable and address 1"):
+        with pytest.raises(
+            LinkError, match=r"chamber: .*check that the program at the other end of this .* and address 1"
+        ):
             driver.identify()
     finally:
         driver.close()

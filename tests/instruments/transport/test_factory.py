@@ -65,7 +65,7 @@ def test_a_port_that_cannot_be_opened_is_named_with_the_command_that_corrects_it
     def refuse(*_: Any, **__: Any) -> Any:
         raise serial.SerialException(number, "could not open port")
 
-    monkeypatch.setattr("serial.serial_for_url", refuse)
+    monkeypatch.setattr("instruments.transport.opened_port.unopened", refuse)
     with pytest.raises(LinkError, match=rf"mems: port /dev/ttyUSB0 cannot be opened \(.*\); {says}") as told:
         Ports(VirtualClock()).serial("/dev/ttyUSB0", device="mems", baudrate=9600, timeout_s=1.0)
     assert "\n" not in str(told.value)

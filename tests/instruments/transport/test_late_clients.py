@@ -119,7 +119,7 @@ def test_a_silent_socket_is_given_up_at_the_end_of_the_time_out(far: tuple[socke
 
 def test_a_write_that_a_busy_computer_interrupts_is_not_a_lost_link(monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {}
-    monkeypatch.setattr("instruments.transport.opened_port.serial.serial_for_url", lambda _, **each: given.update(each))
+    monkeypatch.setattr("instruments.transport.opened_port.unopened", lambda _, each, **__: given.update(each))
     with pytest.raises(AttributeError):  # nothing was opened
         HardwareLinks(ScaledClock(SPEED)).serial_port("/dev/none", baudrate=9600, timeout_s=TIMEOUT_S)
     assert given["write_timeout"] >= 1.0

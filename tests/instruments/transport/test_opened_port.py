@@ -164,4 +164,8 @@ def test_a_pseudo_terminal_has_no_cable(tmp_path: Path) -> None:
         os.close(master)
         os.close(terminal)
     assert silence_remedy("/dev/ttyUSB0") == "power, cable"
+    for host in ("127.0.0.1", "localhost", "socket://127.0.0.1:4001", "::1"):
+        assert "the program at this address of this computer" in silence_remedy(host)
+    for host in ("192.168.1.7", "socket://10.127.0.1:4001", "chamber.lab"):
+        assert silence_remedy(host) == "power, cable"
     assert silence_remedy("sim://stim300") == "power, cable"

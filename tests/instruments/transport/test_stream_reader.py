@@ -192,7 +192,7 @@ def test_dtr_and_rts_are_set_before_the_port_is_opened(monkeypatch: pytest.Monke
         def open(self) -> None:
             done.append(("open", None))
 
-    monkeypatch.setattr("serial.serial_for_url", Port)
+    monkeypatch.setattr("instruments.transport.opened_port.unopened", Port)
     Ports(VirtualClock()).serial(
         "/dev/ttyUSB0", device="mems", baudrate=9600, timeout_s=1.0, line=Line(dtr=False, rts=True)
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 from unittest.mock import create_autospec
@@ -65,11 +66,26 @@ def test_a_reply_that_this_computer_heard_late_is_no_missed_step() -> None:
     assert "partial 7" not in events
 
 
+def test_a_reply_that_was_late_by_the_controllers_own_word_ends_no_campaign() -> None:
+    events: list[str] = []
+    late = replace(FOUND, explained="home seems 58.8 steps from where it was left, but the reply was late")
+    assert check_home(context_of(0.0, events, late), step())["missed_steps"] == 58.8
+    (event,) = [each for each in events if not each.startswith("home_uncertain")]
+    assert event.startswith(f"home_doubtful: table: {late.explained};")
+
+
 @pytest.mark.parametrize("late_s", [0.0, 0.2])
 def test_steps_that_no_late_reply_explains_are_missing(late_s: float) -> None:
     events: list[str] = []
     with pytest.raises(TableStopped, match=r"home is 58\.8 steps"):
         check_home(context_of(late_s, events, FOUND), step())
+    assert events == ["partial 7"]
+
+
+def test_a_table_that_still_moved_has_missed_steps_however_late_this_computer_ran() -> None:
+    events: list[str] = []
+    with pytest.raises(TableStopped, match=r"home is 58\.8 steps"):
+        check_home(context_of(0.5, events, replace(FOUND, is_shown=True)), step())
     assert events == ["partial 7"]
 
 
