@@ -1,0 +1,160 @@
+"""The search over the schemes: one number of a scheme is exchanged at a time, for what helps most.
+
+What helps is hours times a power of U over the goal. Several powers lead from cheap recipes to exact ones; the choice
+is made among all recipes that were tried on the way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
+from typing import TypeVar
+
+from labctl.services.design.problem import Candidate, Goal, Problem
+from procedures.recipe.schemes import Cycle, Levels, Scheme, Soak
+
+SchemeT = TypeVar("SchemeT", Levels, Cycle)
+
+#: Rates of a level at least: fewer would hide a curve of the rate.
+RATES = (5, 7, 9, 11)
+#: Temperatures of a recipe with levels: one more than a parabola has coefficients, so that its error can be seen.
+TEMPERATURES = (4, 5, 6, 7, 8, 10)
+DURATIONS_S = (20.0, 30.0, 45.0, 60.0, 90.0, 120.0)
+HOLDS_S = (300.0, 600.0, 900.0, 1200.0, 1800.0, 2700.0, 3600.0)
+DWELLS_S = (0.0, 120.0, 240.0, 420.0, 600.0, 900.0, 1200.0, 1800.0, 2700.0)
+RAMP_SHARES = (1.0, 0.6, 0.35)
+CYCLES = (1, 2)
+#: Powers of U in what the exchange makes small.
+POWERS = (0.25, 1.0, 4.0)
+#: Rounds of exchanges at most, and what an exchange must gain.
+ROUNDS, GAIN = 6, 1e-6
+#: A unit may still change by so much more over the window than is expected.
+DRIFT_MARGIN = 1.5
+
+Cost = Callable[[Candidate], float]
+
+
+def search(problem: Problem, goal: Goal, *, ramps: bool) -> list[Candidate]:
+    """Return every recipe that was tried and can be run; with `ramps` also those that measure while it warms."""
+    for power in POWERS:
+        cost = _cost(goal, power)
+        for begin in (Levels(5, soaks(problem, 5)[1], 5, 60.0), Levels(10, soaks(problem, 10)[-1], 11, 60.0)):
+            _exchanged(problem, begin, cost, _of_levels)
+        if ramps:
+            for dwell_s in (0.0, 1800.0):
+                _exchanged(problem, Cycle(5, 60.0, dwell_s), cost, _of_cycles)
+    return [candidate for candidate in problem.evaluated.values() if candidate is not None]
+
+
+def chosen(candidates: Sequence[Candidate], goal: Goal) -> Candidate | None:
+    """Return the cheapest candidate that reaches the goal; else the best one within the hours; None for none."""
+    if goal.u_dps is not None and (enough := [each for each in candidates if goal.reached_by(each)]):
+        return min(enough, key=lambda each: (each.hours, each.predicted.worst_dps))
+    within = [each for each in candidates if goal.hours is None or each.hours <= goal.hours]
+    return min(within, key=lambda each: (each.predicted.worst_dps, each.hours), default=None)
+
+
+def next_best(candidates: Sequence[Candidate], choice: Candidate, goal: Goal, number: int) -> list[Candidate]:
+    """Return recipes to compare a choice with, shortest first.
+
+    They are the best of the other kind, and the neighbours of the choice among those that no other recipe beats in both
+    hours and U.
+    """
+    others = [each for each in candidates if type(each.scheme) is not type(choice.scheme)]
+    found = [each for each in (chosen(others, goal),) if each is not None]
+    front = _front(candidates)
+    place = next((n for n, each in enumerate(front) if each.hours >= choice.hours), len(front))
+    near = sorted(
+        (each for each in front if each is not choice),
+        key=lambda each: abs(front.index(each) - place),
+    )
+    for each in near:
+        if len(found) < number and each not in found and _differs(each, [choice, *found]):
+            found.append(each)
+    return sorted(found, key=lambda each: each.hours)
+
+
+def _differs(candidate: Candidate, others: Sequence[Candidate]) -> bool:
+    """Return whether a candidate is worth a line beside others: by some per cent in hours and in U."""
+    return all(
+        abs(math.log(candidate.hours / other.hours)) > 0.02
+        and abs(math.log(candidate.predicted.worst_dps / other.predicted.worst_dps)) > 0.02
+        for other in others
+    )
+
+
+def _front(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Return the candidates that no other one beats in both hours and U, shortest first."""
+    front: list[Candidate] = []
+    for each in sorted(candidates, key=lambda each: (each.hours, each.predicted.worst_dps)):
+        if not front or each.predicted.worst_dps < front[-1].predicted.worst_dps:
+            front.append(each)
+    return front
+
+
+def _cost(goal: Goal, power: float) -> Cost:
+    """Return what an exchange makes small: log hours, and a power of U; what the goal has to spare counts nothing."""
+    enough_dps = goal.u_dps or 0.0
+
+    def cost(candidate: Candidate) -> float:
+        excess = math.log(max(candidate.predicted.worst_dps, enough_dps))
+        over = 0.0 if goal.hours is None else max(math.log(candidate.hours / goal.hours), 0.0)
+        return math.log(candidate.hours) + power * excess + 20.0 * over
+
+    return cost
+
+
+def _exchanged(
+    problem: Problem, begin: SchemeT, cost: Cost,
+    values: Callable[[Problem, SchemeT], Mapping[str, Sequence[object]]],
+) -> SchemeT:  # fmt: skip
+    """Return the scheme that exchanges of one of its numbers at a time lead to."""
+
+    def cost_of(scheme: Scheme) -> float:
+        candidate = problem.candidate(scheme)
+        return math.inf if candidate is None else cost(candidate)
+
+    best, least = begin, cost_of(begin)
+    for _ in range(ROUNDS):
+        before = least
+        for name in [each.name for each in fields(best)]:
+            for value in values(problem, best).get(name, ()):
+                tried = replace(best, **{name: value})
+                if (now := cost_of(tried)) < least - GAIN:
+                    best, least = tried, now
+        if least > before - GAIN:
+            break
+    return best
+
+
+def _of_levels(problem: Problem, scheme: Levels) -> Mapping[str, Sequence[object]]:
+    return {
+        "temperatures": TEMPERATURES, "soak": soaks(problem, scheme.temperatures), "rates": RATES,
+        "duration_s": DURATIONS_S, "order": ("up", "up_down"),
+    }  # fmt: skip
+
+
+def _of_cycles(problem: Problem, scheme: Cycle) -> Mapping[str, Sequence[object]]:
+    del problem, scheme
+    return {
+        "rates": RATES, "duration_s": DURATIONS_S, "dwell_s": DWELLS_S, "ramp_share": RAMP_SHARES, "cycles": CYCLES,
+    }  # fmt: skip
+
+
+def soaks(problem: Problem, temperatures: int) -> list[Soak]:
+    """Return the soaks that are tried: some fixed ones, and, last, one until the unit has settled.
+
+    Each demands of the unit's thermometer what it is expected to show then, with a margin, and no less than the recipe
+    that the design is like.
+    """
+    rules, flow = problem.base.soak, problem.flow
+    way_c = (problem.span.high_c - problem.span.low_c) / max(temperatures - 1, 1) * math.pi / 2  # the widest step
+    settled_s = flow.settling_s(way_c, rules.max_drift_c, rules.drift_window_s)
+    found = []
+    for hold_s in [*HOLDS_S, settled_s]:
+        hold_s = math.ceil(hold_s / 60.0) * 60.0
+        window_s = min(rules.drift_window_s, hold_s)
+        expected_c = flow.change_c(way_c, hold_s, window_s)
+        found.append(Soak(hold_s, window_s, round(max(rules.max_drift_c, DRIFT_MARGIN * expected_c), 2)))
+    return found

@@ -1,0 +1,116 @@
+"""What a scheme does and why it was chosen, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from labctl.services.design.problem import OF_MOVING_HEAT, Candidate, Goal, Problem
+from labctl.services.design.search import chosen
+from procedures.recipe.schemes import Cycle, Levels, Scheme
+
+
+def scheme_text(scheme: Scheme) -> str:
+    """Return what a scheme does."""
+    if isinstance(scheme, Cycle):
+        ends = f", {scheme.dwell_s / 60:g} min at either end" if scheme.dwell_s else ""
+        slow = f" at {100 * scheme.ramp_share:.0f} % of the fastest ramp" if scheme.ramp_share < 1 else ""
+        times = f"{scheme.cycles} cycles" if scheme.cycles > 1 else "one cycle"
+        return (
+            f"{times} of the temperature in each mounting{slow}, without a soak{ends}; {scheme.rates} rates of "
+            f"{scheme.duration_s:g} s"
+        )
+    order = ", up and down" if scheme.order == "up_down" else ""
+    return (
+        f"{scheme.temperatures} temperatures{order}, soaks of {scheme.soak.hold_s / 60:g} min; {scheme.rates} rates of "
+        f"{scheme.duration_s:g} s"
+    )
+
+
+def decisions(problem: Problem, candidates: Sequence[Candidate], choice: Candidate, goal: Goal) -> Iterator[str]:
+    """Yield each choice of a recipe with its reason."""
+    scheme = choice.scheme
+    assert scheme is not None
+    yield _goal(choice, goal)
+    yield _kind(candidates, choice, goal)
+    yield from _of_cycle(problem, scheme) if isinstance(scheme, Cycle) else _of_levels(problem, scheme)
+    yield _rates(scheme)
+    yield _duration(problem, scheme)
+    if choice.predicted.heat_rms_dps > 0.5 * choice.predicted.rms_dps:
+        yield (
+            f"Unsettled heat makes {choice.predicted.heat_rms_dps:.2g} of the {choice.predicted.rms_dps:.2g} deg/s: an "
+            "earlier calibration (--prior), or a model with thermal_lag, would say more than further data sets."
+        )
+
+
+def _goal(choice: Candidate, goal: Goal) -> str:
+    predicted, hours = choice.predicted, choice.hours
+    where = f"output {predicted.worst_axis} at {predicted.worst_temperature_c:.0f} deg C"
+    head = f"U is at most {predicted.worst_dps:.2g} deg/s ({where}) after {hours:.1f} h"
+    if goal.u_dps is None:
+        return f"{head}, the smallest found within {goal.hours:g} h."
+    if goal.reached_by(choice):
+        return f"{head}, the shortest recipe found that reaches {goal.u_dps:g} deg/s."
+    within = f" within {goal.hours:g} h" if goal.hours is not None else ""
+    return f"{head}; no recipe found reaches {goal.u_dps:g} deg/s{within}, and this one comes closest."
+
+
+def _kind(candidates: Sequence[Candidate], choice: Candidate, goal: Goal) -> str:
+    other = chosen([each for each in candidates if type(each.scheme) is not type(choice.scheme)], goal)
+    moving = isinstance(choice.scheme, Cycle)
+    name = "Data are taken while the temperature moves" if moving else "Data are taken at fixed temperatures"
+    rival = "fixed temperatures" if moving else "a moving temperature"
+    if other is None:
+        reason = "the model is a table over temperature" if not moving else "no recipe with fixed temperatures is left"
+        return f"{name}: {reason}."
+    reach = "" if goal.u_dps is None or goal.reached_by(other) else ", which does not reach the goal"
+    return (
+        f"{name}: the best recipe with {rival} takes {other.hours:.1f} h for U = {other.predicted.worst_dps:.2g} deg/s"
+        f"{reach}."
+    )
+
+
+def _of_cycle(problem: Problem, scheme: Cycle) -> Iterator[str]:
+    yield (
+        "Each temperature is passed while warming and while cooling: an element that follows the thermometer late then "
+        "makes opposite errors, which cancel."
+    )
+    if scheme.dwell_s:
+        yield (
+            f"The chamber stays {scheme.dwell_s / 60:g} min at either end while data go on: the unit, which follows with "
+            f"about {problem.flow.unit_tau_s / 60:g} min, comes near the ends of the range."
+        )
+    if OF_MOVING_HEAT in problem.effects_of(scheme) and OF_MOVING_HEAT not in problem.effects:
+        yield (
+            f"The fit also has {OF_MOVING_HEAT}, what heat flow does to the bias; the calibration does not contain it."
+        )
+
+
+def _of_levels(problem: Problem, scheme: Levels) -> Iterator[str]:
+    yield (
+        f"{scheme.temperatures} temperatures, denser towards the ends, where a polynomial is known least"
+        f"{'; one more than a parabola needs, so that its error shows' if scheme.temperatures == 4 else ''}."
+    )
+    soak = scheme.soak
+    yield (
+        f"Soaks of {soak.hold_s / 60:g} min: a unit with a time constant of {problem.flow.unit_tau_s / 60:g} min then "
+        f"changes by at most {soak.max_drift_c:g} K in {soak.window_s / 60:g} min, which the soak also demands."
+    )
+
+
+def _rates(scheme: Scheme) -> str:
+    order = (
+        "the signs in turn, so that drift is alike in neighbours"
+        if isinstance(scheme, Cycle)
+        else "in random order, so that drift is not taken for a law of the rate"
+    )
+    fewest = "the fewest that show a curve of the rate" if scheme.rates == 5 else "denser towards the largest"
+    return f"{scheme.rates} rates of both signs and rest, {fewest}; {order}."
+
+
+def _duration(problem: Problem, scheme: Scheme) -> str:
+    figures = problem.noise.of(problem.axes[0])
+    white = figures.white_dps_rthz / scheme.duration_s**0.5
+    return (
+        f"Data sets of {scheme.duration_s:g} s: white noise leaves {white:.2g} deg/s in a mean, beside a drift of "
+        f"{figures.drift_dps:.2g} deg/s between data sets, which a longer one does not make smaller."
+    )
