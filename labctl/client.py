@@ -33,6 +33,7 @@ from labctl.answers.campaigns import (
 )
 from labctl.answers.certification import CalibrationStateResponse
 from labctl.answers.common_fields import CriticismVerdict
+from labctl.answers.design import DesignRequest, DesignResponse
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
 from labctl.answers.fixed_coefficients import FixedCoefficients
 from labctl.answers.points import PointFigure, PointResponse
@@ -56,6 +57,8 @@ __all__ = [
     "CampaignResponse",
     "Client",
     "ConfirmExperimentRequest",
+    "DesignRequest",
+    "DesignResponse",
     "DiagnosisRequest",
     "DiagnosisResponse",
     "EventResponse",
@@ -271,6 +274,13 @@ class Client:
         response = self._post("/api/campaigns", request)
         kind = ScheduledResponse if response.status_code == httpx.codes.ACCEPTED else CampaignResponse
         return kind.model_validate(json_of(response))
+
+    def design_campaign(self, request: DesignRequest) -> DesignResponse:
+        """Return the cheapest recipe that reaches an uncertainty on the bench of the service, or the best within hours.
+
+        Nothing moves. Its `recipe_toml` is what `CampaignRequest` takes.
+        """
+        return DesignResponse.model_validate(json_of(self._post("/api/designs", request)))
 
     def campaigns(self, *, search: str = "", limit: int | None = None) -> list[CampaignResponse]:
         """Return every campaign, newest first; at most `limit`.

@@ -16,6 +16,7 @@ from labctl.fitting.design.bound import least_heat_h, u_of_one_hour_dps
 from labctl.fitting.design.heat_course import HeatFlow
 from labctl.fitting.design.range_of_use import RangeOfUse
 from labctl.fitting.models.presets import POSES, preset_for
+from labctl.services.cache import UNNAMED, compute
 from labctl.services.design.known import Known, known_noise
 from labctl.services.design.problem import Candidate, Goal, Problem
 from labctl.services.design.search import chosen, next_best, search
@@ -75,6 +76,12 @@ def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFil
     if choice is None:
         raise _nothing(problem, goal, tried)
     return _answer(_Found(problem, goal, tried, choice), on, known, like)
+
+
+def designed(store: Store, request: DesignRequest, bench: BenchFile | None) -> DesignResponse:
+    """Return the same, for a client that waits: in a process for computations. Raises what `design_campaign` raises."""
+    compute(UNNAMED)
+    return design_campaign(store, request, bench)
 
 
 @dataclass(frozen=True)
