@@ -20,7 +20,7 @@ SchemeT = TypeVar("SchemeT", Levels, Cycle)
 RATES = (5, 7, 9, 11)
 #: Temperatures of a recipe with levels: one more than a parabola has coefficients, so that its error can be seen.
 TEMPERATURES = (4, 5, 6, 7, 8, 10)
-DURATIONS_S = (20.0, 30.0, 45.0, 60.0, 90.0, 120.0)
+DURATIONS_S = (30.0, 45.0, 60.0, 90.0, 120.0)
 HOLDS_S = (300.0, 600.0, 900.0, 1200.0, 1800.0, 2700.0, 3600.0)
 DWELLS_S = (0.0, 120.0, 240.0, 420.0, 600.0, 900.0, 1200.0, 1800.0, 2700.0)
 RAMP_SHARES = (1.0, 0.6, 0.35)
