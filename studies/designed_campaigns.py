@@ -307,7 +307,7 @@ def _cell_table(found: Sequence[Judged], units: int) -> str:
 
 def _cover_table(found: Sequence[Covered], units: int) -> str:
     lines = [
-        f"| within U (k = 2), %; {units} units, {VECTORS} vectors each | coefficients | promise | rms over prediction |",
+        f"| within U (k = 2), %; {units} units, {VECTORS} vectors each | coefficients | promise | rms / predicted |",
         "| --- | --- | --- | --- |",
     ]
     for name in DESIGNS:

@@ -31,7 +31,8 @@ class DesignRequest(Request):
         default_factory=list, max_length=MAX_EFFECTS, description="Effects to fit beside the model."
     )
     u_dps: float | None = Field(
-        default=None, gt=0,
+        default=None,
+        gt=0,
         description="U (k = 2) that each component of a corrected rate vector has to reach everywhere in the range, "
         "deg/s; null: as small as the hours allow.",
     )

@@ -110,6 +110,8 @@ class Ramp(Table):
     to_c: Number
     then_c: tuple[Number, ...] = Field(default=(), max_length=20)  #: further ends, one after the other
     dwell_s: Number = Field(default=0.0, ge=0, le=86_400)  #: data sets go on for so long between two legs
+    #: The same in the first mounting, which may come nearer to the ends of the range; absent: `dwell_s`.
+    first_dwell_s: Number | None = Field(default=None, ge=0, le=86_400)
     rates_dps: tuple[Number, ...] = Field(min_length=1)
     c_per_min: Number | None = Field(default=None, gt=0)  #: absent: as fast as the chamber can
     back: Yes = False  #: and back to `from_c` in the same way

@@ -80,6 +80,7 @@ class Cycle:
     rates: int
     duration_s: float
     dwell_s: float  #: data go on for so long at either end of the range
+    first_dwell_s: float  #: and so much longer in the first mounting
     ramp_share: float = 1.0  #: of the chamber's fastest ramp
     cycles: int = 1
 
@@ -91,6 +92,8 @@ class Cycle:
         ramp: dict[str, object] = {
             "from_c": begin_c, "to_c": ends[0], "then_c": ends[1:], "rates_dps": rates, "dwell_s": self.dwell_s,
         }  # fmt: skip
+        if self.first_dwell_s:
+            ramp["first_dwell_s"] = self.dwell_s + self.first_dwell_s
         if self.ramp_share < 1.0 and math.isfinite(ramp_c_per_min):
             ramp["c_per_min"] = round(self.ramp_share * ramp_c_per_min, 3)
         return {
@@ -118,7 +121,7 @@ def handling_c(base: Recipe, span: Span) -> float:
 
 
 def spread_temperatures_c(span: Span, number: int) -> list[float]:
-    """Return temperatures, rising, both ends among them, denser towards the ends: the extrema of Chebyshev's polynomial.
+    """Return temperatures, rising, both ends among them, denser towards the ends: the extrema of a Chebyshev polynomial.
 
     A polynomial through values there has the smallest error between them, and no extrapolation.
     """

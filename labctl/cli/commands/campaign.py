@@ -194,7 +194,8 @@ def design(
 ) -> None:
     """Write the cheapest recipe that reaches an uncertainty on a bench, or the best within given hours.
 
-    Nothing moves. Each choice is explained, with the next best recipes beside it; `labctl campaign start` runs the file.
+    Nothing moves. Each choice is explained, with the next best recipes beside it. `labctl campaign start` runs the
+    file.
     """
     from labctl.answers.design import DesignRequest
     from labctl.cli.printing.design import print_design

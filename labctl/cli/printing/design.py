@@ -15,9 +15,7 @@ def print_design(answer: DesignResponse, out: Path) -> None:
     """Print the choice with its reasons, what it was compared with, and the bound."""
     model = "+".join(filter(None, [answer.model, *answer.effects]))
     (low_c, high_c), (_, most_dps) = answer.temperatures_c, answer.rates_dps
-    print_heading(
-        str(out), f" on {answer.bench}: {model}, {low_c:g} to {high_c:g} deg C, up to {most_dps:g} deg/s"
-    )
+    print_heading(str(out), f" on {answer.bench}: {model}, {low_c:g} to {high_c:g} deg C, up to {most_dps:g} deg/s")
     for sentence in answer.decisions:
         console.print(f"  {sentence}", soft_wrap=True)
     rows = table(

@@ -30,6 +30,8 @@ LEVELS = 7
 #: Steps of the algorithm; the criterion then changes by less than a thousandth.
 STEPS = 200
 HOUR_S = 3600.0
+#: Time at each point, s, where only its columns count.
+EACH_S = 60.0
 
 
 @single_threaded
@@ -76,16 +78,16 @@ def _least_trace(parts: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def _every_point(positions: Sequence[str], use: RangeOfUse) -> PlannedSets:
-    """Return a data set of one hour at each rate and temperature in each position."""
+    """Return a data set at each rate and temperature in each position."""
     low_c, high_c = use.temperature_c
     levels = np.linspace(low_c, high_c, LEVELS)
     grid = [(p, s * use.rate_dps, t) for p in positions for t in levels.tolist() for s in SHARES]
     n = len(grid)
-    begin_s = HOUR_S * np.arange(n)
+    begin_s: Array = EACH_S * np.arange(n, dtype=np.float64)
     warm: Array = np.array([t for _, _, t in grid])
     return PlannedSets(
-        begin_s, np.full(n, HOUR_S), np.array([rate for _, rate, _ in grid]), np.array([p for p, _, _ in grid]),
-        np.ones(n, dtype=np.int64), np.ones(n, dtype=np.int64), begin_s, HeatCourse.constant_in_steps(warm, HOUR_S),
+        begin_s, np.full(n, EACH_S), np.array([rate for _, rate, _ in grid]), np.array([p for p, _, _ in grid]),
+        np.ones(n, dtype=np.int64), np.ones(n, dtype=np.int64), begin_s, HeatCourse.constant_in_steps(warm, EACH_S),
     )  # fmt: skip
 
 

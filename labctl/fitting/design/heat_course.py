@@ -63,7 +63,7 @@ class HeatCourse:
         """Return the unit's mean temperature between times (n,) and (n,), as (n,) deg C."""
         whole = np.concatenate([[0.0], np.cumsum(0.5 * STEP_S * (self.unit_c[1:] + self.unit_c[:-1]))])
         area = np.interp(end_s, self.t_s, whole) - np.interp(begin_s, self.t_s, whole)
-        return np.asarray(area / np.maximum(end_s - begin_s, 1e-9))
+        return np.asarray(area / np.maximum(end_s - begin_s, 1e-9), dtype=np.float64)
 
     def slope_k_s(self, begin_s: Array, end_s: Array) -> Array:
         """Return the unit's mean rate of change between times (n,) and (n,), as (n,) K/s."""

@@ -65,11 +65,11 @@ def predicted_uncertainty(
         of_heat.append(by_heat)
         coefficients += design.columns.shape[1]
     every = np.array(variances)
-    axis, place = np.unravel_index(int(np.argmax(every)), every.shape)
+    row, place = divmod(int(np.argmax(every)), every.shape[1])
     warm = np.asarray(points["temperature_c"], dtype=np.float64)
     return PredictedUncertainty(
-        K * float(np.sqrt(np.mean(every @ weights))), K * float(np.sqrt(every.max())), axes[int(axis)],
-        float(warm[int(place)]), K * float(np.sqrt(np.mean(np.array(of_heat) @ weights))), len(sets), coefficients,
+        K * float(np.sqrt(np.mean(every @ weights))), K * float(np.sqrt(every.max())), axes[row],
+        float(warm[place]), K * float(np.sqrt(np.mean(np.array(of_heat) @ weights))), len(sets), coefficients,
     )  # fmt: skip
 
 

@@ -254,6 +254,6 @@ def _bound(found: _Found) -> DesignBound | None:
 def _heat_text(flow: HeatFlow, bench: BenchFile) -> str:
     air = "as the bench file states" if bench.air_tau_s is not None else "assumed"
     return (
-        f"the air follows the ramp of {flow.ramp_c_per_min:g} K/min with {flow.air_tau_s:g} s ({air}), the unit the air "
-        f"with {flow.unit_tau_s:g} s (assumed)"
+        f"the air follows the ramp of {flow.ramp_c_per_min:g} K/min with {flow.air_tau_s:g} s ({air}), the unit the "
+        f"air with {flow.unit_tau_s:g} s (assumed)"
     )

@@ -1,4 +1,4 @@
-"""What is known of the noise of a unit before a campaign: its data sheet, and earlier calibrations of it or its type."""
+"""What is known of the noise of a unit before a campaign: its data sheet, earlier calibrations of it or its type."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ from labctl.fitting.design.noise_figures import (
     UnsettledHeat,
 )
 from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import USUAL_STABILITY_DPS
-from labctl.services.design.problem import Span
+from procedures.recipe.schemes import Span
 
 if TYPE_CHECKING:
     from labctl.store import CalibrationRecord, Store
@@ -104,7 +105,8 @@ def _heat(gyro: GyroSettings, earlier: Sequence[_Earlier]) -> tuple[UnsettledHea
         source = f"from {_named(earlier)}"
     text = (
         f"the sensing element follows the thermometer by an unknown time, standard uncertainty {element_u_s:g} s "
-        f"(assumed{f' for {gyro.technology}' if gyro.technology else ''}), with {bias:.2g} deg/s of bias and {scale:.2g} of scale factor per K, {source}"
+        f"(assumed{f' for {gyro.technology}' if gyro.technology else ''}), with {bias:.2g} deg/s of bias and "
+        f"{scale:.2g} of scale factor per K, {source}"
     )
     return UnsettledHeat(element_u_s, bias, scale), text
 
@@ -114,8 +116,8 @@ def _earlier(store: Store, serial: str, span: Span) -> _Earlier:
     rows = store.calibrations.of_unit(unit.serial)
     if not rows:
         raise BadInput(
-            f"unit {unit.serial!r} has no calibration, so that nothing is known of its noise; `labctl fit {unit.serial}` "
-            "makes one, or leave --prior out"
+            f"unit {unit.serial!r} has no calibration, so that nothing is known of its noise; "
+            f"`labctl fit {unit.serial}` makes one, or leave --prior out"
         )
     row = max(rows, key=lambda each: each.version)
     document = json.loads(row.document)
@@ -152,7 +154,7 @@ def _slopes(fitted: FittedModel, span: Span) -> tuple[float, float]:
     return _rms(bias), _rms(scale)
 
 
-def _error(fitted: FittedModel, axis: str, warm: np.ndarray, rate_dps: float) -> np.ndarray:
+def _error(fitted: FittedModel, axis: str, warm: Array, rate_dps: float) -> Array:
     rates = {each: np.full(len(warm), rate_dps if each == axis else 0.0) for each in BODY_AXES}
     columns = {"temperature_c": warm, "table_rate_dps": rates[axis], "position": np.full(len(warm), axis)}
     return np.asarray(fitted.error_dps(Channels(columns, rates), axis))

@@ -21,6 +21,8 @@ from procedures.recipe.schemes import Cycle, Scheme, Span, recipe_of
 #: Fitted beside a model without a thermal response where data are taken while the temperature moves: what heat flow
 #: itself does to the bias; a calibration does not contain it.
 OF_MOVING_HEAT = "temperature_rate"
+#: A calibration is valid where its unit has been: that has to be within this of the ends of the range, K.
+COVERED_K = 2.0
 #: Effects of a model that describe the unit while its temperature moves.
 THERMAL = frozenset({OF_MOVING_HEAT, "thermal_lag", "thermal_lag_two_ways"})
 
@@ -33,7 +35,9 @@ class Goal:
     hours: float | None  #: bench hours at most
 
     def reached_by(self, candidate: Candidate) -> bool:
-        """Return whether a candidate is good enough, and short enough."""
+        """Return whether a candidate is good enough, short enough, and covers the range."""
+        if candidate.missed_k > COVERED_K:
+            return False
         good = self.u_dps is None or candidate.predicted.worst_dps <= self.u_dps
         return good and (self.hours is None or candidate.hours <= self.hours)
 
@@ -46,6 +50,7 @@ class Candidate:
     plan: Plan
     predicted: PredictedUncertainty
     covered_c: tuple[float, float]  #: lowest and highest temperature of the unit in a data set
+    missed_k: float  #: by how much the unit stays away from an end of the range, K
 
     @property
     def recipe(self) -> Recipe:
@@ -103,5 +108,6 @@ class Problem:
         sets = foreseen_sets(plan, self.flow, self.limits.max_acceleration_dps2)
         preset = preset_for(self.model, list(effects))
         predicted = predicted_uncertainty(sets, self.axes, preset, self.noise, self.use)
-        warm = sets.temperature_c
-        return Candidate(scheme, plan, predicted, (float(warm.min()), float(warm.max())))
+        low_c, high_c = float(sets.temperature_c.min()), float(sets.temperature_c.max())
+        missed_k = max(low_c - self.span.low_c, self.span.high_c - high_c, 0.0)
+        return Candidate(scheme, plan, predicted, (low_c, high_c), missed_k)

@@ -7,11 +7,11 @@ is made among all recipes that were tried on the way.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
-from labctl.services.design.problem import Candidate, Goal, Problem
+from labctl.services.design.problem import COVERED_K, Candidate, Goal, Problem
 from procedures.recipe.schemes import Cycle, Levels, Scheme, Soak
 
 SchemeT = TypeVar("SchemeT", Levels, Cycle)
@@ -22,11 +22,13 @@ RATES = (5, 7, 9, 11)
 TEMPERATURES = (4, 5, 6, 7, 8, 10)
 DURATIONS_S = (30.0, 45.0, 60.0, 90.0, 120.0)
 HOLDS_S = (300.0, 600.0, 900.0, 1200.0, 1800.0, 2700.0, 3600.0)
-DWELLS_S = (0.0, 120.0, 240.0, 420.0, 600.0, 900.0, 1200.0, 1800.0, 2700.0)
+DWELLS_S = (0.0, 120.0, 240.0, 420.0, 600.0, 900.0, 1200.0, 1500.0, 1800.0, 2400.0, 3600.0)
 RAMP_SHARES = (1.0, 0.6, 0.35)
 CYCLES = (1, 2)
 #: Powers of U in what the exchange makes small.
 POWERS = (0.25, 1.0, 4.0)
+#: Weight of what must not be: hours beyond those given, and ends of the range that are missed.
+MUST = 20.0
 #: Rounds of exchanges at most, and what an exchange must gain.
 ROUNDS, GAIN = 6, 1e-6
 #: A unit may still change by so much more over the window than is expected.
@@ -42,8 +44,8 @@ def search(problem: Problem, goal: Goal, *, ramps: bool) -> list[Candidate]:
         for begin in (Levels(5, soaks(problem, 5)[1], 5, 60.0), Levels(10, soaks(problem, 10)[-1], 11, 60.0)):
             _exchanged(problem, begin, cost, _of_levels)
         if ramps:
-            for dwell_s in (0.0, 1800.0):
-                _exchanged(problem, Cycle(5, 60.0, dwell_s), cost, _of_cycles)
+            for dwell_s, first_s in ((0.0, 1800.0), (1800.0, 0.0)):
+                _exchanged(problem, Cycle(5, 60.0, dwell_s, first_s), cost, _of_cycles)
     return [candidate for candidate in problem.evaluated.values() if candidate is not None]
 
 
@@ -52,6 +54,7 @@ def chosen(candidates: Sequence[Candidate], goal: Goal) -> Candidate | None:
     if goal.u_dps is not None and (enough := [each for each in candidates if goal.reached_by(each)]):
         return min(enough, key=lambda each: (each.hours, each.predicted.worst_dps))
     within = [each for each in candidates if goal.hours is None or each.hours <= goal.hours]
+    within = [each for each in within if each.missed_k <= COVERED_K] or within
     return min(within, key=lambda each: (each.predicted.worst_dps, each.hours), default=None)
 
 
@@ -63,7 +66,7 @@ def next_best(candidates: Sequence[Candidate], choice: Candidate, goal: Goal, nu
     """
     others = [each for each in candidates if type(each.scheme) is not type(choice.scheme)]
     found = [each for each in (chosen(others, goal),) if each is not None]
-    front = _front(candidates)
+    front = _front([each for each in candidates if each.missed_k <= COVERED_K] or candidates)
     place = next((n for n, each in enumerate(front) if each.hours >= choice.hours), len(front))
     near = sorted(
         (each for each in front if each is not choice),
@@ -100,15 +103,15 @@ def _cost(goal: Goal, power: float) -> Cost:
     def cost(candidate: Candidate) -> float:
         excess = math.log(max(candidate.predicted.worst_dps, enough_dps))
         over = 0.0 if goal.hours is None else max(math.log(candidate.hours / goal.hours), 0.0)
-        return math.log(candidate.hours) + power * excess + 20.0 * over
+        missed = max(candidate.missed_k - COVERED_K, 0.0) / COVERED_K
+        return math.log(candidate.hours) + power * excess + MUST * (over + missed)
 
     return cost
 
 
 def _exchanged(
-    problem: Problem, begin: SchemeT, cost: Cost,
-    values: Callable[[Problem, SchemeT], Mapping[str, Sequence[object]]],
-) -> SchemeT:  # fmt: skip
+    problem: Problem, begin: SchemeT, cost: Cost, exchanges: Callable[[Problem, SchemeT], list[list[SchemeT]]]
+) -> SchemeT:
     """Return the scheme that exchanges of one of its numbers at a time lead to."""
 
     def cost_of(scheme: Scheme) -> float:
@@ -118,9 +121,8 @@ def _exchanged(
     best, least = begin, cost_of(begin)
     for _ in range(ROUNDS):
         before = least
-        for name in [each.name for each in fields(best)]:
-            for value in values(problem, best).get(name, ()):
-                tried = replace(best, **{name: value})
+        for number in range(len(exchanges(problem, best))):
+            for tried in exchanges(problem, best)[number]:
                 if (now := cost_of(tried)) < least - GAIN:
                     best, least = tried, now
         if least > before - GAIN:
@@ -128,18 +130,27 @@ def _exchanged(
     return best
 
 
-def _of_levels(problem: Problem, scheme: Levels) -> Mapping[str, Sequence[object]]:
-    return {
-        "temperatures": TEMPERATURES, "soak": soaks(problem, scheme.temperatures), "rates": RATES,
-        "duration_s": DURATIONS_S, "order": ("up", "up_down"),
-    }  # fmt: skip
+def _of_levels(problem: Problem, scheme: Levels) -> list[list[Levels]]:
+    """Return the schemes that differ in one number, a list for each number."""
+    return [
+        [replace(scheme, temperatures=each) for each in TEMPERATURES],
+        [replace(scheme, soak=each) for each in soaks(problem, scheme.temperatures)],
+        [replace(scheme, rates=each) for each in RATES],
+        [replace(scheme, duration_s=each) for each in DURATIONS_S],
+        [replace(scheme, order="up"), replace(scheme, order="up_down")],
+    ]
 
 
-def _of_cycles(problem: Problem, scheme: Cycle) -> Mapping[str, Sequence[object]]:
-    del problem, scheme
-    return {
-        "rates": RATES, "duration_s": DURATIONS_S, "dwell_s": DWELLS_S, "ramp_share": RAMP_SHARES, "cycles": CYCLES,
-    }  # fmt: skip
+def _of_cycles(problem: Problem, scheme: Cycle) -> list[list[Cycle]]:
+    del problem
+    return [
+        [replace(scheme, rates=each) for each in RATES],
+        [replace(scheme, duration_s=each) for each in DURATIONS_S],
+        [replace(scheme, dwell_s=each) for each in DWELLS_S],
+        [replace(scheme, first_dwell_s=each) for each in DWELLS_S],
+        [replace(scheme, ramp_share=each) for each in RAMP_SHARES],
+        [replace(scheme, cycles=each) for each in CYCLES],
+    ]
 
 
 def soaks(problem: Problem, temperatures: int) -> list[Soak]:
@@ -152,8 +163,8 @@ def soaks(problem: Problem, temperatures: int) -> list[Soak]:
     way_c = (problem.span.high_c - problem.span.low_c) / max(temperatures - 1, 1) * math.pi / 2  # the widest step
     settled_s = flow.settling_s(way_c, rules.max_drift_c, rules.drift_window_s)
     found = []
-    for hold_s in [*HOLDS_S, settled_s]:
-        hold_s = math.ceil(hold_s / 60.0) * 60.0
+    for least_s in [*HOLDS_S, settled_s]:
+        hold_s = math.ceil(least_s / 60.0) * 60.0
         window_s = min(rules.drift_window_s, hold_s)
         expected_c = flow.change_c(way_c, hold_s, window_s)
         found.append(Soak(hold_s, window_s, round(max(rules.max_drift_c, DRIFT_MARGIN * expected_c), 2)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from labctl.services.design.problem import OF_MOVING_HEAT, Candidate, Goal, Problem
+from labctl.services.design.problem import COVERED_K, OF_MOVING_HEAT, Candidate, Goal, Problem
 from labctl.services.design.search import chosen
 from procedures.recipe.schemes import Cycle, Levels, Scheme
 
@@ -13,6 +13,8 @@ def scheme_text(scheme: Scheme) -> str:
     """Return what a scheme does."""
     if isinstance(scheme, Cycle):
         ends = f", {scheme.dwell_s / 60:g} min at either end" if scheme.dwell_s else ""
+        if scheme.first_dwell_s:
+            ends += f", in the first mounting {(scheme.dwell_s + scheme.first_dwell_s) / 60:g} min"
         slow = f" at {100 * scheme.ramp_share:.0f} % of the fastest ramp" if scheme.ramp_share < 1 else ""
         times = f"{scheme.cycles} cycles" if scheme.cycles > 1 else "one cycle"
         return (
@@ -32,7 +34,7 @@ def decisions(problem: Problem, candidates: Sequence[Candidate], choice: Candida
     assert scheme is not None
     yield _goal(choice, goal)
     yield _kind(candidates, choice, goal)
-    yield from _of_cycle(problem, scheme) if isinstance(scheme, Cycle) else _of_levels(problem, scheme)
+    yield from _of_cycle(problem, scheme, choice) if isinstance(scheme, Cycle) else _of_levels(problem, scheme)
     yield _rates(scheme)
     yield _duration(problem, scheme)
     if choice.predicted.heat_rms_dps > 0.5 * choice.predicted.rms_dps:
@@ -47,11 +49,17 @@ def _goal(choice: Candidate, goal: Goal) -> str:
     where = f"output {predicted.worst_axis} at {predicted.worst_temperature_c:.0f} deg C"
     head = f"U is at most {predicted.worst_dps:.2g} deg/s ({where}) after {hours:.1f} h"
     if goal.u_dps is None:
-        return f"{head}, the smallest found within {goal.hours:g} h."
+        return f"{head}, the smallest found within {goal.hours:g} h.{_missed(choice)}"
     if goal.reached_by(choice):
         return f"{head}, the shortest recipe found that reaches {goal.u_dps:g} deg/s."
     within = f" within {goal.hours:g} h" if goal.hours is not None else ""
-    return f"{head}; no recipe found reaches {goal.u_dps:g} deg/s{within}, and this one comes closest."
+    return f"{head}; no recipe found reaches {goal.u_dps:g} deg/s{within}, and this one comes closest.{_missed(choice)}"
+
+
+def _missed(choice: Candidate) -> str:
+    if choice.missed_k <= COVERED_K:
+        return ""
+    return " It does not reach the goal: no recipe of so few hours brings the unit to the ends of the range."
 
 
 def _kind(candidates: Sequence[Candidate], choice: Candidate, goal: Goal) -> str:
@@ -69,20 +77,31 @@ def _kind(candidates: Sequence[Candidate], choice: Candidate, goal: Goal) -> str
     )
 
 
-def _of_cycle(problem: Problem, scheme: Cycle) -> Iterator[str]:
+def _of_cycle(problem: Problem, scheme: Cycle, choice: Candidate) -> Iterator[str]:
     yield (
         "Each temperature is passed while warming and while cooling: an element that follows the thermometer late then "
         "makes opposite errors, which cancel."
     )
-    if scheme.dwell_s:
-        yield (
-            f"The chamber stays {scheme.dwell_s / 60:g} min at either end while data go on: the unit, which follows with "
-            f"about {problem.flow.unit_tau_s / 60:g} min, comes near the ends of the range."
-        )
+    if scheme.dwell_s or scheme.first_dwell_s:
+        yield f"The chamber stays at either end while data go on: {_dwells(scheme)}. {_covers(problem, choice)}"
     if OF_MOVING_HEAT in problem.effects_of(scheme) and OF_MOVING_HEAT not in problem.effects:
         yield (
             f"The fit also has {OF_MOVING_HEAT}, what heat flow does to the bias; the calibration does not contain it."
         )
+
+
+def _dwells(scheme: Cycle) -> str:
+    if not scheme.first_dwell_s:
+        return f"{scheme.dwell_s / 60:g} min"
+    others = f"{scheme.dwell_s / 60:g} min in the others" if scheme.dwell_s else "not in the others"
+    return f"{(scheme.dwell_s + scheme.first_dwell_s) / 60:g} min in the first mounting, {others}"
+
+
+def _covers(problem: Problem, choice: Candidate) -> str:
+    follows = f"The unit, which follows with {problem.flow.unit_tau_s / 60:g} min, "
+    if choice.missed_k > COVERED_K:
+        return f"{follows}stays {choice.missed_k:.0f} K away from an end of the range: no calibration is valid there."
+    return f"{follows}is then once within {COVERED_K:g} K of either end of the range, where the calibration is valid."
 
 
 def _of_levels(problem: Problem, scheme: Levels) -> Iterator[str]:
@@ -93,7 +112,7 @@ def _of_levels(problem: Problem, scheme: Levels) -> Iterator[str]:
     soak = scheme.soak
     yield (
         f"Soaks of {soak.hold_s / 60:g} min: a unit with a time constant of {problem.flow.unit_tau_s / 60:g} min then "
-        f"changes by at most {soak.max_drift_c:g} K in {soak.window_s / 60:g} min, which the soak also demands."
+        f"changes by less than {soak.max_drift_c:g} K in {soak.window_s / 60:g} min, which the soak also demands."
     )
 
 
