@@ -49,6 +49,8 @@ FIRST_SEED = int(os.environ.get("LABCTL_STUDY_SEED", "90001"))
 STANDARD, BENCH = "table1-x-table2", "triaxial-sim"
 #: Readings per second: the noise of a mean does not depend on it.
 READINGS_HZ = 4.0
+#: One unit in so many is also criticised.
+VERDICTS = 5
 #: What a cell may have, over the floor.
 ALLOWED = 1.2
 #: Rate vectors of each unit in the coverage, and the later power-on, deg/s, as the data sheet states it.
@@ -277,7 +279,7 @@ def run(units: int = UNITS) -> str:
     with ProcessPoolExecutor(max_workers=WORKERS) as pool:
         of_cells = [each for found in pool.map(judged, range(units)) for each in found]
         of_cover = [each for found in pool.map(covered, range(units)) for each in found]
-        of_verdicts = [each for found in pool.map(verdict, range(max(units // 2, 1))) for each in found]
+        of_verdicts = [each for found in pool.map(verdict, range(max(units // VERDICTS, 1))) for each in found]
     return "\n\n".join([_cell_table(of_cells, units), _cover_table(of_cover, units), _verdict_table(of_verdicts)])
 
 

@@ -121,7 +121,7 @@ def handling_c(base: Recipe, span: Span) -> float:
 
 
 def spread_temperatures_c(span: Span, number: int) -> list[float]:
-    """Return temperatures, rising, both ends among them, denser towards the ends: the extrema of a Chebyshev polynomial.
+    """Return temperatures, rising, both ends among them, denser towards the ends: a Chebyshev polynomial's extrema.
 
     A polynomial through values there has the smallest error between them, and no extrapolation.
     """

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.design.heat_course import HeatCourse
+from labctl.fitting.design.heat_course import STEP_S, HeatCourse
 from labctl.fitting.design.noise_figures import NoiseFigures
 from labctl.fitting.design.planned_sets import PlannedSets, planned_data
 from labctl.fitting.design.predicted_uncertainty import K, derivative_at_points
@@ -30,7 +30,7 @@ LEVELS = 7
 #: Steps of the algorithm; the criterion then changes by less than a thousandth.
 STEPS = 200
 HOUR_S = 3600.0
-#: Time at each point, s, where only its columns count.
+#: Time at each point, s, where only its columns count; the temperature changes behind its data set.
 EACH_S = 60.0
 
 
@@ -81,12 +81,13 @@ def _every_point(positions: Sequence[str], use: RangeOfUse) -> PlannedSets:
     """Return a data set at each rate and temperature in each position."""
     low_c, high_c = use.temperature_c
     levels = np.linspace(low_c, high_c, LEVELS)
-    grid = [(p, s * use.rate_dps, t) for p in positions for t in levels.tolist() for s in SHARES]
+    grid = [(p, s * use.rate_dps, t) for t in levels.tolist() for p in positions for s in SHARES]
     n = len(grid)
     begin_s: Array = EACH_S * np.arange(n, dtype=np.float64)
+    lasts_s = np.full(n, EACH_S - 2.0 * STEP_S)
     warm: Array = np.array([t for _, _, t in grid])
     return PlannedSets(
-        begin_s, np.full(n, EACH_S), np.array([rate for _, rate, _ in grid]), np.array([p for p, _, _ in grid]),
+        begin_s, lasts_s, np.array([rate for _, rate, _ in grid]), np.array([p for p, _, _ in grid]),
         np.ones(n, dtype=np.int64), np.ones(n, dtype=np.int64), begin_s, HeatCourse.constant_in_steps(warm, EACH_S),
     )  # fmt: skip
 

@@ -57,12 +57,12 @@ class HeatCourse:
     @property
     def t_s(self) -> Array:
         """The times, (k,) s."""
-        return STEP_S * np.arange(len(self.unit_c))
+        return np.asarray(STEP_S * np.arange(len(self.unit_c)), dtype=np.float64)
 
     def mean_c(self, begin_s: Array, end_s: Array) -> Array:
         """Return the unit's mean temperature between times (n,) and (n,), as (n,) deg C."""
         whole = np.concatenate([[0.0], np.cumsum(0.5 * STEP_S * (self.unit_c[1:] + self.unit_c[:-1]))])
-        area = np.interp(end_s, self.t_s, whole) - np.interp(begin_s, self.t_s, whole)
+        area: Array = np.interp(end_s, self.t_s, whole) - np.interp(begin_s, self.t_s, whole)
         return np.asarray(area / np.maximum(end_s - begin_s, 1e-9), dtype=np.float64)
 
     def slope_k_s(self, begin_s: Array, end_s: Array) -> Array:
@@ -78,8 +78,8 @@ def heat_course(flow: HeatFlow, set_points: Sequence[tuple[float, float]], start
     for t_s, set_c in set_points:
         target[min(math.ceil(t_s / STEP_S), n) :] = set_c
     ramped = _ramped(target, start_c, flow.ramp_c_per_min * STEP_S / 60.0)
-    air = _followed(ramped, flow.air_tau_s)
-    return HeatCourse(air, _followed(air, flow.unit_tau_s))
+    air = _followed(ramped, start_c, flow.air_tau_s)
+    return HeatCourse(air, _followed(air, start_c, flow.unit_tau_s))
 
 
 def _ramped(target: Array, start_c: float, step_c: float) -> Array:
@@ -97,15 +97,15 @@ def _ramped(target: Array, start_c: float, step_c: float) -> Array:
     return ramped
 
 
-def _followed(course: NDArray[np.float64], tau_s: float) -> Array:
-    """Return a first-order follower of a course (n,) that changes on straight lines, in equilibrium at the start."""
+def _followed(course: NDArray[np.float64], start_c: float, tau_s: float) -> Array:
+    """Return a first-order follower of a course (n,) that changes on straight lines; both come from `start_c`."""
     if tau_s <= 0:
         return course
     keep = math.exp(-STEP_S / tau_s)
     mean = (1.0 - keep) * tau_s / STEP_S
-    followed, value = [], float(course[0])
+    followed, value = [], start_c
     values = course.tolist()
-    for last, new in zip([values[0], *values[:-1]], values, strict=True):
+    for last, new in zip([start_c, *values[:-1]], values, strict=True):
         value = keep * value + (mean - keep) * last + (1.0 - mean) * new
         followed.append(value)
     return np.array(followed)

@@ -68,7 +68,8 @@ def planned_data(sets: PlannedSets, axes: Sequence[str], noise: NoiseFigures) ->
     for axis in axes:
         white = np.sqrt(noise.of(axis).white_var(sets.duration_s))
         columns |= {f"gyro_{axis}": rates[axis], f"gyro_{axis}_std": np.sqrt(READINGS) * white}
-    info = RecordingInfo(serial="planned", axes=tuple(axes), kind="points", started_at=STARTED)
+    head = {"serial": "planned", "axes": tuple(axes), "kind": "points", "started_at": STARTED}
+    info = RecordingInfo.model_validate(head)
     return fit_data_of(Recording(info, columns, _environment(sets)))
 
 

@@ -14,8 +14,8 @@ from labctl.fitting.numeric.arrays import Array
 
 #: Temperatures at which an uncertainty is computed.
 TEMPERATURES = 10
-#: Shares of the radius where a mean over a ball is exact up to degree 3 in the square of the radius.
-GAUSS_RADII = 3
+#: Shares of the radius: a mean over a ball of three axes is exact for the fourth power of a rate.
+GAUSS_RADII = 4
 
 
 @dataclass(frozen=True)

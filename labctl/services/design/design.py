@@ -142,9 +142,11 @@ def _refuse_beyond(base: Recipe, span: Span, limits: BenchLimits) -> None:
 
 
 def _rates(limits: BenchLimits) -> Range:
-    rates = [gyro.max_rate_dps for gyro in limits.gyros.values()]
-    most = min([*rates, *([] if limits.table is None else [limits.table.max_rate_dps])])
-    return -most, most
+    rates: list[float] = [gyro.max_rate_dps for gyro in limits.gyros.values()]
+    if limits.table is not None:
+        rates.append(limits.table.max_rate_dps)
+    largest = min(rates)
+    return -largest, largest
 
 
 def _temperatures(limits: BenchLimits) -> Range:

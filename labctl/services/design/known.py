@@ -146,7 +146,8 @@ def _duration_s(store: Store, row: CalibrationRecord) -> float:
 def _slopes(fitted: FittedModel, span: Span) -> tuple[float, float]:
     """Return the change of bias, deg/s per K, and of scale factor, 1/K: root mean square over outputs and range."""
     warm = np.linspace(span.low_c, span.high_c, 10)
-    bias, scale = [], []
+    bias: list[float] = []
+    scale: list[float] = []
     for axis in fitted.axes:
         still, turning = (_error(fitted, axis, warm, rate) for rate in (0.0, span.rate_dps))
         bias += (np.gradient(still, warm)).tolist()

@@ -16,8 +16,9 @@ from procedures.recipe.schemes import Cycle, Levels, Scheme, Soak
 
 SchemeT = TypeVar("SchemeT", Levels, Cycle)
 
-#: Rates of a level at least: fewer would hide a curve of the rate.
-RATES = (5, 7, 9, 11)
+#: Rates of a level: fewer would hide a curve of the rate. In a cycle further ones cost nothing, and tell one curve from
+#: another.
+RATES, CYCLE_RATES = (5, 7, 9, 11), (7, 9, 11)
 #: Temperatures of a recipe with levels: one more than a parabola has coefficients, so that its error can be seen.
 TEMPERATURES = (4, 5, 6, 7, 8, 10)
 DURATIONS_S = (30.0, 45.0, 60.0, 90.0, 120.0)
@@ -45,7 +46,7 @@ def search(problem: Problem, goal: Goal, *, ramps: bool) -> list[Candidate]:
             _exchanged(problem, begin, cost, _of_levels)
         if ramps:
             for dwell_s, first_s in ((0.0, 1800.0), (1800.0, 0.0)):
-                _exchanged(problem, Cycle(5, 60.0, dwell_s, first_s), cost, _of_cycles)
+                _exchanged(problem, Cycle(CYCLE_RATES[0], 60.0, dwell_s, first_s), cost, _of_cycles)
     return [candidate for candidate in problem.evaluated.values() if candidate is not None]
 
 
@@ -144,7 +145,7 @@ def _of_levels(problem: Problem, scheme: Levels) -> list[list[Levels]]:
 def _of_cycles(problem: Problem, scheme: Cycle) -> list[list[Cycle]]:
     del problem
     return [
-        [replace(scheme, rates=each) for each in RATES],
+        [replace(scheme, rates=each) for each in CYCLE_RATES],
         [replace(scheme, duration_s=each) for each in DURATIONS_S],
         [replace(scheme, dwell_s=each) for each in DWELLS_S],
         [replace(scheme, first_dwell_s=each) for each in DWELLS_S],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from labctl.services.design.problem import COVERED_K, OF_MOVING_HEAT, Candidate, Goal, Problem
-from labctl.services.design.search import chosen
+from labctl.services.design.search import RATES, chosen
 from procedures.recipe.schemes import Cycle, Levels, Scheme
 
 
@@ -122,7 +122,7 @@ def _rates(scheme: Scheme) -> str:
         if isinstance(scheme, Cycle)
         else "in random order, so that drift is not taken for a law of the rate"
     )
-    fewest = "the fewest that show a curve of the rate" if scheme.rates == 5 else "denser towards the largest"
+    fewest = "the fewest that show a curve of the rate" if scheme.rates == RATES[0] else "denser towards the largest"
     return f"{scheme.rates} rates of both signs and rest, {fewest}; {order}."
 
 
