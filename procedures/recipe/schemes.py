@@ -132,7 +132,8 @@ def spread_temperatures_c(span: Span, number: int) -> list[float]:
 
 def spread_rates_dps(span: Span, number: int) -> list[float]:
     """Return rates by size, rest first, then pairs of both signs, denser towards the largest, as temperatures are."""
-    shares = [math.sin(math.pi * k / (number - 1)) for k in range(1, number // 2 + 1)] if number > 1 else []
+    pairs = number // 2
+    shares = [math.sin(math.pi * k / (2 * pairs)) for k in range(1, pairs + 1)]
     sizes = [float(f"{span.rate_dps * share:.{RATE_DIGITS}g}") for share in shares]
     rest = [0.0] if number % 2 else []
     return [*rest, *(sign * size for size in sizes for sign in (1.0, -1.0))]
