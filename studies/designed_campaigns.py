@@ -275,12 +275,14 @@ def verdict(number: int) -> list[tuple[str, str]]:
 
 
 def run(units: int = UNITS) -> str:
-    """Return the tables."""
+    """Print the tables as they come, and return the last one."""
     with ProcessPoolExecutor(max_workers=WORKERS) as pool:
-        of_cells = [each for found in pool.map(judged, range(units)) for each in found]
-        of_cover = [each for found in pool.map(covered, range(units)) for each in found]
+        cells = _cell_table([each for found in pool.map(judged, range(units)) for each in found], units)
+        print(cells, flush=True)
+        cover = _cover_table([each for found in pool.map(covered, range(units)) for each in found], units)
+        print(f"\n{cover}", flush=True)
         of_verdicts = [each for found in pool.map(verdict, range(max(units // VERDICTS, 1))) for each in found]
-    return "\n\n".join([_cell_table(of_cells, units), _cover_table(of_cover, units), _verdict_table(of_verdicts)])
+    return f"\n{_verdict_table(of_verdicts)}"
 
 
 def _cell_table(found: Sequence[Judged], units: int) -> str:

@@ -27,7 +27,7 @@ DWELLS_S = (0.0, 120.0, 240.0, 420.0, 600.0, 900.0, 1200.0, 1500.0, 1800.0, 2400
 RAMP_SHARES = (1.0, 0.6, 0.35)
 CYCLES = (1, 2)
 #: Powers of U in what the exchange makes small.
-POWERS = (0.25, 1.0, 4.0)
+POWERS = (0.5, 3.0)
 #: Weight of what must not be: hours beyond those given, and ends of the range that are missed.
 MUST = 20.0
 #: Rounds of exchanges at most, and what an exchange must gain.
@@ -42,11 +42,9 @@ def search(problem: Problem, goal: Goal, *, ramps: bool) -> list[Candidate]:
     """Return every recipe that was tried and can be run; with `ramps` also those that measure while it warms."""
     for power in POWERS:
         cost = _cost(goal, power)
-        for begin in (Levels(5, soaks(problem, 5)[1], 5, 60.0), Levels(10, soaks(problem, 10)[-1], 11, 60.0)):
-            _exchanged(problem, begin, cost, _of_levels)
+        _exchanged(problem, Levels(TEMPERATURES[0], soaks(problem, TEMPERATURES[0])[3], RATES[0], 60.0), cost, _of_levels)
         if ramps:
-            for dwell_s, first_s in ((0.0, 1800.0), (1800.0, 0.0)):
-                _exchanged(problem, Cycle(CYCLE_RATES[0], 60.0, dwell_s, first_s), cost, _of_cycles)
+            _exchanged(problem, Cycle(CYCLE_RATES[0], 60.0, 0.0, DWELLS_S[-3]), cost, _of_cycles)
     return [candidate for candidate in problem.evaluated.values() if candidate is not None]
 
 
