@@ -42,7 +42,8 @@ def search(problem: Problem, goal: Goal, *, ramps: bool) -> list[Candidate]:
     """Return every recipe that was tried and can be run; with `ramps` also those that measure while it warms."""
     for power in POWERS:
         cost = _cost(goal, power)
-        _exchanged(problem, Levels(TEMPERATURES[0], soaks(problem, TEMPERATURES[0])[3], RATES[0], 60.0), cost, _of_levels)
+        begin = Levels(TEMPERATURES[0], soaks(problem, TEMPERATURES[0])[3], RATES[0], 60.0)
+        _exchanged(problem, begin, cost, _of_levels)
         if ramps:
             _exchanged(problem, Cycle(CYCLE_RATES[0], 60.0, 0.0, DWELLS_S[-3]), cost, _of_cycles)
     return [candidate for candidate in problem.evaluated.values() if candidate is not None]
