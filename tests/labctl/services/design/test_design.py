@@ -1,4 +1,4 @@
-"""The recipe that is designed: it runs, costs what was promised, reaches its goal, and is the cheapest that was tried."""
+"""The designed recipe: it runs, costs what was promised, reaches its goal, and is the cheapest that was tried."""
 
 from __future__ import annotations
 
