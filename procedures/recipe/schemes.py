@@ -105,12 +105,31 @@ class Cycle:
 Scheme = Levels | Cycle
 
 
+def scheme_text(scheme: Scheme) -> str:
+    """Return what a scheme does."""
+    if isinstance(scheme, Cycle):
+        ends = f", {scheme.dwell_s / 60:g} min at either end" if scheme.dwell_s else ""
+        if scheme.first_dwell_s:
+            ends += f", in the first mounting {(scheme.dwell_s + scheme.first_dwell_s) / 60:g} min"
+        slow = f" at {100 * scheme.ramp_share:.0f} % of the fastest ramp" if scheme.ramp_share < 1 else ""
+        times = f"{scheme.cycles} cycles" if scheme.cycles > 1 else "one cycle"
+        return (
+            f"{times} of the temperature in each mounting{slow}, without a soak{ends}; {scheme.rates} rates of "
+            f"{scheme.duration_s:g} s"
+        )
+    order = ", up and down" if scheme.order == "up_down" else ""
+    return (
+        f"{scheme.temperatures} temperatures{order}, soaks of {scheme.soak.hold_s / 60:g} min; {scheme.rates} rates of "
+        f"{scheme.duration_s:g} s"
+    )
+
+
 def recipe_of(
-    scheme: Scheme, base: Recipe, span: Span, *, name: str, fit: FitRules, description: str, ramp_c_per_min: float
+    scheme: Scheme, base: Recipe, span: Span, *, name: str, fit: FitRules, ramp_c_per_min: float
 ) -> Recipe:  # fmt: skip
     """Return the recipe of a scheme over a span; what a scheme says nothing of is as in `base`."""
     changes = scheme.changes(base, span, ramp_c_per_min) if isinstance(scheme, Cycle) else scheme.changes(base, span)
-    head = {"name": name, "description": description, "fit": fit.model_dump()}
+    head = {"name": name, "description": f"Designed: {scheme_text(scheme)}", "fit": fit.model_dump()}
     return Recipe.model_validate({**base.model_dump(), **NOT_TAKEN, **changes, **head})
 
 

@@ -20,7 +20,7 @@ from labctl.services.cache import UNNAMED, compute
 from labctl.services.design.known import Known, known_noise
 from labctl.services.design.problem import Candidate, Goal, Problem
 from labctl.services.design.search import chosen, next_best, search
-from labctl.services.design.sentences import decisions, scheme_text
+from labctl.services.design.sentences import decisions
 from labctl.services.planning.earlier_campaigns import times_on_bench
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
@@ -31,7 +31,7 @@ from procedures.planning.limits import BenchLimits, missing_instruments
 from procedures.planning.step_writer import MOUNTING_S
 from procedures.recipe.fit_rules import FitRules
 from procedures.recipe.recipe import Recipe, recipe_document
-from procedures.recipe.schemes import Span
+from procedures.recipe.schemes import Span, scheme_text
 
 if TYPE_CHECKING:
     from labctl.store import Store

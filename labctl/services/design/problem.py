@@ -98,7 +98,7 @@ class Problem:
         effects = self.effects_of(scheme)
         recipe = recipe_of(
             scheme, self.base, self.span, name=self.name, fit=FitRules(model=self.model, effects=effects),
-            description="Designed by labctl campaign design", ramp_c_per_min=self.limits.ramp_c_per_min,
+            ramp_c_per_min=self.limits.ramp_c_per_min,
         )  # fmt: skip
         return self.of_recipe(recipe, scheme, effects)
 

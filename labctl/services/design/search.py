@@ -32,6 +32,8 @@ POWERS = (0.5, 3.0)
 MUST = 20.0
 #: Rounds of exchanges at most, and what an exchange must gain.
 ROUNDS, GAIN = 6, 1e-6
+#: A recipe is worth a line beside another one where hours and U both differ by more than this share.
+WORTH = 0.05
 #: A unit may still change by so much more over the window than is expected.
 DRIFT_MARGIN = 1.5
 
@@ -81,8 +83,8 @@ def next_best(candidates: Sequence[Candidate], choice: Candidate, goal: Goal, nu
 def _differs(candidate: Candidate, others: Sequence[Candidate]) -> bool:
     """Return whether a candidate is worth a line beside others: by some per cent in hours and in U."""
     return all(
-        abs(math.log(candidate.hours / other.hours)) > 0.02
-        and abs(math.log(candidate.predicted.worst_dps / other.predicted.worst_dps)) > 0.02
+        abs(math.log(candidate.hours / other.hours)) > WORTH
+        and abs(math.log(candidate.predicted.worst_dps / other.predicted.worst_dps)) > WORTH
         for other in others
     )
 

@@ -9,25 +9,6 @@ from labctl.services.design.search import RATES, chosen
 from procedures.recipe.schemes import Cycle, Levels, Scheme
 
 
-def scheme_text(scheme: Scheme) -> str:
-    """Return what a scheme does."""
-    if isinstance(scheme, Cycle):
-        ends = f", {scheme.dwell_s / 60:g} min at either end" if scheme.dwell_s else ""
-        if scheme.first_dwell_s:
-            ends += f", in the first mounting {(scheme.dwell_s + scheme.first_dwell_s) / 60:g} min"
-        slow = f" at {100 * scheme.ramp_share:.0f} % of the fastest ramp" if scheme.ramp_share < 1 else ""
-        times = f"{scheme.cycles} cycles" if scheme.cycles > 1 else "one cycle"
-        return (
-            f"{times} of the temperature in each mounting{slow}, without a soak{ends}; {scheme.rates} rates of "
-            f"{scheme.duration_s:g} s"
-        )
-    order = ", up and down" if scheme.order == "up_down" else ""
-    return (
-        f"{scheme.temperatures} temperatures{order}, soaks of {scheme.soak.hold_s / 60:g} min; {scheme.rates} rates of "
-        f"{scheme.duration_s:g} s"
-    )
-
-
 def decisions(problem: Problem, candidates: Sequence[Candidate], choice: Candidate, goal: Goal) -> Iterator[str]:
     """Yield each choice of a recipe with its reason."""
     scheme = choice.scheme

@@ -25,9 +25,7 @@ SOAK = Soak(600.0, 300.0, 1.5)
 
 
 def made(scheme: Scheme, base: Recipe = BASE, span: Span = SPAN) -> Recipe:
-    return recipe_of(
-        scheme, base, span, name="made", fit=FitRules(model="bias_scale"), description="d", ramp_c_per_min=2.0
-    )
+    return recipe_of(scheme, base, span, name="made", fit=FitRules(model="bias_scale"), ramp_c_per_min=2.0)
 
 
 def test_levels_have_the_ends_of_the_range_and_every_rate_in_both_directions() -> None:
