@@ -110,7 +110,7 @@ def cases() -> tuple[Case, ...]:
         Case("table1-x-table2, bias_scale", standard, "bias_scale"),
         Case("4 temperatures x 5 rates, soak 10 min", cut("cut-a", four, both(100, 400), 600), "yang2018"),
         Case("5 x 9, soak 15 min", cut("cut-b", five, both(50, 100, 200, 400), 900), "yang2018"),
-        Case("10 x 5, no soaks", cut("cut-c", standard.temperatures_c, both(100, 400), 0), "yang2018"),
+        Case("10 x 5, no soaks, bias_scale", cut("cut-c", standard.temperatures_c, both(100, 400), 0), "bias_scale"),
         Case("niu2013", load_recipe("niu2013"), "bias_scale"),
         *(_case(name, asked) for name, asked in DESIGNS.items()),
     )
@@ -304,7 +304,7 @@ def _cell_table(found: Sequence[Judged], units: int) -> str:
         each_cell = " | ".join(f"{value:.2f}" for value in pooled)
         lines.append(
             f"| {case.name} | {hours(case.recipe):.1f} | {len(fitted)} | {np.sqrt(squares.mean()):.4f} | "
-            f"{np.sqrt(floors.mean()):.4f} | {each_cell} | {pooled.max():.2f} | {good} ({low:.0f} to {high:.0f} %) |"
+            f"{np.sqrt(floors.mean()):.4f} | {each_cell} | {pooled.max():.2f} | {good} ({100 * low:.0f} to {100 * high:.0f} %) |"
         )
     return "\n".join(lines)
 

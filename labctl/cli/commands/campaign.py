@@ -136,58 +136,64 @@ def plan(
         print_plan(answer)
 
 
+Like = Annotated[
+    str | None,
+    typer.Option(
+        "--like",
+        metavar="RECIPE",
+        help="Recipe file or shipped recipe whose rates, temperatures, positions and model count where no option gives "
+        "others; the design is compared with it.",
+    ),
+]
+Model = Annotated[str | None, typer.Option("--model", metavar="NAME", help="Model to fit; default: that of --like.")]
+Effects = Annotated[str | None, typer.Option("--effects", metavar="A,B", help="Effects to fit beside the model.")]
+GoalU = Annotated[
+    float | None,
+    typer.Option(
+        "--u",
+        metavar="DPS",
+        help="U (k = 2) to reach everywhere in the range, deg/s, of each component of a corrected rate vector.",
+    ),
+]
+Hours = Annotated[
+    float | None, typer.Option("--hours", metavar="H", help="Bench hours at most; without --u: the best within.")
+]
+Rates = Annotated[
+    str | None,
+    typer.Option(
+        "--rates", metavar="LOW,HIGH", help="Range of rates, deg/s; default: that of --like, or of the bench."
+    ),
+]
+Temperatures = Annotated[
+    str | None,
+    typer.Option(
+        "--temperatures",
+        metavar="LOW,HIGH",
+        help="Range of temperatures, deg C; default: that of --like, or of the bench.",
+    ),
+]
+Prior = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--prior",
+        "--serial",
+        metavar="SERIAL",
+        help="Unit whose newest calibration states the noise: this unit, or one of its type; may be repeated.",
+    ),
+]
+
+
 @app.command("design")
 def design(
     out: Annotated[Path, typer.Option("--out", metavar="RECIPE.toml", help="File for the recipe.")],
-    like: Annotated[
-        str | None,
-        typer.Option(
-            "--like",
-            metavar="RECIPE",
-            help="Recipe file or shipped recipe whose rates, temperatures, positions and model count where no option "
-            "gives others; it is also what the design is compared with.",
-        ),
-    ] = None,
-    model: Annotated[
-        str | None, typer.Option("--model", metavar="NAME", help="Model to fit; default: that of --like.")
-    ] = None,
-    effects: Annotated[
-        str | None, typer.Option("--effects", metavar="A,B", help="Effects to fit beside the model.")
-    ] = None,
-    u_dps: Annotated[
-        float | None,
-        typer.Option(
-            "--u",
-            metavar="DPS",
-            help="U (k = 2) to reach everywhere in the range, deg/s, of each component of a corrected rate vector.",
-        ),
-    ] = None,
-    hours: Annotated[
-        float | None, typer.Option("--hours", metavar="H", help="Bench hours at most; without --u: the best within.")
-    ] = None,
-    rates: Annotated[
-        str | None,
-        typer.Option(
-            "--rates", metavar="LOW,HIGH", help="Range of rates, deg/s; default: that of --like, or of the bench."
-        ),
-    ] = None,
-    temperatures: Annotated[
-        str | None,
-        typer.Option(
-            "--temperatures",
-            metavar="LOW,HIGH",
-            help="Range of temperatures, deg C; default: that of --like, or of the bench.",
-        ),
-    ] = None,
-    prior: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--prior",
-            "--serial",
-            metavar="SERIAL",
-            help="Unit whose newest calibration states the noise: this unit, or one of its type; may be repeated.",
-        ),
-    ] = None,
+    like: Like = None,
+    model: Model = None,
+    effects: Effects = None,
+    u_dps: GoalU = None,
+    hours: Hours = None,
+    rates: Rates = None,
+    temperatures: Temperatures = None,
+    prior: Prior = None,
     bench: BenchName = None,
     as_json: Json = False,
     database: Database = None,

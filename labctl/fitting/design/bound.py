@@ -69,7 +69,9 @@ def _least_trace(parts: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]
             try:
                 inverse = np.linalg.inv(information)
             except np.linalg.LinAlgError:
-                raise NotEnoughData("the points of the range do not determine the coefficients of the model") from None
+                raise NotEnoughData(
+                    "the points of the range do not determine the coefficients of the model; choose another model"
+                ) from None
             total += float(np.trace(wanted @ inverse))
             gains += np.sum((columns @ (inverse @ wanted @ inverse)) * columns, axis=1)
         share = share * np.sqrt(np.maximum(gains, 0.0))

@@ -108,7 +108,9 @@ def _variances(
         q, r = np.linalg.qr(rows[:, :c])
         diagonal = np.abs(np.diag(r))
         if diagonal.min() < SINGULAR * diagonal.max():
-            raise NotEnoughData("the planned data sets do not determine the coefficients of the model")
+            raise NotEnoughData(
+                "the planned data sets do not determine the coefficients of the model; plan more rates or temperatures"
+            )
         reached = solve_triangular(r, (jacobian / size).T, trans="T", check_finite=False)
         by_noise += np.sum(reached**2, axis=0) / len(whole)
         by_heat += np.sum((reached.T @ (q.T @ rows[:, c:])) ** 2, axis=1) / len(whole)
