@@ -16,12 +16,12 @@ from procedures.recipe.schemes import Cycle, Levels, Scheme, Soak
 
 SchemeT = TypeVar("SchemeT", Levels, Cycle)
 
-#: Rates of a level: fewer would hide a curve of the rate. In a cycle further ones cost nothing, and tell one curve from
-#: another.
-RATES, CYCLE_RATES = (5, 7, 9, 11), (7, 9, 11)
-#: Temperatures of a recipe with levels: one more than a parabola has coefficients, so that its error can be seen.
-TEMPERATURES = (4, 5, 6, 7, 8, 10)
-DURATIONS_S = (30.0, 45.0, 60.0, 90.0, 120.0)
+#: Rates and temperatures: with fewer, the uncertainty of the finished calibration would not be known between them (it
+#: needs data sets near: `labctl.fitting.uncertainty.local_model_error`), and a curve would not show.
+RATES, TEMPERATURES = (7, 9, 11), (5, 6, 7, 8, 10)
+#: Shorter data sets are no better: the drift between them remains, and the one correlation time of a fit's drift would
+#: be that of its fast part.
+DURATIONS_S = (60.0, 90.0, 120.0)
 HOLDS_S = (300.0, 600.0, 900.0, 1200.0, 1800.0, 2700.0, 3600.0)
 DWELLS_S = (0.0, 120.0, 240.0, 420.0, 600.0, 900.0, 1200.0, 1500.0, 1800.0, 2400.0, 3600.0)
 RAMP_SHARES = (1.0, 0.6, 0.35)
@@ -47,7 +47,7 @@ def search(problem: Problem, goal: Goal, *, ramps: bool) -> list[Candidate]:
         begin = Levels(TEMPERATURES[0], soaks(problem, TEMPERATURES[0])[3], RATES[0], 60.0)
         _exchanged(problem, begin, cost, _of_levels)
         if ramps:
-            _exchanged(problem, Cycle(CYCLE_RATES[0], 60.0, 0.0, DWELLS_S[-3]), cost, _of_cycles)
+            _exchanged(problem, Cycle(RATES[0], 60.0, 0.0, DWELLS_S[-3]), cost, _of_cycles)
     return [candidate for candidate in problem.evaluated.values() if candidate is not None]
 
 
@@ -146,7 +146,7 @@ def _of_levels(problem: Problem, scheme: Levels) -> list[list[Levels]]:
 def _of_cycles(problem: Problem, scheme: Cycle) -> list[list[Cycle]]:
     del problem
     return [
-        [replace(scheme, rates=each) for each in CYCLE_RATES],
+        [replace(scheme, rates=each) for each in RATES],
         [replace(scheme, duration_s=each) for each in DURATIONS_S],
         [replace(scheme, dwell_s=each) for each in DWELLS_S],
         [replace(scheme, first_dwell_s=each) for each in DWELLS_S],

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from labctl.services.design.problem import COVERED_K, OF_MOVING_HEAT, Candidate, Goal, Problem
-from labctl.services.design.search import RATES, chosen
+from labctl.services.design.search import RATES, TEMPERATURES, chosen
 from procedures.recipe.schemes import Cycle, Levels, Scheme
+
+FEWEST = "; the fewest between which the U of a finished calibration is known everywhere"
 
 
 def decisions(problem: Problem, candidates: Sequence[Candidate], choice: Candidate, goal: Goal) -> Iterator[str]:
@@ -88,7 +90,7 @@ def _covers(problem: Problem, choice: Candidate) -> str:
 def _of_levels(problem: Problem, scheme: Levels) -> Iterator[str]:
     yield (
         f"{scheme.temperatures} temperatures, denser towards the ends, where a polynomial is known least"
-        f"{'; one more than a parabola needs, so that its error shows' if scheme.temperatures == 4 else ''}."
+        f"{FEWEST if scheme.temperatures == TEMPERATURES[0] else ''}."
     )
     soak = scheme.soak
     yield (
@@ -103,7 +105,11 @@ def _rates(scheme: Scheme) -> str:
         if isinstance(scheme, Cycle)
         else "in random order, so that drift is not taken for a law of the rate"
     )
-    fewest = "the fewest that show a curve of the rate" if scheme.rates == RATES[0] else "denser towards the largest"
+    fewest = (
+        "the fewest between which the U of a finished calibration is known"
+        if scheme.rates == RATES[0]
+        else "denser towards the largest"
+    )
     return f"{scheme.rates} rates of both signs and rest, {fewest}; {order}."
 
 
