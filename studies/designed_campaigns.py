@@ -120,7 +120,7 @@ def cases() -> tuple[Case, ...]:
 DESIGNS: Mapping[str, Mapping[str, object]] = {
     "designed, U = 0.004 deg/s": {"model": "bias_scale", "u_dps": 0.004},
     "designed, best within 10 h": {"model": "bias_scale", "hours": 9.5},
-    "designed, yang2018, best within 10 h": {"model": "yang2018", "hours": 9.5},
+    "designed, yang2018, U = 0.01 deg/s": {"model": "yang2018", "u_dps": 0.01},
 }
 
 
@@ -312,7 +312,7 @@ def _cell_table(found: Sequence[Judged], units: int) -> str:
 
 def _cover_table(found: Sequence[Covered], units: int) -> str:
     lines = [
-        f"| within U (k = 2), %; {units} units, {VECTORS} vectors each | coefficients | promise | unknown, % | rms / predicted |",
+        f"| within U (k = 2), %; n = {units} x {VECTORS} | coefficients | promise | unknown, % | rms / predicted |",
         "| --- | --- | --- | --- | --- |",
     ]
     for name in DESIGNS:
