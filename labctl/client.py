@@ -33,6 +33,7 @@ from labctl.answers.campaigns import (
 )
 from labctl.answers.certification import CalibrationStateResponse
 from labctl.answers.common_fields import CriticismVerdict
+from labctl.answers.design import DesignRequest, DesignResponse
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
 from labctl.answers.fixed_coefficients import FixedCoefficients
 from labctl.answers.points import PointFigure, PointResponse
@@ -56,6 +57,8 @@ __all__ = [
     "CampaignResponse",
     "Client",
     "ConfirmExperimentRequest",
+    "DesignRequest",
+    "DesignResponse",
     "DiagnosisRequest",
     "DiagnosisResponse",
     "EventResponse",
@@ -132,15 +135,9 @@ class Client:
         self._connection.close()
 
     def units(
-        self,
-        *,
-        due_within: str | None = None,
-        calibration: UnitState | None = None,
-        verdict: CriticismVerdict | None = None,
-        batch: str = "",
-        search: str = "",
-        limit: int | None = None,
-    ) -> list[UnitResponse]:
+        self, *, due_within: str | None = None, calibration: UnitState | None = None,
+        verdict: CriticismVerdict | None = None, batch: str = "", search: str = "", limit: int | None = None,
+    ) -> list[UnitResponse]:  # fmt: skip
         """Return every unit that was measured or imported, by serial number; at most `limit`.
 
         With `due_within`, such as "30d", those that are due within that span or overdue, the earliest date first; with
@@ -162,14 +159,9 @@ class Client:
         return self._connection.get_list(f"/api/units/{_part(serial)}/calibrations", CalibrationRow)
 
     def calibration(
-        self,
-        serial: str,
-        version: int | None = None,
-        *,
-        file_format: str = "json",
-        held: CalibrationFile | None = None,
-        accept_withdrawn: bool = False,
-    ) -> CalibrationFile:
+        self, serial: str, version: int | None = None, *, file_format: str = "json",
+        held: CalibrationFile | None = None, accept_withdrawn: bool = False,
+    ) -> CalibrationFile:  # fmt: skip
         """Fetch a calibration file: the certified version, or the one with number `version`.
 
         With `held`, the file that the caller already has, its ETag is sent along; the same object is returned when it
@@ -275,6 +267,10 @@ class Client:
         response = self._post("/api/campaigns", request)
         kind = ScheduledResponse if response.status_code == httpx.codes.ACCEPTED else CampaignResponse
         return kind.model_validate(json_of(response))
+
+    def design_campaign(self, request: DesignRequest) -> DesignResponse:
+        """Return the cheapest recipe that reaches an uncertainty on the service's bench, or the best within hours."""
+        return DesignResponse.model_validate(json_of(self._post("/api/designs", request)))
 
     def campaigns(self, *, search: str = "", limit: int | None = None) -> list[CampaignResponse]:
         """Return every campaign, newest first; at most `limit`.

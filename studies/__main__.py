@@ -24,6 +24,7 @@ STUDIES = (
     "joint_recordings",
     "criticism",
     "diagnosis",
+    "designed_campaigns",
     "laws",
     "rest_loops",
     "scale_loops",

@@ -180,6 +180,12 @@ from labctl.answers.datasheet import (
     MeasuredUnder as MeasuredUnder,
 )
 from labctl.answers.course import CourseResponse as CourseResponse
+from labctl.answers.design import (
+    DesignBound as DesignBound,
+    DesignRequest as DesignRequest,
+    DesignResponse as DesignResponse,
+    DesignedCampaign as DesignedCampaign,
+)
 from labctl.answers.diagnosis import (
     ChosenExperiment as ChosenExperiment,
     ConfirmExperimentRequest as ConfirmExperimentRequest,

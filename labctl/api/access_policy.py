@@ -19,7 +19,12 @@ OPEN = frozenset({"/health", "/health/heartbeat"})
 #: Answered without a key to a request that shows by its content that it may ask: with the hash on a certificate.
 PROVEN = frozenset({"/api/certificates/state"})
 #: Queries that are sent by POST because of what they carry: nothing changes, so a viewer may.
-ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview", "/api/recordings/logs/preview")
+ASKING = (
+    "/api/plans",
+    "/api/designs",
+    "/api/units/{serial}/calibrations/{version}/preview",
+    "/api/recordings/logs/preview",
+)
 #: Requests that stop a bench: their key is looked up in memory, as the database may be what does not answer.
 STOPS = re.compile(r"/api/(?:stop|campaigns/[^/]+/abort)")
 _ASKED = re.compile("|".join(re.sub(r"{\w+}", "[^/]+", path) for path in ASKING))

@@ -195,3 +195,19 @@ def who(by: str | None) -> str:
     from labctl.acting_user import actor
 
     return by or actor().name
+
+
+def names_in(text: str | None) -> list[str]:
+    """Return the names of a list with commas; none for no list."""
+    return [name.strip() for name in (text or "").split(",") if name.strip()]
+
+
+def pair(option: str, text: str | None) -> tuple[float, float] | None:
+    """Return the two numbers of an option LOW,HIGH; None without the option. Raises BadInput for anything else."""
+    if text is None:
+        return None
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError:
+        raise BadInput(f"{option} {text!r} is not two numbers; give LOW,HIGH, such as {option} -100,100") from None
+    return low, high

@@ -177,11 +177,9 @@ def _ramp_complaints(recipe: Recipe, limits: BenchLimits) -> list[str]:
     ramp = recipe.ramp
     if ramp is None:
         return []
-    ends = {"from_c": ramp.from_c, "to_c": ramp.to_c}
+    ends = [("from_c", ramp.from_c), ("to_c", ramp.to_c), *(("then_c", end_c) for end_c in ramp.then_c)]
     complaints = [
-        f"ramp.{name} {end_c:g}: {text}"
-        for name, end_c in ends.items()
-        if (text := limits.temperature_complaint(end_c))
+        f"ramp.{name} {end_c:g}: {text}" for name, end_c in ends if (text := limits.temperature_complaint(end_c))
     ]
     if ramp.c_per_min is not None and ramp.c_per_min > limits.ramp_c_per_min:
         complaints.append(

@@ -184,8 +184,9 @@ def _refuse_endless(recipe: Recipe) -> None:
         data_sets += recipe.power_cycle.count * len(recipe.power_cycle.rates_dps)
     if (ramp := recipe.ramp) is not None:
         each_s = recipe.acquire.duration_s + recipe.acquire.settle_s
-        way_s = 60.0 * abs(ramp.to_c - ramp.from_c) / (ramp.c_per_min or 1.0)
-        data_sets += math.ceil(len(recipe.positions) * ramp.legs * way_s / each_s)
+        dwells_s = max(ramp.dwell_s, ramp.first_dwell_s or 0.0) * (len(ramp.ends_c) - 1)
+        way_s = 60.0 * ramp.way_c / (ramp.c_per_min or 1.0) + dwells_s
+        data_sets += math.ceil(len(recipe.positions) * way_s / each_s)
     if (verify := recipe.verification) is not None:
         data_sets += len(verify.positions or recipe.positions) * verify.temperatures * verify.rates
     if recipe.turns is not None:

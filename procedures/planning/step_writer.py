@@ -95,19 +95,22 @@ class _StepWriter:
             self.ramp(self.recipe.ramp)
 
     def ramp(self, rules: Ramp) -> None:
-        """Soak at one temperature, and run rates while the chamber goes to another, and back where that is asked."""
+        """Soak at one temperature, and run rates while the chamber goes to others, one after the other."""
         self.move_chamber(rules.from_c)
         self.soak(rules.from_c)
-        for to_c in (rules.to_c, rules.from_c)[: rules.legs]:
+        is_first = self.mounting == 1 and rules.first_dwell_s is not None
+        dwell_s = rules.first_dwell_s if is_first else rules.dwell_s
+        for leg, to_c in enumerate(rules.ends_c, start=1):
             from_c, way_c = self.air_c, to_c - self.air_c
             lasts_s = self._move_s(way_c, self.recipe.soak.band_c)
             if is_slow := rules.c_per_min is not None and rules.c_per_min < self.limits.ramp_c_per_min:
                 lasts_s = 60.0 * abs(way_c) / (rules.c_per_min or 1.0)
             passed_s, number = 0.0, 0
-            while passed_s < lasts_s:
+            until_s = lasts_s + (dwell_s or 0.0 if leg < len(rules.ends_c) else 0.0)
+            while passed_s < until_s:
                 rate_dps = rules.rates_dps[number % len(rules.rates_dps)]
                 next_s = passed_s + self._set_s(rate_dps)
-                if is_slow or number == 0:
+                if number == 0 or (is_slow and passed_s < lasts_s):
                     share = min(next_s / lasts_s, 1.0) if is_slow else 1.0
                     self.move_chamber(round(from_c + share * way_c, 2), wait=False)
                 self.acquire(Level(self.air_c, (rate_dps,)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
@@ -102,24 +103,37 @@ class Ramp(Table):
 
     The chamber is soaked at `from_c` and then goes to `to_c`; data sets are taken one after the other on the way, their
     rates in the listed order again and again. Slower than the chamber can, it goes in small steps, one before each data
-    set.
+    set. A whole cycle goes on from there to each temperature of `then_c`.
     """
 
     from_c: Number
     to_c: Number
+    then_c: tuple[Number, ...] = Field(default=(), max_length=20)  #: further ends, one after the other
+    dwell_s: Number = Field(default=0.0, ge=0, le=86_400)  #: data sets go on for so long between two legs
+    #: The same in the first mounting, which may come nearer to the ends of the range; absent: `dwell_s`.
+    first_dwell_s: Number | None = Field(default=None, ge=0, le=86_400)
     rates_dps: tuple[Number, ...] = Field(min_length=1)
     c_per_min: Number | None = Field(default=None, gt=0)  #: absent: as fast as the chamber can
     back: Yes = False  #: and back to `from_c` in the same way
 
     @property
-    def legs(self) -> int:
-        """How often the temperature goes through the range."""
-        return 2 if self.back else 1
+    def ends_c(self) -> tuple[float, ...]:
+        """Where each leg ends, in order."""
+        return (self.to_c, *self.then_c, *((self.from_c,) if self.back else ()))
+
+    @property
+    def way_c(self) -> float:
+        """How far the temperature moves on all legs together, K."""
+        return sum(abs(end - begin) for begin, end in pairwise((self.from_c, *self.ends_c)))
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Ramp:
         if self.from_c == self.to_c:
             raise ValueError("from_c and to_c are the same, so that nothing moves; give two temperatures")
+        if any(begin == end for begin, end in pairwise((self.from_c, *self.ends_c))):
+            raise ValueError(
+                "then_c: a leg begins and ends at the same temperature, so that nothing moves; leave one of them out"
+            )
         return self
 
 

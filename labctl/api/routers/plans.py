@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request
 
+from labctl.answers.design import DesignRequest, DesignResponse
 from labctl.answers.plans import PlannedResponse, PlanRequest, RecipeResponse
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
+from labctl.services.design.design import designed
 from labctl.services.planning import planner as services
 from labctl.services.schedule.planned_start import planned_start
 from labctl.services.simulation.visibility import planned
@@ -31,3 +33,12 @@ async def plan(http: Request, request: PlanRequest, service: ServiceDep) -> Plan
     """
     start = planned_start(request.at, request.cron, request.time_zone, service.clock.utc())
     return await while_connected(http, service, planned, request, service.bench, start)
+
+
+@router.post("/designs", summary="Design a campaign")
+async def design(http: Request, request: DesignRequest, service: ServiceDep) -> DesignResponse:
+    """The cheapest recipe on this service's bench that reaches an uncertainty, or the best within given hours.
+
+    Some seconds of computation; nothing moves, nothing is stored. `recipe_toml` can be sent to `POST /api/campaigns`.
+    """
+    return await while_connected(http, service, designed, request, service.bench)

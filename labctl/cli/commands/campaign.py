@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -18,6 +19,8 @@ from labctl.cli.options import (
     SimulatedSpeed,
     SimulatedStart,
     WireLog,
+    names_in,
+    pair,
     simulated_start,
 )
 from labctl.cli.output import console, print_json, print_part, table
@@ -131,6 +134,90 @@ def plan(
         print_json(answer)
     else:
         print_plan(answer)
+
+
+Like = Annotated[
+    str | None,
+    typer.Option(
+        "--like",
+        metavar="RECIPE",
+        help="Recipe file or shipped recipe whose rates, temperatures, positions and model count where no option gives "
+        "others; the design is compared with it.",
+    ),
+]
+Model = Annotated[str | None, typer.Option("--model", metavar="NAME", help="Model to fit; default: that of --like.")]
+Effects = Annotated[str | None, typer.Option("--effects", metavar="A,B", help="Effects to fit beside the model.")]
+GoalU = Annotated[
+    float | None,
+    typer.Option(
+        "--u",
+        metavar="DPS",
+        help="U (k = 2) to reach everywhere in the range, deg/s, of each component of a corrected rate vector.",
+    ),
+]
+Hours = Annotated[
+    float | None, typer.Option("--hours", metavar="H", help="Bench hours at most; without --u: the best within.")
+]
+Rates = Annotated[
+    str | None,
+    typer.Option(
+        "--rates", metavar="LOW,HIGH", help="Range of rates, deg/s; default: that of --like, or of the bench."
+    ),
+]
+Temperatures = Annotated[
+    str | None,
+    typer.Option(
+        "--temperatures",
+        metavar="LOW,HIGH",
+        help="Range of temperatures, deg C; default: that of --like, or of the bench.",
+    ),
+]
+Prior = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--prior",
+        "--serial",
+        metavar="SERIAL",
+        help="Unit whose newest calibration states the noise: this unit, or one of its type; may be repeated.",
+    ),
+]
+
+
+@app.command("design")
+def design(
+    out: Annotated[Path, typer.Option("--out", metavar="RECIPE.toml", help="File for the recipe.")],
+    like: Like = None,
+    model: Model = None,
+    effects: Effects = None,
+    u_dps: GoalU = None,
+    hours: Hours = None,
+    rates: Rates = None,
+    temperatures: Temperatures = None,
+    prior: Prior = None,
+    bench: BenchName = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Write the cheapest recipe that reaches an uncertainty on a bench, or the best within given hours.
+
+    Nothing moves. Each choice is explained, with the next best recipes beside it. `labctl campaign start` runs the
+    file.
+    """
+    from labctl.answers.design import DesignRequest
+    from labctl.cli.printing.design import print_design
+    from labctl.services.design.design import design_campaign
+    from labctl.services.planning.loading import load_bench, own_text
+    from labctl.services.read_access import open_readable
+
+    with one_clear_line():
+        given: dict[str, Any] = {"model": model, "u_dps": u_dps, "hours": hours, "prior": prior or []}
+        given |= {"like": None if like is None else own_text(like), "effects": names_in(effects)}
+        given |= {"rates_dps": pair("--rates", rates), "temperatures_c": pair("--temperatures", temperatures)}
+        request = DesignRequest.model_validate(given)
+        with open_readable(database) as store:
+            answer = design_campaign(store, request, None if bench is None else load_bench(bench))
+        out.write_text(answer.recipe_toml, encoding="utf-8")
+    print_json(answer) if as_json else print_design(answer, out)
 
 
 @app.command("start")

@@ -914,6 +914,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/designs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Design a campaign
+         * @description The cheapest recipe on this service's bench that reaches an uncertainty, or the best within given hours.
+         *
+         *     Some seconds of computation; nothing moves, nothing is stored. `recipe_toml` can be sent to `POST /api/campaigns`.
+         */
+        post: operations["design_api_designs_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/campaigns": {
         parameters: {
             query?: never;
@@ -6517,6 +6539,247 @@ export interface components {
              * @description The result in sentences.
              */
             text: string[];
+        };
+        /**
+         * DesignBound
+         * @description The least hours in which any recipe could reach the same U: by noise and by heat.
+         */
+        DesignBound: {
+            /**
+             * Noise H
+             * @description Without a break at the best points of the range, with white noise alone, until the root mean square of U is that of the goal (or of the chosen recipe, without a goal), h.
+             */
+            noise_h: number;
+            /**
+             * Heat H
+             * @description Ramps of the chamber through the range in each mounting, as fast as it can, and person, h.
+             */
+            heat_h: number;
+            /**
+             * Bound H
+             * @description The larger of the two, h.
+             */
+            bound_h: number;
+            /**
+             * Ratio
+             * @description Hours of the chosen recipe over `bound_h`.
+             */
+            ratio: number;
+        };
+        /**
+         * DesignRequest
+         * @description What a campaign has to reach, for which model and over which range.
+         */
+        DesignRequest: {
+            /**
+             * Like
+             * @description Recipe whose rates, temperatures, positions and model count where the request gives none; null: the ranges are those of the bench and its units.
+             */
+            like?: string | null;
+            /**
+             * Model
+             * @description Model to fit; null: that of `like`, else bias_scale.
+             */
+            model?: string | null;
+            /**
+             * Effects
+             * @description Effects to fit beside the model.
+             */
+            effects?: string[];
+            /**
+             * U Dps
+             * @description U (k = 2) that each component of a corrected rate vector has to reach everywhere in the range, deg/s; null: as small as the hours allow.
+             */
+            u_dps?: number | null;
+            /**
+             * Hours
+             * @description Bench hours at most, h; null: no limit.
+             */
+            hours?: number | null;
+            /**
+             * Rates Dps
+             * @description Lowest and highest rate, deg/s; null: those of `like`, or of the bench.
+             */
+            rates_dps?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Temperatures C
+             * @description Lowest and highest temperature, deg C; null: those of `like`, or of the bench.
+             */
+            temperatures_c?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Prior
+             * @description Serial numbers whose newest calibrations state the noise: of this unit, or of its type.
+             */
+            prior?: string[];
+        };
+        /**
+         * DesignResponse
+         * @description The recipe that was chosen, why, and what it was compared with.
+         */
+        DesignResponse: {
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
+            bench: string;
+            /**
+             * Model
+             * @description Model that is fitted; null: effects alone.
+             */
+            model: string | null;
+            /**
+             * Effects
+             * @description Effects that are fitted beside it.
+             */
+            effects: string[];
+            /**
+             * Rates Dps
+             * @description Range of the size of the rate vector in use, both ways, deg/s.
+             */
+            rates_dps: [
+                number,
+                number
+            ];
+            /**
+             * Temperatures C
+             * @description Range of temperatures in use, deg C.
+             */
+            temperatures_c: [
+                number,
+                number
+            ];
+            /**
+             * Is Reached
+             * @description Whether the chosen recipe reaches the goal.
+             */
+            is_reached: boolean;
+            /** @description The chosen recipe. */
+            chosen: components["schemas"]["DesignedCampaign"];
+            /**
+             * Recipe Toml
+             * @description The chosen recipe as a recipe file, TOML.
+             */
+            recipe_toml: string;
+            /**
+             * Schedule Hash
+             * @description Hash of the steps of its plan on this bench.
+             */
+            schedule_hash: string;
+            /**
+             * Decisions
+             * @description Each choice of the recipe with its reason, a sentence each.
+             */
+            decisions: string[];
+            /**
+             * Others
+             * @description The next best recipes, shortest first.
+             */
+            others: components["schemas"]["DesignedCampaign"][];
+            /** @description The recipe that is compared with (`like`, else table1-x-table2); null: see `reference_refused`. */
+            reference: components["schemas"]["DesignedCampaign"] | null;
+            /**
+             * Reference Name
+             * @description Name of that recipe.
+             */
+            reference_name: string;
+            /**
+             * Reference Refused
+             * @description Why that recipe cannot be run on the bench, or does not fit the model; empty: it can.
+             * @default
+             */
+            reference_refused: string;
+            /** @description The least hours; null: the model has no law over the range. */
+            bound: components["schemas"]["DesignBound"] | null;
+            /**
+             * Standards U Dps
+             * @description U (k = 2) that fixture and table leave at the largest rate, whatever the noise, deg/s: beside the U of the recipe, and only by further mountings made smaller; null: not stated, or no output across the axis.
+             */
+            standards_u_dps: number | null;
+            /**
+             * Assumptions
+             * @description Figures that the prediction counts with, and where they are from.
+             */
+            assumptions: string[];
+            /**
+             * Tried
+             * @description Number of recipes that were planned and compared.
+             */
+            tried: number;
+        };
+        /**
+         * DesignedCampaign
+         * @description One recipe on the bench: what it costs, and what it is expected to give.
+         */
+        DesignedCampaign: {
+            /**
+             * Text
+             * @description What the recipe does, in words.
+             */
+            text: string;
+            /**
+             * Hours
+             * @description Expected duration by the plan on the bench, h.
+             */
+            hours: number;
+            /**
+             * U Worst Dps
+             * @description Largest U (k = 2) of a component of the corrected rate vector in the range, deg/s, by what the campaign decides: noise, drift and unsettled heat.
+             */
+            u_worst_dps: number;
+            /**
+             * U Rms Dps
+             * @description Root mean square of the same U over the range, deg/s.
+             */
+            u_rms_dps: number;
+            /**
+             * U Heat Dps
+             * @description Part of unsettled heat in `u_rms_dps`, deg/s.
+             */
+            u_heat_dps: number;
+            /**
+             * Worst Axis
+             * @description Output where U is largest.
+             */
+            worst_axis: string;
+            /**
+             * Worst Temperature C
+             * @description Temperature where U is largest, deg C.
+             */
+            worst_temperature_c: number;
+            /**
+             * Datasets
+             * @description Number of data sets.
+             */
+            datasets: number;
+            /**
+             * Coefficients
+             * @description Number of coefficients that are estimated, of all outputs.
+             */
+            coefficients: number;
+            /**
+             * Mountings
+             * @description Number of mountings.
+             */
+            mountings: number;
+            /**
+             * Covered C
+             * @description Lowest and highest temperature expected of the unit in a data set, deg C.
+             */
+            covered_c: [
+                number,
+                number
+            ];
+            /**
+             * Is Reaching
+             * @description Whether it reaches the goal: U everywhere in the range, and the hours.
+             */
+            is_reaching: boolean;
         };
         /**
          * DeviceCheck
@@ -16566,6 +16829,39 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["PlannedResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    design_api_designs_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["DesignRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DesignResponse"];
                 };
             };
             /** @description Validation Error */

@@ -94,3 +94,17 @@ def test_what_is_to_come_is_moved_by_what_has_been() -> None:
         step("planned", None, None),
     ]  # fmt: skip
     assert _forecast(steps) == [0.0, 25.0, 25.0, 35.0, 45.0]
+
+
+def test_a_campaign_is_designed_for_the_bench_of_the_service(client: TestClient) -> None:
+    asked = {"like": "ojeda2000", "model": "bias_scale", "u_dps": 0.02}
+    answer = client.post("/api/designs", json=asked).json()
+    assert answer["is_reached"]
+    assert answer["bench"] == "single-axis-sim"
+    plan = client.post("/api/plans", json={"recipe": answer["recipe_toml"]}).json()
+    assert plan["schedule_hash"] == answer["schedule_hash"]
+    assert plan["expected_s"] / 3600 == pytest.approx(answer["chosen"]["hours"])
+    assert client.get("/api/campaigns").json() == []
+    nothing = client.post("/api/designs", json={"like": "ojeda2000"})
+    assert nothing.status_code == 422
+    assert "neither u_dps (deg/s) nor hours (h) is given" in nothing.text

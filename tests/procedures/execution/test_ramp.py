@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from procedures.contracts.campaign_state import CampaignState
@@ -55,9 +56,48 @@ def test_slower_it_goes_in_a_step_before_each_data_set(rig: Any) -> None:
     assert sum(step.expected_s for step in sets) == pytest.approx(60 * 10.0 / 0.5, rel=0.05)
 
 
+def test_a_cycle_goes_on_to_further_ends_and_stays_between_two_legs(rig: Any) -> None:
+    whole = {"back": False, "then_c": [20.0, 30.0]}
+    ends = [30.0, 40.0, 20.0, 30.0]
+    legs = of_legs(planned(rig, **whole))
+    assert [temperature_c for temperature_c, _ in legs] == ends[1:]
+    ramp_c_per_min = rig.limits.ramp_c_per_min
+    for (_, lasts_s), way_c in zip(legs, np.abs(np.diff(ends)), strict=True):
+        assert lasts_s >= 60 * way_c / ramp_c_per_min
+    staying = of_legs(planned(rig, **whole, dwell_s=600.0))
+    more = [long - short for (_, long), (_, short) in zip(staying, legs, strict=True)]
+    assert more == pytest.approx([600.0, 600.0, 0.0], abs=set_s(rig))
+
+
+def test_the_first_mounting_may_stay_longer(rig: Any) -> None:
+    recipe = rig.recipe(positions=["z", "-z"], ramp=FAST | {"first_dwell_s": 900.0})
+    legs = of_legs(rig.plan(recipe))
+    assert legs[0][1] - legs[2][1] == pytest.approx(900.0, abs=set_s(rig))
+    assert legs[1][1] == pytest.approx(legs[3][1])
+
+
+def of_legs(plan: Plan) -> list[tuple[float, float]]:
+    """Return where each leg ends and how long its data sets take, s."""
+    legs: list[tuple[float, float]] = []
+    moving = False
+    for step in plan.steps:
+        if isinstance(step, MoveChamber):
+            moving = not step.wait
+            legs += [(step.temperature_c, 0.0)] if moving else []
+        elif moving and isinstance(step, Acquire):
+            legs[-1] = legs[-1][0], legs[-1][1] + step.expected_s
+    return legs
+
+
+def set_s(rig: Any) -> float:
+    """Return how long the longest data set takes, s."""
+    return max(step.expected_s for step in planned(rig).steps if isinstance(step, Acquire))
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
+        ({"then_c": [30.0, 200.0], "back": False}, "ramp.then_c 200"),
         ({"to_c": 200.0}, "ramp.to_c 200"),
         ({"from_c": -90.0}, "ramp.from_c -90"),
         ({"c_per_min": 500.0}, "ramp.c_per_min 500: faster than"),
@@ -73,6 +113,11 @@ def test_a_ramp_that_goes_nowhere_is_refused() -> None:
     text = 'name = "r"\ntemperatures_c = [20]\nrates_dps = [0]\npositions = ["z"]\n[ramp]\nfrom_c = 20\nto_c = 20\n'
     with pytest.raises(RecipeError, match="the same, so that nothing moves"):
         parse_recipe(f"{text}rates_dps = [0]\n")
+
+
+def test_a_leg_that_goes_nowhere_is_refused(rig: Any) -> None:
+    with pytest.raises(ValueError, match="then_c: a leg begins and ends at the same temperature"):
+        rig.recipe(positions=["z"], ramp=FAST | {"then_c": [30.0]})
 
 
 def test_a_campaign_with_a_ramp_runs_through_and_reads_while_the_air_moves(rig: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
+from statistics import NormalDist
 
 import numpy as np
 
@@ -27,14 +28,13 @@ def check_exchanged(series: Series) -> Iterator[Marked]:
     if series.motion not in ("rest", "rates"):
         return
     fine = [name for name in series.outputs if series.code_steps[name] <= COARSE * series.noises[name]]
-    for one, other in combinations(fine, 2):
-        places = (
-            part.start + row
-            for k, part in enumerate(series.parts)
-            for row in sorted({row for name in (one, other) for row in series.largest_changes[name][k]})
-            if _is_exchanged(series, (one, other), part, row)
+    tried = {pair: list(_places(series, pair)) for pair in combinations(fine, 2)}
+    noise_changes = _noise_changes(sum(map(len, tried.values())))
+    for (one, other), places in tried.items():
+        exchanged = (
+            part.start + row for part, row in places if _is_exchanged(series, (one, other), part, row, noise_changes)
         )
-        first = next(places, None)
+        first = next(exchanged, None)
         if first is None:
             continue
         rows = np.zeros(len(series), dtype=bool)
@@ -51,7 +51,25 @@ def check_exchanged(series: Series) -> Iterator[Marked]:
         )  # fmt: skip
 
 
-def _is_exchanged(series: Series, names: tuple[str, str], part: slice, row: int) -> bool:
+def _places(series: Series, names: tuple[str, str]) -> Iterator[tuple[slice, int]]:
+    """Yield the parts with the rows of each at which one of two outputs changes most."""
+    for k, part in enumerate(series.parts):
+        for row in sorted({row for name in names for row in series.largest_changes[name][k]}):
+            yield part, row
+
+
+def _noise_changes(places: int) -> float:
+    """Return how many standard uncertainties a noise has to differ by, at any of so many places.
+
+    By chance one in all of them does so as rarely as `NOISE_CHANGES` at a single place (Bonferroni).
+    """
+    by_chance = 2.0 * NormalDist().cdf(-NOISE_CHANGES) / max(places, 1)
+    return -NormalDist().inv_cdf(by_chance / 2.0)
+
+
+def _is_exchanged(
+    series: Series, names: tuple[str, str], part: slice, row: int, noise_changes: float
+) -> bool:  # fmt: skip
     one, other = (edges_of(series.outputs[name][part], row) for name in names)
     if one is None or other is None or min(*one[1::2], *other[1::2]) <= 0:
         return False
@@ -67,10 +85,10 @@ def _is_exchanged(series: Series, names: tuple[str, str], part: slice, row: int)
         abs(after_a - before_a) / float(np.hypot(u_after_a, u_before_a)),
         abs(after_b - before_b) / float(np.hypot(u_after_b, u_before_b)),
     )
-    return min(apart, changed) > CHANGES or _noises_are(series, names, part, row)
+    return min(apart, changed) > CHANGES or _noises_are(series, names, part, row, noise_changes)
 
 
-def _noises_are(series: Series, names: tuple[str, str], part: slice, row: int) -> bool:
+def _noises_are(series: Series, names: tuple[str, str], part: slice, row: int, noise_changes: float) -> bool:
     """Whether the noises of two outputs of different noise are exchanged at a row."""
     before, after = zip(*(beside(series.outputs[name][part], row) for name in names), strict=True)
     noises = [spread_of(each) for each in (*before, *after)]
@@ -78,4 +96,4 @@ def _noises_are(series: Series, names: tuple[str, str], part: slice, row: int) -
         return False
     first, then = (float(np.log(noises[k] / noises[k + 1])) for k in (0, 2))
     u = U_LOG_NOISE * 2.0 / np.sqrt(min(len(each) for each in (*before, *after)))
-    return abs(first) > NOISE_CHANGES * u and abs(first + then) < NOISE_CHANGES * u
+    return abs(first) > noise_changes * u and abs(first + then) < NOISE_CHANGES * u

@@ -1,0 +1,54 @@
+"""A designed campaign as text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from labctl.cli.output import console, format_number, print_heading, table
+
+if TYPE_CHECKING:
+    from labctl.answers.design import DesignBound, DesignedCampaign, DesignResponse
+
+
+def print_design(answer: DesignResponse, out: Path) -> None:
+    """Print the choice with its reasons, what it was compared with, and the bound."""
+    model = "+".join(filter(None, [answer.model, *answer.effects]))
+    (low_c, high_c), (_, most_dps) = answer.temperatures_c, answer.rates_dps
+    print_heading(str(out), f" on {answer.bench}: {model}, {low_c:g} to {high_c:g} deg C, up to {most_dps:g} deg/s")
+    for sentence in answer.decisions:
+        console.print(f"  {sentence}", soft_wrap=True)
+    rows = table(
+        "\nrecipes, U (k = 2) in deg/s", "", "recipe", "hours", "largest U", "rms U", "by heat", "data sets", numbers=5
+    )
+    listed = [("chosen", answer.chosen), *(("", each) for each in answer.others)]
+    if answer.reference is not None:
+        listed.append((answer.reference_name, answer.reference))
+    for name, each in listed:
+        rows.add_row(*_row(name, each))
+    console.print(rows)
+    if answer.reference_refused:
+        console.print(f"  {answer.reference_name}: {answer.reference_refused}", style="yellow", soft_wrap=True)
+    if answer.bound is not None:
+        _print_bound(answer.bound)
+    if answer.standards_u_dps is not None:
+        console.print(
+            f"  beside it fixture and table leave {answer.standards_u_dps:.2g} deg/s at {most_dps:g} deg/s, whatever "
+            "the recipe; `labctl campaign plan` says which further mountings make it smaller",
+            soft_wrap=True,
+        )
+    for assumption in answer.assumptions:
+        console.print(f"  counted with: {assumption}", soft_wrap=True)
+
+
+def _row(name: str, each: DesignedCampaign) -> tuple[str, ...]:
+    figures = (each.u_worst_dps, each.u_rms_dps, each.u_heat_dps)
+    return name, each.text, f"{each.hours:.1f}", *(format_number(value, 2) for value in figures), str(each.datasets)
+
+
+def _print_bound(bound: DesignBound) -> None:
+    console.print(
+        f"  at best {bound.bound_h:.2g} h: {bound.heat_h:.2g} h of ramps and mountings, {bound.noise_h:.2g} h of "
+        f"readings against white noise; the chosen recipe takes {bound.ratio:.2g} times as long",
+        soft_wrap=True,
+    )

@@ -1,0 +1,261 @@
+"""Design a campaign: the cheapest recipe on a bench that reaches an uncertainty, or the best within given hours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import tomli_w
+
+from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile
+from instruments.positions import Position
+from labctl.answers.design import DesignBound, DesignedCampaign, DesignRequest, DesignResponse, Range
+from labctl.errors import BadInput, LabctlError
+from labctl.fitting.data.channels import BODY_AXES
+from labctl.fitting.design.bound import least_heat_h, u_of_one_hour_dps
+from labctl.fitting.design.heat_course import HeatFlow
+from labctl.fitting.design.range_of_use import RangeOfUse
+from labctl.fitting.models.presets import POSES, preset_for
+from labctl.services.cache import UNNAMED, compute
+from labctl.services.design.known import Known, known_noise
+from labctl.services.design.problem import Candidate, Goal, Problem
+from labctl.services.design.search import chosen, next_best, search
+from labctl.services.design.sentences import decisions
+from labctl.services.planning.earlier_campaigns import times_on_bench
+from labctl.services.planning.fit_rules import check_fit
+from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
+from labctl.services.planning.plan_answer import misalignment_outlook
+from procedures.contracts.errors import PlanRefused, ProcedureError
+from procedures.contracts.steps import Mount
+from procedures.planning.limits import BenchLimits, missing_instruments
+from procedures.planning.step_writer import MOUNTING_S
+from procedures.recipe.fit_rules import FitRules
+from procedures.recipe.recipe import Recipe, recipe_document
+from procedures.recipe.schemes import Span, scheme_text
+
+if TYPE_CHECKING:
+    from labctl.store import Store
+
+#: The recipe that a design without another one is compared with, and the model of a design without one.
+REFERENCE, USUAL_MODEL = "table1-x-table2", "bias_scale"
+#: Models that have a table over temperature: their data sets have to be at fixed temperatures.
+TABLES = frozenset({"yang2018", "weiss1995"})
+#: Models that no campaign on a rate table is designed for, and why.
+NOT_DESIGNED = {
+    "single_temperature": "it says nothing of other temperatures",
+    "turns": "it is for turns by hand",
+    "bias": "it has no law of temperature",
+    POSES: "it is for poses by hand",
+}
+#: Lines of the comparison.
+COMPARED = 5
+
+
+def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFile | None) -> DesignResponse:
+    """Return the recipe that reaches a goal, and what it was compared with.
+
+    Without a bench it is the simulated one that fits best. Raises RecipeError, BadBench, BadInput, PlanRefused.
+    """
+    like = None if request.like is None else load_recipe(request.like)
+    if like is not None:
+        check_fit(like)
+    model, effects = _model(request, like)
+    on = bench or load_bench(bench_for(like or load_recipe(REFERENCE), driven=True))
+    limits = limits_of(on, driven=True, earlier=None if store is None else times_on_bench(store, on))
+    base, span = _base_and_span(request, like, on, limits)
+    axes = _outputs(base, on)
+    known = known_noise(store, on, axes, request.prior, span)
+    flow = HeatFlow(limits.ramp_c_per_min, USUAL_AIR_TAU_S if on.air_tau_s is None else on.air_tau_s)
+    used = tuple(each for each in BODY_AXES if each in {Position.of(position).axis for position in base.positions})
+    use = RangeOfUse(used, span.rate_dps, (span.low_c, span.high_c))
+    name = f"{base.name}-designed"
+    problem = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name)
+    goal = Goal(request.u_dps, request.hours)
+    tried = search(problem, goal, ramps=model not in TABLES and base.order == "position-major")
+    choice = chosen(tried, goal)
+    if choice is None:
+        raise _nothing(problem, goal, tried)
+    return _answer(_Found(problem, goal, tried, choice), on, known, like)
+
+
+def designed(store: Store, request: DesignRequest, bench: BenchFile | None) -> DesignResponse:
+    """Return the same, for a client that waits: in a process for computations. Raises what `design_campaign` raises."""
+    compute(UNNAMED)
+    return design_campaign(store, request, bench)
+
+
+@dataclass(frozen=True)
+class _Found:
+    problem: Problem
+    goal: Goal
+    tried: list[Candidate]
+    choice: Candidate
+
+
+def _model(request: DesignRequest, like: Recipe | None) -> tuple[str | None, tuple[str, ...]]:
+    """Return the model to fit and the effects beside it. Raises BadInput for one that cannot be designed for."""
+    model, effects = request.model, tuple(request.effects)
+    if model is None and not effects:
+        fit = None if like is None else like.fit
+        model, effects = (USUAL_MODEL, ()) if fit is None else (fit.model, fit.effects)
+    preset_for(model, list(effects))
+    if (why := NOT_DESIGNED.get(model or "")) is not None:
+        raise BadInput(f"model {model}: no campaign on a rate table is designed for it, because {why}; name another")
+    return model, effects
+
+
+def _base_and_span(
+    request: DesignRequest, like: Recipe | None, bench: BenchFile, limits: BenchLimits
+) -> tuple[Recipe, Span]:
+    """Return the recipe that a scheme says nothing of, and what has to be covered."""
+    if like is not None and like.turns is not None:
+        raise BadInput(f"recipe {like.name}: turns by hand need no table; choose a recipe with rates and temperatures")
+    outputs = sorted({axis for gyro in bench.gyros for axis in gyro.axes})
+    rates, temperatures = request.rates_dps, request.temperatures_c
+    if like is not None:
+        base = like
+        rates = rates or (min(like.rates_dps), max(like.rates_dps))
+        temperatures = temperatures or (min(like.temperatures_c), max(like.temperatures_c))
+    else:
+        rates, temperatures = rates or _rates(limits), temperatures or _temperatures(limits)
+        usual = load_recipe(REFERENCE).model_dump() | {"fit": None}
+        base = Recipe.model_validate({**usual, "name": request.model or "effects", "positions": outputs})
+    if missing := missing_instruments(base, limits):
+        raise PlanRefused(base.name, missing, "Name a bench with a rate table and a chamber.")
+    if temperatures[0] >= temperatures[1]:
+        raise BadInput(
+            f"temperatures {temperatures[0]:g} to {temperatures[1]:g} deg C: a design needs a range; give "
+            "--temperatures LOW,HIGH"
+        )
+    span = Span(max(abs(rates[0]), abs(rates[1])), temperatures[0], temperatures[1])
+    _refuse_beyond(base, span, limits)
+    return base, span
+
+
+def _refuse_beyond(base: Recipe, span: Span, limits: BenchLimits) -> None:
+    """Raise PlanRefused for a range that the bench or a unit cannot have."""
+    allowed = base.guards.max_rate_error_fraction
+    asked = [(f"rates {span.rate_dps:g} deg/s", limits.rate_complaint(span.rate_dps, allowed))]
+    asked += [(f"temperatures {c:g} deg C", limits.temperature_complaint(c)) for c in (span.low_c, span.high_c)]
+    if beyond := [f"{name}: {text}" for name, text in asked if text]:
+        raise PlanRefused(base.name, beyond, "Give --rates LOW,HIGH or --temperatures LOW,HIGH within the limits.")
+
+
+def _rates(limits: BenchLimits) -> Range:
+    rates: list[float] = [gyro.max_rate_dps for gyro in limits.gyros.values()]
+    if limits.table is not None:
+        rates.append(limits.table.max_rate_dps)
+    largest = min(rates)
+    return -largest, largest
+
+
+def _temperatures(limits: BenchLimits) -> Range:
+    ends = [(gyro.min_c, gyro.max_c) for gyro in limits.gyros.values()]
+    ends += [] if limits.chamber is None else [(limits.chamber.min_c, limits.chamber.max_c)]
+    return max(low for low, _ in ends), min(high for _, high in ends)
+
+
+def _outputs(base: Recipe, bench: BenchFile) -> tuple[str, ...]:
+    """Return the outputs of the unit with most of them; a unit that is turned about another axis has no law of it."""
+    unit = max(bench.gyros, key=lambda gyro: len(gyro.axes))
+    turned = {Position.of(position).axis for position in base.positions}
+    if not turned & set(unit.axes):
+        raise BadInput(
+            f"recipe {base.name} turns the units about {', '.join(sorted(turned))}, but unit {unit.name} of bench "
+            f"{bench.name} measures {', '.join(unit.axes)}; name a recipe with its axes, or another bench"
+        )
+    return tuple(axis for axis in unit.axes if axis in turned)
+
+
+def _nothing(problem: Problem, goal: Goal, tried: list[Candidate]) -> BadInput:
+    """Return the error of a design without a recipe."""
+    if not tried:
+        return BadInput(
+            f"no recipe that bench and units can run determines model {problem.model or 'of the effects'} over "
+            f"{problem.span.low_c:g} to {problem.span.high_c:g} deg C and {problem.span.rate_dps:g} deg/s; choose "
+            "another model, or a wider range"
+        )
+    shortest = min(tried, key=lambda each: each.hours)
+    return BadInput(
+        f"hours = {goal.hours:g} h: the shortest recipe found takes {shortest.hours:.1f} h; give at least so many"
+    )
+
+
+def _answer(found: _Found, bench: BenchFile, known: Known, like: Recipe | None) -> DesignResponse:
+    problem, goal, choice = found.problem, found.goal, found.choice
+    recipe = choice.recipe
+    reference, refused = _reference(problem, like)
+    outlook = misalignment_outlook(choice.plan, bench, problem.limits)
+    scheme = choice.scheme
+    return DesignResponse(
+        bench=bench.name,
+        model=problem.model,
+        effects=[] if scheme is None else list(problem.effects_of(scheme)),
+        rates_dps=(-problem.span.rate_dps, problem.span.rate_dps),
+        temperatures_c=(problem.span.low_c, problem.span.high_c),
+        is_reached=goal.reached_by(choice),
+        chosen=_designed(choice, goal),
+        recipe_toml=tomli_w.dumps(recipe_document(recipe)),
+        schedule_hash=choice.plan.schedule_hash,
+        decisions=list(decisions(problem, found.tried, choice, goal)),
+        others=[_designed(each, goal) for each in next_best(found.tried, choice, goal, COMPARED)],
+        reference=None if reference is None else _designed(reference, goal),
+        reference_name=REFERENCE if like is None else like.name,
+        reference_refused=refused,
+        bound=_bound(found),
+        standards_u_dps=None if outlook is None else outlook.expanded * problem.span.rate_dps,
+        assumptions=[*known.sources, _heat_text(problem.flow, bench)],
+        tried=len(found.tried),
+    )
+
+
+def _designed(candidate: Candidate, goal: Goal) -> DesignedCampaign:
+    predicted = candidate.predicted
+    return DesignedCampaign(
+        text=candidate.recipe.description if candidate.scheme is None else scheme_text(candidate.scheme),
+        hours=candidate.hours, u_worst_dps=predicted.worst_dps, u_rms_dps=predicted.rms_dps,
+        u_heat_dps=predicted.heat_rms_dps, worst_axis=predicted.worst_axis,
+        worst_temperature_c=predicted.worst_temperature_c, datasets=candidate.plan.datasets,
+        coefficients=predicted.coefficients, mountings=_mountings(candidate), covered_c=candidate.covered_c,
+        is_reaching=goal.reached_by(candidate),
+    )  # fmt: skip
+
+
+def _mountings(candidate: Candidate) -> int:
+    return sum(isinstance(step, Mount) for step in candidate.plan.steps)
+
+
+def _reference(problem: Problem, like: Recipe | None) -> tuple[Candidate | None, str]:
+    """Return what the recipe costs and gives that a design is compared with; else why it cannot be run or fitted."""
+    recipe = load_recipe(REFERENCE) if like is None else like
+    try:
+        plain = recipe.model_copy(update={"fit": FitRules(model=problem.model, effects=problem.effects)})
+        return problem.of_recipe(plain, None, problem.effects), ""
+    except (LabctlError, ProcedureError, ValueError) as error:
+        return None, str(error)
+
+
+def _bound(found: _Found) -> DesignBound | None:
+    """Return the least hours for the goal, or for what the chosen recipe gives where it does not reach one."""
+    problem, choice = found.problem, found.choice
+    wanted = max(found.goal.u_dps or 0.0, choice.predicted.worst_dps)
+    try:
+        preset = preset_for(problem.model, list(problem.effects))
+        hour = u_of_one_hour_dps(problem.base.positions, problem.axes, preset, problem.noise, problem.use)
+    except LabctlError:
+        return None
+    noise_h = (hour / wanted) ** 2
+    handling_c = problem.base.mounting.handling_c
+    mountings = len(problem.base.positions)
+    heat_h = least_heat_h(mountings, problem.use.temperature_c, handling_c, problem.limits.ramp_c_per_min)
+    heat_h += mountings * MOUNTING_S / 3600.0 if problem.limits.needs_person else 0.0
+    bound_h = max(noise_h, heat_h)
+    return DesignBound(noise_h=noise_h, heat_h=heat_h, bound_h=bound_h, ratio=choice.hours / bound_h)
+
+
+def _heat_text(flow: HeatFlow, bench: BenchFile) -> str:
+    air = "as the bench file states" if bench.air_tau_s is not None else "assumed"
+    return (
+        f"the air follows the ramp of {flow.ramp_c_per_min:g} K/min with {flow.air_tau_s:g} s ({air}), the unit the "
+        f"air with {flow.unit_tau_s:g} s (assumed)"
+    )
