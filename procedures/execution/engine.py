@@ -118,6 +118,11 @@ class Engine:
             outcome = self._shutdown.end(state, reason, on_ending, bench_is_safe=self._executor.bench_is_safe)
         return outcome
 
+    def close(self) -> None:
+        """Release what watches over the uncertainty; the bench is closed by whoever opened it."""
+        if self._sufficiency is not None:
+            self._sufficiency.close()
+
     def _begin(self, start_at: int, restart: Restart | None) -> None:
         """Record that the campaign runs, then check the bench; after an interruption, prepare the bench first."""
         if start_at > 0 or restart is not None:
