@@ -18,8 +18,8 @@ from labctl.errors import LabctlError
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import mountings_of
 from labctl.fitting.data.temperature.channel import is_chambers
-from labctl.fitting.estimation.axis_solutions import solve_axes
-from labctl.fitting.estimation.fit import fit_preset
+from labctl.fitting.estimation.axis_solutions import leaning, solve_axes
+from labctl.fitting.estimation.fit import fit_preset, held_out_errors
 from labctl.fitting.estimation.held import with_held
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
@@ -32,7 +32,8 @@ from labctl.fitting.numeric.least_squares import Solution
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.conditions import conditions_of
 from labctl.fitting.uncertainty.evaluated_lines import NO_POWER_ON
-from labctl.fitting.uncertainty.grid import grid_rates, grid_temperatures
+from labctl.fitting.uncertainty.grid import MIN_SPAN_K, grid_rates, grid_temperatures
+from labctl.fitting.uncertainty.rate import COVERAGE
 from labctl.fitting.uncertainty.rate_vector import rate_vector_uncertainty
 from labctl.fitting.uncertainty.repeatability import by_datasheet
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standard_lines
@@ -144,6 +145,43 @@ def least_u(data: FitData, preset: Preset, over: Range) -> LargestU:
     except LabctlError as error:
         return LargestU(None, why=str(error))
     return replace(found, u_dps=None if found.u_dps is None else MARGIN * found.u_dps)
+
+
+#: Said of a fit whose lack of fit cannot be seen.
+CANNOT_LEAVE_OUT = "no inner temperature can be left out of the fit yet, so a lack of fit could not be seen"
+
+
+@single_threaded
+def lack_of_fit(data: FitData, preset: Preset, over: Range, limit_dps: float) -> str:
+    """Return why U may be too small because the model may be wrong between temperatures, in words; empty: it is not.
+
+    U of a fit counts what the model leaves at data sets that it has not seen. Of a model with as many coefficients as
+    temperatures nothing is left, whether it is right or wrong. Each inner temperature is therefore left out in turn: the
+    error there beyond the noise of a mean, twice its root mean square, must not be above the limit either.
+    """
+    if over.temperature_c[1] - over.temperature_c[0] < MIN_SPAN_K:
+        return ""
+    try:
+        model, rows = preset.build(data)
+        solved = solve_axes(data.take(rows), model)
+        errors = held_out_errors(
+            leaning(data, solved.nuisance), replace(preset, inner_only=True), solved.solutions
+        )
+    except LabctlError:
+        return CANNOT_LEAVE_OUT
+    if not errors:
+        return CANNOT_LEAVE_OUT
+    beyond_dps = {}
+    for axis, values in errors.items():
+        noise_dps = float(np.sqrt(np.mean(data.noise_floor.axes[axis].floor_dps ** 2)))
+        beyond_dps[axis] = math.sqrt(max(float(np.mean(values**2)) - noise_dps**2, 0.0))
+    worst = max(beyond_dps, key=lambda axis: beyond_dps[axis])
+    if COVERAGE * beyond_dps[worst] <= limit_dps:
+        return ""
+    return (
+        f"at inner temperatures left out of the fit the error about {worst} is {beyond_dps[worst]:.2g} deg/s RMS beyond "
+        "the noise: the model may be wrong between the temperatures"
+    )
 
 
 def unreachable_below(info: RecordingInfo, over: Range, powered_runs: int) -> LargestU:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
+from labctl.answers.sufficiency import Known
 from labctl.errors import LabctlError
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.uncertainty.over_range import LargestU, Range, data_and_preset, largest_u, least_u
+from labctl.fitting.uncertainty.over_range import LargestU, Range, data_and_preset, lack_of_fit, largest_u, least_u
 from labctl.recording.verification import is_marked
 from labctl.services.sufficiency.running_points import RunningPoints
 from labctl.store import Store
@@ -24,9 +24,6 @@ from procedures.recipe.stop_rules import StopRules
 MAX_EVALUATIONS = 100
 #: A set point, and a share of the fastest rate, by which a data set may be off the end of the range.
 NEAR_C, NEAR_SHARE = 0.15, 0.01
-
-#: Of the fit over the whole range; its lower bound, which is above the limit or not over the whole range; or neither.
-Known = Literal["of the fit", "at least", "unknown"]
 
 
 @dataclass(frozen=True)
@@ -45,8 +42,8 @@ class UnitU:
     model_share: float = 0.0  #: of the variance there, the part of what the model leaves at data sets it has not seen
 
     def reaches(self, limit_dps: float) -> bool:
-        """Return whether U is known over the whole range, and small enough."""
-        return self.known == "of the fit" and self.u_dps is not None and self.u_dps <= limit_dps
+        """Return whether U is known over the whole range, small enough, and not too small for want of a right model."""
+        return self.known == "of the fit" and self.u_dps is not None and self.u_dps <= limit_dps and not self.why
 
 
 class Evaluation:
@@ -92,6 +89,9 @@ class Evaluation:
             if missing or least.u_dps is None or least.u_dps > self._rules.u_dps:
                 return _answer(gyro, sets, "at least", least, why=missing)
         found = largest_u(data, preset, over)
+        if found.u_dps is not None and found.u_dps <= self._rules.u_dps:
+            why = lack_of_fit(data, preset, over, self._rules.u_dps)
+            return _answer(gyro, sets, "of the fit", found, why=why)
         return _answer(gyro, sets, "of the fit", found, found.more_sets(self._rules.u_dps))
 
 

@@ -37,6 +37,14 @@ class Source(Protocol):
         ...
 
 
+def _says_the_same(earlier: UnitU | None, now: UnitU) -> bool:
+    if earlier is None or earlier.known != now.known:
+        return False
+    if now.u_dps is None:
+        return earlier.why == now.why
+    return (earlier.datasets, earlier.u_dps) == (now.datasets, now.u_dps)
+
+
 class InThisThread:
     """Evaluates a campaign when it is asked to."""
 
@@ -58,6 +66,7 @@ class UncertaintyMonitor:
     def __init__(self, source: Source, planned: int, limit_dps: float) -> None:
         """`planned` is the number of data sets in the plan that are fitted."""
         self._source, self._planned, self._limit_dps = source, planned, limit_dps
+        self._told: dict[str, UnitU] = {}  #: the last that was recorded of each unit
         self._failure = ""
 
     def ask(self) -> Sufficiency:
@@ -85,7 +94,10 @@ class UncertaintyMonitor:
         self._source.close()
 
     def _events(self, units: Sequence[UnitU]) -> tuple[Event, ...]:
-        return tuple(event_of(unit, self._planned, self._limit_dps) for unit in units)
+        """Return the events of what is new: U that is not known is said again only for another reason."""
+        told = [unit for unit in units if not _says_the_same(self._told.get(unit.gyro), unit)]
+        self._told.update({unit.gyro: unit for unit in told})
+        return tuple(event_of(unit, self._planned, self._limit_dps) for unit in told)
 
     def _failed(self, error: Exception) -> tuple[Event, ...]:
         """Return the event of a failure, the first time that it occurs."""

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from labctl.services.sufficiency.evaluation import UnitU
+from labctl.services.sufficiency.kinds import KINDS
 from procedures.contracts.journal import Event
 
-#: Kinds of events: U of the fit, its lower bound, and what keeps both from being known.
-OF_FIT, AT_LEAST, UNKNOWN = "uncertainty", "uncertainty_bound", "uncertainty_unknown"
-KINDS = {"of the fit": OF_FIT, "at least": AT_LEAST, "unknown": UNKNOWN}
 #: Part of the variance from which on the model is named as the reason of a U that is too large.
 MOSTLY = 0.5
 
@@ -24,9 +22,8 @@ def event_of(unit: UnitU, planned: int, limit_dps: float) -> Event:
         text += f"; {unit.why}" if unit.why else ""
     else:
         text = f"{unit.gyro}: U is {unit.u_dps:.2g} deg/s {_place(unit)}, {after}; target {limit_dps:g} deg/s"
-    return Event(
-        KINDS[unit.known], text, device=unit.gyro, value=unit.u_dps, limit=limit_dps, unit="deg/s",
-    )  # fmt: skip
+        text += f"; {unit.why}" if unit.why else ""
+    return Event(KINDS[unit.known], text, device=unit.gyro, value=unit.u_dps, limit=limit_dps, unit="deg/s")
 
 
 def reached_text(units: Sequence[UnitU], planned: int, limit_dps: float) -> str:
@@ -50,9 +47,11 @@ def _missing(unit: UnitU, limit_dps: float, units: int) -> str:
     of = f" of {unit.gyro}" if units > 1 else ""
     if unit.u_dps is None:
         return f"U{of} is not known, so the target {limit_dps:g} deg/s was not reached: {unit.why}"
-    text = f"U{of} {unit.u_dps:.2g} deg/s {_place(unit)} is above the target {limit_dps:g} deg/s"
+    if unit.known == "of the fit" and unit.u_dps <= limit_dps:
+        return f"U{of} {unit.u_dps:.2g} deg/s {_place(unit)} is within the target {limit_dps:g} deg/s, but {unit.why}"
     if unit.known == "at least":
         return f"U{of} is at least {unit.u_dps:.2g} deg/s: {unit.why}"
+    text = f"U{of} {unit.u_dps:.2g} deg/s {_place(unit)} is above the target {limit_dps:g} deg/s"
     if unit.more_sets is not None:
         sets = "1 more data set" if unit.more_sets == 1 else f"{unit.more_sets} more data sets"
         return f"{text}; about {sets} there would bring it to the target"
