@@ -37,7 +37,7 @@ from labctl.fitting.uncertainty.rate import COVERAGE
 from labctl.fitting.uncertainty.rate_vector import rate_vector_uncertainty
 from labctl.fitting.uncertainty.repeatability import by_datasheet
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standard_lines
-from labctl.fitting.uncertainty.use import use_evidence
+from labctl.fitting.uncertainty.use import AxisEvidence, use_evidence
 from labctl.recording import Recording, RecordingInfo
 
 #: Name of what is fitted, in messages.
@@ -102,7 +102,8 @@ def largest_u(data: FitData, preset: Preset, over: Range) -> LargestU:
     """
     try:
         result = fit_preset(data, preset)
-        evidence = use_evidence(data, preset)
+        seen = use_evidence(data, preset)
+        evidence = {axis: AxisEvidence.from_json(one.to_json()) for axis, one in seen.items()}  # as a document rounds it
         exported, _ = result.exported()
         bench = conditions_of(data.info, result.environment, [], result.mountings, result.angles_rad)
 
