@@ -10,7 +10,7 @@ a small one selects campaigns whose residuals are small by chance, and the study
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -158,7 +158,7 @@ def _row(key: Key, ends: list[End], whole_h: float) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def table_of(found: list[Mapping[Key, End]]) -> str:
+def table_of(found: Sequence[Mapping[Key, End]]) -> str:
     """Return the table of all units."""
     columns = (
         "model", "power-on", "ends at", "reached", "data sets, median", "hours, median", "saved, mean",
@@ -166,9 +166,8 @@ def table_of(found: list[Mapping[Key, End]]) -> str:
     )  # fmt: skip
     lines = [f"| {' | '.join(columns)} |", "| --- " * len(columns) + "|"]
     whole_h = next(end.hours for (_, target, _), end in found[0].items() if target is None)
-    for key in sorted(found[0], key=lambda key: (key[0], not key[2], -(key[1] or np.inf))):
-        lines.append(_row(key, [each[key] for each in found], whole_h))
-    return "\n".join(lines)
+    keys = sorted(found[0], key=lambda key: (key[0], not key[2], -(key[1] or np.inf)))
+    return "\n".join([*lines, *(_row(key, [each[key] for each in found], whole_h) for key in keys)])
 
 
 def run(units: int = UNITS) -> str:

@@ -132,7 +132,7 @@ def scores(seed: int) -> dict[tuple[str, str], list[float]]:
                 rate_dps = corrected(fitted, output, warm)
                 claimed = rate_uncertainty(fitted, rate, warm, evidence=evidence, name="unit")["z"].expanded_dps
                 assert claimed is not None
-                found[f"{name}, {told}", place].append((found_dps - rate) / claimed)
+                found[f"{name}, {told}", place].append((rate_dps - rate) / claimed)
     return dict(found)
 
 

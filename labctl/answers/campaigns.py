@@ -18,8 +18,8 @@ from labctl.answers.campaign_parts import (
 )
 from labctl.answers.common_fields import BenchName, CampaignNumber, Clip, Person, Reason, RecipeName, StepCount
 from labctl.answers.drafts import DraftResponse
-from labctl.answers.sufficiency import TargetResponse
 from labctl.answers.plans import RecipeSource
+from labctl.answers.sufficiency import TargetResponse
 from procedures.contracts.campaign_state import ACTIVE, ENDED, CampaignState
 
 #: What a person confirms about a real bench before a campaign starts there.

@@ -17,9 +17,9 @@ class TargetUnitResponse(ResponseModel):
 
     gyro: str = Field(description="Name of the unit on the bench.")
     known: Known = Field(
-        description="What `u_dps` is: U of the fit over the whole range; a lower bound of it, by the white noise of the "
-        "readings and the reference standards alone, which is above the target or not over the whole range yet; or "
-        "unknown."
+        description="What `u_dps` is: U of the fit over the whole range; a lower bound of it, by the white noise of "
+        "the readings and the reference standards alone, which is above the target or not over the whole range yet; "
+        "or unknown."
     )
     u_dps: float | None = Field(
         description="Largest U (95.45 %) of a corrected rate about the axis of an output over the range, deg/s; null: "
@@ -29,7 +29,7 @@ class TargetUnitResponse(ResponseModel):
 
 
 class TargetResponse(ResponseModel):
-    """The U at which a campaign ends before its plan does ([stop] of its recipe), and how far it is."""
+    """The U at which a campaign ends before its plan does ([stop] of its recipe), and U so far."""
 
     u_dps: float = Field(description="The U that ends the campaign, deg/s.")
     model: str | None = Field(description="The model that is fitted; null: the effects alone.")

@@ -36,11 +36,11 @@ from labctl.services.diagnosis.in_service import ServiceLaboratory, criticise_to
 from labctl.services.diagnosis.watch import DiagnosisWatch
 from labctl.services.drafts.answers import with_drafts
 from labctl.services.drafts.watch import DraftWatch
-from labctl.services.sufficiency.answers import with_target
 from labctl.services.live.live_stream import LiveEventStream
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
 from labctl.services.standards.register import count_by_state
+from labctl.services.sufficiency.answers import with_target
 from labctl.services.units import count_due
 from labctl.store import Store
 from labctl.store.paging import Page, PageRequest

@@ -127,9 +127,7 @@ def plan(
         start = planned_start(None, None, None, SystemClock().utc())
         with open_readable(database) as store:
             seen = look if visibility else None
-            answer = describe_plan(
-                recipe, bench, clip=clip, look=seen, start=start, store=store, check=check_stop_on
-            )
+            answer = describe_plan(recipe, bench, clip=clip, look=seen, start=start, store=store, check=check_stop_on)
     if as_json:
         print_json(answer)
     else:

@@ -103,7 +103,9 @@ def largest_u(data: FitData, preset: Preset, over: Range) -> LargestU:
     try:
         result = fit_preset(data, preset)
         seen = use_evidence(data, preset)
-        evidence = {axis: AxisEvidence.from_json(one.to_json()) for axis, one in seen.items()}  # as a document rounds it
+        evidence = {
+            axis: AxisEvidence.from_json(one.to_json()) for axis, one in seen.items()
+        }  # as a document rounds it
         exported, _ = result.exported()
         bench = conditions_of(data.info, result.environment, [], result.mountings, result.angles_rad)
 
@@ -157,17 +159,15 @@ def lack_of_fit(data: FitData, preset: Preset, over: Range, limit_dps: float) ->
     """Return why U may be too small because the model may be wrong between temperatures, in words; empty: it is not.
 
     U of a fit counts what the model leaves at data sets that it has not seen. Of a model with as many coefficients as
-    temperatures nothing is left, whether it is right or wrong. Each inner temperature is therefore left out in turn: the
-    error there beyond the noise of a mean, twice its root mean square, must not be above the limit either.
+    temperatures nothing is left, whether it is right or wrong. Each inner temperature is therefore left out in turn:
+    the error there beyond the noise of a mean, twice its root mean square, must not be above the limit either.
     """
     if over.temperature_c[1] - over.temperature_c[0] < MIN_SPAN_K:
         return ""
     try:
         model, rows = preset.build(data)
         solved = solve_axes(data.take(rows), model)
-        errors = held_out_errors(
-            leaning(data, solved.nuisance), replace(preset, inner_only=True), solved.solutions
-        )
+        errors = held_out_errors(leaning(data, solved.nuisance), replace(preset, inner_only=True), solved.solutions)
     except LabctlError:
         return CANNOT_LEAVE_OUT
     if not errors:
@@ -180,8 +180,8 @@ def lack_of_fit(data: FitData, preset: Preset, over: Range, limit_dps: float) ->
     if COVERAGE * beyond_dps[worst] <= limit_dps:
         return ""
     return (
-        f"at inner temperatures left out of the fit the error about {worst} is {beyond_dps[worst]:.2g} deg/s RMS beyond "
-        "the noise: the model may be wrong between the temperatures"
+        f"at inner temperatures left out of the fit the error about {worst} is {beyond_dps[worst]:.2g} deg/s RMS "
+        "beyond the noise: the model may be wrong between the temperatures"
     )
 
 
@@ -259,4 +259,3 @@ def _with_noise(found: LargestU, result: FitResult) -> LargestU:
         return found
     drift_dps, white_dps = noise["drift_dps"] or 0.0, noise["white_dps"] or 0.0
     return replace(found, noise_dps=math.hypot(white_dps, drift_dps, (noise["per_rate"] or 0.0) * found.rate_dps))
-

@@ -1,4 +1,4 @@
-"""The [stop] of a recipe, checked before a campaign begins: a U that the bench cannot reach is refused with its reason."""
+"""The [stop] of a recipe, checked before a campaign begins: a U that the bench cannot reach is refused."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def check_stop(plan: Plan, units: Iterable[RecordingInfo]) -> None:
     rules = plan.recipe.stop
     if rules is None:
         return
-    from labctl.fitting.uncertainty.over_range import Range, unreachable_below  # noqa: PLC0415  it loads the libraries of the fit
+    from labctl.fitting.uncertainty.over_range import Range, unreachable_below  # noqa: PLC0415  it loads a lot
 
     runs = sum(isinstance(step, PowerOn) for step in plan.steps)
     over = Range(

@@ -14,8 +14,8 @@ from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.command import Command, CommandExecutor, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
 from labctl.services.drafts.answers import with_drafts
-from labctl.services.sufficiency.answers import with_target
 from labctl.services.read_access import open_readonly
+from labctl.services.sufficiency.answers import with_target
 from labctl.store import Store, holder_of, is_url, open_store
 
 if TYPE_CHECKING:

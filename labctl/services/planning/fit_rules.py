@@ -1,4 +1,4 @@
-"""Models in [fit] and [stop] of a recipe, checked before a campaign begins: a wrong name is no reason to lose a night."""
+"""Models of [fit] and [stop] in a recipe, checked before it begins: a wrong name is no reason to lose a night."""
 
 from __future__ import annotations
 

@@ -67,7 +67,8 @@ def plan_steps(
 ) -> PlannedResponse:
     """Plan a recipe on a bench, or on the simulated one that fits it best; `look` returns what the plan could find.
 
-    With `start` the answer says when a person is needed. `check` may refuse the plan. The times are those of earlier campaigns where there are any.
+    With `start` the answer says when a person is needed. `check` may refuse the plan. The times are those of
+    earlier campaigns where there are any.
 
     Raises RecipeError, PlanRefused, BadInput.
     """

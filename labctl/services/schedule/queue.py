@@ -9,9 +9,9 @@ from labctl.answers.campaigns import CampaignRequest
 from labctl.answers.schedule import ScheduledResponse, StartEventResponse
 from labctl.errors import BadInput
 from labctl.services.benches.start_confirmation import confirmation_text
+from labctl.services.benches.stop_rules import check_stop_on
 from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.earlier_campaigns import times_on_bench
-from labctl.services.benches.stop_rules import check_stop_on
 from labctl.services.planning.loading import limits_of, load_recipe
 from labctl.services.schedule import times
 from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S

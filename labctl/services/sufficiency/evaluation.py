@@ -48,7 +48,7 @@ class UnitU:
 
 
 class Evaluation:
-    """Evaluates one campaign again and again; all that it knows is in the database, so another process finds the same."""
+    """Evaluates one campaign again and again, from the database alone: another process finds the same."""
 
     def __init__(self, store: Store, campaign: int) -> None:
         row = store.campaigns.get(campaign)
@@ -67,7 +67,7 @@ class Evaluation:
         self._asked = -1  # the first time something is known at once
 
     def evaluate(self, *, is_last: bool = False) -> list[UnitU]:
-        """Return U of each unit; nothing where it was asked for too soon. `is_last`: by all data sets, and of the fit."""
+        """Return U of each unit; nothing where it is too soon. `is_last`: by all data sets, and of the fit."""
         self._asked += 1
         if not is_last and self._asked % self._every:
             return []

@@ -38,7 +38,7 @@ class InOwnProcess:
     """Evaluates a campaign in another process. One request is under way at a time; only `last` waits for it."""
 
     def __init__(self, location: str, campaign: int) -> None:
-        """Start the process; `location` of the database goes to it over the socket, because a URL may have a password."""
+        """Start the process; it gets the `location` of the database over the socket: a URL may have a password."""
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(  # noqa: S603  this very program

@@ -10,7 +10,7 @@ from labctl.store import Store
 
 
 class RunningPoints:
-    """The means of one recording. The same as `points_of` returns, which reads all readings anew after each data set."""
+    """The means of one recording, as `points_of` returns them, which would read all readings after each data set."""
 
     def __init__(self, store: Store, recording: int) -> None:
         self._store, self._recording = store, recording
@@ -35,6 +35,9 @@ class RunningPoints:
             if number not in self._summaries:
                 self._summaries[number] = summarise(readings_of(number))
         summary = joined(info, [self._summaries[number] for number in numbers])
-        coarse = {axis: steps_of(summary, axis) for axis in info.axes} if len(summary) else {}
-        quantisation = {axis: u_dps.tolist() for axis, (step, u_dps) in coarse.items() if step is not None}
+        quantisation: dict[str, list[float]] = {}
+        for axis in info.axes if len(summary) else ():
+            step, u_dps = steps_of(summary, axis)
+            if step is not None:
+                quantisation[axis] = u_dps.tolist()
         return with_steps(with_pieces(points, pieces_of), summary["dataset"].tolist(), quantisation)

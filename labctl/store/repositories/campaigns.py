@@ -255,9 +255,7 @@ class Campaigns:
         with self._database.reading() as connection:
             return records_of(DoneStepRow, connection.execute(query))
 
-    def events(
-        self, campaign: int, after: int = 0, limit: int = 1000, *, kinds: Sequence[str] = ()
-    ) -> list[EventRow]:
+    def events(self, campaign: int, after: int = 0, limit: int = 1000, *, kinds: Sequence[str] = ()) -> list[EventRow]:
         """Return events in order, those with a number above `after`; with `kinds` those of these kinds alone."""
         e = tables.events.c
         query = (

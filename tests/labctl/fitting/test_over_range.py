@@ -143,6 +143,7 @@ def test_what_the_bench_cannot_do_better_is_known_before() -> None:
     assert two_runs.u_dps == pytest.approx(2 * 50e-6 * 400, rel=1e-3)
     assert two_runs.rate_dps in {-400, 400}
     assert one_run.u_dps is not None
+    assert two_runs.u_dps is not None
     assert one_run.u_dps > two_runs.u_dps
     nothing = info.model_copy(update={"datasheet": {}})
     assert unreachable_below(nothing, over, 1).u_dps is None

@@ -104,4 +104,6 @@ def test_rules_that_cannot_be_met_are_refused(rig: Any, stop: dict[str, Any], te
 def test_the_model_of_the_fit_is_taken_where_none_is_named(rig: Any) -> None:
     recipe = rig.recipe(stop={"u_dps": 0.003}, fit={"model": "bias_scale"})
     assert recipe.stop.model == "bias_scale"
-    assert rig.recipe(stop={"u_dps": 0.003, "model": "ojeda2000"}, fit={"model": "bias_scale"}).stop.model == "ojeda2000"
+    assert (
+        rig.recipe(stop={"u_dps": 0.003, "model": "ojeda2000"}, fit={"model": "bias_scale"}).stop.model == "ojeda2000"
+    )
