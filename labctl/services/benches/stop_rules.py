@@ -17,6 +17,7 @@ STATE_REPEATABILITY = (
     "Switch the units off between mountings (mounting.repower_each = true), or leave a later power-on out of U "
     "(stop.repeatability = false)."
 )
+TOO_SMALL = "No campaign on this bench is long enough; ask for a larger u_dps or a smaller range."
 
 
 def check_stop_on(plan: Plan, bench: BenchFile) -> None:
@@ -62,7 +63,7 @@ def check_stop(plan: Plan, units: Iterable[RecordingInfo]) -> None:
                 f"{least.u_dps:.2g} deg/s at {least.rate_dps:g} deg/s about {least.axis}, mostly by {source} (standard "
                 f"uncertainty {part:.2g} deg/s)"
             )
-            raise PlanRefused(plan.recipe.name, [text], "Ask for a larger u_dps or a smaller range, or improve that.")
+            raise PlanRefused(plan.recipe.name, [text], TOO_SMALL)
 
 
 def _ends(values: tuple[float, ...]) -> tuple[float, float]:

@@ -170,8 +170,7 @@ def prepare(
             identities = _identities(bench, clock)
         plan = make_plan(recipe, _limits(bench, bench_file, times_on_bench(store, bench_file)), clip=clip)
         bench_file = _with_reported(store, bench_file, identities)
-        standards = as_used(store, standards_of(bench_file), today)
-        units = _units(bench, identities, bench_file, clock, recipe, standards)
+        units = _units(bench, identities, bench_file, clock, recipe, as_used(store, standards_of(bench_file), today))
         check_stop(plan, [RecordingInfo.model_validate(unit.info) for unit in units])
         new = NewCampaign(
             recipe_name=recipe.name,

@@ -11,7 +11,7 @@ from labctl.answers.sufficiency import (
     UncertaintyCourse,
     UncertaintyCourseResponse,
 )
-from labctl.services.sufficiency.kinds import KNOWN
+from labctl.services.sufficiency.event_kinds import KNOWN
 from labctl.store import EventRow, Store
 from procedures.recipe.recipe import Recipe
 

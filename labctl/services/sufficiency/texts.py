@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from labctl.services.sufficiency.evaluation import UnitU
-from labctl.services.sufficiency.kinds import KINDS
+from labctl.services.sufficiency.event_kinds import KINDS
 from procedures.contracts.journal import Event
 
 #: Part of the variance from which on the model is named as the reason of a U that is too large.
