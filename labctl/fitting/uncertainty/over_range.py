@@ -26,6 +26,7 @@ from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.presets import Preset, preset_for
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.drift_noise import Drift
 from labctl.fitting.numeric.least_squares import Solution
@@ -33,6 +34,7 @@ from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.conditions import conditions_of
 from labctl.fitting.uncertainty.evaluated_lines import NO_POWER_ON
 from labctl.fitting.uncertainty.grid import MIN_SPAN_K, grid_rates, grid_temperatures
+from labctl.fitting.uncertainty.local_model_error import LocalModelError
 from labctl.fitting.uncertainty.rate import COVERAGE
 from labctl.fitting.uncertainty.rate_vector import rate_vector_uncertainty
 from labctl.fitting.uncertainty.repeatability import by_datasheet
@@ -209,6 +211,18 @@ def unreachable_below(info: RecordingInfo, over: Range, powered_runs: int) -> La
             lines = [source.lines[0] for source in standard_lines(bench, _of_ideal(rate))]
             found.append(_placed(_of_known([*lines, *later]), axis, rate, warm))
     return max(found, key=lambda each: each.u_dps or 0.0)
+
+
+def not_near(rates_dps: Array, temperature_c: Array, over: Range) -> str:
+    """Return a place of a range near which none of the planned data sets is, (n,) each, so that U stays unknown there.
+
+    `rates_dps` are those about one axis, `temperature_c` set points. Empty where each place has data sets near it.
+    """
+    planned = LocalModelError(rates_dps, temperature_c, np.ones(len(rates_dps)), np.zeros(len(rates_dps)))
+    for rate_dps, warm in over.places:
+        if reason := planned.unknown_at(rate_dps, warm):
+            return f"at {rate_dps:g} deg/s and {warm:g} deg C {reason}"
+    return ""
 
 
 def _of_ideal(rate_dps: float) -> Sensitivities:

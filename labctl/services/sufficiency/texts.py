@@ -16,7 +16,7 @@ def event_of(unit: UnitU, planned: int, limit_dps: float) -> Event:
     """Return the event of one evaluation."""
     after = f"after {unit.datasets} of {planned} data sets"
     if unit.u_dps is None:
-        text = f"{unit.gyro}: U is not known {after}: {unit.why}"
+        text = f"{unit.gyro}: U is not known{_unknown_place(unit)} {after}: {unit.why}"
     elif unit.known == "at least":
         text = f"{unit.gyro}: U is at least {unit.u_dps:.2g} deg/s {_place(unit)}, {after}; target {limit_dps:g} deg/s"
         text += f"; {unit.why}" if unit.why else ""
@@ -46,7 +46,7 @@ def missing_text(units: Sequence[UnitU], limit_dps: float) -> str:
 def _missing(unit: UnitU, limit_dps: float, units: int) -> str:
     of = f" of {unit.gyro}" if units > 1 else ""
     if unit.u_dps is None:
-        return f"U{of} is not known, so the target {limit_dps:g} deg/s was not reached: {unit.why}"
+        return f"U{of} is not known{_unknown_place(unit)}: {unit.why}; the target {limit_dps:g} deg/s was not reached"
     if unit.known == "of the fit" and unit.u_dps <= limit_dps:
         return f"U{of} {unit.u_dps:.2g} deg/s {_place(unit)} is within the target {limit_dps:g} deg/s, but {unit.why}"
     if unit.known == "at least":
@@ -59,6 +59,10 @@ def _missing(unit: UnitU, limit_dps: float, units: int) -> str:
     if unit.model_share > MOSTLY:
         why = "what the model leaves at data sets that it has not seen; `labctl criticise` says what is missing in it"
     return f"{text}; more data sets there would not bring it to the target, because the rest is {why}"
+
+
+def _unknown_place(unit: UnitU) -> str:
+    return f" {_place(unit)}," if unit.axis else ""
 
 
 def _place(unit: UnitU) -> str:

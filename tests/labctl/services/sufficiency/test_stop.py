@@ -193,6 +193,12 @@ def test_a_target_that_the_bench_cannot_reach_is_refused_with_the_figure(
     describe_plan(recipe(0.03, **stop), BENCH, clip=False, check=check_stop_on)
 
 
+def test_a_range_with_a_place_that_is_not_near_any_data_set_is_refused() -> None:
+    sparse = recipe(0.0085).replace("[-60, -20, 0, 20, 60]", "[-60, 0, 60]")
+    with pytest.raises(PlanRefused, match="about z stays unknown: at -30 deg/s and 22 deg C no data set was measured"):
+        describe_plan(sparse, BENCH, clip=False, check=check_stop_on)
+
+
 def test_a_campaign_that_cannot_reach_its_target_does_not_begin(tmp_path: Path) -> None:
     with pytest.raises(PlanRefused, match=r"stop.u_dps = 0.001 deg/s cannot be reached"):
         run_once(tmp_path / "lab.sqlite", recipe(0.001))
@@ -226,8 +232,8 @@ UNIT = UnitU("fog", 30, "of the fit", 0.0041, "z", 400.0, -40.0)
             "U is at least 0.0041 deg/s: 50 deg C was not measured with y up yet",
         ),
         (
-            replace(UNIT, known="unknown", u_dps=None, why="the model needs 3 temperatures"),
-            "U is not known, so the target 0.003 deg/s was not reached: the model needs 3 temperatures",
+            replace(UNIT, known="unknown", u_dps=None, axis="", why="the model needs 3 temperatures"),
+            "U is not known: the model needs 3 temperatures; the target 0.003 deg/s was not reached",
         ),
         (
             replace(UNIT, u_dps=0.002, why="the model may be wrong"),
