@@ -30,6 +30,9 @@ NEWEST, LAST = b"newest", b"last"
 _UNITS = TypeAdapter(list[UnitU])
 
 
+ENDED = "the process that computes U could not be started, or has ended"
+
+
 class ProcessEnded(Exception):
     """The process that evaluates a campaign has ended, or does not answer."""
 
@@ -38,9 +41,15 @@ class InOwnProcess:
     """Evaluates a campaign in another process. One request is under way at a time; only `last` waits for it."""
 
     def __init__(self, location: str, campaign: int) -> None:
-        """Start the process; it gets the `location` of the database over the socket: a URL may have a password."""
+        """Start the process; it gets the `location` of the database over the socket: a URL may have a password.
+
+        Where it cannot be started, every request raises ProcessEnded: a campaign does not need it to run.
+        """
+        self._is_asked = False
+        self._process: subprocess.Popen[bytes] | None = None
         ours, theirs = socket.socketpair()
-        with theirs:
+        self._line = Connection(ours.detach())
+        with theirs, suppress(OSError):
             self._process = subprocess.Popen(  # noqa: S603  this very program
                 [sys.executable, "-m", "labctl.services.sufficiency.in_process", str(theirs.fileno())],
                 pass_fds=[theirs.fileno()],
@@ -49,9 +58,7 @@ class InOwnProcess:
                 env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
                 start_new_session=True,  # signals of the terminal do not reach it
             )
-        self._line = Connection(ours.detach())
-        self._line.send_bytes(f"{campaign} {location}".encode())
-        self._is_asked = False
+            self._line.send_bytes(f"{campaign} {location}".encode())
 
     def newest(self) -> Sequence[UnitU]:
         """Return the answer that has come, if one has; ask anew where none is awaited. Raises ProcessEnded."""
@@ -60,26 +67,28 @@ class InOwnProcess:
             if not self._is_asked:
                 self._ask(NEWEST)
         except (EOFError, OSError) as error:
-            raise ProcessEnded("the process that computes U has ended") from error
+            raise ProcessEnded(ENDED) from error
         return units
 
     def last(self) -> Sequence[UnitU]:
         """Wait for U by all data sets. Raises ProcessEnded."""
         try:
             if self._is_asked and self._line.poll(LAST_WITHIN_S):
-                self._received()
-            self._ask(LAST)
-            if self._line.poll(LAST_WITHIN_S):
-                return self._received()
+                self._received()  # by fewer data sets
+            if not self._is_asked:
+                self._ask(LAST)
+                if self._line.poll(LAST_WITHIN_S):
+                    return self._received()
         except (EOFError, OSError) as error:
-            raise ProcessEnded("the process that computes U has ended") from error
+            raise ProcessEnded(ENDED) from error
         raise ProcessEnded(f"the process that computes U gave no answer in {LAST_WITHIN_S:.0f} s")
 
     def close(self) -> None:
         """End the process; it has nothing to save."""
         self._line.close()
-        self._process.kill()
-        self._process.wait()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
 
     def _ask(self, word: bytes) -> None:
         self._line.send_bytes(word)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -138,12 +139,24 @@ def test_another_process_finds_the_same_from_the_database(store: Store) -> None:
 
 def test_a_process_that_has_died_ends_no_campaign(store: Store) -> None:
     other = InOwnProcess(store.location, 1)
+    assert other._process is not None
     other._process.kill()
     other._process.wait()
     monitor = UncertaintyMonitor(other, 35, 0.0085)
     found = [monitor.ask(), monitor.ask(), monitor.conclude("")]
     assert [each.enough for each in found] == ["", "", ""]
     assert [event.kind for each in found for event in each.events] == ["uncertainty_not_computed"]
+    monitor.close()
+
+
+def test_a_process_that_cannot_be_started_ends_no_campaign(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(11, "no more processes")
+
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+    monitor = UncertaintyMonitor(InOwnProcess(store.location, 1), 35, 0.0085)
+    assert [event.kind for event in (*monitor.ask().events, *monitor.ask().events)] == ["uncertainty_not_computed"]
+    assert monitor.conclude("").enough == ""
     monitor.close()
 
 
