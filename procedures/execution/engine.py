@@ -119,7 +119,7 @@ class Engine:
         return outcome
 
     def close(self) -> None:
-        """Release what watches over the uncertainty; the bench is closed by whoever opened it."""
+        """Release what watches over the uncertainty; the bench stays open."""
         if self._sufficiency is not None:
             self._sufficiency.close()
 
