@@ -8,6 +8,7 @@ import sys
 STUDIES = (
     "coverage",
     "use_coverage",
+    "enough",
     "budget_coverage",
     "rate_vector_coverage",
     "indexing",

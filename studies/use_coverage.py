@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -82,15 +82,26 @@ def drift(t_s: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.floa
     return found
 
 
-def campaign(unit: Unit, runs: int, rng: np.random.Generator, convention: Convention = "1 sigma") -> Recording:
-    """Return means of one minute over all temperatures and rates, the temperatures shared among powered runs."""
+def campaign(
+    unit: Unit,
+    runs: int,
+    rng: np.random.Generator,
+    convention: Convention = "1 sigma",
+    levels_c: Sequence[float] = tuple(WARM_C.tolist()),
+    turn_on_dps: float | None = None,
+) -> Recording:
+    """Return means of one minute over all temperatures and rates, the temperatures shared among powered runs.
+
+    `turn_on_dps` is what every run is off by; default: drawn for each.
+    """
     parts = []
     for run in range(1, runs + 1):
-        levels = WARM_C[(run - 1) % runs :: runs] if runs > 1 else WARM_C
+        levels = np.asarray(levels_c[(run - 1) % runs :: runs] if runs > 1 else levels_c)
         warm = np.repeat(levels, len(RATES)) + rng.normal(0, 0.02, len(levels) * len(RATES))
         rate = np.concatenate([rng.permutation(RATES) for _ in levels])
         t_s = 75.0 * np.arange(len(rate)) + 5400.0 * np.repeat(np.arange(len(levels)), len(RATES)) + 1e6 * run
-        noise = rng.normal(0, WHITE_DPS, len(rate)) + drift(t_s, rng) + TURN_ON_DPS * CONVENTIONS[convention](rng)
+        noise = rng.normal(0, WHITE_DPS, len(rate)) + drift(t_s, rng)
+        noise += TURN_ON_DPS * CONVENTIONS[convention](rng) if turn_on_dps is None else turn_on_dps
         parts.append((t_s, np.full(len(rate), run), rate, warm, rate + unit.error_dps(rate, warm) + noise))
     t_s, number, rate, warm, output = (np.concatenate(column) for column in zip(*parts, strict=True))
     n = len(rate)
@@ -118,14 +129,15 @@ def scores(seed: int) -> dict[tuple[str, str], list[float]]:
             fitted, evidence = fit_preset(data, preset).fitted, use_evidence(data, preset)
             for place, (rate, warm) in PLACES.items():
                 output = np.array([rate]) + unit.error_dps(np.array([rate]), np.array([warm])) + later
-                corrected = _corrected(fitted, output, warm)
+                rate_dps = corrected(fitted, output, warm)
                 claimed = rate_uncertainty(fitted, rate, warm, evidence=evidence, name="unit")["z"].expanded_dps
                 assert claimed is not None
-                found[f"{name}, {told}", place].append((corrected - rate) / claimed)
+                found[f"{name}, {told}", place].append((rate_dps - rate) / claimed)
     return dict(found)
 
 
-def _corrected(fitted: FittedModel, output: NDArray[np.float64], warm: float) -> float:
+def corrected(fitted: FittedModel, output: NDArray[np.float64], warm: float) -> float:
+    """Return the corrected rate of an output (1,) at a temperature, deg/s."""
     columns = {"temperature_c": np.array([warm]), "table_rate_dps": output, "position": np.array(["z"])}
     return float(fitted.compensate({"z": output}, Channels(columns, {"z": output}))["z"][0])
 

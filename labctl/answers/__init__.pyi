@@ -421,6 +421,12 @@ from labctl.answers.standards import (
     WithdrawFindingRequest as WithdrawFindingRequest,
 )
 from labctl.answers.steps import StepJson as StepJson
+from labctl.answers.sufficiency import (
+    TargetResponse as TargetResponse,
+    TargetUnitResponse as TargetUnitResponse,
+    UncertaintyCourse as UncertaintyCourse,
+    UncertaintyCourseResponse as UncertaintyCourseResponse,
+)
 from labctl.answers.uncertainty import (
     AnyAxisUncertainty as AnyAxisUncertainty,
     AxisUncertainty as AxisUncertainty,

@@ -19,6 +19,7 @@ from labctl.answers.campaign_parts import (
 from labctl.answers.common_fields import BenchName, CampaignNumber, Clip, Person, Reason, RecipeName, StepCount
 from labctl.answers.drafts import DraftResponse
 from labctl.answers.plans import RecipeSource
+from labctl.answers.sufficiency import TargetResponse
 from procedures.contracts.campaign_state import ACTIVE, ENDED, CampaignState
 
 #: What a person confirms about a real bench before a campaign starts there.
@@ -241,6 +242,11 @@ class CampaignResponse(ResponseModel):
         default_factory=list,
         description="Draft calibrations made at the end of the campaign, one per recording; empty: the recipe "
         "has no [fit], the campaign is not done, or the response is a list.",
+    )
+    target: TargetResponse | None = Field(
+        default=None,
+        description="The U that ends the campaign before its plan does, and U so far; null: the recipe has no [stop], "
+        "or the response is a list.",
     )
     drivers: dict[str, DriverResponse] = Field(
         default_factory=dict,

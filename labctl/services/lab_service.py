@@ -40,6 +40,7 @@ from labctl.services.live.live_stream import LiveEventStream
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
 from labctl.services.standards.register import count_by_state
+from labctl.services.sufficiency.answers import with_target
 from labctl.services.units import count_due
 from labctl.store import Store
 from labctl.store.paging import Page, PageRequest
@@ -163,7 +164,7 @@ class LabService:
 
     def status(self, campaign: int) -> CampaignResponse:
         """Return where a campaign is: live when it runs here, else as the database tells."""
-        return with_drafts(self.store, self._status(campaign))
+        return with_target(self.store, with_drafts(self.store, self._status(campaign)))
 
     def _status(self, campaign: int) -> CampaignResponse:
         access = self.bench_access

@@ -12,7 +12,8 @@ from procedures.contracts.control import Control
 from procedures.contracts.errors import Aborted, Interrupted, ProcedureError
 from procedures.contracts.journal import Event, Journal
 from procedures.contracts.operator import Operator
-from procedures.contracts.steps import Mount
+from procedures.contracts.steps import Acquire, Mount
+from procedures.contracts.sufficiency import SufficiencyMonitor
 from procedures.execution.active_bench import ActiveBench
 from procedures.execution.context import ExecutionContext
 from procedures.execution.resume import Restart, resume_campaign
@@ -33,6 +34,7 @@ class Engine:
     `run` blocks until the campaign is over; `control` and `progress` are for other threads. Journal times are
     campaign time: that of `time` for a resumed campaign, else seconds since `run` was called. Without `guards` the
     recipe's own rules are compared with the limits of the bench. `notices` are recorded as the campaign starts.
+    `sufficiency` is asked after each data set whether the campaign may end before its plan does; None: it does not.
     """
 
     def __init__(
@@ -48,8 +50,11 @@ class Engine:
         observer: Observer | None = None,
         time: CampaignTime | None = None,
         notices: Sequence[Event] = (),
+        sufficiency: SufficiencyMonitor | None = None,
     ) -> None:
         self.plan = plan
+        self._sufficiency = sufficiency
+        self._enough = ""
         self._notices = notices
         self.control = control or Control()
         self._tracker = ProgressTracker(plan, clock, observer)
@@ -94,6 +99,8 @@ class Engine:
                 self._begin(start_at, restart)
                 for index in range(start_at, len(self.plan.steps)):
                     self._executor.run(index)
+                    if isinstance(self.plan.steps[index], Acquire):
+                        self._end_where_enough(index)
             state, reason = CampaignState.DONE, self._describe_done()
         except Interrupted as error:
             state, reason = CampaignState.INTERRUPTED, f"interrupted: {error}"
@@ -110,6 +117,11 @@ class Engine:
         finally:
             outcome = self._shutdown.end(state, reason, on_ending, bench_is_safe=self._executor.bench_is_safe)
         return outcome
+
+    def close(self) -> None:
+        """Release what watches over the uncertainty; the bench stays open."""
+        if self._sufficiency is not None:
+            self._sufficiency.close()
 
     def _begin(self, start_at: int, restart: Restart | None) -> None:
         """Record that the campaign runs, then check the bench; after an interruption, prepare the bench first."""
@@ -131,6 +143,7 @@ class Engine:
         for index in restart.skipped:
             if isinstance(self.plan.steps[index], Mount):
                 self._executor.skip_mounting(index)
+        self._executor.note_skipped(restart.skipped)
         self._context.added_runs = restart.added_runs
         self._context.clock_runs = [
             run for run in restart.clock_runs if run.used
@@ -138,6 +151,26 @@ class Engine:
         self._context.clock_session = 1 + max((run.session for run in restart.clock_runs), default=0)
         self._recorder.change_state(CampaignState.RUNNING, f"resumed at step {start_at + 1}")
         resume_campaign(self._context, self.plan, start_at, restart, self._executor.carry_out)
+
+    def _end_where_enough(self, index: int) -> None:
+        """After the data set of step `index`, skip the others that are fitted where enough is measured."""
+        if self._sufficiency is None or self._enough or index in self._executor.not_needed:
+            return
+        found = self._sufficiency.ask()
+        for event in found.events:
+            self._recorder.event(event)
+        if found.enough and self._executor.skip_fitted_after(index, found.enough):
+            self._enough = found.enough
+            self._recorder.event(Event("enough", f"{found.enough}; the data sets that are left are skipped"))
+
+    def _concluded(self) -> list[str]:
+        """Return what all data sets say of the uncertainty that the campaign was to reach."""
+        if self._sufficiency is None:
+            return []
+        found = self._sufficiency.conclude(self._enough)
+        for event in found.events:
+            self._recorder.event(event)
+        return [found.enough] if found.enough else []
 
     def _failed(self, error: InstrumentError | ProcedureError) -> tuple[CampaignState, str]:
         """Return how a step ends that fails. One that fails after a request to end has been stopped by another thread.
@@ -151,7 +184,10 @@ class Engine:
         return state, f"{state}: {request.reason} (the step then ended with: {error})"
 
     def _describe_done(self) -> str:
-        skipped, dropped = len(self._executor.skipped), self._context.bench.dropped
+        executor, dropped = self._executor, self._context.bench.dropped
+        not_needed = len(executor.not_needed)
+        skipped = len(executor.skipped - executor.not_needed)
         left_out = [f"{skipped} steps were left out because the units were not turned"] if skipped else []
         gone = [f"{name} was excluded ({reason})" for name, reason in dropped.items()]
-        return "; ".join(["all steps done", *left_out, *gone])
+        done = f"{not_needed} steps were skipped, because they are not needed" if not_needed else "all steps done"
+        return "; ".join([*self._concluded(), done, *left_out, *gone])

@@ -119,6 +119,10 @@ class Recovery:
         return isinstance(error, Unanswered) and isinstance(self.step, Mount) and may
 
 
+def _is_fitted(step: Step) -> bool:
+    return isinstance(step, Acquire) and not step.verification
+
+
 class StepExecutor:
     """Runs single steps of one plan in one context."""
 
@@ -126,12 +130,33 @@ class StepExecutor:
         self._plan = plan
         self._context = context
         self._recorder = context.recorder
-        self.skipped: set[int] = set()  #: mountings that were not done, with the steps that depend on them
+        self._not_needed_because = ""
+        self.skipped: set[int] = set()  #: steps that are left out
+        self.not_needed: set[int] = set()  #: those of them that are left out because enough is measured
         self.bench_is_safe = False  #: whether the last step left the bench in its safe state
 
     def skip_mounting(self, index: int) -> None:
         """Leave out mounting `index` and every step that makes no sense without it."""
         self.skipped |= {index, *self._plan.left_out_with(index)}
+
+    def note_skipped(self, skipped: frozenset[int]) -> None:
+        """Note steps that were left out before an interruption: those of no mounting were not needed."""
+        self.not_needed = set(skipped) - self.skipped
+        self.skipped |= self.not_needed
+
+    def skip_fitted_after(self, index: int, why: str) -> bool:
+        """Leave out all steps after `index` up to the last data set that is fitted; returns whether there are any.
+
+        What follows them is done: data sets that verify, the checks of the table, and the safe state.
+        """
+        steps = self._plan.steps
+        fitted = [n for n in range(index + 1, len(steps)) if _is_fitted(steps[n]) and n not in self.skipped]
+        if not fitted:
+            return False
+        self._not_needed_because = why
+        self.not_needed |= set(range(index + 1, fitted[-1] + 1)) - self.skipped
+        self.skipped |= self.not_needed
+        return True
 
     def run(self, index: int) -> None:
         """Run step `index` to its end; it is begun again after each recovery.
@@ -139,7 +164,8 @@ class StepExecutor:
         Raises what the step raises once the recipe allows no further recovery.
         """
         if index in self.skipped:
-            self._record_skipped(index, "the units were not turned")
+            is_enough = index in self.not_needed
+            self._record_skipped(index, self._not_needed_because if is_enough else "the units were not turned")
             return
         recovery = Recovery(self._context, self._plan.steps[index])
         while index not in self.skipped:

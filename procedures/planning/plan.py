@@ -56,6 +56,11 @@ class Plan(BaseModel):
         return sum(isinstance(step, Acquire) for step in self.steps) + DATA_SETS_OF_TURN * turns
 
     @property
+    def fitted_datasets(self) -> int:
+        """How many data sets at rates of the table a calibration is fitted to."""
+        return sum(isinstance(step, Acquire) and not step.verification for step in self.steps)
+
+    @property
     def verification_steps(self) -> tuple[Step, ...]:
         """The steps that verify, from their first mounting on; none where the recipe has no verification part."""
         mountings = {step.mounting for step in self.steps if isinstance(step, Acquire) and step.verification}

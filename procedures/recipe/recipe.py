@@ -33,6 +33,7 @@ from procedures.recipe.rules import (
     Verification,
     Whole,
 )
+from procedures.recipe.stop_rules import StopRules, outside
 from procedures.recipe.turns import TurnRules
 
 #: A key that is not known is shown up to here.
@@ -42,7 +43,7 @@ LONGEST_KEY = 80
 #: What a recipe of turns by hand has no use for: no table and no chamber is driven.
 _OF_RATES = (
     "temperatures_c", "rates_dps", "order", "temperature_order", "rate_order", "repeats", "soak", "acquire",
-    "replicates", "indexing", "inverted", "power_cycle", "ramp", "profiles", "verification",
+    "replicates", "indexing", "inverted", "power_cycle", "ramp", "profiles", "verification", "stop",
 )  # fmt: skip
 
 
@@ -81,6 +82,7 @@ class Recipe(Table):
     on_failure: OnFailure = OnFailure()
     resume: ResumeRules = ResumeRules()
     fit: FitRules | None = None  #: absent: a campaign ends in its recordings
+    stop: StopRules | None = None  #: absent: a campaign ends with its plan
 
     @model_validator(mode="before")
     @classmethod
@@ -89,6 +91,33 @@ class Recipe(Table):
         if isinstance(document, dict) and document.get("turns") is not None:
             return {"temperatures_c": (), "rates_dps": (), **document}
         return document
+
+    @model_validator(mode="before")
+    @classmethod
+    def _stop_by_fit(cls, document: Any) -> Any:
+        """Take the model of [fit] where [stop] names none."""
+        if not isinstance(document, dict):
+            return document
+        stop, fit = document.get("stop"), document.get("fit")
+        if not (isinstance(stop, dict) and isinstance(fit, dict)) or "model" in stop or "effects" in stop:
+            return document
+        fitted = {key: fit[key] for key in ("model", "effects") if fit.get(key)}
+        return {**document, "stop": {**stop, **fitted}}
+
+    @model_validator(mode="after")
+    def _stop_within(self) -> Recipe:
+        """Refuse a range of [stop] beyond what is measured, and courses of the rate beside it."""
+        if self.stop is None:
+            return self
+        if self.profiles:
+            raise ValueError(
+                "stop: a fit of courses of the rate takes every reading, too many to be fitted while the campaign "
+                "runs; remove [stop] or profiles"
+            )
+        beyond = outside("rates_dps", self.stop.rates_dps, self.rates_dps, "deg/s")
+        if beyond := beyond or outside("temperature_c", self.stop.temperature_c, self.temperatures_c, "deg C"):
+            raise ValueError(beyond)
+        return self
 
     @field_validator(*_OF_RATES)
     @classmethod

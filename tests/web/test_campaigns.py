@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -68,6 +69,50 @@ def assert_channels_are_chosen(service: Service, page: Page) -> None:
     page.reload()
     expect(card).to_contain_text("2 of ")
     page.wait_for_function(f"Object.keys(({drawn})()).length === 2")
+
+
+UNTIL_ENOUGH = """format = "labctl-recipe/1"
+name = "until-enough"
+temperatures_c = [22, 26, 30, 34]
+rates_dps = [-40, -20, 0, 20, 40]
+positions = ["z"]
+[soak]
+hold_s = 1800
+max_drift_c = 1.0
+drift_window_s = 60
+[acquire]
+duration_s = 10
+settle_s = 2
+[stop]
+effects = ["bias", "bias_temperature", "scale_factor"]
+u_dps = 0.1
+"""
+
+
+def test_u_of_a_campaign_is_drawn_against_its_target(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    service.post("/api/campaigns", {"recipe": UNTIL_ENOUGH})
+    campaign = service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")
+    answer = service.get("/api/campaigns/1/uncertainty")
+    course, unit = answer["units"]["fog"], campaign["target"]["units"][0]
+    assert (answer["target_u_dps"], answer["planned"]) == (0.1, 20)
+    assert unit["u_dps"] == course["u_dps"][-1]
+    assert set(course["known"]) == {"unknown", "at least", "of the fit"}
+
+    card = visit("/campaigns/1").get_by_role("region", name="Uncertainty")
+    card.scroll_into_view_if_needed()
+    expect(card).to_contain_text(unit["text"])
+    plot = card.locator(".plot")
+    expect(plot.locator(".main-svg").first).to_be_attached()
+    drawn = json.loads(
+        plot.evaluate("plot => JSON.stringify(plot.data.map(({ name, x, y }) => [name, [...x], [...y]]))")
+    )
+    rows = list(zip(course["datasets"], course["u_dps"], course["known"], strict=True))
+    assert drawn == [
+        [name, [n for n, _, each in rows if each == known], [u for _, u, each in rows if each == known]]
+        for name, known in (("at least", "at least"), ("U", "of the fit"))
+    ] + [["target", [0, 20], [0.1, 0.1]]]
 
 
 def assert_course_is_scrubbed(service: Service, page: Page) -> None:

@@ -13,6 +13,7 @@ from labctl.answers.course import CourseResponse
 from labctl.answers.drafts import DraftsRequest, DraftsResponse
 from labctl.answers.plans import CampaignPlanResponse
 from labctl.answers.schedule import ScheduledResponse
+from labctl.answers.sufficiency import UncertaintyCourseResponse
 from labctl.api.act_routes import add_act_route
 from labctl.api.computation import execute
 from labctl.api.dependencies import ServiceDep, command_route
@@ -24,6 +25,7 @@ from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
 from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.registry import MAKE_DRAFTS
 from labctl.services.commands.requests import CampaignStart, ToCampaign
+from labctl.services.sufficiency.answers import uncertainty_course
 from labctl.store.paging import PageRequest
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
@@ -77,6 +79,12 @@ def course(
 ) -> CourseResponse:
     """Temperatures of chamber and units while the campaign ran, also while it runs."""
     return campaign_course(service.store, campaign, points, from_s)
+
+
+@router.get("/{campaign}/uncertainty", summary="Its U")
+def uncertainty(campaign: int, service: ServiceDep) -> UncertaintyCourseResponse:
+    """U of the campaign's fit as it fell with each data set, against the target of its recipe ([stop])."""
+    return uncertainty_course(service.store, campaign)
 
 
 for _act in CAMPAIGN_ACTS:

@@ -120,6 +120,7 @@ def plan(
 ) -> None:
     """Show the steps of a campaign and how long it takes, by earlier campaigns on the bench if any. Nothing moves."""
     from instruments.clock import SystemClock
+    from labctl.services.benches.stop_rules import check_stop_on
     from labctl.services.planning.plan_answer import describe_plan
     from labctl.services.read_access import open_readable
     from labctl.services.schedule.planned_start import planned_start
@@ -129,7 +130,7 @@ def plan(
         start = planned_start(None, None, None, SystemClock().utc())
         with open_readable(database) as store:
             seen = look if visibility else None
-            answer = describe_plan(recipe, bench, clip=clip, look=seen, start=start, store=store)
+            answer = describe_plan(recipe, bench, clip=clip, look=seen, start=start, store=store, check=check_stop_on)
     if as_json:
         print_json(answer)
     else:

@@ -107,6 +107,8 @@ def print_campaign(answer: CampaignResponse) -> None:
             f"  chamber {format_number(answer.chamber_c)} deg C, gyro {format_number(answer.gyro_c)} deg C, "
             f"table {format_number(answer.rate_dps)} deg/s"
         )
+    for unit in answer.target.units if answer.target is not None else ():
+        console.print(f"  {unit.text}", soft_wrap=True)
     _print_instruments(answer)
     _print_question(answer)
     _print_troubles(answer)

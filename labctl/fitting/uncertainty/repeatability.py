@@ -10,6 +10,7 @@ import numpy as np
 from instruments.datasheet import LIMITS, Convention
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording import RecordingInfo
 
 #: The drift whose Allan deviation is as high as a bias instability B, over B.
 DRIFT_OVER_INSTABILITY = 1.35
@@ -52,7 +53,7 @@ def repeatability_of(
         measured = instability_dps.get(axis)
         if between is not None:
             by_axis[axis] = between
-        elif sheet := _by_datasheet(data):
+        elif sheet := by_datasheet(data.info):
             by_axis[axis] = sheet
         elif measured:
             by_axis[axis] = Repeatability(OF_TWO * DRIFT_OVER_INSTABILITY * measured, "static record")
@@ -61,10 +62,10 @@ def repeatability_of(
     return by_axis
 
 
-def _by_datasheet(data: FitData) -> Repeatability | None:
-    """Return what the data sheet states by its convention."""
+def by_datasheet(info: RecordingInfo) -> Repeatability | None:
+    """Return what the data sheet states by its convention; None where it states nothing."""
     for name in ("bias_repeatability_dps", "bias_stability_dps"):
-        if figure := data.info.datasheet_figure(name):
+        if figure := info.datasheet_figure(name):
             text = f"{figure.text}; times sqrt(2), for the run that was calibrated and the one that is corrected"
             return Repeatability(OF_TWO * figure.u, "data sheet", None, text, figure.convention)
     return None

@@ -45,6 +45,7 @@ from labctl.store.connection.writer_lock import note_campaign
 from procedures.contracts.campaign_state import ENDED
 from procedures.contracts.control import Control
 from procedures.contracts.operator import Operator
+from procedures.contracts.sufficiency import SufficiencyMonitor
 from procedures.execution.engine import Engine
 from procedures.execution.signals import ignore_signals, signals_were_obeyed
 from procedures.execution.stoppable_clock import stoppable
@@ -96,8 +97,21 @@ def _engine(
         control=control or Control(),
         observer=with_pace_watch(prepared.clock, observe),
         time=prepared.time,
+        sufficiency=sufficiency_of(store, prepared, is_simulated=bench.is_simulated),
         notices=(*overdue_events(bench.standards, today), *register_events(store, standards_of(bench), today)),
     )
+
+
+def sufficiency_of(store: Store, prepared: Prepared, *, is_simulated: bool) -> SufficiencyMonitor | None:
+    """Return what says when a campaign has measured enough; None where its recipe does not ask for that."""
+    rules = prepared.plan.recipe.stop
+    if rules is None:
+        return None
+    from labctl.services.sufficiency.in_process import InOwnProcess  # noqa: PLC0415  it loads the libraries of the fit
+    from labctl.services.sufficiency.monitor import InThisThread, UncertaintyMonitor  # noqa: PLC0415  as above
+
+    source = InThisThread(store, prepared.id) if is_simulated else InOwnProcess(store.location, prepared.id)
+    return UncertaintyMonitor(source, prepared.plan.fitted_datasets, rules.u_dps)
 
 
 def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse:
@@ -105,6 +119,7 @@ def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse
     bench = store.campaigns.get(prepared.id).bench_name
     with ExitStack() as until_reported:
         until_reported.enter_context(for_campaign(prepared.id, bench))
+        until_reported.callback(engine.close)
         try:
             engine.run(prepared.start_at, prepared.restart, lambda: until_reported.enter_context(ignore_signals()))
         except KeyboardInterrupt as interrupt:

@@ -33,6 +33,7 @@ from labctl.services.benches.reference_columns import (
     temperature_instrument,
 )
 from labctl.services.benches.standards import standards_of
+from labctl.services.benches.stop_rules import check_stop
 from labctl.services.planning.earlier_campaigns import times_on_bench
 from labctl.services.planning.loading import load_recipe, with_drivers
 from labctl.services.planning.timeline import step_json
@@ -169,8 +170,8 @@ def prepare(
             identities = _identities(bench, clock)
         plan = make_plan(recipe, _limits(bench, bench_file, times_on_bench(store, bench_file)), clip=clip)
         bench_file = _with_reported(store, bench_file, identities)
-        standards = as_used(store, standards_of(bench_file), today)
-        units = _units(bench, identities, bench_file, clock, recipe, standards)
+        units = _units(bench, identities, bench_file, clock, recipe, as_used(store, standards_of(bench_file), today))
+        check_stop(plan, [RecordingInfo.model_validate(unit.info) for unit in units])
         new = NewCampaign(
             recipe_name=recipe.name,
             recipe=plan.recipe.model_dump(mode="json"),

@@ -15,6 +15,7 @@ from labctl.services.commands.command import Command, CommandExecutor, LocalExec
 from labctl.services.commands.context import CommandContext
 from labctl.services.drafts.answers import with_drafts
 from labctl.services.read_access import open_readonly
+from labctl.services.sufficiency.answers import with_target
 from labctl.store import Store, holder_of, is_url, open_store
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def current_status(database: str | None, campaign: int | None) -> CampaignRespon
     Without a number: the newest campaign. Raises NotFound.
     """
     with open_readonly(database) as store:
-        answer = with_drafts(store, with_resume(store, campaign_status(store, campaign)))
+        answer = with_target(store, with_drafts(store, with_resume(store, campaign_status(store, campaign))))
     if url := service_url(database, answer.id):
         with _remote(url) as executor:
             return executor.fetch(f"/api/campaigns/{answer.id}", CampaignResponse)

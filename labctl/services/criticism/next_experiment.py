@@ -129,12 +129,15 @@ def ranked_experiments(
 
 def _what(recipe: Recipe) -> dict[str, object]:
     """Return what is done in a recipe, whatever it is called."""
-    return recipe.model_dump(exclude={"name", "description", "seed", "fit"})
+    return recipe.model_dump(exclude={"name", "description", "seed", "fit", "stop"})
 
 
 def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
-    """Yield every installed experiment that can be made of a recipe and run on a bench, short ones also longer."""
-    limits = limits_of(bench)
+    """Yield every installed experiment that can be made of a recipe and run on a bench, short ones also longer.
+
+    An experiment looks for an effect, so it does not end where U of a model without that effect is small enough.
+    """
+    limits, recipe = limits_of(bench), recipe.model_copy(update={"stop": None})
     for block in all_blocks():
         try:
             changed = block.changed(recipe)

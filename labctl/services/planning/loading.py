@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,14 @@ LONGEST_PLACE = 80
 
 #: End of the name of a shipped bench that simulates the unit of a paper.
 OF_A_PAPER = "-paper-sim"
+
+
+#: What else may refuse a plan on a bench; it raises PlanRefused.
+Check = Callable[[Plan, BenchFile], None]
+
+
+def no_check(_plan: Plan, _bench: BenchFile) -> None:
+    """Refuse nothing."""
 
 
 def load_recipe(source: str) -> Recipe:
@@ -149,14 +158,16 @@ def _can_do(recipe: Recipe, bench: BenchFile, *, driven: bool) -> bool:
 
 
 def plan_for(
-    recipe_source: str, bench_source: str | None, *, clip: bool, store: Store | None = None
+    recipe_source: str, bench_source: str | None, *, clip: bool, store: Store | None = None, check: Check = no_check
 ) -> tuple[Plan, BenchFile, EarlierTimes | None]:
     """Return the plan of a recipe on a bench, and what its forecast takes from the earlier campaigns of `store`.
 
-    Raises RecipeError, BadBench, PlanRefused.
+    `check` may refuse it. Raises RecipeError, BadBench, PlanRefused.
     """
     recipe = load_recipe(recipe_source)
     check_fit(recipe)
     bench = load_bench(bench_source or bench_for(recipe, driven=True))
     earlier = times_on_bench(store, bench)
-    return make_plan(recipe, limits_of(bench, driven=True, earlier=earlier), clip=clip), bench, earlier
+    plan = make_plan(recipe, limits_of(bench, driven=True, earlier=earlier), clip=clip)
+    check(plan, bench)
+    return plan, bench, earlier

@@ -17,7 +17,7 @@ from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
 from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.earlier_campaigns import learned_texts
-from labctl.services.planning.loading import limits_of, plan_for
+from labctl.services.planning.loading import Check, limits_of, no_check, plan_for
 from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Acquire, CheckHome, Home, Mount, MoveChamber
 from procedures.planning.earlier_times import EarlierTimes
@@ -141,10 +141,13 @@ LocalStart = tuple[datetime, ZoneInfo]
 
 def describe_plan(
     recipe: str, bench: str | None, *, clip: bool, look: Look | None = None, start: LocalStart | None = None,
-    store: Store | None = None,
+    store: Store | None = None, check: Check = no_check,
 ) -> PlanResponse:  # fmt: skip
-    """Say what a campaign would do and how long it takes, by the earlier campaigns of `store`; see `plan_answer`."""
-    plan, bench_file, earlier = plan_for(recipe, bench, clip=clip, store=store)
+    """Say what a campaign would do and how long it takes, by the earlier campaigns of `store`; see `plan_answer`.
+
+    `check` may refuse the plan.
+    """
+    plan, bench_file, earlier = plan_for(recipe, bench, clip=clip, store=store, check=check)
     return plan_answer(plan, bench_file, look, start, earlier)
 
 

@@ -10,7 +10,7 @@ from instruments.positions import Position
 from labctl.answers.plans import PlannedResponse, PlanRequest, RecipeResponse, TimelineColumns
 from labctl.errors import BadInput
 from labctl.services.planning.earlier_campaigns import times_on_bench
-from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
+from labctl.services.planning.loading import Check, bench_for, limits_of, load_bench, load_recipe, no_check
 from labctl.services.planning.plan_answer import LocalStart, Look, plan_answer
 from labctl.services.planning.timeline import step_json, timeline_columns
 from procedures.contracts.errors import PlanRefused
@@ -58,11 +58,17 @@ def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
 
 
 def plan_steps(
-    store: Store, request: PlanRequest, bench: BenchFile | None, look: Look, start: LocalStart | None = None
+    store: Store,
+    request: PlanRequest,
+    bench: BenchFile | None,
+    look: Look,
+    start: LocalStart | None = None,
+    check: Check = no_check,
 ) -> PlannedResponse:
     """Plan a recipe on a bench, or on the simulated one that fits it best; `look` returns what the plan could find.
 
-    With `start` the answer says when a person is needed. The times are those of earlier campaigns where there are any.
+    With `start` the answer says when a person is needed. `check` may refuse the plan. The times are those of
+    earlier campaigns where there are any.
 
     Raises RecipeError, PlanRefused, BadInput.
     """
@@ -70,6 +76,7 @@ def plan_steps(
     on = bench or load_bench(bench_for(recipe, driven=True))
     earlier = times_on_bench(store, on)
     plan = make_plan(recipe, limits_of(on, driven=True, earlier=earlier), clip=request.clip)
+    check(plan, on)
     if request.visibility and plan.expected_s > LONGEST_LOOK_S:
         raise BadInput(
             f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days, but the effects that a plan can "

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from labctl.answers.inspection import DataWarning, RecordingInspection
+from labctl.answers.inspection import DataWarning
 from labctl.errors import BadInput, NotEnoughData, NotFound
 from labctl.recording import Recording, to_points
 from labctl.recording.output_steps import per_reading
@@ -49,7 +49,8 @@ def points_of(
         info = points.info.model_copy(update={"kind": "samples"})
         return to_points(Recording(info, store.recordings.dataset(row.id, dataset)))
 
-    return _with_steps(with_pieces(points, pieces_of), inspect_stored(store, row))
+    inspection = inspect_stored(store, row)
+    return with_steps(with_pieces(points, pieces_of), inspection.dataset, inspection.quantisation_dps)
 
 
 def source_of(store: Store, row: RecordingRow) -> Recording:
@@ -69,13 +70,18 @@ def is_profile(row: RecordingRow) -> bool:
     return row.kind == "samples" and row.info.get("motion") == "profile"
 
 
-def _with_steps(points: Recording, inspection: RecordingInspection) -> Recording:
-    """Return means with a column for what coarse steps of an output leave in them, where they do."""
-    if not inspection.quantisation_dps:
+def with_steps(
+    points: Recording, numbers_of_sets: Sequence[int], quantisation_dps: Mapping[str, Sequence[float]]
+) -> Recording:
+    """Return means with a column for what coarse steps of an output leave in them, where they do.
+
+    `quantisation_dps` is that of each axis, by data set.
+    """
+    if not quantisation_dps:
         return points
     columns = dict(points.columns)
-    numbers, dataset = np.asarray(inspection.dataset), np.asarray(columns["dataset"], dtype=np.int64)
-    for axis, u_dps in inspection.quantisation_dps.items():
+    numbers, dataset = np.asarray(numbers_of_sets), np.asarray(columns["dataset"], dtype=np.int64)
+    for axis, u_dps in quantisation_dps.items():
         unit = next((unit for name, unit in points.info.output.items() if name == axis), None)
         scale = abs(unit.scale) if unit else 1.0
         columns[f"gyro_{axis}{QUANTISATION}"] = per_reading(dataset, numbers, scale * np.asarray(u_dps))

@@ -9,6 +9,7 @@ from labctl.answers.campaigns import CampaignRequest
 from labctl.answers.schedule import ScheduledResponse, StartEventResponse
 from labctl.errors import BadInput
 from labctl.services.benches.start_confirmation import confirmation_text
+from labctl.services.benches.stop_rules import check_stop_on
 from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.earlier_campaigns import times_on_bench
 from labctl.services.planning.loading import limits_of, load_recipe
@@ -52,6 +53,7 @@ def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: dat
     with_hidden_effects(bench, request.hide)  # what cannot be hidden is refused now
     earlier = times_on_bench(store, bench)
     plan = make_plan(recipe, limits_of(bench, driven=True, earlier=earlier), clip=request.clip)
+    check_stop_on(plan, bench)
     confirmed = confirmation_text(bench, request)
     new = NewStart(
         bench_name=bench.name, recipe_name=recipe.name, recipe=request.recipe, clip=request.clip,

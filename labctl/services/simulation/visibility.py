@@ -8,6 +8,7 @@ from instruments.bench_config import BenchFile
 from labctl.answers.plans import PlannedResponse, PlanRequest, Visibility
 from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.services.benches.stop_rules import check_stop_on
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.planning.plan_answer import LocalStart
 from labctl.services.planning.planner import plan_steps
@@ -41,4 +42,4 @@ def planned(
         compute(UNNAMED)
         return visibility(plan, on)
 
-    return plan_steps(store, request, bench, look, start)
+    return plan_steps(store, request, bench, look, start, check_stop_on)

@@ -255,8 +255,8 @@ class Campaigns:
         with self._database.reading() as connection:
             return records_of(DoneStepRow, connection.execute(query))
 
-    def events(self, campaign: int, after: int = 0, limit: int = 1000) -> list[EventRow]:
-        """Return events in order, those with a number above `after`."""
+    def events(self, campaign: int, after: int = 0, limit: int = 1000, *, kinds: Sequence[str] = ()) -> list[EventRow]:
+        """Return events in order, those with a number above `after`; with `kinds` those of these kinds alone."""
         e = tables.events.c
         query = (
             sa.select(
@@ -272,7 +272,7 @@ class Campaigns:
                 e.limit_value.label("limit"),
                 e.unit,
             )
-            .where(e.campaign_id == campaign, e.id > after)
+            .where(e.campaign_id == campaign, e.id > after, *([e.kind.in_(kinds)] if kinds else []))
             .order_by(e.id)
             .limit(limit)
         )

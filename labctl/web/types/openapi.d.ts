@@ -1024,6 +1024,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/campaigns/{campaign}/uncertainty": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Its U
+         * @description U of the campaign's fit as it fell with each data set, against the target of its recipe ([stop]).
+         */
+        get: operations["uncertainty_api_campaigns__campaign__uncertainty_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/campaigns/{campaign}/abort": {
         parameters: {
             query?: never;
@@ -4364,6 +4384,8 @@ export interface components {
              * @description Draft calibrations made at the end of the campaign, one per recording; empty: the recipe has no [fit], the campaign is not done, or the response is a list.
              */
             drafts: components["schemas"]["DraftResponse"][];
+            /** @description The U that ends the campaign before its plan does, and U so far; null: the recipe has no [stop], or the response is a list. */
+            target: components["schemas"]["TargetResponse"] | null;
             /**
              * Drivers
              * @description For each table, chamber and gyro: the driver that was used when the campaign began.
@@ -14073,6 +14095,74 @@ export interface components {
             name: string;
         };
         /**
+         * TargetResponse
+         * @description The U at which a campaign ends before its plan does ([stop] of its recipe), and how far it is.
+         */
+        TargetResponse: {
+            /**
+             * U Dps
+             * @description The U that ends the campaign, deg/s.
+             */
+            u_dps: number;
+            /**
+             * Model
+             * @description The model that is fitted; null: the effects alone.
+             */
+            model: string | null;
+            /**
+             * Effects
+             * @description Effects beside the model, or without one.
+             */
+            effects: string[];
+            /**
+             * Rates Dps
+             * @description Lowest and highest rate of the range, deg/s.
+             */
+            rates_dps: number[];
+            /**
+             * Temperature C
+             * @description Lowest and highest set point of the chamber in the range, deg C.
+             */
+            temperature_c: number[];
+            /**
+             * Repeatability
+             * @description Whether U counts the difference of a later power-on.
+             */
+            repeatability: boolean;
+            /**
+             * Units
+             * @description Each unit's newest evaluation; a unit that was not evaluated yet is left out.
+             */
+            units: components["schemas"]["TargetUnitResponse"][];
+        };
+        /**
+         * TargetUnitResponse
+         * @description U of one unit by its newest evaluation.
+         */
+        TargetUnitResponse: {
+            /**
+             * Gyro
+             * @description Name of the unit on the bench.
+             */
+            gyro: string;
+            /**
+             * Known
+             * @description What `u_dps` is: U of the fit over the whole range; a lower bound of it, by the white noise of the readings and the reference standards alone, which is above the target or not over the whole range yet; or unknown.
+             * @enum {string}
+             */
+            known: "of the fit" | "at least" | "unknown";
+            /**
+             * U Dps
+             * @description Largest U (95.45 %) of a corrected rate about the axis of an output over the range, deg/s; null: unknown.
+             */
+            u_dps: number | null;
+            /**
+             * Text
+             * @description The same in words, with the place, or why it is unknown.
+             */
+            text: string;
+        };
+        /**
          * TemperatureBasisJson
          * @description How temperature enters a model.
          */
@@ -14578,6 +14668,60 @@ export interface components {
              * @default
              */
             refused: string;
+        };
+        /**
+         * UncertaintyCourse
+         * @description U of one unit while the campaign ran, as lists of equal length.
+         */
+        UncertaintyCourse: {
+            /**
+             * Datasets
+             * @description Data sets to be fitted that were complete when U was known.
+             */
+            datasets: number[];
+            /**
+             * T S
+             * @description Campaign time at which U was known, s.
+             */
+            t_s: number[];
+            /**
+             * U Dps
+             * @description U, or its lower bound, deg/s; null: unknown.
+             */
+            u_dps: (number | null)[];
+            /**
+             * Known
+             * @description What each `u_dps` is.
+             */
+            known: ("of the fit" | "at least" | "unknown")[];
+        };
+        /**
+         * UncertaintyCourseResponse
+         * @description U of a campaign's fit as it fell while the campaign ran; without units where its recipe has no [stop].
+         */
+        UncertaintyCourseResponse: {
+            /**
+             * Campaign
+             * @description Number of the campaign.
+             */
+            campaign: number;
+            /**
+             * Target U Dps
+             * @description The U that ends the campaign, deg/s; null: its recipe has none.
+             */
+            target_u_dps: number | null;
+            /**
+             * Planned
+             * @description Data sets of the plan that are fitted.
+             */
+            planned: number;
+            /**
+             * Units
+             * @description By name of the unit on the bench.
+             */
+            units: {
+                [key: string]: components["schemas"]["UncertaintyCourse"];
+            };
         };
         /**
          * UncertaintyGrid
@@ -17038,6 +17182,37 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CourseResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    uncertainty_api_campaigns__campaign__uncertainty_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                campaign: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["UncertaintyCourseResponse"];
                 };
             };
             /** @description Validation Error */

@@ -12,6 +12,7 @@ import { eventList } from "../bench/event_list.js";
 import { followCampaign } from "../bench/campaign_stream.js";
 import { remainingSeconds } from "../bench/campaign_history.js";
 import { courseCard } from "../campaigns/course.js";
+import { uncertaintyCard } from "../campaigns/uncertainty.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { draftsCard } from "../campaigns/drafts.js";
 import { adviceNotice } from "../campaigns/advice.js";
@@ -46,7 +47,8 @@ export async function page({ params, query, signal }) {
   const level = LEVELS.find(([each]) => each === query.level)?.[0] ?? "info";
   const events = eventList(MAX_EVENTS, level, now);
   const [about, reason, connection] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
-  const [drafts, recordings] = [h("div", {}), h("div", {})];
+  const [drafts, recordings, target] = [h("div", {}), h("div", {}), h("div", {})];
+  let shownU = "";
   /** @type {number | null} */
   let scrubbed_s = null;
   const picture = planChart(
@@ -73,6 +75,7 @@ export async function page({ params, query, signal }) {
     setChildren(reason, reasonNotices(now));
     setChildren(drafts, draftsCard(now.drafts ?? []));
     setChildren(recordings, recordingsCard(now, setStates(plan).includes("done")));
+    showTarget();
     if (ended) showAgain();
     else if (Date.now() - asked > PLAN_REFRESH_MS) again();
   }
@@ -80,6 +83,16 @@ export async function page({ params, query, signal }) {
     asked = Date.now();
     plan = await get("/api/campaigns/{campaign}/plan", { path, signal }).catch(() => plan);
     picture.redraw();
+  }
+  /** U against the target, anew after each evaluation. */
+  function showTarget() {
+    const said = JSON.stringify(now.target);
+    if (!now.target || said === shownU) return;
+    shownU = said;
+    const units = now.target.units;
+    get("/api/campaigns/{campaign}/uncertainty", { path, signal })
+      .then((answer) => setChildren(target, uncertaintyCard(answer, units)))
+      .catch((error) => isAbort(error) || setChildren(target, notice("bad", messageOf(error))));
   }
   show(now);
   followCampaign(
@@ -133,6 +146,7 @@ export async function page({ params, query, signal }) {
     reason,
     about,
     drafts,
+    target,
     cardWithHeader("Plan", h("span", { class: "muted small" }, "Click a data set to open its readings."), picture),
     course,
     recordings,

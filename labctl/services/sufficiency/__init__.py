@@ -1,0 +1,1 @@
+"""Whether a campaign has measured enough: U of its fit while it runs."""
