@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from labctl.services.planning.plan_answer import describe_plan
-from tests.helpers.browser import NARROW, Faults, Service
+from tests.helpers.browser import NARROW, Faults, Service, figure
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -205,3 +205,28 @@ def test_a_start_is_put_on_the_schedule_and_taken_out(service: Service, visit: C
     entry.get_by_role("button", name="Cancel").click()
     expect(page.locator(".toasts")).to_contain_text("Removed from the schedule")
     assert service.get("/api/schedule") == []
+
+
+def test_a_designed_recipe_is_the_services_and_its_plan_is_shown(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/campaigns/new?recipe=short")
+    page.get_by_text("Design a campaign for an uncertainty").click()
+    card = page.locator("details", has_text="Design a campaign for an uncertainty")
+    card.get_by_label("Ranges of").select_option("short")
+    card.get_by_label("U of a corrected rate").fill("0.02")
+    card.get_by_role("button", name="Design", exact=True).click()
+    expected = service.post("/api/designs", {"like": "short", "u_dps": 0.02})
+    expect(card.get_by_role("button", name="Take this recipe")).to_be_visible()
+    for sentence in expected["decisions"]:
+        expect(card).to_contain_text(sentence)
+    rows = [expected["chosen"], *expected["others"], *filter(None, [expected["reference"]])]
+    drawn = figure(page, "Hours and uncertainty of the recipes")["data"][0]
+    assert drawn["x"] == pytest.approx([row["hours"] for row in rows])
+    assert drawn["y"] == pytest.approx([row["u_worst_dps"] for row in rows])
+    expect(card.locator("tbody tr")).to_have_count(len(rows))
+    card.get_by_role("button", name="Take this recipe").click()
+    expect(page.get_by_label("Recipe as TOML")).to_have_value(expected["recipe_toml"])
+    plan = service.post("/api/plans", {"recipe": expected["recipe_toml"]})
+    expect(page.get_by_role("region", name="Steps")).to_contain_text(str(plan["datasets"]))
+    assert plan["expected_s"] == pytest.approx(3600 * expected["chosen"]["hours"])

@@ -5,12 +5,13 @@ import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, duration, percent } from "../core/format.js";
 import { busyIndicator, card, chip, factList, pageHeader, notice } from "../core/components.js";
-import { updateQuery } from "../core/router.js";
+import { navigate, updateQuery } from "../core/router.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
 import { startForm } from "../campaigns/start_form.js";
 import { hiddenEffectForm } from "../campaigns/hidden_effects.js";
 import { mountingWorth } from "../campaigns/mounting_worth.js";
+import { designerCard } from "../campaigns/designer.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { recipeChoice } from "../campaigns/recipe_choice.js";
 import { visibilityReport } from "../campaigns/visibility.js";
@@ -131,6 +132,7 @@ export async function page({ query, signal }) {
           plan();
         }),
         h("div", { class: "card" }, clipping),
+        designerCard(all, (text) => navigate(`/campaigns/new?toml=${encodeURIComponent(text)}`), signal),
       ),
       h(
         "div",
