@@ -132,11 +132,11 @@ export async function page({ query, signal }) {
           plan();
         }),
         h("div", { class: "card" }, clipping),
-        designerCard(all, (text) => navigate(`/campaigns/new?toml=${encodeURIComponent(text)}`), signal),
       ),
       h(
         "div",
         { class: "page" },
+        designerCard(all, (text) => navigate(`/campaigns/new?toml=${encodeURIComponent(text)}`), signal),
         planned,
         card("Effects that the plan can detect", found),
         hider
