@@ -131,8 +131,8 @@ def _stated(kind: Effect, texts: Sequence[str]) -> dict[str, float]:
     for text in texts:
         name, _, value_text = (part.strip() for part in text.partition("="))
         if name not in parameters:
-            choices = ", ".join(parameters) or "it has none"
-            raise BadInput(f"effect {kind.id!r} has no parameter {name!r}; its parameters: {choices}")
+            advice = f"give one of {', '.join(parameters)}" if parameters else "write it without '@'"
+            raise BadInput(f"effect {kind.id!r} has no parameter {name!r}; {advice}")
         parameter = parameters[name]
         try:
             value = float(value_text)

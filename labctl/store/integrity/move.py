@@ -217,13 +217,16 @@ class _Move:
             try:
                 connection.execute(sa.insert(raw).values(values), [dict(row) for row in rows])
             except exc.DataError as error:
-                raise StoreError(f"table {table.name}: the target does not take a value ({error.orig})") from error
+                raise StoreError(
+                    f"table {table.name}: the target does not take a value ({error.orig}); correct it in the source"
+                ) from error
 
 
-Key = tuple[Any, ...] | None
+#: Values of the primary key of a row; None: before the first, or after the last.
+Key = tuple[object, ...] | None
 
 
-def _key(row: Mapping[str, Any], keys: Sequence[sa.Column[Any]]) -> tuple[Any, ...]:
+def _key(row: Mapping[str, Any], keys: Sequence[sa.Column[Any]]) -> tuple[object, ...]:
     return tuple(row[column.name] for column in keys)
 
 
@@ -239,7 +242,7 @@ def _stored_type(column: sa.Column[Any]) -> sa.types.TypeEngine[Any]:
 
 
 def _bound(column: sa.Column[Any], *, is_server: bool) -> sa.ColumnElement[Any]:
-    """Return the parameter of a column; a document is text that a server is told to take as a document."""
+    """Return the parameter of a column; a document is text, which a server casts."""
     parameter = sa.bindparam(column.name, type_=_stored_type(column))
     return sa.cast(parameter, sa.JSON) if _is_json(column) and is_server else parameter
 
@@ -275,5 +278,5 @@ def _comparable(value: Any) -> Any:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-def _literals(keys: Sequence[sa.Column[Any]], values: tuple[Any, ...]) -> list[sa.ColumnElement[Any]]:
+def _literals(keys: Sequence[sa.Column[Any]], values: tuple[object, ...]) -> list[sa.ColumnElement[Any]]:
     return [sa.literal(value, _stored_type(column)) for column, value in zip(keys, values, strict=True)]

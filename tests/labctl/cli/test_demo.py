@@ -1,4 +1,4 @@
-"""The story of the demo: an effect that a schedule cannot name, experiments that can, and an error at the floor."""
+"""What the demo shows: an effect that a schedule cannot name, experiments that can, and an error at the floor."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ function form(all, taken, signal) {
   async function design() {
     setChildren(
       answer,
-      busyIndicator("Planning about a hundred recipes on the bench; this takes up to half a minute."),
+      busyIndicator("Planning about a hundred recipes on the bench; half a minute at most."),
     );
     try {
       const found = await post("/api/designs", { body: designBody(asked), signal });
