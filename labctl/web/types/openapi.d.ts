@@ -13756,7 +13756,7 @@ export interface components {
         };
         /**
          * TargetResponse
-         * @description The U at which a campaign ends before its plan does ([stop] of its recipe), and how far it is.
+         * @description The U at which a campaign ends before its plan does ([stop] of its recipe), and U so far.
          */
         TargetResponse: {
             /**
