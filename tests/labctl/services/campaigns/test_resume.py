@@ -31,7 +31,6 @@ from procedures.contracts.control import Control
 from studies import crash_recovery, faults
 from studies.crashable_process import all_readings, complete_data_sets
 
-
 #: Of the 240 kills of `python -m studies crash_recovery` (drawn in equal parts of a campaign, deaths of the process and
 #: power cuts in turn); and so many campaigns of `python -m studies faults` have every kind of fault, on all benches.
 KILLS, FAULTY = 4, 12
