@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
-import numpy as np
-
 from labctl.fitting.criticism import Criticism
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.recording import Recording
@@ -24,7 +22,7 @@ def digest_of(recording: Recording, model: ErrorModel) -> str:
     for columns in (recording.columns, recording.environment or {}):
         for name, values in columns.items():
             digest.update(f"{name} {values.dtype} {values.shape}".encode())
-            digest.update(repr(values.tolist()).encode() if values.dtype.hasobject else np.ascontiguousarray(values))
+            digest.update(repr(values.tolist()).encode() if values.dtype.hasobject else values.tobytes())
     return digest.hexdigest()
 
 
