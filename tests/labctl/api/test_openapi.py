@@ -39,7 +39,7 @@ THERE = {"serial": UNIT, "version": 1, "recording": 1}
 #: Seconds of work each: of these only few reach a version that is there.
 COSTLY = ("/criticism", "/improve", "/preview", "/residuals", "/pictures", "/assessment", "/certify")
 #: Of each operation; drawn from the same seed every time.
-EXAMPLES_EACH, SEED = 6, 1
+EXAMPLES_EACH, SEED = 10, 1
 
 
 @pytest.fixture(scope="module")
