@@ -128,7 +128,8 @@ WAITING = ("tests/system/", "tests/web/", "tests/test_docs_")
 #: Tests that compute for longest, 10 to 60 s of processor time a file: early, so that none is left alone at the end.
 LONG = (
     "tests/labctl/corpus/", "tests/labctl/fitting/criticism/", "tests/labctl/services/campaigns/test_resume",
-    "tests/labctl/services/criticism/test_next_experiment", "tests/blind/",
+    "tests/labctl/services/criticism/test_next_experiment", "tests/blind/", "tests/labctl/api/test_openapi",
+    "tests/labctl/plots/test_truth", "tests/labctl/recording/test_verification", "tests/labctl/cli/test_diagnose",
 )  # fmt: skip
 #: So many files of other tests come between two that wait: these then wait while the other workers compute. With them
 #: all at the begin, all workers waited at once; the last one comes well before the end.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.points import dataset_starts
-from labctl.recording.quantisation import CODE_READINGS, QUANTISATION, codes_of, quantisation_std, steps_columns
+from labctl.recording.quantisation import CODE_READINGS, QUANTISATION, figures_of, quantisation_std, steps_columns
 from labctl.recording.recording import Recording
 
 #: Readings of one piece of a long data set.
@@ -56,8 +56,7 @@ def output_steps(recording: Recording) -> dict[str, OutputStep]:
     starts = dataset_starts(dataset[valid])
     for axis in recording.info.axes:
         values = np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[valid]
-        figures = np.array([codes_of(part) for part in _pieces(values, starts)], dtype=np.float64).reshape(-1, 4)
-        step, deviation = quantisation_std(*figures.T)
+        step, deviation = quantisation_std(*figures_of(_pieces(values, starts)).T)
         if step is not None:
             output = recording.info.output.get(axis)
             scale = abs(output.scale) if output else 1.0

@@ -12,7 +12,7 @@ from labctl.recording.motions.turn_means import turned_points
 from labctl.recording.motions.windows import kept_windows, usual_step_s, white_std_of_profile, window_labels
 from labctl.recording.quantisation import steps_columns
 from labctl.recording.recording import Columns, Recording
-from labctl.recording.spread import MIN_FOR_SPECTRUM, white_std
+from labctl.recording.spread import MIN_FOR_SPECTRUM, white_stds
 
 if TYPE_CHECKING:
     from labctl.answers.recording_head import Motion
@@ -159,7 +159,7 @@ def to_points(recording: Recording) -> Recording:
                 sets = np.split(values.astype(np.float64), starts[1:])
                 points |= steps_columns(name, sets)
                 if counts.min() >= MIN_FOR_SPECTRUM:
-                    points[f"{name}_white_std"] = np.array([white_std(readings) for readings in sets])
+                    points[f"{name}_white_std"] = white_stds(sets)
     points["n"] = counts.astype(np.int64)
     if recording.info.motion == "turns":
         points |= turned_points(rows, points, starts, counts)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.spread import MIN_FOR_SPECTRUM, white_std
+from labctl.recording.spread import MIN_FOR_SPECTRUM, of_one_length, white_std
 
 #: Suffix of the column with the standard deviation of a mean by the quantisation of an output.
 QUANTISATION = "_quantisation_std"
@@ -49,6 +49,18 @@ def codes_of(values: NDArray[np.float64]) -> Codes:
     return Codes(float(apart.min()) if len(apart) else 0.0, float(codes[0]), std, white)
 
 
+def figures_of(sets: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return `codes_of` of each data set, (m, 4): of those of a fine converter, nearly all, many together."""
+    figures = np.empty((len(sets), 4))
+    for numbers, rows in of_one_length(sets):
+        std = rows.std(axis=1) if rows.shape[1] else np.zeros(len(rows))
+        few = rows[:, : MAX_CODES + 1]
+        fine = np.isfinite(std) & (few.shape[1] > MAX_CODES) & np.all(np.diff(np.sort(few, axis=1)) != 0, axis=1)
+        for number, readings, spread, is_fine in zip(numbers, rows, std, fine, strict=True):
+            figures[number] = (np.nan, np.nan, spread, spread) if is_fine else codes_of(readings)
+    return figures
+
+
 def quantisation_std(
     steps: NDArray[np.float64], codes: NDArray[np.float64], std: NDArray[np.float64], white: NDArray[np.float64]
 ) -> tuple[float | None, NDArray[np.float64]]:
@@ -71,8 +83,7 @@ def quantisation_std(
 
 def steps_columns(name: str, sets: Sequence[NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
     """Return the column of the standard deviation of the means by quantisation; none for a fine converter."""
-    figures = np.array([codes_of(readings) for readings in sets], dtype=np.float64).reshape(-1, 4)
-    step, deviation = quantisation_std(*figures.T)
+    step, deviation = quantisation_std(*figures_of(sets).T)
     return {} if step is None else {f"{name}{QUANTISATION}": deviation}
 
 

@@ -79,10 +79,11 @@ def test_a_campaign_is_followed_through_all_processes_and_no_key_is_in_it(
     assert workers == ["worker.started", "worker.ended"]
 
 
-@pytest.mark.parametrize("shell", ["exec 2>&-", "exec 2>/dev/full"])
-def test_a_service_whose_log_cannot_be_written_runs_its_campaign(tmp_path: Path, shell: str) -> None:
+@pytest.mark.parametrize(("shell", "log"), [("exec 2>&-", None), ("", Path("/dev/full"))])
+def test_a_service_whose_log_cannot_be_written_runs_its_campaign(tmp_path: Path, shell: str, log: Path | None) -> None:
+    """Only a shell starts a process with its standard error closed; one that is full is given to any process."""
     database = tmp_path / "lab.sqlite"
-    with running(database, "--speed", "0", shell=shell) as service:
+    with running(database, "--speed", "0", shell=shell, log=log) as service:
         campaign = done(service, **CAMPAIGN)
         assert service.http.get("/metrics").status_code == 200
         end(service)

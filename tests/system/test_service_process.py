@@ -37,13 +37,10 @@ def service(tmp_path: Path) -> Iterator[ServiceProcess]:
 def lasting_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceProcess]:
     """A service for the tests that neither end it nor run a campaign, and leave nothing that another asks for.
 
-    Its processes are those of a user: they load their modules.
+    Its processes are those of a user: they load their modules. Answers are kept for the run (`cache_of_fixtures`).
     """
-    folder = tmp_path_factory.mktemp("lasting")
-    with pytest.MonkeyPatch.context() as environment:
-        environment.setenv("XDG_CACHE_HOME", str(folder))
-        with running(folder / "lab.sqlite", loads=True) as made:
-            yield made
+    with running(tmp_path_factory.mktemp("lasting") / "lab.sqlite", loads=True) as made:
+        yield made
 
 
 def test_commands_ask_the_service_that_holds_the_database(lasting_service: ServiceProcess) -> None:

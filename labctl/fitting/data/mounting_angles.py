@@ -19,7 +19,7 @@ between mountings (`shifts`) have the angles.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 
@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.data.joined import recordings_in
-from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.arrays import Array, block_diagonal
 from labctl.recording import Standard
 from labctl.recording.positions import Position
 
@@ -119,21 +119,11 @@ def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> Ang
         placed = [f"{position}{PLACED}" for position in scheme.positions] if placed_rad else []
         regressors = np.column_stack([angle_regressor(channels, name) for name in (*scheme.names, *placed)])
         names += [*scheme.names, *placed]
-        blocks.append(_block_diagonal([scheme.separated, np.eye(len(placed)) * placed_rad / PLACED_SIZE]))
+        blocks.append(block_diagonal([scheme.separated, np.eye(len(placed)) * placed_rad / PLACED_SIZE]))
         values.append(regressors @ blocks[-1])
         sizes += [np.full(scheme.separated.shape[1], WIDE_RAD), np.full(len(placed), PLACED_SIZE)]
-    combined = _block_diagonal(blocks)
+    combined = block_diagonal(blocks)
     return AngleColumns(tuple(names), combined, np.concatenate(values, axis=1), np.concatenate(sizes))
-
-
-def _block_diagonal(blocks: Sequence[Array]) -> Array:
-    """Return a matrix with these, (r, c) each, along its diagonal."""
-    stacked = np.zeros((sum(len(block) for block in blocks), sum(block.shape[1] for block in blocks)))
-    row = column = 0
-    for block in blocks:
-        stacked[row : row + len(block), column : column + block.shape[1]] = block
-        row, column = row + len(block), column + block.shape[1]
-    return stacked
 
 
 def placed_rad(standards: Iterable[Standard]) -> float:

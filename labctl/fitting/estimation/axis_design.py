@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.channels import Channels
@@ -18,7 +17,7 @@ from labctl.fitting.data.shifts import Shift, shifts_of
 from labctl.fitting.effects import Column
 from labctl.fitting.estimation.held import HeldColumns, HeldPart
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.arrays import Array, block_diagonal
 
 #: A column is a combination of others when less than this share of its length is left beside them.
 DEPENDENT_SHARE = 1e-9
@@ -78,13 +77,14 @@ def axis_design(
         spread.append(np.ones((nodes, 1)) if owner in steady else np.eye(nodes))
         held.add_none()
         names.append((owner, column.name, column.unit))
+    held_part = held.part
     return AxisDesign(
         np.concatenate(columns, axis=1),
-        block_diag(*spread) if spread else np.zeros((0, 0)),
+        block_diagonal(spread),
         names,
         turning_columns(data.info, data.channels, axis),
-        offset + held.part.error_dps,
-        held.part,
+        offset + held_part.error_dps,
+        held_part,
         tuple(laws),
         tuple(shifts_of(data.channels, axis)),
         data.angle_columns(axis),

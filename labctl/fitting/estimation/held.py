@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Argument, Channels
@@ -20,7 +19,7 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.held import Held, HeldCoefficient
 from labctl.fitting.models.presets import Preset, holding
 from labctl.fitting.models.temperature import LagrangeTable
-from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.arrays import Array, block_diagonal
 from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.fitting.numeric.least_squares import Considered, Solution, rank_of
 from labctl.recording import OutputUnit, RecordingInfo
@@ -76,7 +75,7 @@ class HeldColumns:
             np.concatenate(self._columns, axis=1),
             np.array([value for one in self._held for value in one.value]),
             np.array([u for one in self._held for u in one.u]),
-            block_diag(*self._spread) if self._spread else np.zeros((0, 0)),
+            block_diagonal(self._spread),
         )
 
 

@@ -22,6 +22,7 @@ from labctl.services.admin.api_keys import identify
 from labctl.store import migrate, open_store
 from tests.helpers.corpus import ENTRIES, SAME, SERIAL, Entry, migrated, wrongly_named
 from tests.helpers.lab import Lab
+from tests.helpers.shared_criticisms import criticised_once
 
 #: Each step once, from the oldest database that has it ahead, and of each database its first and last step.
 AHEAD = {entry.name: [step for step in sorted(migrate.KNOWN) if step > entry.name] for entry in ENTRIES}
@@ -54,6 +55,13 @@ def labs(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Entry], Lab]:
         return opened[entry.name]
 
     return lab_of
+
+
+@pytest.fixture(scope="module")
+def once() -> Iterator[None]:
+    """Work out what is the same in several entries once: their recordings are read and answered for each of them."""
+    with criticised_once():
+        yield
 
 
 @contextmanager
@@ -185,6 +193,7 @@ def judged(lab: Lab, number: str) -> dict[str, Any]:
     return {**kept, **error, "first_suspect": suspects[0]["effect"] if suspects else None}
 
 
+@pytest.mark.usefixtures("once")
 @pytest.mark.parametrize("number", ["1", "2"])
 @of_each_entry
 def test_its_calibrations_are_judged_as_they_were(labs: Callable[[Entry], Lab], entry: Entry, number: str) -> None:

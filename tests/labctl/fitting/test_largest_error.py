@@ -40,7 +40,7 @@ def test_widening_for_one_output_is_the_normal_quantile() -> None:
 
 def test_over_all_directions_it_is_that_of_the_length_of_a_vector() -> None:
     """|E w| over the sphere is largest along E, and its length is chi distributed with three degrees of freedom."""
-    directions = np.random.default_rng(1).normal(size=(2000, 3))
+    directions = np.random.default_rng(1).normal(size=(800, 3))
     sphere = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     every = found(0.0, np.full((3, 3), 1e-3), outputs="x", places=np.concatenate([sphere, 0.5 * sphere]))
     assert widening(every) == pytest.approx(chi(3).ppf(LEVEL) / 2.0, rel=0.02)

@@ -55,7 +55,7 @@ def test_the_constant_is_found_exactly(k: float) -> None:
 
 def test_its_uncertainty_covers_the_truth() -> None:
     score = []
-    for seed in range(40):
+    for seed in range(20):
         found = k_of(fit(open_loop(0.05, 2e-3, seed), effects=EFFECTS))
         assert found["identified"]
         score.append((found["value"] - 0.05) / found["u"])
@@ -64,7 +64,7 @@ def test_its_uncertainty_covers_the_truth() -> None:
 
 
 def test_where_the_data_do_not_show_it_that_is_said_with_a_bound() -> None:
-    for seed in range(10):
+    for seed in range(4):
         found = k_of(fit(open_loop(0.0, 2e-3, seed), effects=EFFECTS))
         assert not found["identified"]
         assert 0 < found["at_most"] < 0.01

@@ -7,7 +7,8 @@ import pytest
 
 from labctl.recording import to_points
 from labctl.recording.output_steps import with_quantisation
-from labctl.recording.quantisation import codes_of, quantisation_std, quantisation_variance
+from labctl.recording.quantisation import codes_of, figures_of, quantisation_std, quantisation_variance
+from labctl.recording.spread import white_std, white_stds
 from tests.helpers.simulated_recordings import single_axis
 from tests.helpers.spoilt import quantised, spoilt
 
@@ -26,6 +27,18 @@ def test_the_variance_is_that_of_simulated_means(noise: float, wave: float) -> N
     assert step == 1.0
     real, said = (np.sqrt(np.mean(np.square(values))) for values in (errors, deviation))
     assert 0.8 * real < said < 3.0 * real  # of one data set the noise is known roughly: the figure is on the safe side
+
+
+def test_data_sets_computed_together_have_the_figures_of_each_alone() -> None:
+    """Of several lengths, so that some are computed together: fine, coarse, too short, constant, with a gap, empty."""
+    rng = np.random.default_rng(5)
+    sets = [rng.normal(size=n) for n in (40, 300, 40, 32, 300, 40, 5)]
+    sets += [np.round(rng.normal(size=300) * 3), np.full(300, 2.0), np.array([])]
+    sets.append(np.where(np.arange(300) == 7, np.nan, rng.normal(size=300)))
+    np.testing.assert_array_equal(figures_of(sets), [codes_of(each) for each in sets])
+    spectral = [each for each in sets if len(each) >= 32]
+    np.testing.assert_array_equal(white_stds(spectral), [white_std(each) for each in spectral])
+    assert len(set(white_stds(spectral[:6]))) == 6
 
 
 def test_without_noise_it_is_a_twelfth_of_the_step_squared() -> None:

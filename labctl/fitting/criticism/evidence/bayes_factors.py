@@ -42,7 +42,8 @@ class AxisEvidence:
 
 def means_by_noise(design: Design, y: NDArray[np.float64], white_var: Array, noises: list[Noise]) -> MeansByNoise:
     """Return the inner products of the means at every noise; `white_var` (m,) is their white variance, (deg/s)^2."""
-    return MeansByNoise.of(design, _with_data(design, y)[0], slices_of(design.options), white_var, noises)
+    means = np.concatenate([*(option.rows[0] for option in design.options), y[0][:, None]], axis=1)
+    return MeansByNoise.of(design, means, slices_of(design.options), white_var, noises)
 
 
 def evidence_of(

@@ -21,7 +21,9 @@ from labctl.fitting.numeric.arrays import Array
 def stack(rows: NDArray[np.float64], scale: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the coordinates besides the means, (rows, k), over their scale (R, m): each present one is a row."""
     present_after = present[1:]
-    return rows[1:][present_after] / scale[1:][present_after][:, None]
+    stacked = rows[1:][present_after]
+    stacked /= scale[1:][present_after][:, None]  # in place: the arrays are large, and a second one costs as much again
+    return stacked
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,9 @@ class MeansByNoise:
             base, columns = modes.amplitudes(design.base[0]), modes.amplitudes(means)
             weights, log_dets = zip(*(modes.weights(noise.size_dps) for noise in of_tau), strict=True)
             shares = np.array(weights) ** 2
-            pairs = shares @ (columns[:, options.left] * columns[:, options.right])
+            products_of_pairs = columns.take(options.left, axis=1)
+            products_of_pairs *= columns.take(options.right, axis=1)
+            pairs = shares @ products_of_pairs
             with_data = shares @ (columns * columns[:, -1:])
             for k, noise in enumerate(of_tau):
                 weighted = shares[k][:, None] * base

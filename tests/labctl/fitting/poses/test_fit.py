@@ -40,7 +40,7 @@ def agrees(result: FitResult, truth: Truth) -> bool:
 def test_coefficients_cover_the_truth_and_held_out_moves_their_error() -> None:
     scores: dict[str, list[float]] = defaultdict(list)
     within, figures = [], []
-    for seed in range(24):
+    for seed in range(12):
         recording, truth = simulate_session(seed, KNOWN)
         result = fit(recording, "poses")
         score(result, truth, scores, latitude_known=True)
@@ -49,7 +49,7 @@ def test_coefficients_cover_the_truth_and_held_out_moves_their_error() -> None:
         figures.append((result.error.rms_dps, result.error.heldout_rms_dps, result.error.noise_floor_dps))
     for kind in ("scale factor", "misalignment", "bias"):
         z = np.array(scores[kind])
-        assert np.mean(np.abs(z) <= 2) > 0.85, kind  # of 72 at least: four standard deviations below 95 %
+        assert np.mean(np.abs(z) <= 2) > 0.8, kind  # of 36 at least: four standard deviations below 95 %
         assert 0.7 < np.sqrt(np.mean(z**2)) < 1.3, kind
     assert np.mean(within) == pytest.approx(0.955, abs=0.04)
     after, held_out, floor = np.mean(figures, axis=0)

@@ -31,6 +31,10 @@ from procedures.contracts.control import Control
 from studies import crash_recovery, faults
 from studies.crashable_process import all_readings, complete_data_sets
 
+#: Of the 240 kills of `python -m studies crash_recovery` (drawn in equal parts of a campaign, deaths of the process and
+#: power cuts in turn); and so many campaigns of `python -m studies faults` have every kind of fault, on all benches.
+KILLS, FAULTY = 4, 12
+
 
 @pytest.fixture(scope="module")
 def whole() -> tuple[int, Any]:
@@ -40,15 +44,15 @@ def whole() -> tuple[int, Any]:
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", range(KILLS))
 def test_a_kill_at_any_instant_loses_nothing_and_repeats_nothing(whole: tuple[int, Any], number: int) -> None:
     instants, expected = whole
-    kill = crash_recovery.drawn(instants, 8, seed=5)[number]
+    kill = crash_recovery.drawn(instants, KILLS, seed=5)[number]
     verdict = crash_recovery.one((kill, expected))
     assert verdict.well, f"{kill}: {verdict}"
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", range(FAULTY))
 def test_a_faulty_bench_ends_the_campaign_or_not_but_never_hangs_and_never_lies(seed: int) -> None:
     end = faults.one(seed)
     assert end.well, end
