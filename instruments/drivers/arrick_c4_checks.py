@@ -139,10 +139,11 @@ def only_once(check: HomeCheck, once: HomeCheck) -> HomeCheck:
     if check.is_missing:
         return check
     where = "in a turn from which the homing is learned" if once.learning else "before the first check"
-    late_s = once.step_s * once.missed_steps * (2 if once.learning else 1)
+    late_s = once.step_s * once.missed_steps
+    late = f"up to {2 * late_s:.2f} s" if once.learning else f"about {late_s:.2f} s"  # one of three places on a line
     text = (
         f"{once.missed_steps:g} steps seemed to be missed {where}, but not when it was made again: a reply was late by "
-        f"about {late_s:.2f} s, or the table missed steps that once; no data set depends on it"
+        f"{late}, or the table missed steps that once; no data set depends on it"
     )
     return replace(check, explained="; ".join(filter(None, (check.explained, text))))
 
