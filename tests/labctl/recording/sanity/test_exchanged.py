@@ -1,4 +1,4 @@
-"""Exchanged outputs: how much their noises have to differ where many places are looked at."""
+"""Exchanged outputs: how much their noises have to differ where many places are compared."""
 
 from __future__ import annotations
 
