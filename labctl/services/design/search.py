@@ -47,7 +47,8 @@ def search(problem: Problem, goal: Goal, *, ramps: bool) -> list[Candidate]:
         begin = Levels(TEMPERATURES[0], soaks(problem, TEMPERATURES[0])[3], RATES[0], 60.0)
         _exchanged(problem, begin, cost, _of_levels)
         if ramps:
-            _exchanged(problem, Cycle(RATES[0], 60.0, 0.0, DWELLS_S[-3]), cost, _of_cycles)
+            stays = (0.0, DWELLS_S[-3]) if len(problem.base.positions) > 1 else (DWELLS_S[-3], 0.0)
+            _exchanged(problem, Cycle(RATES[0], 60.0, *stays), cost, _of_cycles)
     return [candidate for candidate in problem.evaluated.values() if candidate is not None]
 
 
@@ -144,12 +145,12 @@ def _of_levels(problem: Problem, scheme: Levels) -> list[list[Levels]]:
 
 
 def _of_cycles(problem: Problem, scheme: Cycle) -> list[list[Cycle]]:
-    del problem
+    further = DWELLS_S if len(problem.base.positions) > 1 else ()  # a single mounting is the first one
     return [
         [replace(scheme, rates=each) for each in RATES],
         [replace(scheme, duration_s=each) for each in DURATIONS_S],
         [replace(scheme, dwell_s=each) for each in DWELLS_S],
-        [replace(scheme, first_dwell_s=each) for each in DWELLS_S],
+        [replace(scheme, first_dwell_s=each) for each in further],
         [replace(scheme, ramp_share=each) for each in RAMP_SHARES],
         [replace(scheme, cycles=each) for each in CYCLES],
     ]
