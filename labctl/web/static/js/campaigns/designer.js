@@ -73,10 +73,7 @@ function form(all, taken, signal) {
       hint,
     );
   async function design() {
-    setChildren(
-      answer,
-      busyIndicator("Planning about a hundred recipes on the bench; half a minute at most."),
-    );
+    setChildren(answer, busyIndicator("Planning about a hundred recipes on the bench; half a minute at most."));
     try {
       const found = await post("/api/designs", { body: designBody(asked), signal });
       setChildren(answer, shown(found, taken));
