@@ -439,6 +439,8 @@ from labctl.answers.uncertainty import (
 from labctl.answers.units import (
     AppliedVersion as AppliedVersion,
     AxisPoint as AxisPoint,
+    BatchRequest as BatchRequest,
+    BatchResponse as BatchResponse,
     Drift as Drift,
     DriftLine as DriftLine,
     ExportFormatResponse as ExportFormatResponse,

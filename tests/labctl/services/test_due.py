@@ -142,7 +142,7 @@ def test_units_are_chosen_by_the_verdict_on_the_version_in_force(three_units: St
     [
         ({"calibration": "late"}, "calibration 'late': choose one of in_force, overdue, none"),
         ({"verdict": "good"}, "verdict 'good': choose one of adequate, missing"),
-        ({"verdict": "missing", "within": DAY}, "due_within is given together with calibration or verdict"),
+        ({"verdict": "missing", "within": DAY}, "due_within is given together with calibration, verdict or batch"),
     ],
 )
 def test_what_there_is_no_unit_of_is_refused(store: Store, wanted: dict[str, Any], reason: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
 from instruments.drivers.arrick_c4 import ArrickC4
+from instruments.drivers.arrick_c4_checks import Homing, TimedHome
 from instruments.drivers.resolution import resolve
 from instruments.standards import MEASURED_STEP_CLOCK
 from labctl.answers.campaigns import ResumeRequest
@@ -231,9 +233,10 @@ def test_a_check_for_missed_steps_that_sees_little_says_how_much(tmp_path: Path)
         assert isinstance(table, ArrickC4)
         timed, calls = table._timed_home, []
 
-        def scattered() -> float:
+        def scattered(learned: Homing | None = None) -> TimedHome:
             calls.append(0.1 * (len(calls) % 5 == 1))
-            return timed() + calls[-1]
+            home = timed(learned)
+            return replace(home, took_s=home.took_s + calls[-1])
 
         table._timed_home = scattered  # type: ignore[method-assign]
         assert run(store, prepared).state == "done"
