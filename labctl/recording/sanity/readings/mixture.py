@@ -18,6 +18,8 @@ BLOCKS, MIN_IN_BLOCK = 40, 50
 DEG_PER_RAD, NEAR, VERY_NEAR = 180.0 / np.pi, 0.4, 0.12
 #: The same of a gain, in which the bias of the outputs is too.
 GAIN_NEAR = 1.0
+#: Another output that is at least this share of the table's rate: the table turns about its axis.
+OTHER_AXIS = 0.5
 #: Rates from this size on (root mean square), deg/s, show the gain of the outputs.
 MIN_RATE_DPS = 1.0
 #: Third differences of a copy have at least this squared correlation with those of its source; and how many must move.
@@ -107,7 +109,11 @@ def _gains_agree(series: Series, names: list[str], rows: Rows, *, off: float) ->
 
 
 def _gain_along(series: Series, names: list[str], rows: Rows) -> float:
-    """Return the usual size of the outputs over the table's rate in data sets within some rows, of the largest each."""
+    """Return the usual size of the outputs over the table's rate in data sets within some rows, of the largest each.
+
+    Where the table turns about the axis of another output, one alone shows its misalignment, which may be any, and is
+    quiet: what the table does to it is in the other one. Such data sets say nothing of its gain.
+    """
     assert series.rate_dps is not None
     if series.motion == "profile":
         rate = series.rate_dps[rows]
@@ -115,6 +121,9 @@ def _gain_along(series: Series, names: list[str], rows: Rows) -> float:
     sizes = []
     for part in series.parts:
         speed = abs(float(np.median(series.rate_dps[part])))
+        others = (values for name, values in series.outputs.items() if name not in names)
+        if any(abs(float(np.median(values[part]))) > OTHER_AXIS * speed for values in others):
+            continue
         if speed >= MIN_RATE_DPS and rows[part].mean() > 0.5:
             sizes.append(max(abs(float(np.median(series.outputs[name][part]))) for name in names) / speed)
     return float(np.median(sizes)) if sizes else 0.0
