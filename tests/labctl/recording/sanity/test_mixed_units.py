@@ -29,7 +29,7 @@ def campaign(*, in_rad: tuple[int, int] | None = None) -> Series:
         outputs["gyro_y"][rows] *= np.pi / 180
     n = len(rate)
     return Series(
-        np.arange(n) * 0.01, np.repeat(np.arange(n // READINGS), READINGS), rate, np.zeros(n, dtype=bool), outputs, {},
+        0.01 * np.arange(n, dtype=np.float64), np.repeat(np.arange(n // READINGS), READINGS), rate, np.zeros(n, dtype=bool), outputs, {},
         {}, "rates",
     )  # fmt: skip
 
@@ -40,7 +40,7 @@ def test_an_output_that_is_quiet_while_another_axis_is_turned_is_in_its_unit() -
 
 @pytest.mark.parametrize("span", [(4, 6), (6, 8)])
 def test_an_output_in_rad_s_while_its_own_axis_is_turned_is_found(span: tuple[int, int]) -> None:
-    (found,) = [each for each in check_units(only_own_axis(campaign(in_rad=span)))]
+    (found,) = check_units(only_own_axis(campaign(in_rad=span)))
     assert (found.finding.what, found.finding.channel) == ("mixed_units", "gyro_y")
     expected = np.zeros(len(found.rows), dtype=bool)
     expected[(span[0] - 4) * READINGS : (span[1] - 4) * READINGS] = True
