@@ -1,4 +1,4 @@
-"""(c) The published table of the Gyrostar, and (d) the recording of a real fibre-optic gyro."""
+"""(a) The published table of the Gyrostar, and (b) the recording of a real fibre-optic gyro."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from labctl.services.recordings.transfer import import_folder
 
 def play(demo: DemoRunner) -> None:
     """Import both and fit them."""
-    demo.title("(c) Vibrating gyro: the published table of the Weiss report")
+    demo.title("(a) Vibrating gyro: the published table of the Weiss report")
     table = import_folder(demo.store, example("weiss-gyrostar"), VirtualClock().utc())
     demo.fit(table.serial, "weiss1995", table.recording)
-    demo.title("(d) A real fibre-optic gyro: 695 dwells on a heated rate table (Ohio State Underwater Robotics)")
+    demo.title("(b) A real fibre-optic gyro: 695 dwells on a heated rate table (Ohio State Underwater Robotics)")
     real = import_folder(demo.store, example("osu-fog"), VirtualClock().utc())
     demo.say(f"imported as points: {real.datasets} data sets")
     answer = demo.fit(real.serial, "ojeda2000", real.recording)

@@ -1,4 +1,4 @@
-"""(e) What is missing? An effect hidden in a simulated gyro, then the real gyro: criticise, improve, see it fall.
+"""(d) What is missing? An effect hidden in a simulated gyro, then the real gyro: criticise, improve, see it fall.
 
 The schedule of the simulated gyro cannot tell which of two effects is missing: experiments on its bench can.
 """
@@ -38,7 +38,7 @@ def play(demo: DemoRunner, real_serial: str) -> None:
 
 def simulated_gyro(demo: DemoRunner) -> None:
     """Hide an effect, and have experiments find it."""
-    demo.title("(e) Which effect is missing? A gyro with a hidden effect")
+    demo.title("(d) Which effect is missing? A gyro with a hidden effect")
     campaign = demo.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
     demo.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])
     before = criticise_unit(demo.store, SERIAL, None, None, [])

@@ -1,4 +1,4 @@
-"""(b) The fibre-optic gyro of Ojeda et al. 2000: error per rate, and per full turn."""
+"""(c) The fibre-optic gyro of Ojeda et al. 2000: error per rate, and per full turn."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SERIAL = "FOG-0001"
 
 def play(demo: DemoRunner) -> None:
     """Measure, fit, and show what is left per rate and per turn of 360 deg."""
-    demo.title("(b) Fibre-optic gyro: 21 rates x 11 temperatures on a single-axis table")
+    demo.title("(c) Fibre-optic gyro: 21 rates x 11 temperatures on a single-axis table")
     answer = demo.campaign("ojeda2000", "single-axis-sim")
     recording = answer.recordings[SERIAL]
     fitted = demo.fit(SERIAL, "ojeda2000", recording)

@@ -28,10 +28,8 @@ def campaign(*, in_rad: tuple[int, int] | None = None) -> Series:
         rows = slice(in_rad[0] * READINGS, in_rad[1] * READINGS)
         outputs["gyro_y"][rows] *= np.pi / 180
     n = len(rate)
-    return Series(
-        0.01 * np.arange(n, dtype=np.float64), np.repeat(np.arange(n // READINGS), READINGS), rate, np.zeros(n, dtype=bool), outputs, {},
-        {}, "rates",
-    )  # fmt: skip
+    t_s, dataset = 0.01 * np.arange(n, dtype=np.float64), np.repeat(np.arange(n // READINGS), READINGS)
+    return Series(t_s, dataset, rate, np.zeros(n, dtype=bool), outputs, {}, {}, "rates")
 
 
 def test_an_output_that_is_quiet_while_another_axis_is_turned_is_in_its_unit() -> None:
