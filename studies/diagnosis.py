@@ -2,7 +2,7 @@
 
 Simulated units with one effect of the catalogue hidden at z noise units (of the standard campaign), or with none. The
 standard campaign is criticised; while its verdict is ambiguous, a policy chooses what is measured next, and all
-recordings are criticised together. Policies: the experiment with the most expected information per hour; a random one
+recordings are criticised together. Policies: the experiment that labctl proposes first; a random one
 of the same experiments; the standard campaign again. Named alone: one cause, exact aliases as one.
 
 `LABCTL_STUDY_UNITS` units a cell, `LABCTL_STUDY_PROTOCOLS`, `LABCTL_STUDY_Z`, `LABCTL_STUDY_POLICIES` (names with
@@ -96,7 +96,7 @@ Policy = Callable[[Known, np.random.Generator], Choice]
 
 
 def by_information(known: Known, _: np.random.Generator) -> Choice:
-    """Choose the experiment with the most expected information per hour that the hours left allow."""
+    """Choose the experiment that labctl proposes first of those that the hours left allow."""
     question = open_question(known.found)
     if question is None:
         return None

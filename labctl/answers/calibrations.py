@@ -59,7 +59,9 @@ class FitRequest(Request):
     """Which model to fit to which recording."""
 
     recording: int | None = Field(
-        default=None, description="Number of the recording; default: the unit's newest recording that can be fitted."
+        default=None,
+        description="Number of the recording; default: the unit's newest recording that can be fitted, together with "
+        "the others of its diagnosis, if it belongs to one.",
     )
     recordings: list[int] = Field(default_factory=list, description=SEVERAL)
     model: str | None = Field(
@@ -92,7 +94,9 @@ class ImproveRequest(Request):
         default=None, description="Number of the version to change; default: the unit's newest version."
     )
     recording: int | None = Field(
-        default=None, description="Number of the recording; default: the unit's newest recording that can be fitted."
+        default=None,
+        description="Number of the recording; default: the unit's newest recording that can be fitted, together with "
+        "the others of its diagnosis, if it belongs to one.",
     )
     recordings: list[int] = Field(
         default_factory=list,

@@ -86,11 +86,15 @@ class UnitResponse(ResponseModel):
     formats: list[ExportFormatResponse] = Field(description="Formats in which the unit's calibrations are available.")
 
 
+#: Units of one request.
+MAX_SERIALS = 10_000
+
+
 class BatchRequest(Request):
     """State the batch of some units."""
 
     batch: str = Field(max_length=100, description="Batch of the manufacturer; empty: no batch is stated any more.")
-    serials: list[Serial] = Field(min_length=1, max_length=10_000, description="Serial numbers of the units.")
+    serials: list[Serial] = Field(min_length=1, max_length=MAX_SERIALS, description="Serial numbers of the units.")
     supplier: str | None = Field(
         default=None, max_length=200, description="Supplier of the units; null: what is stated stays."
     )

@@ -65,7 +65,8 @@ RecordingIds = Annotated[
         "--recording",
         metavar="ID[,ID...]",
         help="Number of the recording, or several numbers to use recordings together, such as 1,2,3; default: "
-        "the unit's newest recording that can be fitted.",
+        "the unit's newest recording that can be fitted, together with the others of its diagnosis, if it belongs to "
+        "one.",
     ),
 ]
 RecordingId = Annotated[

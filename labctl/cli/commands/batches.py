@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from labctl.answers.units import BatchResponse
 
 app = typer.Typer(no_args_is_help=True, help="Batches of units: which there are, and which units are of one.")
-#: Serial numbers of one request.
-MAX_SERIALS = 10_000
 
 
 @app.command("list")
@@ -55,7 +53,7 @@ def set_(
     database: Database = None,
 ) -> None:
     """State the batch of units: of all that are named, or of none where one is not in the database."""
-    from labctl.answers.units import BatchRequest
+    from labctl.answers.units import MAX_SERIALS, BatchRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import SET_BATCH
 

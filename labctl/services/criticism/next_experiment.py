@@ -176,7 +176,7 @@ def _described(foreseen: Foreseen, question: OpenQuestion, recipe: Recipe, of: i
 
 
 #: What experiments are ordered by, in words: whether one is expected to decide.
-_ORDER = {True: "the probability that one cause is then named alone", False: "expected information"}
+_ORDER = {True: "the probability per hour that one cause is then named alone", False: "expected information per hour"}
 
 
 def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
@@ -189,7 +189,7 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
         f"{foreseen.bit_per_h:.2g} bit/h with set-up and a person's time"
     )
     order = _ORDER[foreseen.rank[0] > 0]
-    rank = f"; {of} experiments that this bench can run are ordered by {order} per hour" if of > 1 else ""
+    rank = f"; {of} experiments that this bench can run are ordered by {order}" if of > 1 else ""
     listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
     pair = f"; if it is {leader}, this distinguishes it from {listed}" if told else ""
     return f"{first}{rank}{pair}; the probability that one cause is then named alone is {expected.names_one:.2f}."

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +23,11 @@ from labctl.errors import BadInput, Conflict, OldSchema, StoreError
 from labctl.store import migrate
 from labctl.store.connection.database import Database
 from labctl.store.connection.location import is_url, shown
+from labctl.store.integrity.check import Progress
 from labctl.store.schema import tables
 
 #: Rows of a block: of readings, which are some hundred kB each, and of anything else.
 READINGS_ROWS, ROWS = 32, 2000
-
-Progress = Callable[[str, int, int], None]  #: which table, rows so far, of how many
 
 
 @dataclass(frozen=True)
@@ -200,9 +199,7 @@ class _Move:
                     f"table {table.name}: the rows after {after} are not those of the source; if the source was used "
                     "since an earlier move was interrupted, empty the target and move again"
                 )
-            self.kept += len(there)
-        else:
-            self.kept += len(there)
+        self.kept += len(there)
         self.rows += len(block)
         for row in block:
             self.digest.update(repr((table.name, *row.values())).encode())

@@ -7965,7 +7965,7 @@ export interface components {
         FitRequest: {
             /**
              * Recording
-             * @description Number of the recording; default: the unit's newest recording that can be fitted.
+             * @description Number of the recording; default: the unit's newest recording that can be fitted, together with the others of its diagnosis, if it belongs to one.
              */
             recording?: number | null;
             /**
@@ -8537,7 +8537,7 @@ export interface components {
             version?: number | null;
             /**
              * Recording
-             * @description Number of the recording; default: the unit's newest recording that can be fitted.
+             * @description Number of the recording; default: the unit's newest recording that can be fitted, together with the others of its diagnosis, if it belongs to one.
              */
             recording?: number | null;
             /**
