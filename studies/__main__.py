@@ -15,6 +15,7 @@ STUDIES = (
     "single_outputs",
     "conformity",
     "drift_coverage",
+    "drift_shapes",
     "table_clock",
     "figures_agree",
     "page_figures",

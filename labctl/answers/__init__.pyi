@@ -223,6 +223,7 @@ from labctl.answers.fitted_model import (
     Coefficient as Coefficient,
     CoefficientTable as CoefficientTable,
     Coefficients as Coefficients,
+    CorrelationTimes as CorrelationTimes,
     Entry as Entry,
     ErrorFiguresJson as ErrorFiguresJson,
     ErrorModelJson as ErrorModelJson,

@@ -14,7 +14,7 @@ from labctl.answers.common_fields import (
     Serial,
     VersionNumber,
 )
-from labctl.answers.fitted_model import Coefficient, Origin, ThermalFamilyJson, ThermalHintJson
+from labctl.answers.fitted_model import Coefficient, CorrelationTimes, Origin, ThermalFamilyJson, ThermalHintJson
 from labctl.answers.inspection import WARNINGS, DataWarning
 from labctl.answers.joint import JointJson
 from labctl.answers.laws import LawTest, ProposedLaw
@@ -40,15 +40,13 @@ class CriticisedErrors(TypedDict):
     """RMS residual of the model as it is applied to the output, deg/s; null: it is a function of the true rate."""
 
 
-class CriticisedNoise(TypedDict):
+class CriticisedNoise(CorrelationTimes):
     """Noise of the data set means of the recording, and of its record at rest."""
 
     white_dps: float | None
     """Standard deviation of a data set mean by white noise, RMS over the axes, deg/s; null: unknown."""
     drift_dps: float | None
     """Standard deviation of the drift between data sets, of the axis where it is largest, deg/s; null: unknown."""
-    drift_tau_s: float | None
-    """Correlation time of that drift, s; null: there is no drift, or it is unknown."""
     vs_datasheet: float | None
     """Largest drift divided by half the bias stability of the data sheet, at least 0; null: unknown."""
     static: StaticRecordJson | None

@@ -228,15 +228,22 @@ class ValidityJson(TypedDict):
     """Lowest and highest true rate over all axes, deg/s; null: no limit."""
 
 
-class AxisNoiseJson(TypedDict):
+class CorrelationTimes(TypedDict):
+    """How long a drift between data sets keeps its value."""
+
+    drift_tau_s: float | None
+    """Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown."""
+    drift_shortest_tau_s: NotRequired[float]
+    """Shortest correlation time of flicker, which has equal parts in each decade of time, s; absent: there is only one."""
+
+
+class AxisNoiseJson(CorrelationTimes):
     """The noise that weighted one axis of a fit."""
 
     white_dps: float | None
     """Standard deviation of a data set mean by white noise, RMS, deg/s; null: only the total is known."""
     drift_dps: float
     """Standard deviation of the drift between data sets, deg/s; 0: none was found."""
-    drift_tau_s: float | None
-    """Correlation time of the drift, s; null: there is none."""
     per_rate: float
     """Standard deviation of the part that grows with the rate, per deg/s of table rate, 1."""
     covariance_scale: float | None

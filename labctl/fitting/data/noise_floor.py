@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from labctl.answers.fitted_model import CorrelationTimes
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.levels import SAME_TEMPERATURE_C
 from labctl.fitting.data.rich_surface import MIN_FREE, rich_surface, with_levels_of_temperature
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import Drift, Scatter, whitened
+from labctl.fitting.numeric.drift_noise import Drift, Scatter
+from labctl.fitting.numeric.drift_whitening import whitened
 from labctl.fitting.numeric.least_squares import drift_beside
 
 #: Data sets closer than this in rate (of the fastest) and temperature repeat each other.
@@ -136,6 +138,15 @@ def _of_scatter(m: int, scatter_dps: Mapping[str, float], source: str) -> NoiseF
 def _scatter_dps(residual: Array, surface: NDArray[np.float64]) -> float | None:
     freedom = len(residual) - surface.shape[1]
     return float(np.sqrt(residual @ residual / freedom)) if freedom >= MIN_FREE else None
+
+
+def correlation_times(drift: Drift) -> CorrelationTimes:
+    """Return the time constants of a drift that was found, as JSON."""
+    if drift.drift_dps <= 0:
+        return {"drift_tau_s": None}
+    if drift.shortest_tau_s is None:
+        return {"drift_tau_s": drift.tau_s}
+    return {"drift_tau_s": drift.tau_s, "drift_shortest_tau_s": drift.shortest_tau_s}
 
 
 def repeats_dps(channels: Channels, residual: Mapping[str, Array]) -> float | None:

@@ -25,7 +25,7 @@ from labctl.fitting.models.error_model import ErrorModel, is_exported
 from labctl.fitting.models.presets import Preset
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
-from labctl.fitting.numeric.drift_noise import whitened
+from labctl.fitting.numeric.drift_whitening import whitened
 
 #: Coverage factor of U.
 K = 2.0

@@ -15,7 +15,7 @@ from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import mountings_of
-from labctl.fitting.data.noise_floor import AxisNoise
+from labctl.fitting.data.noise_floor import AxisNoise, correlation_times
 from labctl.fitting.data.temperature.channel import is_chambers
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.data.temperature.legs import legs_of
@@ -274,12 +274,11 @@ def _with_shapes(model: ErrorModel, fits: Mapping[str, AxisFit], history: Temper
 
 
 def _noise_json(noise: AxisNoise, solution: Solution) -> AxisNoiseJson:
-    drift = noise.drift
     return {
         "white_dps": noise.white_dps,
-        "drift_dps": drift.drift_dps,
-        "drift_tau_s": drift.tau_s if drift.drift_dps > 0 else None,
-        "per_rate": drift.per_rate,
+        "drift_dps": noise.drift.drift_dps,
+        **correlation_times(noise.drift),
+        "per_rate": noise.drift.per_rate,
         "covariance_scale": None if np.isnan(solution.scale) else solution.scale,
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from labctl.answers.fitted_model import AxisNoiseJson, FitEnvironment
 from labctl.errors import BadInput
+from labctl.fitting.data.noise_floor import correlation_times
 from labctl.fitting.estimation.error_metrics import ErrorFigures
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.presets import POSES
@@ -44,11 +45,10 @@ def of_poses(recording: Recording, model: str | None, effects: list[str]) -> Fit
 
 
 def _noise_json(solution: Solution) -> AxisNoiseJson:
-    drift = solution.drift
     return {
         "white_dps": solution.white_dps,
-        "drift_dps": drift.drift_dps,
-        "drift_tau_s": drift.tau_s if drift.drift_dps > 0 else None,
+        "drift_dps": solution.drift.drift_dps,
+        **correlation_times(solution.drift),
         "per_rate": 0.0,
         "covariance_scale": solution.scale,
     }

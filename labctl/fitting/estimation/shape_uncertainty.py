@@ -17,7 +17,7 @@ from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_design import axis_design
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import whitened
+from labctl.fitting.numeric.drift_whitening import whitened
 from labctl.fitting.numeric.least_squares import Solution
 
 #: Step of a parameter, in its logarithm.

@@ -22,7 +22,7 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import Preset, Rows
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
-from labctl.fitting.numeric.drift_noise import whitened
+from labctl.fitting.numeric.drift_whitening import whitened
 
 #: Shapes are found to this share, in at most so many evaluations for each.
 TOLERANCE, EVALUATIONS = 0.005, 60

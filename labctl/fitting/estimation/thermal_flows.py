@@ -18,7 +18,7 @@ from labctl.fitting.effects.thermal_lag import LONGEST_S, SHORTEST_S, Lag, LagEl
 from labctl.fitting.estimation.axis_design import axis_design
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import whitened
+from labctl.fitting.numeric.drift_whitening import whitened
 from labctl.fitting.numeric.variable_projection import Local, refined
 
 #: Time constants that are tried, s; neighbours are a tenth apart.

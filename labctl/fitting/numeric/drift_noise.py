@@ -1,18 +1,19 @@
 """Noise of data-set means: white noise, drift between means, and a part that grows with rate.
 
-The drift is an Ornstein-Uhlenbeck process inside each powered run, independent between runs. It is not plugged in as
-one estimate: a grid of drifts is weighted by the restricted likelihood of the data, and the fit is averaged over it.
+The drift is an Ornstein-Uhlenbeck process inside each powered run, independent between runs, or a sum of such processes
+whose time constants lie evenly in their logarithm: flicker, as bias instability is (IEEE Std 952, annex C). It is not
+plugged in as one estimate: a grid of drifts is weighted by the restricted likelihood of the data, and the fit is
+averaged over it.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtbtrs
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -20,6 +21,12 @@ from labctl.fitting.numeric.arrays import Array
 TAU_SPACINGS = (0.25, 3.0, 12.0, 50.0, 200.0)
 #: Drift sizes tried, in units of the scatter that white noise does not explain.
 DRIFT_SIZES = (0.0, 0.35, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2)
+#: Further sizes of a slow drift: most of it passes for bias and temperature, and little is left in the scatter.
+HIDDEN_SIZES = (4.5, 6.5, 9.0)
+#: A drift is slow where its time constant is more than this share of the time between the first data set and the last.
+SLOW_SHARE = 0.05
+#: Neighbouring time constants of flicker differ by about this factor: their sum is that of a continuum to some percent.
+FLICKER_RATIO = 4.0
 #: No drift is larger than this many times half the bias stability: what is left beyond it is the model's fault.
 LARGEST = 12.0
 #: The usual bias stability, deg/s, where no data sheet says it.
@@ -55,98 +62,65 @@ class Drift:
     """A point of the grid, or what was found over all of it: size, time constant, and the part that grows with rate."""
 
     drift_dps: float
-    tau_s: float
+    tau_s: float  #: the longest, where there are several
     per_rate: float = 0.0  #: standard deviation per deg/s of table rate
     least_dps: float = 0.0  #: of a drift that was found: `MAX_EVIDENCE` is for this size or a larger one
+    shortest_tau_s: float | None = None  #: flicker: equal parts with time constants from this to `tau_s`
 
-
-def whitened(
-    scatter: Scatter, drifts: Sequence[Drift], white_var: Array, values: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], Array]:
-    """Return values (m, k) whitened for each drift, (drifts, m, k), and log determinants of the covariances, (drifts,).
-
-    The returned rows are in order of time. They are whitened one after the other, as in a Kalman filter: only the last
-    value of an Ornstein-Uhlenbeck process matters, so the result is that of the Cholesky factors, in a number of
-    operations that grows with m and not with its cube. The expectation of each row is a linear recurrence, solved for
-    all columns at once.
-    """
-    order = np.lexsort((scatter.t_s, scatter.run))
-    ordered = values[order]
-    remaining, total, share = _filter(scatter, drifts, white_var, order)
-    before, shares = (
-        remaining * np.roll(share, 1, axis=1),
-        remaining * np.roll(1.0 - share, 1, axis=1),
-    )  # kept is 0 in the first row
-    expect = _expected_of_one if len(drifts) == 1 else _expected_of_many
-    expected = expect(ordered, before, shares)
-    np.subtract(ordered, expected, out=expected)
-    expected /= np.sqrt(total)[:, :, None]
-    return expected, np.log(total).sum(axis=1)
-
-
-def _expected_of_one(
-    ordered: NDArray[np.float64], before: NDArray[np.float64], shares: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return what is expected of each row (m, k) from those before it, (1, m, k): the solution of a banded system."""
-    band = np.ones((2, len(ordered)))
-    band[1, :-1] = -shares[0, 1:]
-    pull = np.zeros_like(ordered, order="F")
-    pull[1:] = before[0, 1:, None] * ordered[:-1]
-    expected, _ = dtbtrs(band, pull, uplo="L", diag="U", overwrite_b=True)
-    return np.asarray(expected)[None]
-
-
-def _expected_of_many(
-    ordered: NDArray[np.float64], before: NDArray[np.float64], shares: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the same for many drifts, (drifts, m, k), row by row for all of them at once."""
-    expected = np.empty((len(ordered), len(before), ordered.shape[1]))
-    expected[0] = 0.0
-    np.multiply(before.T[1:, :, None], ordered[:-1, None, :], out=expected[1:])
-    pull = np.empty(expected.shape[1:])
-    for row, last, share in zip(expected[1:], expected[:-1], shares.T[1:, :, None], strict=True):
-        np.multiply(share, last, out=pull)
-        np.add(row, pull, out=row)
-    return np.ascontiguousarray(expected.transpose(1, 0, 2))
-
-
-def _filter(
-    scatter: Scatter, drifts: Sequence[Drift], white_var: Array, order: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the terms of the recurrence for rows in order of time, (drifts, m) each.
-
-    They are the share of the drift that is left since the row before (0 where a run begins), the variance of a row
-    about its expectation, and the drift's share of that variance.
-    """
-    size_var, tau_s, per_rate = np.array([(d.drift_dps**2, d.tau_s, d.per_rate) for d in drifts]).T[:, :, None]
-    begins = np.concatenate([[True], np.diff(scatter.run[order]) != 0])
-    decay = np.where(begins, 0.0, np.exp(-np.diff(scatter.t_s[order], prepend=scatter.t_s[order[0]]) / tau_s))
-    white = white_var[order] + (per_rate * scatter.rate_dps[order]) ** 2
-    size: Any = size_var[:, 0]
-    rows: Any = zip((decay**2).T, white.T, strict=True)
-    if len(drifts) == 1:  # single numbers are faster than arrays of one
-        size, rows = float(size[0]), zip((decay[0] ** 2).tolist(), white[0].tolist(), strict=True)
-    variances, variance = [], size
-    for part, noise in rows:
-        before = size + part * (variance - size)
-        variances.append(before)
-        variance = before * noise / (before + noise)
-    drift_var = np.array(variances).reshape(len(order), len(drifts)).T
-    return decay, drift_var + white, drift_var / (drift_var + white)
+    @property
+    def taus_s(self) -> tuple[float, ...]:
+        """The time constants of its equal parts."""
+        if self.shortest_tau_s is None:
+            return (self.tau_s,)
+        steps = max(1, round(math.log(self.tau_s / self.shortest_tau_s) / math.log(FLICKER_RATIO)))
+        return tuple(np.geomspace(self.shortest_tau_s, self.tau_s, steps + 1).tolist())
 
 
 def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:
     """Return the drifts to average over, around the scatter that white noise leaves unexplained."""
-    spacing = float(np.median(np.diff(np.sort(scatter.t_s)))) if len(scatter.t_s) > 1 else 1.0
-    spacing = max(spacing, 1e-3)
-    points = [Drift(0.0, spacing, per_rate)]
-    points += [
-        Drift(size * unexplained_dps, ratio * spacing, per_rate)
-        for ratio in TAU_SPACINGS
-        for size in DRIFT_SIZES
-        if size > 0 and unexplained_dps > 0
+    spacing, span = _times_s(scatter)
+    shapes: list[tuple[float, float | None]] = [(ratio * spacing, None) for ratio in TAU_SPACINGS]
+    if span > FLICKER_RATIO * spacing:
+        shapes.append((span, spacing))
+    return [
+        Drift(0.0, spacing, per_rate),
+        *_points(shapes, [size for size in DRIFT_SIZES if size > 0], unexplained_dps, per_rate),
     ]
-    return points
+
+
+def hidden(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:
+    """Return drifts of which the scatter between data sets shows little: slow ones, larger than it.
+
+    A coefficient is uncertain by them too. They are no part of the noise of a data set, with which errors are compared.
+    """
+    spacing, span = _times_s(scatter)
+    if span <= FLICKER_RATIO * spacing:
+        return []
+    slow = [(ratio * spacing, None) for ratio in TAU_SPACINGS if ratio * spacing > SLOW_SHARE * span]
+    sizes = [size for size in DRIFT_SIZES if size > 0]
+    return [
+        *_points([*slow, (span, spacing)], HIDDEN_SIZES, unexplained_dps, per_rate),
+        *_points([(span, None)], [*sizes, *HIDDEN_SIZES], unexplained_dps, per_rate),
+    ]
+
+
+def _times_s(scatter: Scatter) -> tuple[float, float]:
+    """Return the median spacing of data sets, and the time from the first to the last."""
+    in_time = np.sort(scatter.t_s)
+    spacing = float(np.median(np.diff(in_time))) if len(in_time) > 1 else 1.0
+    return max(spacing, 1e-3), float(in_time[-1] - in_time[0])
+
+
+def _points(
+    shapes: Sequence[tuple[float, float | None]], sizes: Sequence[float], unexplained_dps: float, per_rate: float
+) -> list[Drift]:
+    if unexplained_dps <= 0:
+        return []
+    return [
+        Drift(size * unexplained_dps, tau_s, per_rate, shortest_tau_s=shortest_s)
+        for tau_s, shortest_s in shapes
+        for size in sizes
+    ]
 
 
 def log_prior(scatter: Scatter, drift: Drift) -> float:

@@ -18,6 +18,7 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.numeric import drift_noise
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Drift, Scatter
+from labctl.fitting.numeric.drift_whitening import whitened
 from labctl.fitting.numeric.variance_components import Component, RandomEffects, Triangles, mixture
 
 #: Scaled columns are taken as linearly dependent below this ratio of singular values.
@@ -62,6 +63,7 @@ class _Fits:
     projected: NDArray[np.float64]  #: (d, k) the data's projection on them
     log_evidence: Array  #: (d,) restricted log likelihoods, with the prior of each drift
     scale: Array  #: (d,) factors on the covariance
+    shown: int | None = None  #: so many points are drifts that the scatter between data sets shows
 
     @property
     def best(self) -> int:
@@ -78,17 +80,23 @@ class _Fits:
         return np.asarray(weights / weights.sum())
 
     def drift(self) -> Drift:
-        """Return the likeliest drift, with a size that is averaged over the points, and the least that it may be."""
-        best, weights = self.drifts[self.best], self.weights()
-        size_dps = np.array([drift.drift_dps for drift in self.drifts])
-        found_dps = np.sqrt(self.scale) * size_dps
+        """Return the likeliest drift, with a size that is averaged over the points, and the least that it may be.
+
+        Of a drift that the scatter between data sets does not show, no size is stated.
+        """
+        drifts, scale = self.drifts[: self.shown], self.scale[: self.shown]
+        evidence = self.log_evidence[: self.shown]
+        best, weights = int(np.argmax(evidence)), np.exp(evidence - evidence.max())
+        weights /= weights.sum()
+        found_dps = np.sqrt(scale) * np.array([drift.drift_dps for drift in drifts])
         rising = np.argsort(found_dps)
         least = np.searchsorted(np.cumsum(weights[rising]), 1.0 - drift_noise.MAX_EVIDENCE)
         return Drift(
-            float(np.sqrt(np.sum(weights * self.scale * size_dps**2))),
-            best.tau_s,
-            best.per_rate * float(np.sqrt(self.scale[self.best])),
+            float(np.sqrt(np.sum(weights * found_dps**2))),
+            drifts[best].tau_s,
+            drifts[best].per_rate * float(np.sqrt(scale[best])),
             float(found_dps[rising[least]]),
+            drifts[best].shortest_tau_s,
         )
 
 
@@ -157,20 +165,34 @@ def drift_beside(columns: NDArray[np.float64], y: Array, scatter: Scatter) -> Dr
     No coefficient is wanted of them, and orthonormal columns, with their part of y taken off, have no condition that
     normal equations could spoil.
     """
-    return _over_grid(columns, y - columns @ (columns.T @ y), scatter, _by_normal_equations).drift()
+    y = y - columns @ (columns.T @ y)
+    return _over_grid(columns, y, scatter, drift_noise.grid, _by_normal_equations).drift()
 
 
-def _over_grid(design: NDArray[np.float64], y: Array, scatter: Scatter, reduce: _Reduce = _by_qr) -> _Fits:
+def _all_drifts(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:
+    return [
+        *drift_noise.grid(scatter, unexplained_dps, per_rate),
+        *drift_noise.hidden(scatter, unexplained_dps, per_rate),
+    ]
+
+
+def _over_grid(
+    design: NDArray[np.float64],
+    y: Array,
+    scatter: Scatter,
+    drifts: Callable[..., list[Drift]] = _all_drifts,
+    reduce: _Reduce = _by_qr,
+) -> _Fits:
     """Return the fits over the grid of drifts; with noise that grows with the rate where that is clearly likelier."""
     at = partial(_at, design, y, scatter, reduce=reduce)
     unexplained = _unexplained(design, y, scatter, at([Drift(0.0, 1.0)]).values(0))
-    fits = at(drift_noise.grid(scatter, unexplained))
+    fits = at(drifts(scatter, unexplained))
     growing = _per_rate(design, y, scatter, fits)
     if growing > 0:
-        more = at(drift_noise.grid(scatter, unexplained, growing))
+        more = at(drifts(scatter, unexplained, growing))
         if more.log_evidence.max() > fits.log_evidence.max() + 3.0:
-            return more
-    return fits
+            fits = more
+    return replace(fits, shown=len(drift_noise.grid(scatter, unexplained)))
 
 
 def _at(
@@ -180,7 +202,7 @@ def _at(
     has_white = scatter.white_var is not None
     white = scatter.white_var if scatter.white_var is not None else np.ones(len(y))
     m, k = design.shape
-    rows, log_dets = drift_noise.whitened(scatter, drifts, white, np.column_stack([design, y]))
+    rows, log_dets = whitened(scatter, drifts, white, np.column_stack([design, y]))
     r, projected, chi2 = reduce(rows)
     log_dets = log_dets + 2 * np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))).sum(axis=1)
     freedom = max(m - k, 1)
@@ -276,7 +298,7 @@ def _along(
     counting = np.flatnonzero(~(weights < NEGLIGIBLE_NOISE))
     projected = np.zeros((k, columns.shape[1]))
     for point, share in zip(counting.tolist(), weights[counting] / weights[counting].sum(), strict=True):
-        rows = drift_noise.whitened(scatter, [fits.drifts[point]], white, np.column_stack([design, columns]))[0][0]
+        rows = whitened(scatter, [fits.drifts[point]], white, np.column_stack([design, columns]))[0][0]
         rows = np.vstack([rows, below])
         size = np.maximum(np.linalg.norm(rows[:, :k], axis=0), 1e-300)
         coordinates, *_ = np.linalg.lstsq(rows[:, :k] / size, rows[:, k:], rcond=1e-12)

@@ -18,6 +18,7 @@ from labctl.fitting.criticism import (
     where_it_fails,
     worst_data_sets,
 )
+from labctl.fitting.data.noise_floor import correlation_times
 from labctl.fitting.effects import CATALOGUE, kind_of
 from labctl.services.criticism.advice_text import (
     advice_sentences,
@@ -107,7 +108,7 @@ def _noise(found: Criticism) -> CriticisedNoise:
     return {
         "white_dps": float(np.sqrt(np.mean(np.square(known)))),
         "drift_dps": largest.drift.drift_dps,
-        "drift_tau_s": largest.drift.tau_s if largest.drift.drift_dps > 0 else None,
+        **correlation_times(largest.drift),
         "vs_datasheet": found.drift_over_datasheet,
         "static": static,
     }

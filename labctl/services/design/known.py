@@ -123,7 +123,8 @@ def _earlier(store: Store, serial: str, span: Span) -> _Earlier:
     document = json.loads(row.document)
     noise = list(document["noise"].values())
     white = [each["white_dps"] for each in noise if each["white_dps"] is not None]
-    taus = [each["drift_tau_s"] for each in noise if each["drift_tau_s"]]
+    # flicker has no time constant: it counts as one that is not known
+    taus = [each["drift_tau_s"] for each in noise if each["drift_tau_s"] and "drift_shortest_tau_s" not in each]
     bias, scale = _slopes(FittedModel.from_dict(document["model"]), span)
     return _Earlier(
         f"{unit.serial} version {row.version}",

@@ -6,10 +6,19 @@ import numpy as np
 import pytest
 
 from labctl.fitting.criticism.criticism import LARGE_DRIFT
-from labctl.fitting.numeric.drift_noise import Drift, Scatter, whitened
+from labctl.fitting.data.noise_floor import correlation_times
+from labctl.fitting.numeric.drift_noise import Drift, Scatter
+from labctl.fitting.numeric.drift_whitening import whitened
 from labctl.fitting.numeric.least_squares import drift_beside
+from studies.drift_shapes import SCHEDULES, TRUTHS, share_inside
 
-DRIFTS = [Drift(0.0, 10.0), Drift(2.0, 300.0, 0.01), Drift(0.5, 1e5), Drift(3.0, 1e-3)]
+DRIFTS = [
+    Drift(0.0, 10.0),
+    Drift(2.0, 300.0, 0.01),
+    Drift(0.5, 1e5),
+    Drift(3.0, 1e-3),
+    Drift(1.5, 4000.0, 0.02, shortest_tau_s=20.0),
+]
 
 
 def scatter(rng: np.random.Generator, m: int) -> Scatter:
@@ -31,7 +40,7 @@ def test_the_same_inner_products_and_determinant_as_by_the_covariance(point: int
     lag = np.abs(known.t_s[:, None] - known.t_s)
     together = known.run[:, None] == known.run
     covariance = np.diag(known.white_var + (drift.per_rate * known.rate_dps) ** 2)
-    covariance += drift.drift_dps**2 * np.exp(-lag / drift.tau_s) * together
+    covariance += drift.drift_dps**2 * np.mean([np.exp(-lag / tau_s) for tau_s in drift.taus_s], axis=0) * together
     np.testing.assert_allclose(rows[point].T @ rows[point], values.T @ np.linalg.solve(covariance, values), atol=1e-10)
     assert log_det[point] == pytest.approx(np.linalg.slogdet(covariance)[1])
 
@@ -56,3 +65,19 @@ def test_a_drift_as_specified_is_not_called_large_and_a_large_one_is() -> None:
     assert least_over_expected(0.0, 5).max() < 0.3
     assert np.mean(least_over_expected(1.0, 6) >= LARGE_DRIFT) <= 0.05
     assert np.mean(least_over_expected(4.0, 7) >= LARGE_DRIFT) >= 0.95
+
+
+def test_coefficients_are_within_their_uncertainty_where_the_drift_is_flicker() -> None:
+    schedule, truth = SCHEDULES["10 temperatures, 21 rates, soaks of 1 h"], TRUTHS["flicker, 10 s to 28 h"]
+    assert share_inside(schedule, *truth, units=50, seed=8)[0] > 92.0  # 83 with drifts of one time constant only
+
+
+def test_flicker_is_reported_with_its_shortest_and_longest_time_constant() -> None:
+    m, rng = 240, np.random.default_rng(9)
+    t_s = 100.0 * np.arange(m)
+    lag_s = np.abs(t_s[:, None] - t_s)
+    covariance = 1e-6 * np.mean([np.exp(-lag_s / tau_s) for tau_s in np.geomspace(100.0, 24_000.0, 7)], axis=0)
+    y = np.linalg.cholesky(covariance + 1e-9 * np.eye(m)) @ rng.normal(size=m)
+    known = Scatter(t_s, np.ones(m, dtype=np.int64), np.zeros(m), np.full(m, 1e-9), 2e-3)
+    found = correlation_times(drift_beside(np.full((m, 1), m**-0.5), y, known))
+    assert found == {"drift_tau_s": 100.0 * (m - 1), "drift_shortest_tau_s": 100.0}

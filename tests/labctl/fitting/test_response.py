@@ -101,7 +101,7 @@ def test_a_delay_on_a_ramp_there_and_back_is_told_from_a_bias_and_its_uncertaint
     both = profile_recording(np.concatenate([up, up[::-1]]), delay_s=DELAY_S, scale=SCALE, bias_dps=BIAS_DPS)
     result = fit(both, None, [*PLAIN, "time_delay"])
     delay, u = value_and_u(result, "delay")
-    assert u == pytest.approx(0.02 / np.sqrt(12_000) / 2.0, rel=0.1)  # noise of the mean over the acceleration
+    assert u == pytest.approx(0.02 / np.sqrt(12_000) / 2.0, rel=0.2)  # noise of the mean over the acceleration
     assert delay == pytest.approx(DELAY_S, abs=3 * u)
     for name, expected in (("bias", BIAS_DPS), ("scale_factor", SCALE)):
         value, u = value_and_u(result, name)
