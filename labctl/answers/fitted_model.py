@@ -234,7 +234,7 @@ class CorrelationTimes(TypedDict):
     drift_tau_s: float | None
     """Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown."""
     drift_shortest_tau_s: NotRequired[float]
-    """Shortest correlation time of flicker, which has equal parts in each decade of time, s; absent: there is only one."""
+    """Shortest correlation time of flicker, of which each decade has an equal part, s; absent: there is only one."""
 
 
 class AxisNoiseJson(CorrelationTimes):

@@ -16,6 +16,10 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Drift, Scatter
 
 
+#: A drift of no size counts as one of this variance, (deg/s)^2, so that nothing is divided by 0.
+MIN_VAR = 1e-200
+
+
 def whitened(
     scatter: Scatter, drifts: Sequence[Drift], white_var: Array, values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], Array]:
@@ -108,30 +112,33 @@ def _of_many_parts(
     """Whiten rows in order for drifts of p equal parts, each with a time constant of its own.
 
     A Kalman filter with p states, of all drifts at once: what each part is expected to be, (drifts, p, k), and the
-    covariance of what it may be beside that, (drifts, p, p).
+    covariance of what it may be beside that, (drifts, p, p), over the variance of a part.
     """
-    decay, noise = _decays(scatter, drifts, order), _noise_var(scatter, drifts, white_var, order)
+    decay, noise_var = _decays(scatter, drifts, order), _noise_var(scatter, drifts, white_var, order)
     parts = decay.shape[2]
-    size_var = np.array([drift.drift_dps**2 / parts for drift in drifts])
-    stationary = size_var[:, None, None] * np.eye(parts)
-    covariance = stationary.copy()
+    part_var = np.maximum([drift.drift_dps**2 / parts for drift in drifts], MIN_VAR)
+    noise = noise_var / part_var
+    covariance: NDArray[np.float64] = np.broadcast_to(np.eye(parts), (len(drifts), parts, parts)).copy()
+    diagonal = covariance.reshape(len(drifts), -1)[:, :: parts + 1]
     state = np.zeros((len(drifts), parts, ordered.shape[1]))
-    whitened_rows = np.empty((len(order), len(drifts), ordered.shape[1]))
+    innovations = np.empty((len(order), len(drifts), ordered.shape[1]))
     totals = np.empty((len(order), len(drifts)))
-    for row, (values, kept, white) in enumerate(zip(ordered, decay, noise, strict=True)):
-        covariance -= stationary
-        covariance *= kept[:, :, None] * kept[:, None, :]
-        covariance += stationary
+    gained = 1.0 - decay**2
+    for row, (values, kept) in enumerate(zip(ordered, decay, strict=True)):
+        covariance *= kept[:, :, None]
+        covariance *= kept[:, None, :]
+        diagonal += gained[row]
         state *= kept[:, :, None]
-        with_output = covariance.sum(axis=2)
-        total = with_output.sum(axis=1) + white
-        innovation = values - state.sum(axis=1)
-        gain = with_output / total[:, None]
-        covariance -= gain[:, :, None] * with_output[:, None, :]
-        state += gain[:, :, None] * innovation[:, None, :]
-        whitened_rows[row], totals[row] = innovation, total
-    whitened_rows /= np.sqrt(totals)[:, :, None]
-    return whitened_rows.transpose(1, 0, 2), np.log(totals).sum(axis=0)
+        with_output = np.add.reduce(covariance, axis=2)
+        total = np.add.reduce(with_output, axis=1, out=totals[row])
+        total += noise[row]
+        innovation = np.subtract(values, np.add.reduce(state, axis=1), out=innovations[row])
+        gain = (with_output / total[:, None])[:, :, None]
+        covariance -= gain * with_output[:, None, :]
+        state += gain * innovation[:, None, :]
+    totals *= part_var
+    innovations /= np.sqrt(totals)[:, :, None]
+    return innovations.transpose(1, 0, 2), np.log(totals).sum(axis=0)
 
 
 def _decays(scatter: Scatter, drifts: Sequence[Drift], order: NDArray[np.int64]) -> NDArray[np.float64]:
