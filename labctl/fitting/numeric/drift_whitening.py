@@ -15,7 +15,6 @@ from scipy.linalg.lapack import dtbtrs
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Drift, Scatter
 
-
 #: A drift of no size counts as one of this variance, (deg/s)^2, so that nothing is divided by 0.
 MIN_VAR = 1e-200
 
