@@ -18,11 +18,13 @@ FIXED_POINT_STEPS, FIXED_POINT_STEP_DPS = 60, 1e-12
 DIVERGING = 3.0
 #: Newton's method: steps, the step of its numerical derivative in deg/s, and the least slope of output over rate.
 NEWTON_STEPS, SLOPE_STEP_DPS, MIN_SLOPE = 40, 1e-4, 1e-3
+#: Where the output changes by less than this share of the rate, from no rate on, the rate is in a dead band.
+DEAD_BAND_SLOPE = 0.1
 #: Bisection: rounds over the axes, halvings of an interval, and the step in deg/s at which the rounds have converged.
 ROUNDS, HALVINGS, ROUND_STEP_DPS = 8, 50, 1e-9
-#: Half of the interval of a bisection: this share of the largest output, plus this many deg/s; where it holds no root
-#: the second share is tried, which holds that of any gain from 0.5 on.
-REACH_SHARES, REACH_DPS = (0.02, 1.0), 10.0
+#: How far from an output its rate may be: this share of the largest output, which holds that of any gain from 0.5 on,
+#: plus this many deg/s. It is looked for from the first distance on, in so many steps.
+REACH_SHARE, REACH_DPS, FIRST_REACH_DPS, REACH_STEPS = 1.0, 10.0, 1e-3, 60
 
 
 class NotConverged(LabctlError):
@@ -48,7 +50,23 @@ def invert(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: str) -> 
             return rates
         if before and change > DIVERGING * before:
             break
-    return _by_newton(outputs, error_dps) or _by_bisection(outputs, error_dps, name)
+    rates = _by_newton(outputs, error_dps) or _by_bisection(outputs, error_dps, name)
+    return _with_dead_bands(rates, outputs, error_dps)
+
+
+def _with_dead_bands(
+    rates: Mapping[str, Array], outputs: Mapping[str, Array], error_dps: ErrorOfRates
+) -> dict[str, Array]:
+    """Return rates of which those in a dead band are what the output is beyond that of no rate, axis -> (n,) deg/s.
+
+    Between them and no rate the output hardly changes: noise of the output would be many times larger in the rate, and
+    pass from one edge of the band to the other.
+    """
+    corrected = {}
+    for axis, rate in rates.items():
+        beyond = outputs[axis] - error_dps({**rates, axis: np.zeros_like(rate)}, axis)
+        corrected[axis] = np.where(np.abs(beyond) < DEAD_BAND_SLOPE * np.abs(rate), beyond, rate)
+    return corrected
 
 
 def _by_newton(outputs: Mapping[str, Array], error_dps: ErrorOfRates) -> dict[str, Array] | None:
@@ -71,7 +89,7 @@ def _by_newton(outputs: Mapping[str, Array], error_dps: ErrorOfRates) -> dict[st
 
 def _are_near(rates: Mapping[str, Array], outputs: Mapping[str, Array]) -> bool:
     """Return whether every rate is one that a gyro with such an output can have had."""
-    return not any(np.any(np.abs(rates[axis] - output) > _reach(output)[-1]) for axis, output in outputs.items())
+    return not any(np.any(np.abs(rates[axis] - output) > _reach(output)) for axis, output in outputs.items())
 
 
 def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: str) -> dict[str, Array]:
@@ -101,37 +119,55 @@ def _require_roots(outputs: Mapping[str, Array], outside: Mapping[str, NDArray[n
             row = int(np.argmax(rows))
             raise NotConverged(
                 f"model {name!r} cannot be inverted: on axis {axis}, no true rate within "
-                f"{_reach(outputs[axis])[-1]:.3g} deg/s of the output explains the output "
+                f"{_reach(outputs[axis]):.3g} deg/s of the output explains the output "
                 f"{outputs[axis][row]:.6g} deg/s ({int(rows.sum())} of {len(rows)} rows); check sign, unit and "
                 "axes of the output: these coefficients are implausible for a gyro"
             )
 
 
-def _reach(output: Array) -> list[float]:
-    """Return half intervals to try, deg/s, the narrow one first."""
-    largest = float(np.max(np.abs(output[np.isfinite(output)]), initial=0.0))
-    return [share * largest + REACH_DPS for share in REACH_SHARES]
+def _reach(output: Array) -> float:
+    """Return how far from an output a rate may be, deg/s."""
+    return REACH_SHARE * float(np.max(np.abs(output[np.isfinite(output)]), initial=0.0)) + REACH_DPS
 
 
 def _bisected(
     output: Array, error_dps: ErrorOfRates, rates: Mapping[str, Array], axis: str
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the rates of one axis, (n,) deg/s, and where the interval holds none, (n,)."""
+    """Return the rates of one axis, (n,) deg/s, and where no rate near the output has that output, (n,)."""
 
     def excess(at: Array) -> Array:
         return np.asarray(at + error_dps({**rates, axis: at}, axis) - output)
 
-    low, high, outside = output, output, np.ones(len(output), dtype=np.bool_)
-    for reach in _reach(output):
-        low, high = np.where(outside, output - reach, low), np.where(outside, output + reach, high)
-        outside = np.asarray((excess(low) > 0) | (excess(high) < 0))
-        if not outside.any():
-            break
+    low, high, outside = _bracket(output, excess)
+    rising = excess(low) <= 0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        above = excess(middle) > 0
-        low, high = np.where(above, low, middle), np.where(above, middle, high)
+        beyond = (excess(middle) > 0) == rising
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
     return np.asarray(0.5 * (low + high)), outside
+
+
+def _bracket(output: Array, excess: Callable[[Array], Array]) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return an interval about a root for each output, (n,) deg/s each, and where there is none, (n,).
+
+    Several rates may have one output: in a dead band all have the same. The interval nearest the output is taken, as
+    an error is far smaller than the rate; where the law rises from one end of the reach to the other, there is one.
+    """
+    low, high, outside = output.copy(), output.copy(), ~np.isnan(output)
+    last_step = 0.0
+    below = above = excess(output)
+    for step in np.geomspace(FIRST_REACH_DPS, _reach(output), REACH_STEPS):
+        next_below, next_above = excess(output - step), excess(output + step)
+        for turned, ends in (
+            (below * next_below <= 0, (output - step, output - last_step)),
+            (above * next_above <= 0, (output + last_step, output + step)),
+        ):
+            first = outside & turned
+            low, high, outside = np.where(first, ends[0], low), np.where(first, ends[1], high), outside & ~first
+        if not outside.any():
+            break
+        below, above, last_step = next_below, next_above, float(step)
+    return low, high, outside
 
 
 def _largest_change(rates: Mapping[str, Array], before: Mapping[str, Array]) -> float:

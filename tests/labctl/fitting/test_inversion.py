@@ -43,3 +43,41 @@ def test_outputs_that_are_no_numbers_stay_so_beside_the_others() -> None:
     assert np.isnan(found["z"][0])
     assert found["z"][1] == pytest.approx(10 / 1.1)
     assert found["x"] == pytest.approx(outputs["x"] / 1.1)
+
+
+@pytest.mark.parametrize("size", [0.935, 1.0, 1.025])
+def test_noise_within_a_dead_band_is_not_taken_for_its_edges(size: float) -> None:
+    band, bias, rng = 1.0, 0.2, np.random.default_rng(3)
+
+    def dead(rates: Mapping[str, np.ndarray], axis: str) -> np.ndarray:
+        rate = rates[axis]
+        return bias + size * (np.sign(rate) * np.sqrt(np.maximum(rate**2 - band**2, 0.0)) - rate)
+
+    true = np.concatenate([np.zeros(40), np.array([-30.0, -4.0, -1.2, 1.2, 4.0, 30.0])])
+    output = true + dead({"z": true}, "z") + rng.normal(0, 0.003, len(true))
+    found = invert({"z": output}, dead, "m")["z"]
+    assert np.abs(found[:40]).max() < 0.015
+    assert found[40:] == pytest.approx(true[40:], abs=0.02)
+
+
+def test_a_saturated_output_is_that_of_a_rate_where_it_begins() -> None:
+    def clipped(rates: Mapping[str, np.ndarray], axis: str) -> np.ndarray:
+        return 100.0 * np.tanh(rates[axis] / 100.0) - rates[axis]
+
+    assert invert({"z": np.array([76.159, -90.0])}, clipped, "m")["z"] == pytest.approx([100.0, -147.2], rel=0.001)
+
+
+def test_of_rates_with_the_same_output_the_nearest_is_returned() -> None:
+    def wave(rates: Mapping[str, np.ndarray], axis: str) -> np.ndarray:
+        return 4.0 * np.sin(rates[axis])  # the output 0 is that of -2.5, 0 and 2.5 deg/s
+
+    assert invert({"z": np.array([0.01])}, wave, "m")["z"] == pytest.approx([0.002], abs=1e-4)
+
+
+def test_numbers_beside_no_numbers_are_inverted_by_bisection_too() -> None:
+    def flank(rates: Mapping[str, np.ndarray], axis: str) -> np.ndarray:
+        return 3.0 * np.tanh(20.0 * (rates[axis] - 1.0))
+
+    found = invert({"z": np.array([np.nan, 0.5])}, flank, "m")["z"]
+    assert np.isnan(found[0])
+    assert found[1] + flank({"z": found[1:]}, "z")[0] == pytest.approx(0.5, abs=1e-8)
