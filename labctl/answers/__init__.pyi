@@ -52,6 +52,7 @@ from labctl.answers.benches import (
     WiggleUnit as WiggleUnit,
 )
 from labctl.answers.budget import (
+    AnyAxisUncertainty as AnyAxisUncertainty,
     AxisBoundJson as AxisBoundJson,
     BenchConditionsJson as BenchConditionsJson,
     BudgetJson as BudgetJson,
@@ -429,7 +430,6 @@ from labctl.answers.sufficiency import (
     UncertaintyCourseResponse as UncertaintyCourseResponse,
 )
 from labctl.answers.uncertainty import (
-    AnyAxisUncertainty as AnyAxisUncertainty,
     AxisUncertainty as AxisUncertainty,
     Surface as Surface,
     SurfaceResponse as SurfaceResponse,

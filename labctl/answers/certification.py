@@ -9,6 +9,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from labctl.answers.base import BY_KEY, Request, ResponseModel
+from labctl.answers.budget import AnyAxisUncertainty
 from labctl.answers.common_fields import (
     ActTime,
     CalibrationHash,
@@ -105,6 +106,8 @@ class JudgementDetail(TypedDict, total=False):
     """Objections that were overridden; empty: none."""
     due_from: str | None
     """Where the due date is from; null: no due date."""
+    uncertainty_unknown: str
+    """Why the uncertainty in use was unknown; empty: it was known."""
 
 
 class CertifiedErrors(ResponseModel):
@@ -126,6 +129,10 @@ class AssessmentResponse(ResponseModel):
     verdict_recording: int | None = Field(description="Recording that the verdict is of; null: there is no verdict.")
     verdict_text: str = Field(description="The verdict in words; empty if there is none.")
     error: CertifiedErrors = Field(description="Errors that the version states, deg/s.")
+    any_axis: dict[str, AnyAxisUncertainty] = Field(
+        description="For each output: its largest U in use, or why it is unknown, which is no objection; empty: the "
+        "version states none."
+    )
     objections: list[Objection] = Field(description="Objections to certifying the version; empty: none.")
     override_needed: bool = Field(description="Whether the version can be certified only with `override`.")
     least_reason_characters: int = Field(description="Smallest number of characters of the reason for an override.")
@@ -206,6 +213,10 @@ class CertificationResponse(ResponseModel):
     released_key: str | None = Field(default=None, description="Name of the API key of the second person.")
     release_reason: str | None = Field(
         default=None, description="Reason that the second person gave; null: none was needed."
+    )
+    uncertainty_unknown: str | None = Field(
+        default=None,
+        description="Why the uncertainty in use was unknown at the certification; empty: it was known; null: not kept.",
     )
     withdrawn_certificates: list[str] = Field(
         default_factory=list, description="Only in the answer to a revocation: certificates that it withdrew."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from labctl.answers.base import ResponseModel
-from labctl.answers.budget import BudgetJson, ContributionsOverJson, CrossRatesJson
+from labctl.answers.budget import AnyAxisUncertainty, BudgetJson, ContributionsOverJson
 from labctl.answers.calibrations import Validity
 from labctl.answers.common_fields import Serial, VersionNumber
 from labctl.answers.fitted_model import LeftOutEffect
@@ -86,18 +86,6 @@ class VectorUncertainty(ResponseModel):
     aligned_expanded_dps: dict[str, float | None] = Field(
         description="For each output: U up to a rotation of the frame, deg/s; null: unknown."
     )
-
-
-class AnyAxisUncertainty(ResponseModel):
-    """Largest U of one output over all rate vectors up to the calibrated rate, about any axis."""
-
-    bound_dps: float | None = Field(description="U in the frame of the case, deg/s; null: unknown somewhere.")
-    aligned_bound_dps: float | None = Field(description="U up to a rotation of the frame, deg/s.")
-    reach_dps: float = Field(description="Largest magnitude of the rate vectors, deg/s.")
-    rates_dps: dict[str, float] = Field(description="Rate vector where U is largest, or unknown, deg/s.")
-    temperature_c: float = Field(description="Temperature there, deg C.")
-    why: str = Field(description="Why it is unknown; empty where it is known.")
-    cross_rates: CrossRatesJson | None = Field(description="null: every body axis has an output.")
 
 
 class UncertaintyResponse(ResponseModel):

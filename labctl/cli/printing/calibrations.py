@@ -100,6 +100,9 @@ def print_certification(answer: CertificationResponse | ReleaseRequestResponse) 
     console.print(f"{answer.serial} version {answer.version} {done} ({_persons(answer)}: {answer.reason})")
     if answer.act == "certify":
         console.print(f"  verdict: {_verdict(answer)}", soft_wrap=True)
+    if answer.uncertainty_unknown:
+        text = f"  its uncertainty in use is unknown: {answer.uncertainty_unknown}"
+        console.print(text, style="yellow", soft_wrap=True)
     _print_objections(answer)
     for number in answer.withdrawn_certificates:
         console.print(f"  certificate {number} is withdrawn", soft_wrap=True)

@@ -6,10 +6,12 @@ from collections.abc import Iterator
 
 from labctl.answers.certification import AssessmentResponse, CertifiedErrors, Objection
 from labctl.answers.criticism import CriticismResponse
+from labctl.calibration import read_calibration
 from labctl.errors import BadInput, NotEnoughData, NotFound
 from labctl.fitting.models.inversion import NotConverged
 from labctl.services.calibrations.comparison import worse_than_raw, worse_than_version
 from labctl.services.calibrations.due import interval_days
+from labctl.services.calibrations.uncertainty import over_any_axis
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.standards.usage import Notices
@@ -37,6 +39,7 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
         verdict_recording=criticism.recording if criticism else None,
         verdict_text=_sentence(criticism) if criticism else "",
         error=_errors(row),
+        any_axis=over_any_axis(read_calibration(row.document)),
         objections=objections,
         override_needed=bool(objections),
         least_reason_characters=MIN_REASON_CHARACTERS,

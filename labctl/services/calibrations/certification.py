@@ -99,6 +99,7 @@ def put_in_force(
         JudgementDetail(
             verdict_reason=known.verdict_reason, verdict_text=known.verdict_text, error=known.error.model_dump(),
             objections=known.objections, due_from=due_from,
+            uncertainty_unknown="; ".join(dict.fromkeys(each.why for each in known.any_axis.values() if each.why)),
         ),
     )  # fmt: skip
     due = None if days is None else at + timedelta(days=days)

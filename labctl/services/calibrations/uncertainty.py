@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 
+from labctl.answers.budget import AnyAxisUncertainty
 from labctl.answers.uncertainty import (
-    AnyAxisUncertainty,
     AxisUncertainty,
     UncertaintyGrid,
     UncertaintyResponse,

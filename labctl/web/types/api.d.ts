@@ -18,6 +18,7 @@ export type Schema<Name extends keyof Schemas> = Declared<Schemas[Name]>;
 
 /* Answers */
 
+export type AnyAxisUncertainty = Schema<"AnyAxisUncertainty">;
 export type Assessment = Schema<"AssessmentResponse">;
 export type Attendance = Schema<"AttendanceResponse">;
 export type AxisUncertainty = Schema<"AxisUncertainty">;

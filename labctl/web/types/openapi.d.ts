@@ -3115,6 +3115,13 @@ export interface components {
             /** @description Errors that the version states, deg/s. */
             error: components["schemas"]["CertifiedErrors"];
             /**
+             * Any Axis
+             * @description For each output: its largest U in use, or why it is unknown, which is no objection; empty: the version states none.
+             */
+            any_axis: {
+                [key: string]: components["schemas"]["AnyAxisUncertainty"];
+            };
+            /**
              * Objections
              * @description Objections to certifying the version; empty: none.
              */
@@ -3251,6 +3258,16 @@ export interface components {
          */
         AxisNoiseJson: {
             /**
+             * Drift Tau S
+             * @description Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown.
+             */
+            drift_tau_s: number | null;
+            /**
+             * Drift Shortest Tau S
+             * @description Shortest correlation time of flicker, of which each decade has an equal part, s; absent: there is only one.
+             */
+            drift_shortest_tau_s?: number;
+            /**
              * White Dps
              * @description Standard deviation of a data set mean by white noise, RMS, deg/s; null: only the total is known.
              */
@@ -3260,11 +3277,6 @@ export interface components {
              * @description Standard deviation of the drift between data sets, deg/s; 0: none was found.
              */
             drift_dps: number;
-            /**
-             * Drift Tau S
-             * @description Correlation time of the drift, s; null: there is none.
-             */
-            drift_tau_s: number | null;
             /**
              * Per Rate
              * @description Standard deviation of the part that grows with the rate, per deg/s of table rate, 1.
@@ -4876,6 +4888,12 @@ export interface components {
              */
             release_reason: string | null;
             /**
+             * Uncertainty Unknown
+             * @description Only in the answer to a certification: why the uncertainty in use is unknown; empty: it is known.
+             * @default
+             */
+            uncertainty_unknown: string;
+            /**
              * Withdrawn Certificates
              * @description Only in the answer to a revocation: certificates that it withdrew.
              */
@@ -6023,6 +6041,16 @@ export interface components {
          */
         CriticisedNoise: {
             /**
+             * Drift Tau S
+             * @description Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown.
+             */
+            drift_tau_s: number | null;
+            /**
+             * Drift Shortest Tau S
+             * @description Shortest correlation time of flicker, of which each decade has an equal part, s; absent: there is only one.
+             */
+            drift_shortest_tau_s?: number;
+            /**
              * White Dps
              * @description Standard deviation of a data set mean by white noise, RMS over the axes, deg/s; null: unknown.
              */
@@ -6032,11 +6060,6 @@ export interface components {
              * @description Standard deviation of the drift between data sets, of the axis where it is largest, deg/s; null: unknown.
              */
             drift_dps: number | null;
-            /**
-             * Drift Tau S
-             * @description Correlation time of that drift, s; null: there is no drift, or it is unknown.
-             */
-            drift_tau_s: number | null;
             /**
              * Vs Datasheet
              * @description Largest drift divided by half the bias stability of the data sheet, at least 0; null: unknown.

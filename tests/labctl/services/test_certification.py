@@ -112,6 +112,11 @@ def test_over_http_the_refusal_is_a_conflict_and_the_assessment_says_it_before(t
         client.post(f"{unit}/calibrations", json={"effects": ["bias", "scale_factor"]})
         known = client.get(f"{unit}/calibrations/1/assessment").json()
         assert (known["verdict"], known["override_needed"]) == ("ambiguous", True)
+        in_use = client.get(f"{unit}/calibrations/1/uncertainty", params={"rate_dps": 10, "temperature_c": 25}).json()[
+            "any_axis"
+        ]
+        assert known["any_axis"] == in_use
+        assert in_use["z"]["bound_dps"] is None
         path = f"{unit}/calibrations/1/certify"
         refused = client.post(path, json={"by": "A", "reason": "fits"})
         assert (refused.status_code, refused.json()["type"]) == (409, "urn:labctl:problem:certification-refused")
@@ -121,6 +126,7 @@ def test_over_http_the_refusal_is_a_conflict_and_the_assessment_says_it_before(t
         assert (short.status_code, short.json()["type"]) == (400, "urn:labctl:problem:bad-input")
         act = client.post(path, json={"by": "A", **OVERRIDE}).json()
         assert (act["override"], act["verdict"]) == (True, "ambiguous")
+        assert act["uncertainty_unknown"] == in_use["z"]["why"] != ""
         assert client.get(f"{unit}/certifications").json() == [act]
         assert client.get(f"{unit}/calibrations/1").json()["certification"] == act
         assert client.get(f"{unit}/calibrations/9/assessment").status_code == 404

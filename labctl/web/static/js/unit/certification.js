@@ -7,8 +7,8 @@ import { button, chip, factList, notice, table, toast } from "../core/components
 import { dialog } from "../core/dialog.js";
 import { show } from "../core/router.js";
 
-/** @import { Assessment, Certification, Fetch, ReleaseRequest } from "../../../types/api.js" */
-/** @import { Field } from "../../../types/pages.js" */
+/** @import { AnyAxisUncertainty, Assessment, Certification, Fetch, ReleaseRequest } from "../../../types/api.js" */
+/** @import { Fact, Field } from "../../../types/pages.js" */
 
 /** @type {Record<string, [text: string, kind: string]>} */
 export const VERDICTS = {
@@ -204,6 +204,7 @@ function assessed(known) {
         known.error.raw_rms_dps === null ? null : `${number(known.error.raw_rms_dps)} without correction`,
       ],
       ["RMS error at temperatures left out of the fit", number(known.error.heldout_rms_dps), "deg/s"],
+      ...Object.entries(known.any_axis).map(largestUncertainty),
     ]),
     known.objections.some((each) => each.what === "verdict")
       ? null
@@ -221,6 +222,18 @@ function assessed(known) {
       : null,
   );
 }
+
+/**
+ * The largest uncertainty of one output in use, or why it is unknown.
+ * @param {[axis: string, found: AnyAxisUncertainty]} of
+ * @returns {Fact}
+ */
+const largestUncertainty = ([axis, found]) => [
+  `Largest U of ${axis} in use, k = 2`,
+  found.bound_dps === null ? chip("unknown", "warn") : number(found.bound_dps),
+  found.bound_dps === null ? null : "deg/s",
+  found.bound_dps === null ? found.why : `any axis, up to ${number(found.reach_dps)} deg/s`,
+];
 
 /** @param {readonly Certification[]} history */
 export function certificationTable(history) {
