@@ -77,10 +77,14 @@ class Drift:
 
 
 def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:
-    """Return the drifts to average over, around the scatter that white noise leaves unexplained."""
+    """Return the drifts to average over, around the scatter that white noise leaves unexplained.
+
+    Flicker is among them where the white noise is known: else a drift of every length would pass for what a model
+    lacks, as only the residuals show the noise.
+    """
     spacing, span = _times_s(scatter)
     shapes: list[tuple[float, float | None]] = [(ratio * spacing, None) for ratio in TAU_SPACINGS]
-    if span > FLICKER_RATIO * spacing:
+    if scatter.white_var is not None and span > FLICKER_RATIO * spacing:
         shapes.append((span, spacing))
     return [
         Drift(0.0, spacing, per_rate),
@@ -92,9 +96,10 @@ def hidden(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> l
     """Return drifts of which the scatter between data sets shows little: slow ones, larger than it.
 
     A coefficient is uncertain by them too. They are no part of the noise of a data set, with which errors are compared.
+    There are none where the white noise is not known.
     """
     spacing, span = _times_s(scatter)
-    if span <= FLICKER_RATIO * spacing:
+    if scatter.white_var is None or span <= FLICKER_RATIO * spacing:
         return []
     slow = [(ratio * spacing, None) for ratio in TAU_SPACINGS if ratio * spacing > SLOW_SHARE * span]
     sizes = [size for size in DRIFT_SIZES if size > 0]
