@@ -256,6 +256,17 @@ from labctl.answers.fixed_coefficients import (
     Number as Number,
     Text as Text,
 )
+from labctl.answers.fleet import (
+    FleetCancelRequest as FleetCancelRequest,
+    FleetCandidate as FleetCandidate,
+    FleetJobRequest as FleetJobRequest,
+    FleetJobResponse as FleetJobResponse,
+    FleetJobState as FleetJobState,
+    FleetKind as FleetKind,
+    FleetUnitResponse as FleetUnitResponse,
+    FleetUnits as FleetUnits,
+    FleetUnitState as FleetUnitState,
+)
 from labctl.answers.inspection import (
     CourseJson as CourseJson,
     DataWarning as DataWarning,
