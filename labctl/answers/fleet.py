@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 from typing_extensions import TypedDict
 
 from labctl.answers.base import Request, ResponseModel
@@ -55,8 +55,8 @@ class FleetJobRequest(FleetUnits):
     """A fit or a criticism of many units, one task for each unit."""
 
     kind: FleetKind = Field(
-        description="fit: a model is fitted to the newest recording of each unit and kept as its next version, which is "
-        "not put in force; criticise: the newest version of each unit is compared with its newest recording."
+        description="fit: a model is fitted to the newest recording of each unit and kept as its next version, which "
+        "is not put in force; criticise: the newest version of each unit is compared with its newest recording."
     )
     model: str = Field(
         default="",
@@ -67,8 +67,8 @@ class FleetJobRequest(FleetUnits):
     effects: list[str] = Field(
         default_factory=list,
         max_length=50,
-        description="For a fit: ids of the effects of the model, or with `model` of effects to add to it; `name:2` sets "
-        "the polynomial order to 2.",
+        description="For a fit: ids of the effects of the model, or with `model` of effects to add to it; `name:2` "
+        "sets the polynomial order to 2.",
     )
     accept_warnings: bool = Field(
         default=False, description="Whether to fit data in which labctl found errors, and to keep fits worse than none."
@@ -84,20 +84,6 @@ class FleetJobRequest(FleetUnits):
         description="What computes: local (processes of this computer), dask (a cluster of Dask on this computer) or "
         "dask://HOST:PORT (the scheduler of a cluster).",
     )
-    recordings: str = Field(
-        default="",
-        max_length=1000,
-        description="Address of a folder with exported recordings, one folder for each by its number, that workers read "
-        "by fsspec where they cannot reach the database, such as s3://bucket/recordings; empty: they read the database.",
-    )
-
-    @model_validator(mode="after")
-    def _says_what_to_fit(self) -> FleetJobRequest:
-        if self.kind == "fit" and not self.model and not self.effects:
-            raise ValueError("a fit needs an error model: give model, effects or both")
-        if self.kind == "criticise" and self.effects:
-            raise ValueError("effects are of a fit: leave them out of a criticism")
-        return self
 
 
 class FleetCancelRequest(Request):
@@ -120,8 +106,9 @@ class FleetJobResponse(ResponseModel):
     started_at: datetime | None = Field(description="Time at which it was begun; null: not yet.")
     ended_at: datetime | None = Field(description="Time of its end; null: it has not ended.")
     state: FleetJobState = Field(
-        description="waiting: not begun; running; done: every unit has a result or a reason; cancelled; failed: it could "
-        "not go on, see `why`. What was written before a cancel or a failure stays, and the same request goes on there."
+        description="waiting: not begun; running; done: every unit has a result or a reason; cancelled; failed: it "
+        "could not go on, see `why`. What was written before a cancel or a failure stays, and the same request goes on "
+        "there."
     )
     ended: bool = Field(description="Whether it has ended.")
     why: str = Field(description="Why it was cancelled or failed; empty otherwise.")

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import logging
 from concurrent.futures import Future
+from pathlib import Path
 from typing import Protocol
 
 from labctl.errors import BadInput, ComputationEnded
 from labctl.extras import needs_extra
-from labctl.services.computation import Computation
+from labctl.services.computation import Computation, Limits
+from labctl.services.fleet.processes import ProcessEngine
 from labctl.services.fleet.source import Source
 from labctl.services.fleet.task import FleetTask, Outcome, perform
+from labctl.store import StoreAddress, is_url
 
 LOCAL, DASK, SCHEME = "local", "dask", "dask://"
 #: Tasks that are sent to a cluster for each of its threads, so that none waits for the next one.
 AHEAD = 2
-#: How long a scheduler that does not answer is asked again, s.
-CONNECT_S = 60.0
+#: How long a scheduler is waited for at first, and one that was lost, s.
+CONNECT_S, RECONNECT_S = 10.0, 60.0
 
 
 class UnderWay(Protocol):
@@ -52,8 +56,8 @@ class Engine(Protocol):
         ...
 
 
-class LocalEngine:
-    """Tasks are done by the computation of this process: a bounded pool of processes, each ended at once."""
+class ComputationEngine:
+    """Tasks are done by a computation that is there already, such as the threads of a test."""
 
     def __init__(self, computation: Computation, at_once: int) -> None:
         self._computation, self.at_once = computation, at_once
@@ -88,21 +92,22 @@ class DaskEngine:
         with needs_extra("fleet", f"the engine {address}"):
             import distributed  # noqa: PLC0415  of the extra `fleet`
 
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a job says itself what it has lost
         self._distributed, self._source = distributed, source
         self._address = None if address == DASK else f"tcp://{address.removeprefix(SCHEME)}"
-        self._open()
+        self._open(CONNECT_S)
 
-    def _open(self) -> None:
+    def _open(self, within_s: float) -> None:
         try:
             if self._address is None:
                 self._client = self._distributed.Client(threads_per_worker=1, dashboard_address=None)
             else:
-                self._client = self._distributed.Client(self._address, timeout=CONNECT_S)
-            self._client.wait_for_workers(1, timeout=CONNECT_S)
+                self._client = self._distributed.Client(self._address, timeout=within_s)
+            self._client.wait_for_workers(1, timeout=within_s)
         except (OSError, TimeoutError) as error:
             raise ComputationEnded(
                 f"the scheduler at {self._address or 'this computer'} did not answer, or has no worker, within "
-                f"{CONNECT_S:g} s ({error or type(error).__name__}); start `dask scheduler` and `dask worker` there, "
+                f"{within_s:g} s ({error or type(error).__name__}); start `dask scheduler` and `dask worker` there, "
                 "then start the job again: units that are done are skipped"
             ) from error
         self._executor = self._client.get_executor(pure=False)
@@ -119,7 +124,7 @@ class DaskEngine:
     def reconnect(self) -> None:
         """Connect to the scheduler again, also to one that was started anew. Raises ComputationEnded."""
         self.close()
-        self._open()
+        self._open(RECONNECT_S)
 
     def close(self) -> None:
         """Leave the cluster; one on this computer ends."""
@@ -128,8 +133,21 @@ class DaskEngine:
 
 def perform_from(source: Source, task: FleetTask) -> Outcome:
     """Do a task on a worker of a cluster, which opens the store itself."""
-    with source.open(task) as store:
+    with source.open() as store:
         return perform(store, task)
+
+
+def open_engine(engine: str, address: StoreAddress, limits: Limits | None = None) -> Engine:
+    """Open an engine by its name; its workers read the database at `address`. Raises BadInput, ComputationEnded."""
+    refuse_unknown(engine)
+    if engine == LOCAL:
+        return ProcessEngine(address, limits=limits)
+    return DaskEngine(engine, Source(StoreAddress(_everywhere(address.location))))
+
+
+def _everywhere(location: str) -> str:
+    """Return an address of a database that does not depend on the folder of the process."""
+    return location if is_url(location) else str(Path(location).absolute())
 
 
 def refuse_unknown(engine: str) -> None:

@@ -12,11 +12,23 @@ from labctl.answers.fleet import (
     FleetUnitResponse,
     FleetUnitState,
 )
+from labctl.config import FLEET_ENGINE_VARIABLE, fleet_engine
+from labctl.errors import BadInput
 from labctl.fitting.models.presets import preset_for
-from labctl.services.fleet.engines import refuse_unknown
+from labctl.services.fleet.engines import LOCAL, refuse_unknown
 from labctl.store import FleetCounts, FleetFilter, FleetJobRow, NewFleetJob, Store
 from labctl.store.paging import Page, PageRequest
 from labctl.store.repositories.fleet_jobs import OPEN
+
+
+def refuse_other_engine(engine: str) -> None:
+    """Raise BadInput for a cluster that this service may not use: what a cluster answers is code to it."""
+    allowed = fleet_engine()
+    if engine not in {LOCAL, allowed}:
+        raise BadInput(
+            f"engine {engine!r}: this service may use {' or '.join(filter(None, (LOCAL, allowed)))}; start the service "
+            f"with {FLEET_ENGINE_VARIABLE}={engine} to allow it"
+        )
 
 
 def begin(store: Store, request: FleetJobRequest, at: datetime, runner: str = "") -> FleetJobResponse:
@@ -27,6 +39,8 @@ def begin(store: Store, request: FleetJobRequest, at: datetime, runner: str = ""
     refuse_unknown(request.engine)
     if request.kind == "fit":
         preset_for(request.model or None, list(request.effects))
+    elif request.effects:
+        raise BadInput("effects are of a fit, and a criticism judges the newest versions as they are; leave them out")
     wanted = FleetFilter(request.type, request.batch, request.supplier, request.search)
     new = NewFleetJob(request.kind, request.model_dump(mode="json"), request.engine, actor().name)
     model = request.model if request.kind == "criticise" else ""

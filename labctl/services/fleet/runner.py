@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from contextlib import closing
+from dataclasses import dataclass
 from datetime import timedelta
 
 from instruments.clock import Clock
 from labctl.acting_user import Actor, acting
 from labctl.answers.fleet import FleetJobRequest, FleetJobState
-from labctl.errors import ComputationEnded, LabctlError, TooBusy, VersionTaken
+from labctl.errors import ComputationEnded, LabctlError, StoreError, TooBusy, VersionTaken
 from labctl.log import get_logger
 from labctl.services.cache import code_digest
 from labctl.services.fleet.engines import Engine, UnderWay
@@ -31,6 +33,35 @@ LEFT_AFTER = timedelta(seconds=60)
 Told = Callable[[], None]
 
 
+def carry_out(
+    store: Store,
+    clock: Clock,
+    job: int,
+    runner: str,
+    make_engine: Callable[[], Engine],
+    told: Told = lambda: None,
+    over: Callable[[], bool] = lambda: False,
+) -> None:
+    """Carry out a job with an engine of its own, unless another process does. Raises LabctlError, as `JobRun.run`."""
+    if not store.fleet.take(job, runner, clock.utc() - LEFT_AFTER, clock.utc()):
+        return
+    try:
+        engine = make_engine()
+    except LabctlError as error:
+        store.fleet.end(job, runner, "failed", str(error), clock.utc())
+        raise
+    with closing(engine):
+        JobRun(store, clock, store.fleet.get(job), runner, engine).run(told, over)
+
+
+@dataclass(frozen=True)
+class _Ending:
+    """How a run ends; running: nothing is written, and the job is taken up again."""
+
+    state: FleetJobState
+    why: str = ""
+
+
 class JobRun:
     """One job, carried out by this process until it is done, cancelled or cannot go on."""
 
@@ -41,39 +72,48 @@ class JobRun:
         self._again: deque[str] = deque()
         self._tries: Counter[str] = Counter()
 
-    def run(self, told: Told = lambda: None) -> FleetJobState:
-        """Carry out what is left; returns how it ended. `told` is called after each result, to report progress.
+    def run(self, told: Told = lambda: None, over: Callable[[], bool] = lambda: False) -> FleetJobState:
+        """Carry out what is left; returns how it ended, or `waiting` where `over` said so: another process goes on.
 
-        An interrupt ends it as a cancel does: what was written stays, and what is under way is ended.
+        `told` is called after each result, to report progress. An interrupt ends the job as a cancel does: what was
+        written stays, and what is under way is ended. Raises LabctlError where it cannot go on; a StoreError leaves it
+        as it is, to be taken up again.
         """
-        job, clock = self._job.id, self._clock
-        state: FleetJobState = "failed"
-        why = "its process was interrupted; start it again, units that are done are skipped"
+        ending = _Ending("cancelled", "interrupted; start it again, units that are done are skipped")
         try:
-            with acting(Actor(self._job.by, f"fleet job {job}")):
-                state, why = ("done", "") if self._carry_out(told) else ("cancelled", "")
-        except KeyboardInterrupt:
-            state = "cancelled"
+            with acting(Actor(self._job.by, f"fleet job {self._job.id}")):
+                ending = self._carry_out(told, over)
+        except StoreError:
+            ending = _Ending("running")
             raise
         except LabctlError as error:
-            why = str(error)
+            ending = _Ending("failed", str(error))
             raise
         finally:
             for _, under_way in self._under_way.values():
                 under_way.leave()
-            self._store.fleet.end(job, self._runner, state, why, clock.utc())
-            log.info("fleet.ended", job=job, state=state, why=why)
-        return state
+            self._write_end(ending)
+        return ending.state
 
-    def _carry_out(self, told: Told) -> bool:
-        """Do every unit that is left; returns False where the job is to stop. Raises LabctlError."""
+    def _write_end(self, ending: _Ending) -> None:
+        fleet, now = self._store.fleet, self._clock.utc()
+        if ending.state == "waiting":
+            fleet.release(self._job.id, self._runner)
+        elif ending.state != "running":
+            fleet.end(self._job.id, self._runner, ending.state, ending.why, now)
+        log.info("fleet.ended", job=self._job.id, state=ending.state, why=ending.why)
+
+    def _carry_out(self, told: Told, over: Callable[[], bool]) -> _Ending:
+        """Do every unit that is left, until the job is to stop. Raises LabctlError."""
         left = self._tasks()
         while True:
+            if over():
+                return _Ending("waiting")
             if not self._store.fleet.is_wanted(self._job.id, self._runner, self._clock.utc()):
-                return False
+                return _Ending("cancelled")
             self._fill(left)
             if not self._under_way:
-                return True
+                return _Ending("done")
             finished, _ = wait(list(self._under_way), timeout=LOOK_S, return_when=FIRST_COMPLETED)
             for future in finished:
                 self._take_in(future)
@@ -146,7 +186,9 @@ class JobRun:
 
     def _lost(self, task: FleetTask, error: Exception) -> None:
         self._tries[task.serial] += 1
-        log.warning("fleet.lost", job=self._job.id, serial=task.serial, tries=self._tries[task.serial], error=str(error))
+        log.warning(
+            "fleet.lost", job=self._job.id, serial=task.serial, tries=self._tries[task.serial], error=str(error)
+        )
         if self._tries[task.serial] < TRIES:
             self._again.append(task.serial)
         else:

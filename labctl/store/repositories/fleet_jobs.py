@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, Literal
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 
 from labctl.answers.fleet import FleetCandidate, FleetJobState, FleetKind, FleetUnitState
 from labctl.answers.json_object import JsonObject
-from labctl.errors import Conflict, NotFound
+from labctl.errors import Conflict, NotFound, VersionTaken
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.paging import Page, PageRequest, rows_to_read
@@ -147,7 +147,12 @@ class FleetJobs:
         """
         j, u = tables.fleet_jobs, tables.units
         with self._database.writing() as connection:
-            values: dict[str, Any] = {"kind": new.kind, "request": dict(new.request), "engine": new.engine, "by": new.by}
+            values: dict[str, Any] = {
+                "kind": new.kind,
+                "request": dict(new.request),
+                "engine": new.engine,
+                "by": new.by,
+            }
             number = connection.scalar(
                 sa.insert(j).values(**values, created_at=at, units=0, state="waiting", runner=runner, seen_at=at)
                 .returning(j.c.id)
@@ -240,19 +245,24 @@ class FleetJobs:
         query = sa.update(tables.fleet_jobs).where(j.id == job, j.state.in_(OPEN), is_free)
         first = sa.func.coalesce(j.started_at, sa.bindparam("first", at, type_=tables.Instant()))
         with self._database.writing() as connection:
-            return bool(
-                connection.execute(
-                    query.values(runner=runner, seen_at=at, state="running", started_at=first)
-                ).rowcount
-            )  # fmt: skip
+            taken = connection.execute(query.values(runner=runner, seen_at=at, state="running", started_at=first))
+            return bool(taken.rowcount)
 
     @transaction
     def is_wanted(self, job: int, runner: str, at: datetime) -> bool:
         """Note that a process still carries out a job; returns False where it is to stop, or another one has it."""
         j = tables.fleet_jobs.c
         mine = sa.update(tables.fleet_jobs).where(j.id == job, j.runner == runner, j.state == "running")
-        with self._database.writing() as connection:
+        with self._database.writing(synced=False) as connection:
             return bool(connection.execute(mine.where(sa.not_(j.cancel_asked)).values(seen_at=at)).rowcount)
+
+    @transaction
+    def release(self, job: int, runner: str) -> None:
+        """Leave a job to the next process that takes it."""
+        j = tables.fleet_jobs.c
+        own = sa.update(tables.fleet_jobs).where(j.id == job, j.runner == runner, j.state == "running")
+        with self._database.writing() as connection:
+            connection.execute(own.values(runner="", state="waiting"))
 
     @transaction
     def cancel(self, job: int, by: str, reason: str, at: datetime) -> None:
@@ -290,11 +300,16 @@ class FleetJobs:
 
         Raises VersionTaken when another version got the number meanwhile; nothing was changed.
         """
-        with self._database.writing() as connection:
-            if not _keep(connection, job, "fit", result, at):
-                return False
-            add_version(connection, result.serial, at, fit.version, fit.new)
-            _replace_coefficients(connection, result.serial, fit)
+        try:
+            with self._database.writing() as connection:
+                if not _keep(connection, job, "fit", result, at):
+                    return False
+                add_version(connection, result.serial, at, fit.version, fit.new)
+                _replace_coefficients(connection, result.serial, fit)
+        except exc.IntegrityError as error:  # where several processes write
+            raise VersionTaken(
+                f"{result.serial} version {fit.version} was made by another fit in the meantime; fit again"
+            ) from error
         return True
 
 
@@ -336,5 +351,3 @@ def _replace_coefficients(connection: sa.Connection, serial: str, fit: FleetFit)
     ]  # fmt: skip
     if rows:
         connection.execute(sa.insert(tables.fleet_coefficients), rows)
-
-
