@@ -115,9 +115,10 @@ class JobRun:
             if not self._under_way:
                 return _Ending("done")
             finished, _ = wait(list(self._under_way), timeout=LOOK_S, return_when=FIRST_COMPLETED)
-            for future in finished:
-                self._take_in(future)
-                told()
+            for future in sorted(finished, key=Future.cancelled):  # those that were lost recall all that is under way
+                if future in self._under_way:
+                    self._take_in(future)
+                    told()
 
     def _tasks(self) -> Iterator[FleetTask]:
         """Yield the units that have no result, but for those that have nothing to be computed."""
