@@ -1,4 +1,4 @@
-"""Estimates of every candidate beside a model, whatever its evidence: what a unit contributes to the criticism of a type.
+"""Estimates of every candidate beside a model, whatever its evidence, for the criticism of a type by its units.
 
 A list of suspects says which effects stand out in one unit. An effect of the type may stand out in none, so each shape
 of each effect counts here: each coefficient as it is estimated alone beside the model, in standard uncertainties.

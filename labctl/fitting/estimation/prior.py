@@ -59,16 +59,20 @@ class CoefficientPrior:
 def coefficient_names(model: ErrorModel, axis: str, owners: Sequence[str], names: Sequence[str]) -> list[str]:
     """Return a name for each coefficient of an axis at each node of the temperature table, the nodes fastest.
 
-    `axis.name`; of a table `axis.name@temperature`, in deg C; "" for all but the first node of an effect that has one
-    coefficient for all temperatures. `owners` are the effects of the coefficients.
+    `axis.name`; of a table `axis.name@temperature`, in whole deg C where these differ, since the levels of two units
+    are never exactly the same; "" for all but the first node of an effect that has one coefficient for all
+    temperatures. `owners` are the effects of the coefficients.
     """
-    nodes = model.temperature.nodes_c if isinstance(model.temperature, LagrangeTable) else (None,)
+    nodes = model.temperature.nodes_c if isinstance(model.temperature, LagrangeTable) else ()
+    places = [f"@{round(node)}" for node in nodes]
+    if len(set(places)) < len(places):
+        places = [f"@{node:.1f}" for node in nodes]
     found = []
     for owner, name in zip(owners, names, strict=True):
-        if owner in model.steady or nodes == (None,):
-            found += [f"{axis}.{name}", *([""] * (len(nodes) - 1))]
+        if owner in model.steady or not places:
+            found += [f"{axis}.{name}", *([""] * (len(places) - 1))]
         else:
-            found += [f"{axis}.{name}@{node:.4g}" for node in nodes]
+            found += [f"{axis}.{name}{place}" for place in places]
     return found
 
 

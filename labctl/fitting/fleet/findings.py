@@ -1,4 +1,4 @@
-"""What is found of the units of a type: each coefficient, groups that differ, and units that are not like the others."""
+"""What is found of the units of a type: each coefficient, groups that differ, and units unlike the others."""
 
 from __future__ import annotations
 

@@ -103,7 +103,9 @@ class Levels:
 
     def tried(self, root: Array, left: Array, basis: NDArray[np.float64]) -> _Tried:
         """Return what each level explains of a weighted residual `left` (n,) beside an orthonormal `basis` (n, q)."""
-        levels, gain, norm = [], [], []
+        levels: list[Level] = []
+        gain: list[Array] = []
+        norm: list[Array] = []
         whole = np.column_stack([left - basis @ (basis.T @ left), basis])
         for factor, (numbers, total) in self._enough().items():
             if not len(numbers):

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -47,6 +46,8 @@ def reml(y: Array, variance: Array, columns: NDArray[np.float64]) -> Spread:
 
     def loss(tau: float) -> float:
         return -_log_likelihood(tau * scale, centred, variance, normed)
+
+    from scipy.optimize import minimize_scalar
 
     grid = np.geomspace(MIN_SHARE, MAX_SHARE, STEPS)
     if np.all(variance > 0):
@@ -86,6 +87,8 @@ def _interval(
     loss: Callable[[float], float], tau: float, least: float, lowest: float, highest: float
 ) -> tuple[float, float]:
     """Return where the log likelihood has fallen by `FALL` below and above its maximum."""
+
+    from scipy.optimize import brentq
 
     def fallen(at: float) -> float:
         return loss(at) - least - FALL

@@ -11,7 +11,7 @@ from scipy.special import chdtrc, ndtr, ndtri
 
 from labctl.fitting.fleet.directions import Direction, directions_of
 from labctl.fitting.fleet.findings import CoefficientPopulation, GroupEffect, GroupSpread, OutlierUnit
-from labctl.fitting.fleet.group_effects import DATE, Level, Levels, RobustFit, Shift, heterogeneity, select_shifts
+from labctl.fitting.fleet.group_effects import DATE, Levels, RobustFit, Shift, heterogeneity, select_shifts
 from labctl.fitting.fleet.spread import Spread, reml, weighted_fit
 from labctl.fitting.fleet.unit_coefficients import UnitTable
 from labctl.fitting.numeric.arrays import Array
@@ -63,7 +63,10 @@ def estimate(table: UnitTable) -> TypeEstimate:
     tests = max(levels.tested * (len(table.names) + len(directions)), 1)
     shared = [each for direction in directions for each in _shared(table, direction, levels, tests)]
     limit = -float(ndtri(OUTLIER_ALARM / 2.0 / max(table.values.size, 1)))
-    settled, effects, spreads, outliers = [], [], [], []
+    settled: list[_Settled] = []
+    effects: list[GroupEffect] = []
+    spreads: list[GroupSpread] = []
+    outliers: list[OutlierUnit] = []
     for k in range(len(table.names)):
         own = [each for each in shared if k in each.direction.places]
         taken = {each.shift.level: levels.column(each.shift.level) for each in own}
