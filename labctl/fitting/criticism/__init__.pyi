@@ -1,4 +1,4 @@
-from labctl.fitting.criticism.candidate_estimates import (
+from labctl.fitting.criticism.estimated_shapes import (
     CandidateEstimates as CandidateEstimates,
     EstimatedShape as EstimatedShape,
     candidate_estimates as candidate_estimates,

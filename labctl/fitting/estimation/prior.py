@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import chdtrc
 
+from labctl.fitting.effects import Reference
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
@@ -33,12 +34,19 @@ class CoefficientPrior:
     mean: Array  #: (k,)
     covariance: NDArray[np.float64]  #: (k, k)
     units: int  #: of the type that it is from
+    reference_temperature_c: float | None = None  #: that they hold for; None: it has no part in them
 
     def of(self, names: Sequence[str]) -> CoefficientPrior:
         """Return the prior of those coefficients among `names` that it knows, in their order."""
         places = [self.names.index(name) for name in names if name in self.names]
         known = tuple(self.names[i] for i in places)
-        return CoefficientPrior(known, self.mean[places], self.covariance[np.ix_(places, places)], self.units)
+        return replace(self, names=known, mean=self.mean[places], covariance=self.covariance[np.ix_(places, places)])
+
+    def referred(self, model: ErrorModel) -> ErrorModel:
+        """Return a model with the reference temperature that the prior holds for."""
+        if self.reference_temperature_c is None:
+            return model
+        return replace(model, reference=Reference(self.reference_temperature_c))
 
     def whitened(self, spread: NDArray[np.float64], names: Sequence[str]) -> tuple[NDArray[np.float64], Array]:
         """Return rows (q, c) and their values (q,), of noise 1, of c columns from which `spread` makes coefficients.

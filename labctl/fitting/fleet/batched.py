@@ -85,7 +85,9 @@ def batched_fit_of_each(
     for part in chunks(n, m * (k + 1)):
         rows = np.concatenate([design[part], y[part, :, None]], axis=2).transpose(1, 0, 2)
         flat = whitened(scatter, [drift], white, rows.reshape(m, -1))[0][0]
-        triangles = np.linalg.qr(flat.reshape(m, -1, k + 1).transpose(1, 0, 2), mode="r")
+        triangles: NDArray[np.float64] = np.asarray(
+            np.linalg.qr(flat.reshape(m, -1, k + 1).transpose(1, 0, 2), mode="r"), dtype=np.float64
+        )
         size = np.sqrt(np.sum(triangles[:, :, :k] ** 2, axis=1))
         diagonal = np.abs(np.diagonal(triangles, axis1=1, axis2=2))[:, :k] / np.maximum(size, 1e-300)
         lost = diagonal.min(axis=1) < SINGULAR

@@ -53,6 +53,7 @@ def fit_with_prior(data: FitData, preset: Preset, prior: CoefficientPrior) -> Fi
     the prior.
     """
     model, kept = preset.build(data)
+    model = prior.referred(model)
     used = data.take(kept)
     solved = solve_axes(used, model, prior=prior)
     p_value, axes = 1.0, len(solved.solutions)

@@ -23,8 +23,9 @@ from labctl.fitting.numeric.arrays import Array
 ENOUGH, ENOUGH_NEXT = 6.0, 9.0
 #: A lead of less than this leaves both; beyond `FAR` the evidence alone decides against what is hardly distinguished.
 LEAD, FAR = 3.0, 12.0
-#: A rival that leaves less than this of the leader's chi2, or less than this share of it, is not distinguished.
-INDISTINGUISHABLE_CHI2, ALIKE = 7.0, 0.995
+#: A rival that leaves less than this of the leader's chi2 is not distinguished, nor one of no more coefficients that
+#: reproduces this share of it: no shape is known better than to about a fifth of its amplitude, and a fleet sees less.
+INDISTINGUISHABLE_CHI2, ALIKE = 7.0, 0.95
 #: A further effect takes off at least this share of the chi2 of the first one.
 MIN_NEXT_SHARE = 0.1
 #: Effects named at most, and units without which nothing is.
@@ -37,7 +38,7 @@ BENCH_LEVEL = 1e-3
 
 @dataclass(frozen=True)
 class UnitEvidence:
-    """What the criticism of one unit says of every candidate (`labctl.fitting.criticism.candidate_estimates`)."""
+    """What the criticism of one unit says of every candidate (`candidate_estimates`)."""
 
     serial_number: str
     axes: Mapping[str, CandidateEstimates]
@@ -78,7 +79,7 @@ class TypeEffect:
     sizes: tuple[MeanSize, ...]
     is_common: bool  #: whether units share the size; else its sign differs from unit to unit
     axes: tuple[str, ...]  #: output axes on which it shows
-    largest_unit_z: float  #: root mean square of the units' own z, by which none stands out
+    rms_unit_z: float  #: root mean square of what the units show each, in standard uncertainties; 1 is noise alone
     benches: tuple[BenchSize, ...]
     of_bench: str | None  #: the only bench whose units show it: then it is the bench's error; None: no such bench
 

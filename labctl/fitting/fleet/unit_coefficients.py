@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.estimation.prior import coefficient_names
 from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array, block_diagonal
 
 YEAR = timedelta(days=365.25)
@@ -30,6 +31,8 @@ class UnitCoefficients:
     groups: Mapping[str, str | None] = field(default_factory=dict)  #: factor of `FACTORS` -> level; "" or None: unknown
     measured_at: datetime | None = None
     units: tuple[str, ...] = ()  #: (k,) of the coefficients, such as deg/s; (): not stated
+    model: str = ""  #: error model and what its law is of; coefficients of two models are not compared
+    reference_temperature_c: float | None = None  #: zero point of terms in temperature; None: it has no part in them
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class UnitTable:
     level: Mapping[str, NDArray[np.int64]]  #: factor -> (n,) number of the level of each unit; -1: unknown
     years: Array  #: (n,) date of the measurement, years from the mean of all; NaN: unknown
     mean_date: datetime | None  #: None: no date is known
+    reference_temperature_c: float | None  #: that the coefficients hold for; None: it has no part in them
     left_out: tuple[LeftOut, ...]
 
     def __len__(self) -> int:
@@ -86,19 +90,22 @@ def unit_coefficients_of(
         blocks.append(fit.covariance[np.ix_(kept, kept)])
     return UnitCoefficients(
         serial_number, tuple(names), np.concatenate([np.zeros(0), *values]), block_diagonal(blocks), groups or {},
-        measured_at, tuple(units),
+        measured_at, tuple(units), f"{exported.model.name} of the {exported.model.argument}",
+        None if isinstance(exported.model.temperature, LagrangeTable) else exported.model.reference.temperature_c,
     )  # fmt: skip
 
 
 def unit_table(units: Sequence[UnitCoefficients]) -> UnitTable:
     """Return the units that have the coefficients which most of them have; the others are left out with the reason.
 
+    The same coefficients are those of one model and one reference temperature, by name; a unit may have more of them.
     Of a unit that was calibrated more than once the newest calibration counts.
     """
-    sets = Counter(frozenset(unit.names) for unit in units)
-    wanted = max(sets, key=lambda names: (sets[names], len(names))) if sets else frozenset[str]()
-    names = next((unit.names for unit in units if frozenset(unit.names) == wanted), ())
-    left_out = list(_unusable(units, wanted))
+    kinds = Counter((unit.model, unit.reference_temperature_c, frozenset(unit.names)) for unit in units)
+    none = ("", None, frozenset[str]())
+    wanted = max(kinds, key=lambda kind: (kinds[kind], len(kind[2]), kind[0])) if kinds else none
+    names = next((unit.names for unit in units if frozenset(unit.names) == wanted[2]), ())
+    left_out = [(unit, reason) for unit in units if (reason := _unusable(unit, *wanted))]
     refused = {id(unit) for unit, _ in left_out}
     newest: dict[str, UnitCoefficients] = {}
     for unit in units:
@@ -115,20 +122,32 @@ def unit_table(units: Sequence[UnitCoefficients]) -> UnitTable:
     first = next((unit for unit in rows if unit.units and unit.names == names), None)
     return UnitTable(
         tuple(newest), names, first.units if first else ("",) * len(names), values,
-        covariance.reshape(len(rows), len(names), len(names)), levels, level, years, mean_date,
+        covariance.reshape(len(rows), len(names), len(names)), levels, level, years, mean_date, wanted[1],
         tuple(LeftOut(unit.serial_number, reason) for unit, reason in left_out),
     )  # fmt: skip
 
 
-def _unusable(units: Sequence[UnitCoefficients], wanted: frozenset[str]) -> Iterator[tuple[UnitCoefficients, str]]:
-    for unit in units:
-        missing = sorted(wanted - set(unit.names))
-        if missing:
-            yield unit, f"its calibration has no coefficient {', '.join(missing)}, which most units of the type have"
-        elif not (np.all(np.isfinite(unit.values)) and np.all(np.isfinite(unit.covariance))):
-            yield unit, "its calibration states no value or no uncertainty of a coefficient"
-        elif np.any(np.diag(unit.covariance) < 0):
-            yield unit, "its calibration states a negative variance of a coefficient"
+def _unusable(unit: UnitCoefficients, model: str, reference_c: float | None, names: frozenset[str]) -> str:
+    """Return why a unit is no part of a table of coefficients; "" for one that is."""
+    missing = sorted(names - set(unit.names))
+    if unit.model != model:
+        return f"its calibration is by model {unit.model}, those of most units are by {model}"
+    if missing:
+        return f"its calibration has no coefficient {', '.join(missing)}, which most units of the type have"
+    if unit.reference_temperature_c != reference_c:
+        return (
+            f"its coefficients hold for a reference temperature of {_degrees(unit.reference_temperature_c)}, those of "
+            f"most units for {_degrees(reference_c)}"
+        )
+    if not (np.all(np.isfinite(unit.values)) and np.all(np.isfinite(unit.covariance))):
+        return "its calibration states no value or no uncertainty of a coefficient"
+    if np.any(np.diag(unit.covariance) < 0):
+        return "its calibration states a negative variance of a coefficient"
+    return ""
+
+
+def _degrees(temperature_c: float | None) -> str:
+    return "none" if temperature_c is None else f"{temperature_c:.4g} deg C"
 
 
 def _is_newer(unit: UnitCoefficients, other: UnitCoefficients | None) -> bool:
