@@ -6,11 +6,9 @@ from datetime import datetime
 from typing import Literal
 
 from pydantic import Field
-from typing_extensions import TypedDict
 
 from labctl.answers.base import Request, ResponseModel
 from labctl.answers.common_fields import CriticismVerdict, Serial
-from labctl.answers.fitted_model import Coefficient
 
 #: What a job does with each unit.
 FleetKind = Literal["fit", "criticise"]
@@ -25,21 +23,6 @@ _SUPPLIER = "Only units of this supplier; empty: of any."
 _SEARCH = "Only units whose serial number, type, technology, batch or supplier holds this text, in any case."
 _RMS = "RMS residual of the model on the data set means, deg/s; null: not known."
 _FLOOR = "RMS residual that noise alone leaves, deg/s; null: not known."
-
-
-class FleetCandidate(TypedDict):
-    """The estimate of an effect that may be missing in the model of one unit."""
-
-    effect: str
-    """Id of the effect."""
-    log_bayes_factor: float
-    """Natural logarithm of the Bayes factor of the model with the effect against the model."""
-    p_value: float
-    """Probability of such a gain in chi2 by chance, corrected for the number of shapes tried, 0 to 1."""
-    alias_group: list[str]
-    """Ids of the effects that the recording cannot distinguish from it, itself first."""
-    coefficients: dict[str, dict[str, Coefficient]]
-    """Output axis -> name -> coefficient of the effect."""
 
 
 class FleetUnits(Request):
@@ -141,3 +124,170 @@ class FleetUnitResponse(ResponseModel):
     noise_floor_dps: float | None = Field(description=_FLOOR)
     verdict: CriticismVerdict | None = Field(description="Verdict of the criticism; null: there was none.")
     named: list[str] | None = Field(description="Ids of the effects that the verdict is based on; null: no verdict.")
+
+
+class FleetReportRequest(FleetUnits):
+    """Which units a report is about."""
+
+    model: str = Field(
+        default="", max_length=200, description="Only units whose newest version is of this error model; empty: of any."
+    )
+
+
+class RatioClass(ResponseModel):
+    """Units of one class of error over noise floor."""
+
+    low: float = Field(description="Least error over noise floor of the class, 1.")
+    high: float | None = Field(description="Error over noise floor that the class ends below, 1; null: no end.")
+    units: int = Field(description="Number of units.")
+
+
+class FleetDue(ResponseModel):
+    """Units by the date until which their version in force is valid."""
+
+    overdue: int = Field(description="Units whose date has passed.")
+    within_30_days: int = Field(description="Units that are due within 30 days.")
+    within_90_days: int = Field(description="Units that are due within 90 days, but not within 30.")
+    later: int = Field(description="Units that are due later.")
+    no_date: int = Field(description="Units with a version in force that has no date.")
+    none_in_force: int = Field(description="Units without a version in force.")
+
+
+class FleetTypeResponse(ResponseModel):
+    """The units of one type in figures: how many, how good, how judged, and when due."""
+
+    type: str = Field(description="Type of the units: their model; empty: not stated.")
+    units: int = Field(description="Number of units.")
+    error_over_floor: list[RatioClass] = Field(
+        description="RMS residual over noise floor of the newest version of each unit that a fleet job has fitted."
+    )
+    fitted: int = Field(description="Units that a fleet job has fitted and whose noise floor is known.")
+    verdicts: dict[str, int] = Field(description="Verdict -> units whose newest criticism by a fleet job gave it.")
+    criticised: int = Field(description="Units that a fleet job has criticised.")
+    missing: dict[str, int] = Field(
+        description="Id of an effect -> units whose newest criticism names it as missing, alone or with others."
+    )
+    due: FleetDue = Field(description="Units by their due date.")
+
+
+class FleetCoefficientFigures(ResponseModel):
+    """One coefficient over the units of a type."""
+
+    name: str = Field(description="Output axis and name of the coefficient, such as x.scale_factor.")
+    unit: str = Field(description="Unit of the figures; empty: not stated.")
+    mean: float = Field(description="Mean over the units outside of the groups that differ, in `unit`.")
+    expanded_u_mean: float = Field(description="Expanded uncertainty of the mean, 95.45 %, in `unit`.")
+    spread: float = Field(description="Standard deviation of the units' true values, in `unit`.")
+    spread_low: float = Field(description="Lower end of the 95 % interval of the spread, in `unit`.")
+    spread_high: float = Field(description="Upper end of the 95 % interval of the spread, in `unit`.")
+    median_u: float = Field(description="Median standard uncertainty of the units' own calibrations, in `unit`.")
+    units: int = Field(description="Number of units, without outliers.")
+
+
+class FleetGroup(ResponseModel):
+    """A group of units that differs from the rest of its type."""
+
+    factor: str = Field(description="batch, bench, supplier or date (a trend).")
+    level: str = Field(description="Name of the group; empty for a trend.")
+    coefficients: list[str] = Field(description="Coefficients that it shifts, all by the same amount.")
+    shift: float = Field(description="Shift in `unit`; of a trend, per year.")
+    u: float = Field(description="Standard uncertainty of the shift, in `unit`.")
+    unit: str = Field(description="Unit of the coefficients; empty: not stated.")
+    units: int = Field(description="Number of units in the group; of a trend, with a date.")
+    p_value: float = Field(description="Probability that chance gives such a group anywhere in the type, 0 to 1.")
+    of_bench: bool = Field(description="Whether it is an error of a bench that all units on it share.")
+    text: str = Field(description="The finding in a sentence.")
+
+
+class FleetOutlier(ResponseModel):
+    """A unit that is not like its type in one coefficient."""
+
+    serial: Serial
+    coefficient: str = Field(description="Output axis and name of the coefficient.")
+    z: float = Field(description="Distance from the expected value over its standard uncertainty, with sign, 1.")
+    text: str = Field(description="The finding in a sentence.")
+
+
+class FleetSize(ResponseModel):
+    """A coefficient of a missing effect over the units of a type."""
+
+    axis: str = Field(description="Output axis: x, y or z.")
+    name: str = Field(description="Name of the coefficient.")
+    unit: str = Field(description="Unit of the figures.")
+    mean: float = Field(description="Mean over the units, in `unit`.")
+    u_mean: float = Field(description="Standard uncertainty of the mean, in `unit`.")
+    spread: float = Field(description="Standard deviation of the units' sizes about the mean, in `unit`.")
+
+
+class FleetMissing(ResponseModel):
+    """An effect that the model of a type is missing, or several that cannot be distinguished."""
+
+    effects: list[str] = Field(description="Ids of the effects, the likeliest first.")
+    log_bayes_factor: float = Field(description="Natural logarithm of the evidence against nothing missing, 1.")
+    common: bool = Field(description="Whether units share the size; false: its sign differs from unit to unit.")
+    sizes: list[FleetSize] = Field(description="Its coefficients over the units.")
+    rms_unit_z: float = Field(
+        description="Root mean square of what single units show, in standard uncertainties, 1; 1 is noise alone."
+    )
+    of_bench: str | None = Field(description="The only bench whose units show it: the bench's error; null: none.")
+    text: str = Field(description="The finding in a sentence.")
+
+
+class FleetAgeing(ResponseModel):
+    """Change of one coefficient per year over the units of a type that were calibrated more than once."""
+
+    name: str = Field(description="Output axis and name of the coefficient.")
+    unit: str = Field(description="Unit of the coefficient; the figures are per year.")
+    mean: float = Field(description="Mean change per year, in `unit`.")
+    u_mean: float = Field(description="Standard uncertainty of the mean, in `unit`.")
+    spread: float = Field(description="Standard deviation of the changes of units, in `unit`.")
+    units: int = Field(description="Number of units with a history.")
+
+
+class FleetReportResponse(ResponseModel):
+    """What the units of a type have in common, which differ, and what their model is missing."""
+
+    type: str = Field(description="Type of the units: their model.")
+    figures: FleetTypeResponse = Field(description="The units in figures.")
+    compared: int = Field(description="Units whose coefficients were compared.")
+    left_out: int = Field(description="Units with a version that were not compared: their coefficients are others.")
+    coefficients: list[FleetCoefficientFigures] = Field(description="Mean and spread of each coefficient.")
+    groups: list[FleetGroup] = Field(description="Groups that differ from the rest of the type, strongest first.")
+    outliers: list[FleetOutlier] = Field(description="Units that are not like their type, farthest first.")
+    ageing: list[FleetAgeing] = Field(description="Change per year of each coefficient; empty: too few histories.")
+    evidence_units: int = Field(description="Units whose criticisms were added up for `missing`.")
+    missing: list[FleetMissing] = Field(description="Effects that the model of the type is missing, strongest first.")
+    text: list[str] = Field(description="The report in sentences, and what could not be said and why.")
+
+
+class FleetChartCoefficient(ResponseModel):
+    """A coefficient that a chart can show."""
+
+    axis: str = Field(description="Output axis: x, y or z.")
+    name: str = Field(description="Name of the coefficient.")
+    unit: str = Field(description="Unit of the coefficient.")
+    units: int = Field(description="Number of units that have it.")
+
+
+class FleetChartPoint(ResponseModel):
+    """A coefficient over the units of one group that were measured in one span of time."""
+
+    level: str = Field(description="Name of the group; empty: not stated.")
+    at: datetime = Field(description="Mean time of the measurements.")
+    units: int = Field(description="Number of units.")
+    mean: float = Field(description="Mean of the coefficient, in its unit.")
+    low: float = Field(description="Least value, in its unit.")
+    high: float = Field(description="Largest value, in its unit.")
+    mean_u: float | None = Field(description="Mean standard uncertainty of a unit, in its unit; null: not known.")
+
+
+class FleetChartResponse(ResponseModel):
+    """A control chart of a coefficient over time, by group."""
+
+    type: str = Field(description="Type of the units: their model; empty: all.")
+    axis: str = Field(description="Output axis: x, y or z; empty: no coefficient is known.")
+    name: str = Field(description="Name of the coefficient; empty: no coefficient is known.")
+    unit: str = Field(description="Unit of the coefficient.")
+    factor: str = Field(description="What the points are grouped by: batch, bench or supplier.")
+    points: list[FleetChartPoint] = Field(description="Points, by group and time.")
+    coefficients: list[FleetChartCoefficient] = Field(description="Coefficients that the chart can show.")

@@ -51,6 +51,19 @@ def upgrade() -> None:
     )
 
     op.create_table(
+        "fleet_evidence",
+        sa.Column("id", sa.BigInteger().with_variant(sa.Integer(), "sqlite"), autoincrement=True, nullable=False),
+        sa.Column("job_id", sa.BigInteger().with_variant(sa.Integer(), "sqlite"), nullable=False),
+        sa.Column("type", sa.String(200), nullable=False),
+        sa.Column("model", sa.String(200), nullable=False),
+        sa.Column("units", sa.Integer(), nullable=False),
+        sa.Column("content", sa.LargeBinary(), nullable=False),
+        sa.ForeignKeyConstraint(["job_id"], ["fleet_jobs.id"], name=op.f("fk_fleet_evidence_job_id_fleet_jobs")),
+        sa.PrimaryKeyConstraint("id", name=op.f("pk_fleet_evidence")),
+    )
+    op.create_index(op.f("ix_fleet_evidence_type_model"), "fleet_evidence", ["type", "model"])
+
+    op.create_table(
         "fleet_units",
         sa.Column("job_id", sa.BigInteger().with_variant(sa.Integer(), "sqlite"), autoincrement=False, nullable=False),
         sa.Column("serial", sa.String(200), nullable=False),
@@ -66,16 +79,20 @@ def upgrade() -> None:
         sa.Column("noise_floor_dps", sa.Float(), nullable=True),
         sa.Column("verdict", sa.String(20), nullable=True),
         sa.Column("named", sa.JSON(none_as_null=True), nullable=True),
-        sa.Column("candidates", sa.JSON(none_as_null=True), nullable=True),
+        sa.Column("evidence_id", sa.BigInteger().with_variant(sa.Integer(), "sqlite"), nullable=True),
         sa.ForeignKeyConstraint(["job_id"], ["fleet_jobs.id"], name=op.f("fk_fleet_units_job_id_fleet_jobs")),
+        sa.ForeignKeyConstraint(
+            ["evidence_id"], ["fleet_evidence.id"], name=op.f("fk_fleet_units_evidence_id_fleet_evidence")
+        ),
         sa.ForeignKeyConstraint(["serial"], ["units.serial"], name=op.f("fk_fleet_units_serial_units")),
         sa.PrimaryKeyConstraint("job_id", "serial", name=op.f("pk_fleet_units")),
     )
     op.create_index(op.f("ix_fleet_units_job_id_state"), "fleet_units", ["job_id", "state"])
+    op.create_index(op.f("ix_fleet_units_evidence_id"), "fleet_units", ["evidence_id"])
     op.create_index(op.f("ix_fleet_units_serial_kind_newest"), "fleet_units", ["serial", "kind", "newest"])
 
 
 def downgrade() -> None:
     """Remove them, and what they hold."""
-    for table in ("fleet_units", "fleet_coefficients", "fleet_jobs"):
+    for table in ("fleet_units", "fleet_evidence", "fleet_coefficients", "fleet_jobs"):
         op.drop_table(table)

@@ -130,6 +130,35 @@ def criticise(
 
 
 @app.command()
+def report(
+    model: NewestModel = "",
+    type_: UnitType = "",
+    batch: Batch = "",
+    supplier: Supplier = "",
+    search: Search = "",
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Report on the units of a type: error over noise floor, verdicts, due dates, which batch, bench or unit differs,
+    and which effect the model of the type is missing."""
+    from instruments.clock import SystemClock
+    from labctl.answers.fleet import FleetReportRequest
+    from labctl.cli.stage_line import stage_line
+    from labctl.services.fleet.report import fleet_report
+    from labctl.services.read_access import open_readonly
+
+    with one_clear_line(), open_readonly(database) as store, stage_line():
+        request = FleetReportRequest(type=type_, model=model, batch=batch, supplier=supplier, search=search)
+        answer = fleet_report(store, request, SystemClock().utc())
+    if as_json:
+        print_json(answer)
+    else:
+        from labctl.cli.printing.fleet import print_report
+
+        print_report(answer)
+
+
+@app.command()
 def jobs(limit: Limit = None, as_json: Json = False, database: Database = None) -> None:
     """List the jobs, newest first."""
     from instruments.clock import SystemClock

@@ -10,7 +10,10 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from labctl.cli.output import console, format_number, print_part, stderr, table
 
 if TYPE_CHECKING:
-    from labctl.answers.fleet import FleetJobResponse, FleetUnitResponse
+    from labctl.answers.fleet import FleetJobResponse, FleetReportResponse, FleetTypeResponse, FleetUnitResponse
+
+#: Outliers that are printed; --json has more.
+MAX_OUTLIERS = 20
 
 
 class FleetProgress:
@@ -91,3 +94,40 @@ def print_units(answers: list[FleetUnitResponse], total: int) -> None:
         rows.add_row(each.serial, each.state, version, each.verdict or "–", each.reason)
     console.print(rows)
     print_part(len(answers), total, "units")
+
+
+def print_report(answer: FleetReportResponse) -> None:
+    """Print the report on a type."""
+    _print_figures(answer.figures)
+    if answer.coefficients:
+        rows = table("", "coefficient", "unit", "mean", "U", "spread", "u of a unit", numbers=4)
+        for each in answer.coefficients:
+            rows.add_row(
+                each.name, each.unit, format_number(each.mean), format_number(each.expanded_u_mean, 2),
+                format_number(each.spread, 3), format_number(each.median_u, 2),
+            )  # fmt: skip
+        console.print(rows)
+    for outlier in answer.outliers[:MAX_OUTLIERS]:
+        console.print(f"{outlier.serial}: {outlier.text}", soft_wrap=True)
+    for sentence in answer.text:
+        console.print(sentence, style="bold", soft_wrap=True)
+
+
+def _print_figures(figures: FleetTypeResponse) -> None:
+    console.print(f"type {figures.type or 'not stated'}: {figures.units} units", style="bold")
+    classes = [
+        f"{each.units} {f'below {each.high:g}' if each.high is not None else f'from {each.low:g}'}"
+        for each in figures.error_over_floor
+        if each.units
+    ]
+    console.print(f"  error over noise floor: {', '.join(classes) or 'no fleet job has fitted any'}", soft_wrap=True)
+    verdicts = [f"{units} {verdict}" for verdict, units in figures.verdicts.items()]
+    console.print(f"  verdicts: {', '.join(verdicts) or 'no fleet job has criticised any'}", soft_wrap=True)
+    if figures.missing:
+        named = [f"{effect} in {units}" for effect, units in figures.missing.items()]
+        console.print(f"  named as missing: {', '.join(named)}", soft_wrap=True)
+    due = figures.due
+    console.print(
+        f"  due: {due.overdue} overdue, {due.within_30_days} within 30 days, {due.within_90_days} within 90 days, "
+        f"{due.later} later, {due.no_date} without a date; {due.none_in_force} without a version in force"
+    )

@@ -71,6 +71,9 @@ class JobRun:
         self._under_way: dict[Future[Outcome], tuple[FleetTask, UnderWay]] = {}
         self._again: deque[str] = deque()
         self._tries: Counter[str] = Counter()
+        from labctl.services.fleet.evidence import EvidenceParts  # noqa: PLC0415  slow to load, for a job alone
+
+        self._evidence = EvidenceParts()
 
     def run(self, told: Told = lambda: None, over: Callable[[], bool] = lambda: False) -> FleetJobState:
         """Carry out what is left; returns how it ended, or `waiting` where `over` said so: another process goes on.
@@ -97,6 +100,9 @@ class JobRun:
 
     def _write_end(self, ending: _Ending) -> None:
         fleet, now = self._store.fleet, self._clock.utc()
+        if ending.state != "running":
+            for part in self._evidence.rest():
+                fleet.keep_evidence(self._job.id, part)
         if ending.state == "waiting":
             fleet.release(self._job.id, self._runner)
         elif ending.state != "running":
@@ -201,7 +207,9 @@ class JobRun:
 
     def _write(self, task: FleetTask, outcome: Outcome) -> None:
         if outcome.fit is None:
-            self._store.fleet.keep(self._job.id, self._request.kind, outcome.result, task.at)
+            kept = self._store.fleet.keep(self._job.id, self._request.kind, outcome.result, task.at)
+            if kept and outcome.estimates is not None and (part := self._evidence.add(task.serial, outcome.estimates)):
+                self._store.fleet.keep_evidence(self._job.id, part)
             return
         try:
             self._store.fleet.keep_fit(self._job.id, outcome.result, outcome.fit, task.at)

@@ -11,14 +11,18 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 from instruments.clock import processor_s
 from labctl.answers.calibrations import FitRequest
-from labctl.answers.fleet import FleetCandidate, FleetJobRequest
+from labctl.answers.fleet import FleetJobRequest
 from labctl.errors import BadInput, ComputationEnded, LabctlError
 from labctl.services.cache import code_digest
 from labctl.services.recordings.loading import chosen_rows, readings_question
 from labctl.store import CalibrationRecord, FleetCoefficient, FleetFit, FleetResult, NewCalibration, RecordingRow, Store
+
+if TYPE_CHECKING:
+    from labctl.services.fleet.evidence import UnitEstimates
 
 
 @dataclass(frozen=True)
@@ -33,10 +37,11 @@ class FleetTask:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a task; a fit has the version that is to be kept."""
+    """The result of a task; a fit has the version that is to be kept, a criticism what it shows of every effect."""
 
     result: FleetResult
     fit: FleetFit | None = None
+    estimates: UnitEstimates | None = None
 
 
 def perform(store: Store, task: FleetTask) -> Outcome:
@@ -151,25 +156,26 @@ def coefficients_of(new: NewCalibration) -> Iterator[FleetCoefficient]:
 
 
 def _criticised(store: Store, task: FleetTask) -> Outcome:
-    from labctl.services.criticism.criticise import criticise_unit  # noqa: PLC0415  loaded by a worker only
+    from labctl.fitting.criticism import Criticism, candidate_estimates  # noqa: PLC0415  loaded by a worker only
+    from labctl.services.criticism.criticise import criticise_seen  # noqa: PLC0415  as above
+    from labctl.services.fleet.evidence import UnitEstimates, packed  # noqa: PLC0415  as above
 
     calibration = _newest(store, task)
     rows = chosen_rows(store, task.serial, None)
-    answer = criticise_unit(store, task.serial, calibration.version, None)
-    return Outcome(
-        FleetResult(
-            task.serial, "done", _criticism_question(store, calibration, rows), calibration.version,
-            rms_dps=_finite(answer.error["rms_dps"]), noise_floor_dps=_finite(answer.error["noise_floor_dps"]),
-            verdict=answer.verdict, named=list(answer.named),
-            candidates=[
-                FleetCandidate(
-                    effect=each["effect"], log_bayes_factor=each["log_bayes_factor"], p_value=each["p_value"],
-                    alias_group=each["alias_group"], coefficients=each["coefficients"],
-                )
-                for each in answer.suspects
-            ],
-        )
+    found: list[Criticism] = []
+    answer = criticise_seen(store, calibration, rows, found.append)
+    result = FleetResult(
+        task.serial, "done", _criticism_question(store, calibration, rows), calibration.version,
+        rms_dps=_finite(answer.error["rms_dps"]), noise_floor_dps=_finite(answer.error["noise_floor_dps"]),
+        verdict=answer.verdict, named=list(answer.named),
     )  # fmt: skip
+    campaign = rows[-1].campaign
+    estimates = UnitEstimates(
+        store.units.get(task.serial).model, calibration.model,
+        "" if campaign is None else store.campaigns.get(campaign).bench_name,
+        {axis: packed(each) for axis, each in candidate_estimates(found[0]).items()},
+    )  # fmt: skip
+    return Outcome(result, estimates=estimates)
 
 
 def _finite(value: float | None) -> float | None:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import sqlalchemy as sa
 from sqlalchemy import exc
 
-from labctl.answers.fleet import FleetCandidate, FleetJobState, FleetKind, FleetUnitState
+from labctl.answers.fleet import FleetJobState, FleetKind, FleetUnitState
 from labctl.answers.json_object import JsonObject
 from labctl.errors import Conflict, NotFound, VersionTaken
 from labctl.store.connection.database import Database
@@ -109,7 +109,6 @@ class FleetResult:
     noise_floor_dps: float | None = None
     verdict: str | None = None
     named: list[str] | None = None
-    candidates: list[FleetCandidate] | None = None
 
 
 @dataclass(frozen=True)
@@ -130,6 +129,16 @@ class FleetUnitRow(FleetResult):
 
     state: FleetUnitState  # type: ignore[assignment]
     at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class FleetEvidence:
+    """What the criticisms of some units of a type show of every effect, added up."""
+
+    type: str  #: model of the units
+    model: str  #: error model of their versions
+    serials: list[str]
+    content: bytes
 
 
 class FleetJobs:
@@ -216,7 +225,7 @@ class FleetJobs:
         x = tables.fleet_units.c
         columns = (
             x.serial, x.state, x.question, x.version, x.reason, x.processor_s, x.rms_dps, x.noise_floor_dps, x.verdict,
-            x.named, x.candidates, x.at,
+            x.named, x.at,
         )  # fmt: skip
         wanted = [x.job_id == job, request.matching((x.serial,))]
         if state is not None:
@@ -230,9 +239,13 @@ class FleetJobs:
             return Page.of(rows, lambda row: row.serial, request, int(connection.scalar(total) or 0))
 
     def answered(self, serial: str, kind: FleetKind) -> tuple[str, int | None] | None:
-        """Return the question and the version of a unit's newest result of a kind; None where there is none."""
+        """Return the question and the version of a unit's newest result of a kind; None where there is none.
+
+        Nor does a criticism count that was written without its evidence, which is written for many units together.
+        """
         x = tables.fleet_units.c
-        query = sa.select(x.question, x.version).where(x.serial == serial, x.kind == kind, x.newest)
+        has_evidence = sa.or_(x.kind != "criticise", x.evidence_id.is_not(None))
+        query = sa.select(x.question, x.version).where(x.serial == serial, x.kind == kind, x.newest, has_evidence)
         with self._database.reading() as connection:
             row = connection.execute(query).first()
         return None if row is None else (row.question, row.version)
@@ -293,6 +306,16 @@ class FleetJobs:
         """Write down what came of a unit; returns whether that was left to do: a second result changes nothing."""
         with self._database.writing() as connection:
             return _keep(connection, job, kind, result, at)
+
+    @transaction
+    def keep_evidence(self, job: int, new: FleetEvidence) -> None:
+        """Keep sums over units whose criticisms are written."""
+        e, x = tables.fleet_evidence, tables.fleet_units
+        with self._database.writing() as connection:
+            values = {"job_id": job, "type": new.type, "model": new.model, "content": new.content}
+            number = connection.scalar(sa.insert(e).values(**values, units=len(new.serials)).returning(e.c.id))
+            own = sa.update(x).where(x.c.job_id == job, x.c.serial.in_(new.serials))
+            connection.execute(own.values(evidence_id=number))
 
     @transaction
     def keep_fit(self, job: int, result: FleetResult, fit: FleetFit, at: datetime) -> bool:

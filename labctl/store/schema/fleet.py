@@ -27,6 +27,19 @@ fleet_jobs = sa.Table(
     sa.Index(None, "state"),
 )
 
+#: What the criticisms of some units show of every effect, added up; it counts while each of its units' is the newest.
+fleet_evidence = sa.Table(
+    "fleet_evidence",
+    metadata,
+    id_column(),
+    sa.Column("job_id", RowId, sa.ForeignKey("fleet_jobs.id"), nullable=False),
+    sa.Column("type", sa.String(200), nullable=False),  #: model of the units
+    sa.Column("model", sa.String(200), nullable=False),  #: error model of their versions
+    sa.Column("units", sa.Integer, nullable=False),
+    sa.Column("content", sa.LargeBinary, nullable=False),
+    sa.Index(None, "type", "model"),
+)
+
 #: One row for each unit of a job, from its beginning. State: waiting, done, failed, skipped.
 fleet_units = sa.Table(
     "fleet_units",
@@ -45,9 +58,10 @@ fleet_units = sa.Table(
     sa.Column("noise_floor_dps", sa.Float),
     sa.Column("verdict", sa.String(20)),
     sa.Column("named", sa.JSON(none_as_null=True)),  #: ids of the effects that a verdict is based on
-    sa.Column("candidates", sa.JSON(none_as_null=True)),  #: estimates of the effects that may be missing
+    sa.Column("evidence_id", RowId, sa.ForeignKey("fleet_evidence.id")),  #: sums that hold what a criticism shows
     sa.Index(None, "serial", "kind", "newest"),
     sa.Index(None, "job_id", "state"),
+    sa.Index(None, "evidence_id"),
 )
 
 #: Coefficients of the newest version of each unit that a fleet job has made.
