@@ -36,7 +36,6 @@ from labctl.answers.common_fields import CriticismVerdict
 from labctl.answers.design import DesignRequest, DesignResponse
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
 from labctl.answers.fixed_coefficients import FixedCoefficients
-from labctl.answers.fleet import FleetCancelRequest, FleetJobRequest, FleetJobResponse
 from labctl.answers.points import PointFigure, PointResponse
 from labctl.answers.recordings import ImportResponse, RecordingResponse
 from labctl.answers.residuals import ResidualsResponse
@@ -66,8 +65,6 @@ __all__ = [
     "FitRequest",
     "FitResponse",
     "FixedCoefficients",
-    "FleetJobRequest",
-    "FleetJobResponse",
     "ImportResponse",
     "PointResponse",
     "RecordingResponse",
@@ -353,19 +350,6 @@ class Client:
     ) -> DiagnosisResponse:
         """Stop a diagnosis and abort its campaign, resume both, or end the diagnosis for good."""
         return self._diagnosis(f"/api/diagnoses/{diagnosis}/{act}", ReasonRequest(reason=reason, by=by))
-
-    def start_fleet_job(self, request: FleetJobRequest) -> FleetJobResponse:
-        """Have the service fit or criticise many units; returns at once."""
-        return FleetJobResponse.model_validate(json_of(self._post("/api/fleet/jobs", request)))
-
-    def fleet_job(self, job: int) -> FleetJobResponse:
-        """Return how far a fleet job is."""
-        return self._connection.get(f"/api/fleet/jobs/{job}", FleetJobResponse)
-
-    def cancel_fleet_job(self, job: int, reason: str = "", *, by: str = "") -> FleetJobResponse:
-        """End a fleet job before it is done; what was written stays."""
-        request = FleetCancelRequest(reason=reason, by=by)
-        return FleetJobResponse.model_validate(json_of(self._post(f"/api/fleet/jobs/{job}/cancel", request)))
 
     def _diagnosis(self, path: str, request: Request) -> DiagnosisResponse:
         return DiagnosisResponse.model_validate(json_of(self._post(path, request)))

@@ -244,18 +244,23 @@ def _carry_out(database: str | None, request: FleetJobRequest, *, as_json: bool)
 def _follow(url: str, request: FleetJobRequest, progress: FleetProgress) -> FleetJobResponse:
     """Have the service that holds the database carry out a job; an interrupt cancels it there."""
     from instruments.clock import SystemClock
-    from labctl.client import Client
+    from labctl.answers.fleet import FleetCancelRequest, FleetJobResponse
+    from labctl.service_connection import ServiceConnection
+    from labctl.services.commands.fleet import CANCEL_FLEET_JOB, START_FLEET_JOB, ToFleetJob
+    from labctl.services.commands.remote import HttpExecutor
 
     clock = SystemClock()
-    with Client(url) as client:
-        answer = client.start_fleet_job(request)
+    with ServiceConnection(url) as connection:
+        service = HttpExecutor(connection)
+        answer = service.execute(START_FLEET_JOB, request)
         try:
             while not answer.ended:
                 progress.update(answer)
                 clock.sleep(POLL_S)
-                answer = client.fleet_job(answer.id)
+                answer = service.fetch(f"/api/fleet/jobs/{answer.id}", FleetJobResponse)
         except KeyboardInterrupt:
-            client.cancel_fleet_job(answer.id, reason="interrupted on the command line")
+            cancelled = FleetCancelRequest(reason="interrupted on the command line")
+            service.execute(CANCEL_FLEET_JOB, ToFleetJob(answer.id, cancelled))
             raise
     return answer
 

@@ -103,7 +103,7 @@ def _group(found: GroupEffect) -> FleetGroup:
 
 
 def ageing_in(units: Sequence[UnitCoefficients]) -> tuple[list[FleetAgeing], list[str]]:
-    """Return the change per year of each coefficient, and what there is to say."""
+    """Return the change per year of each coefficient, and a sentence on it."""
     try:
         found = ageing_of(units)
     except NotEnoughData as error:

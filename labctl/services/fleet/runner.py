@@ -28,9 +28,9 @@ TRIES = 3
 UNITS_AT_ONCE = 200
 #: How long a result is waited for before a cancel is looked for, s.
 LOOK_S = 1.0
-#: A process that was not heard of for so long has left its job.
+#: A process without a sign of life for so long has left its job.
 LEFT_AFTER = timedelta(seconds=60)
-Told = Callable[[], None]
+Report = Callable[[], None]
 
 
 def carry_out(
@@ -39,7 +39,7 @@ def carry_out(
     job: int,
     runner: str,
     make_engine: Callable[[], Engine],
-    told: Told = lambda: None,
+    report: Report = lambda: None,
     over: Callable[[], bool] = lambda: False,
 ) -> None:
     """Carry out a job with an engine of its own, unless another process does. Raises LabctlError, as `JobRun.run`."""
@@ -51,12 +51,12 @@ def carry_out(
         store.fleet.end(job, runner, "failed", str(error), clock.utc())
         raise
     with closing(engine):
-        JobRun(store, clock, store.fleet.get(job), runner, engine).run(told, over)
+        JobRun(store, clock, store.fleet.get(job), runner, engine).run(report, over)
 
 
 @dataclass(frozen=True)
 class _Ending:
-    """How a run ends; running: nothing is written, and the job is taken up again."""
+    """How a run ends; running: nothing is written, and the job is resumed later."""
 
     state: FleetJobState
     why: str = ""
@@ -75,17 +75,17 @@ class JobRun:
 
         self._evidence = EvidenceParts()
 
-    def run(self, told: Told = lambda: None, over: Callable[[], bool] = lambda: False) -> FleetJobState:
+    def run(self, report: Report = lambda: None, over: Callable[[], bool] = lambda: False) -> FleetJobState:
         """Carry out what is left; returns how it ended, or `waiting` where `over` said so: another process goes on.
 
-        `told` is called after each result, to report progress. An interrupt ends the job as a cancel does: what was
+        `report` is called after each result, to report progress. An interrupt ends the job as a cancel does: what was
         written stays, and what is under way is ended. Raises LabctlError where it cannot go on; a StoreError leaves it
-        as it is, to be taken up again.
+        as it is, and it is resumed later.
         """
         ending = _Ending("cancelled", "interrupted; start it again, units that are done are skipped")
         try:
             with acting(Actor(self._job.by, f"fleet job {self._job.id}")):
-                ending = self._carry_out(told, over)
+                ending = self._carry_out(report, over)
         except StoreError:
             ending = _Ending("running")
             raise
@@ -109,7 +109,7 @@ class JobRun:
             fleet.end(self._job.id, self._runner, ending.state, ending.why, now)
         log.info("fleet.ended", job=self._job.id, state=ending.state, why=ending.why)
 
-    def _carry_out(self, told: Told, over: Callable[[], bool]) -> _Ending:
+    def _carry_out(self, report: Report, over: Callable[[], bool]) -> _Ending:
         """Do every unit that is left, until the job is to stop. Raises LabctlError."""
         left = self._tasks()
         while True:
@@ -124,7 +124,7 @@ class JobRun:
             for future in sorted(finished, key=Future.cancelled):  # those that were lost recall all that is under way
                 if future in self._under_way:
                     self._take_in(future)
-                    told()
+                    report()
 
     def _tasks(self) -> Iterator[FleetTask]:
         """Yield the units that have no result, but for those that have nothing to be computed."""

@@ -66,7 +66,7 @@ class FleetJobRow(NewFleetJob):
     units: int
     state: FleetJobState
     runner: str  #: process that carries it out; empty: none yet
-    seen_at: datetime | None  #: when that process was heard of last
+    seen_at: datetime | None  #: last sign of life of that process
     started_at: datetime | None
     ended_at: datetime | None
     cancel_asked: bool
@@ -252,7 +252,7 @@ class FleetJobs:
 
     @transaction
     def take(self, job: int, runner: str, since: datetime, at: datetime) -> bool:
-        """Have a process carry out a job that no other one was heard of since an instant; returns whether it may."""
+        """Have a process carry out a job, unless another one gave a sign of life since an instant; returns whether."""
         j = tables.fleet_jobs.c
         is_free = sa.or_(j.runner.in_(("", runner)), j.seen_at < since)
         query = sa.update(tables.fleet_jobs).where(j.id == job, j.state.in_(OPEN), is_free)

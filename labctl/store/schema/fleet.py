@@ -19,7 +19,7 @@ fleet_jobs = sa.Table(
     sa.Column("units", sa.Integer, nullable=False),
     sa.Column("state", sa.String(20), nullable=False),
     sa.Column("runner", sa.String(200), nullable=False, server_default=""),  #: process that carries it out
-    sa.Column("seen_at", Instant),  #: when that process was heard of last
+    sa.Column("seen_at", Instant),  #: last sign of life of that process
     sa.Column("started_at", Instant),
     sa.Column("ended_at", Instant),
     sa.Column("cancel_asked", sa.Boolean, nullable=False, server_default=sa.false()),

@@ -1,4 +1,4 @@
-"""The report on a type: what no single unit shows is named by all of them together, and a batch that differs is found."""
+"""The report on a type: what no single unit shows is named by all together, and a batch that differs is found."""
 
 from __future__ import annotations
 
