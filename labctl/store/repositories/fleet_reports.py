@@ -13,6 +13,7 @@ from labctl.answers.json_object import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.repositories.fleet_jobs import FleetFilter, newest_has_model
 from labctl.store.schema import tables
+from labctl.store.schema.types import EPOCH
 
 #: Edges of the classes of error over noise floor; below the first and above the last are classes too.
 RATIO_EDGES = (1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0)
@@ -195,7 +196,7 @@ def _chart_query(
     f = tables.fleet_coefficients.c
     level = {"bench": f.bench, "batch": tables.units.c.batch, "supplier": tables.units.c.supplier}[factor]
     instant = sa.type_coerce(f.measured_at, sa.BigInteger)
-    first_us = sa.type_coerce(sa.bindparam("first", first, type_=tables.Instant()), sa.BigInteger)
+    first_us = (first - EPOCH) // timedelta(microseconds=1)
     span = (instant - first_us) / sa.literal(width // timedelta(microseconds=1), sa.BigInteger)
     span = sa.cast(sa.func.floor(span), sa.BigInteger)
     query = sa.select(

@@ -82,6 +82,9 @@ def test_a_chart_shows_each_unit_once_by_batch_over_time(store: Store) -> None:
     of_b2 = [point.mean for point in chart.points if point.level == "B2"]
     assert abs(sum(of_b1) / len(of_b1) - sum(of_b2) / len(of_b2)) == pytest.approx(0.02, rel=0.2)
     assert all(point.low <= point.mean <= point.high for point in chart.points)
+    assert [point.at for point in chart.points if point.level == "B1"] == [
+        AT + timedelta(days=n) for n in BATCHES["B1"]
+    ]
     with pytest.raises(BadInput, match="is not known"):
         fleet_chart(store, FleetUnits(), "x", "sausage", "batch")
     with pytest.raises(BadInput, match="choose one of"):
