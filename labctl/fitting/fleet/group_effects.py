@@ -34,6 +34,8 @@ DEPENDENT = 1e-6
 DATE = "date"
 #: Standard deviation over the median absolute deviation of a normal distribution.
 ROBUST = 1.4826
+#: Mean square of a standard normal value that is clipped at `CLIP`, and the most that a step changes a deviation by.
+CLIPPED_SQUARE, MAX_STEP = 0.99501, 1.5
 
 
 @dataclass(frozen=True)
@@ -171,8 +173,14 @@ def robust_fit(y: Array, variance: Array, columns: NDArray[np.float64]) -> tuple
 
 
 def _robust_spread(residual: Array, variance: Array) -> float:
-    """Return the spread beside known variances (n,): what the median absolute deviation leaves."""
-    total = (ROBUST * float(np.median(np.abs(residual)))) ** 2
+    """Return the spread beside known variances (n,): by the median absolute deviation and one step from it.
+
+    The step takes the root mean square of what is clipped at `CLIP` deviations: nearly all that n values say of a
+    normal distribution, where the median alone wastes two thirds.
+    """
+    first = ROBUST * float(np.median(np.abs(residual)))
+    clipped = np.clip(residual, -CLIP * first, CLIP * first)
+    total = min(float(np.mean(clipped**2)) / CLIPPED_SQUARE, (MAX_STEP * first) ** 2)
     least = 1e-24 if np.all(variance > 0) else 1e-16 * max(float(np.mean(residual**2)), 1e-280)
     return float(np.sqrt(max(total - float(np.median(variance)), least)))
 
