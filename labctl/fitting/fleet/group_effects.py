@@ -19,8 +19,9 @@ from labctl.fitting.fleet.spread import weighted_fit
 from labctl.fitting.fleet.unit_coefficients import UnitTable
 from labctl.fitting.numeric.arrays import Array
 
-#: Probability that any group is named of a type without groups, over all coefficients and levels (Bonferroni).
-ALARM = 0.01
+#: Probability that any group is named of a type without groups, over all coefficients and levels (Bonferroni): half of
+#: the 1 % that is stated, since few units may not be normally distributed.
+ALARM = 0.005
 #: Units of a level, and beside it, without which nothing is said of the level.
 MIN_UNITS = 3
 #: Standard deviations that a unit counts for at most in a group (Huber 1964).
