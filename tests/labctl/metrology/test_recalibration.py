@@ -102,5 +102,5 @@ def test_what_cannot_be_evaluated_is_refused() -> None:
         leaving(0.0, 0.1, STEADY, 0.0)
     with pytest.raises(BadInput, match="no calibration to derive an interval from"):
         staircase([], 1.0, 1.0)
-    with pytest.raises(BadInput, match="target = 1.5 is no probability"):
+    with pytest.raises(BadInput, match=r"target = 1\.5 is no probability"):
         staircase([found(0.1)], 1.0, 1.0, target=1.5)
