@@ -5,7 +5,7 @@ The errors that are hidden have shapes of their own here, not those of the catal
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -16,12 +16,13 @@ from labctl.fitting.criticism import CandidateEstimates, Criticism, candidate_es
 from labctl.fitting.criticism.evidence.elimination import eliminate_base
 from labctl.fitting.criticism.evidence.gains import MIN_REMAINING
 from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.fleet.type_sums import AxisSums, TypeSums
 from labctl.fitting.models.presets import usual_model
 from labctl.recording import Recording, RecordingInfo
 
 Array = NDArray[np.float64]
-#: Rate (m,) deg/s along the axis, temperature (m,) deg C, time (m,) s -> error (m,) in any unit.
-Shape = Callable[[Array, Array, Array], Array]
+#: Rate along the axis (m,) deg/s, time since switching on (m,) s -> error (m,) in any unit.
+Shape = Callable[[Array, Array], Array]
 
 RATES_DPS = np.linspace(-100.0, 100.0, 11)
 LEVELS_C = (0.0, 12.0, 25.0, 38.0, 50.0)
@@ -32,16 +33,16 @@ DRIFT_DPS, DRIFT_TAU_S = 1e-3, 900.0
 #: What is hidden, with the effects of the catalogue that its name may stand for.
 HIDDEN: Mapping[str, tuple[Shape, frozenset[str]]] = {
     "output that bends over like a hyperbolic tangent": (
-        lambda rate, warm, t: 60.0 * np.tanh(rate / 60.0) - rate,
+        lambda rate, _: 60.0 * np.tanh(rate / 60.0) - rate,
         frozenset({"scale_factor_odd", "sine_response", "saturation"}),
     ),
     "rounded kink at rest": (
-        lambda rate, warm, t: np.sqrt(rate**2 + 15.0**2),
+        lambda rate, _: np.sqrt(rate**2 + 15.0**2),
         frozenset({"scale_factor_asymmetry", "scale_factor_even"}),
     ),
     "bias that settles after switching on, by a power of time": (
-        lambda rate, warm, t: (1.0 + t / 600.0) ** -1.5,
-        frozenset({"warm_up", "bias_drift", "power_law_warm_up", "run_bias", "thermal_lag"}),
+        lambda _, t_s: (1.0 + t_s / 600.0) ** -1.5,
+        frozenset({"warm_up"}),
     ),
 }
 
@@ -68,7 +69,7 @@ def recording(seed: int, hidden: Mapping[str, tuple[Shape, float]] | None = None
         output = output + sum(rng.normal(0.0, 2e-3) * each for each in across) + _noise(rng, t_s)
         if hidden and axis in hidden:
             shape, size = hidden[axis]
-            output = output + size * shape(along, warm, t_s)
+            output = output + size * shape(along, t_s)
         columns |= {f"gyro_{axis}": output, f"gyro_{axis}_std": np.full(3 * n, WHITE_DPS * np.sqrt(READINGS))}
     info = RecordingInfo(
         serial=serial or f"U{seed}", axes=AXES, kind="points", started_at=datetime(2026, 1, 1, tzinfo=UTC)
@@ -94,7 +95,7 @@ def criticised(points: Recording) -> Criticism:
 
 @dataclass(frozen=True)
 class Algebra:
-    """The algebra of the criticism of one schedule: what it estimates of every candidate, at the noise that it found."""
+    """Algebra of the criticism of one schedule: what it estimates of every candidate, at the noise that it found."""
 
     found: Criticism
     axes: Mapping[str, CandidateEstimates]
@@ -120,7 +121,7 @@ class Algebra:
         assert comparison is not None
         design, base, nodes = comparison.designs[axis], comparison.axes[axis].best, comparison.data.nodes
         along = np.where(np.asarray(nodes["position"]) == axis, np.asarray(nodes["table_rate_dps"]), 0.0)
-        error = shape(along, np.asarray(nodes["temperature_c"]), np.asarray(nodes["t_s"]))
+        error = shape(along, np.asarray(nodes["t_s"]))
         y = comparison.data.rows_of(error[:, None])[:, :, 0]
         (beside,) = eliminate_base(design, y, comparison.white_var[axis], comparison.scales[axis], [base.noise])
         left = np.diag(base.gram)
@@ -134,3 +135,24 @@ class Algebra:
         """Return estimates of units without any error, over their uncertainty, (units, K)."""
         root = self.roots[axis]
         return np.asarray(rng.normal(size=(units, root.shape[1])) @ root.T)
+
+    def fleet(
+        self, rng: np.random.Generator, benches: Sequence[str], hidden: Mapping[str, Array] | None = None,
+        signs: Array | None = None,
+    ) -> TypeSums:  # fmt: skip
+        """Return the sums over units, one for each of `benches`; `hidden` is axis -> (K,) what all of them have.
+
+        `signs` (units,) multiply what is hidden; without them all units have it alike.
+        """
+        sums = TypeSums(units=len(benches))
+        each_bench = np.array(benches)
+        for axis, of_axis in self.axes.items():
+            z = self.drawn(rng, len(benches), axis)
+            if hidden and axis in hidden:
+                z += (np.ones(len(benches)) if signs is None else signs)[:, None] * hidden[axis]
+            for bench in dict.fromkeys(benches):
+                own = each_bench == bench
+                u = np.broadcast_to(of_axis.u, (int(own.sum()), len(of_axis.u)))
+                added = sums.benches.setdefault(bench, {}).setdefault(axis, AxisSums())
+                added.add(of_axis.shapes, z[own], u, of_axis.overlap)
+        return sums

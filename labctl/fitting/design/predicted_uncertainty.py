@@ -71,7 +71,7 @@ def predicted_uncertainty(
     points, weights = use.points
     variances, of_heat, coefficients = [], [], 0
     for axis in axes:
-        design = axis_design(kept, model, axis)
+        design = axis_design(kept, model, axis, known=frozenset() if prior is None else prior.known(axis))
         jacobian = derivative_at_points(model, use, design, axis)
         known = None if prior is None else prior_rows(design, model, axis, prior)[0]
         by_noise, by_heat = _variances(kept, design, jacobian, sets.slope_k_s[rows], axis, noise, known)
@@ -115,6 +115,7 @@ def _variances(
     scatter = data.scatter(axis)
     assert scatter.white_var is not None
     size = np.linalg.norm(design.columns, axis=0)
+    size = np.where(size > 0, size, 1.0)  # what only a prior knows has no column
     unsettled = heat.element_u_s * np.column_stack(
         [heat.bias_per_k * slope_k_s, heat.scale_per_k * slope_k_s * data.true_rate_dps(axis)]
     )

@@ -148,7 +148,8 @@ def _converged(
     """
     response = first_response(data, model, axis)
     data = data.through(response)
-    design = axis_design(data, model, axis)
+    known = frozenset[str]() if prior is None else prior.known(axis)
+    design = axis_design(data, model, axis, known=known)
     solution = _solve_axis(data, model, axis, design, fixed, prior=prior)
     for _ in range(GAUSS_NEWTON_STEPS if design.laws else 0):
         before, at = solution.values, _law_coefficients(design, solution)
@@ -156,7 +157,7 @@ def _converged(
             u_s = _axis_fit(design, solution).u_of(TIME_CONSTANT)
             response = next_response(response, response_at(at), model, u_s)
             data, at = data.through(response), with_response(at, response)
-        design = axis_design(data, model, axis, at)
+        design = axis_design(data, model, axis, at, known)
         solution = _solve_axis(data, model, axis, design, fixed or solution, prior=prior)
         if np.allclose(solution.values, before, rtol=1e-7, atol=1e-14):
             break

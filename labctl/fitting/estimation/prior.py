@@ -1,7 +1,7 @@
 """What is known of coefficients before a fit, from other units of the type: as rows of the fit.
 
 A prior is a measurement like any other: the coefficients are its mean, up to its covariance. Fewer data sets then leave
-the same uncertainty. A unit that is not like its type contradicts the prior; `conflict` says how much.
+the same uncertainty. A unit that is not like its type contradicts the prior (`labctl.fitting.fleet.prior`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.special import chdtrc
 
 from labctl.fitting.effects import Reference
 from labctl.fitting.models.error_model import ErrorModel
@@ -41,6 +40,10 @@ class CoefficientPrior:
         places = [self.names.index(name) for name in names if name in self.names]
         known = tuple(self.names[i] for i in places)
         return replace(self, names=known, mean=self.mean[places], covariance=self.covariance[np.ix_(places, places)])
+
+    def known(self, axis: str) -> frozenset[str]:
+        """Return the names of the coefficients of an axis that it knows, without axis and temperature."""
+        return frozenset(name.split(".", 1)[1].split("@")[0] for name in self.names if name.startswith(f"{axis}."))
 
     def referred(self, model: ErrorModel) -> ErrorModel:
         """Return a model with the reference temperature that the prior holds for."""
@@ -104,21 +107,3 @@ def with_coefficient_prior(
         white_var=np.concatenate([scatter.white_var, np.full(q, ROW_DPS**2)]),
     )
     return np.vstack([columns, below]), np.concatenate([y, ROW_DPS * values]), extended
-
-
-def conflict(
-    rows: NDArray[np.float64], values: Array, estimate: Array, covariance: NDArray[np.float64]
-) -> tuple[float, float]:
-    """Return chi2 of the difference between a prior and the data, and the probability of a larger one by chance.
-
-    `rows` (q, c), `values` (q,) are those of the prior, whitened; `estimate` (c,) and its covariance (c, c) are by the
-    prior and the data together.
-    """
-    if len(values) == 0:
-        return 0.0, 1.0
-    left = values - rows @ estimate
-    spread = np.eye(len(values)) - rows @ covariance @ rows.T
-    size, vectors = np.linalg.eigh((spread + spread.T) / 2)
-    kept = size > 1e-6
-    chi2 = float(np.sum((vectors[:, kept].T @ left) ** 2 / size[kept]))
-    return chi2, float(chdtrc(max(int(kept.sum()), 1), chi2))

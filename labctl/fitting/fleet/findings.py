@@ -63,7 +63,7 @@ class OutlierUnit:
     expected: float  #: mean of its type and groups
     spread: float  #: of the type
     u: float  #: the unit's own standard uncertainty
-    z: float  #: distance from what is expected over the root of spread^2 + u^2, with sign
+    t: float  #: distance from what the other units expect, over its standard uncertainty: Student's t, with sign
     p_value: float  #: that chance gives such a unit anywhere in the type
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, ndtr, ndtri
+from scipy.special import chdtrc, stdtr, stdtrit
 
 from labctl.fitting.fleet.directions import Direction, directions_of
 from labctl.fitting.fleet.findings import CoefficientPopulation, GroupEffect, GroupSpread, OutlierUnit
@@ -19,10 +19,10 @@ from labctl.fitting.numeric.freedom import student_factor
 
 #: Probability that any unit is called an outlier of a type without any, over all units and coefficients.
 OUTLIER_ALARM = 0.01
+#: Degrees of freedom of a robust spread per unit, and the least that are taken.
+ROBUST_SHARE, MIN_FREEDOM = 0.6, 3
 #: Rounds in which outliers and spread are found beside each other.
 ROUNDS = 6
-#: Correlations of coefficients are believed as if so many units more had none.
-UNCORRELATED_UNITS = 4.0
 #: Coefficients that a common cause shifts differ from a common shift by no more than chance has it, at this level.
 CONSISTENT = 1e-3
 
@@ -53,7 +53,8 @@ class _Settled:
 
     found: RobustFit
     spread: Spread
-    z: Array  #: (n,) distance of each unit from what is expected of it, over its standard deviation
+    t: Array  #: (n,) distance of each unit from what the others expect of it, Student's t
+    freedom: int  #: of it
     is_out: NDArray[np.bool_]  #: (n,)
 
 
@@ -62,7 +63,7 @@ def estimate(table: UnitTable) -> TypeEstimate:
     levels, directions = Levels(table), directions_of(table)
     tests = max(levels.tested * (len(table.names) + len(directions)), 1)
     shared = [each for direction in directions for each in _shared(table, direction, levels, tests)]
-    limit = -float(ndtri(OUTLIER_ALARM / 2.0 / max(table.values.size, 1)))
+    level = OUTLIER_ALARM / 2.0 / max(table.values.size, 1)
     settled: list[_Settled] = []
     effects: list[GroupEffect] = []
     spreads: list[GroupSpread] = []
@@ -71,7 +72,7 @@ def estimate(table: UnitTable) -> TypeEstimate:
         own = [each for each in shared if k in each.direction.places]
         taken = {each.shift.level: levels.column(each.shift.level) for each in own}
         found = select_shifts(table.values[:, k], table.variance[:, k], levels, tests, taken)
-        each = _settled(table, k, found, limit)
+        each = _settled(table, k, found, level)
         settled.append(each)
         effects += _own_effects(table, k, each, 1 + len(taken))
         spreads += _group_spreads(table, k, each)
@@ -80,7 +81,7 @@ def estimate(table: UnitTable) -> TypeEstimate:
     return TypeEstimate(
         tuple(_coefficient(table, k, each) for k, each in enumerate(settled)), _correlation(table, settled),
         tuple(sorted(effects, key=lambda each: -each.t)), tuple(spreads),
-        tuple(sorted(outliers, key=lambda each: -abs(each.z))), tests,
+        tuple(sorted(outliers, key=lambda each: -abs(each.t))), tests,
     )  # fmt: skip
 
 
@@ -112,19 +113,38 @@ def _are_alike(table: UnitTable, direction: Direction, column: Array) -> bool:
     return float(chdtrc(len(values) - 1, chi2)) > CONSISTENT
 
 
-def _settled(table: UnitTable, k: int, found: RobustFit, limit: float) -> _Settled:
-    """Return the spread beside the shifts that were found, without the units that are too far out for it."""
+def _settled(table: UnitTable, k: int, found: RobustFit, level: float) -> _Settled:
+    """Return the spread beside the shifts that were found, without the units that are too far out for it.
+
+    A unit is judged by the spread of the others (externally studentised), at `level` on each side.
+    """
     y, variance, columns = table.values[:, k], table.variance[:, k], found.columns
-    z = (y - found.fitted) / np.sqrt(variance + found.tau**2)
-    is_out = np.abs(z) > limit
+    p = columns.shape[1]
+    t = (y - found.fitted) / np.sqrt(variance + found.tau**2)
+    is_out = np.abs(t) > -float(stdtrit(max(ROBUST_SHARE * len(y) - p, MIN_FREEDOM), level))
     for _ in range(ROUNDS):
         kept = ~is_out
         spread = reml(y[kept], variance[kept], columns[kept])
-        z = (y - columns @ spread.values) / np.sqrt(np.maximum(variance + spread.tau**2, 1e-300))
-        before, is_out = is_out, np.abs(z) > limit
-        if np.array_equal(before, is_out) or kept.sum() <= columns.shape[1] + 1:
+        freedom = max(int(kept.sum()) - p - 1, MIN_FREEDOM)
+        t = _studentised(y, variance, columns, spread, kept, freedom)
+        before, is_out = is_out, np.abs(t) > -float(stdtrit(freedom, level))
+        if np.array_equal(before, is_out) or int((~is_out).sum()) <= p + MIN_FREEDOM:
+            is_out = before
             break
-    return _Settled(found, spread, z, is_out)
+    return _Settled(found, spread, t, freedom, ~kept)
+
+
+def _studentised(
+    y: Array, variance: Array, columns: NDArray[np.float64], spread: Spread, kept: NDArray[np.bool_], freedom: int
+) -> Array:
+    """Return the distance of each unit from what the other units expect of it, (n,)."""
+    total = np.maximum(variance + spread.tau**2, 1e-300)
+    of_mean = np.einsum("np,pq,nq->n", columns, spread.covariance, columns)
+    square = (y - columns @ spread.values) ** 2 / np.maximum(np.where(kept, total - of_mean, total + of_mean), 1e-300)
+    # a unit that is among the others widened their spread, as far as that is estimated
+    estimated = spread.tau**2 / (spread.tau**2 + float(np.median(variance)) + 1e-300)
+    without = np.maximum(1.0 - estimated * (square - 1.0) / freedom, 0.05)
+    return np.asarray(np.sign(y - columns @ spread.values) * np.sqrt(np.where(kept, square / without, square)))
 
 
 def _coefficient(table: UnitTable, k: int, settled: _Settled) -> CoefficientPopulation:
@@ -179,30 +199,34 @@ def _group_spreads(table: UnitTable, k: int, settled: _Settled) -> Iterator[Grou
 def _outliers(table: UnitTable, k: int, settled: _Settled) -> Iterator[OutlierUnit]:
     expected = settled.found.columns @ settled.spread.values
     for i in np.flatnonzero(settled.is_out).tolist():
-        z = float(settled.z[i])
+        t = float(settled.t[i])
         yield OutlierUnit(
             table.serial_numbers[i], table.names[k], table.units[k], float(table.values[i, k]), float(expected[i]),
-            settled.spread.tau, float(np.sqrt(table.variance[i, k])), z,
-            min(1.0, 2.0 * table.values.size * float(ndtr(-abs(z)))),
+            settled.spread.tau, float(np.sqrt(table.variance[i, k])), t,
+            min(1.0, 2.0 * table.values.size * float(stdtr(settled.freedom, -abs(t)))),
         )  # fmt: skip
 
 
 def _correlation(table: UnitTable, settled: Sequence[_Settled]) -> NDArray[np.float64]:
     """Return the correlation (k, k) of the coefficients over units, beside what their calibrations have in common.
 
-    Where a spread is small beside the units' own uncertainties little is known of its correlations, and they are 0.
+    It is shrunk towards none by as much as chance explains of all correlations together (Schaefer and Strimmer 2005):
+    few units of many coefficients would else seem to have directions without any spread.
     """
     k, tau = len(settled), np.array([each.spread.tau for each in settled])
     residual = np.column_stack(
-        [np.where(each.is_out, 0.0, table.values[:, i] - each.found.columns @ each.spread.values)
-         for i, each in enumerate(settled)]
-    )  # fmt: skip
+        [
+            np.where(each.is_out, 0.0, table.values[:, i] - each.found.columns @ each.spread.values)
+            for i, each in enumerate(settled)
+        ]
+    )
     size = np.sqrt(np.maximum(tau**2, 1e-300))
-    n = len(table)
-    joint = (residual.T @ residual / n - table.covariance.mean(axis=0)) / np.outer(size, size)
-    share = tau**2 / np.maximum(tau**2 + table.variance.mean(axis=0), 1e-300)
-    known = n * np.outer(share, share)
-    shrunk = np.clip(joint * known / (known + UNCORRELATED_UNITS), -0.99, 0.99)
+    joint = (residual.T @ residual / len(table) - table.covariance.mean(axis=0)) / np.outer(size, size)
+    share = np.maximum(tau**2 / np.maximum(tau**2 + table.variance.mean(axis=0), 1e-300), 1e-6)
+    weight = np.outer(share, share) * (1.0 - np.eye(k))  # what is seen worse counts less
+    by_chance, found = float(weight.sum()) / len(table), float(np.sum((weight * joint) ** 2))
+    kept = max(1.0 - by_chance / found, 0.0) if found > 0 else 0.0
+    shrunk = np.clip(kept * joint, -0.99, 0.99)
     shrunk[np.diag_indices(k)] = 1.0
     values, vectors = np.linalg.eigh((shrunk + shrunk.T) / 2)
     positive = (vectors * np.maximum(values, 1e-6)) @ vectors.T
