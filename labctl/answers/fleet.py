@@ -204,7 +204,9 @@ class FleetOutlier(ResponseModel):
 
     serial: Serial
     coefficient: str = Field(description="Output axis and name of the coefficient.")
-    z: float = Field(description="Distance from the expected value over its standard uncertainty, with sign, 1.")
+    t: float = Field(
+        description="Distance from what the other units expect over its standard uncertainty, with sign, 1."
+    )
     text: str = Field(description="The finding in a sentence.")
 
 

@@ -57,7 +57,7 @@ def population_in(units: Sequence[UnitCoefficients]) -> Compared:
         return Compared(text=[f"{_capital(str(error))}."])
     groups = [_group(each) for each in found.effects]
     outliers = [
-        FleetOutlier(serial=each.serial_number, coefficient=each.coefficient, z=each.z, text=each.reason)
+        FleetOutlier(serial=each.serial_number, coefficient=each.coefficient, t=each.t, text=each.reason)
         for each in found.outliers
     ]
     said = [f"{len(found.table)} units were compared."]
@@ -138,7 +138,7 @@ def evidence_in(store: Store, type_: str, model: str, *, whole: bool) -> Evidenc
     missing = [_missing(each) for each in found.named]
     said += [each.text for each in missing]
     if not missing and not found.reason:
-        said.append("No effect is missing in the model of the type.")
+        said.append("No effect is named for the type by all units together.")
     return Evidence(sums.units, missing, said)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from labctl.answers.fleet import FleetReportRequest, FleetReportResponse
+from labctl.answers.fleet import FleetReportRequest, FleetReportResponse, FleetTypeResponse
 from labctl.errors import BadInput
 from labctl.progress import report_stage
 from labctl.services.cache import cached
@@ -79,8 +79,16 @@ def _computed(store: Store, request: FleetReportRequest, now: datetime) -> Fleet
         ageing=ageing,
         evidence_units=evidence.units,
         missing=evidence.missing,
-        text=[*compared.text, *evidence.text, *ageing_text, *more],
+        text=[*compared.text, *evidence.text, *_by_units(figures), *ageing_text, *more],
     )
+
+
+def _by_units(figures: Sequence[FleetTypeResponse]) -> list[str]:
+    """Return what single units name as missing, in a sentence."""
+    if not figures or not figures[0].missing:
+        return []
+    named = [f"{effect} in {units}" for effect, units in list(figures[0].missing.items())[:5]]
+    return [f"Single units name as missing: {', '.join(named)} of {figures[0].criticised} units."]
 
 
 def _coefficients(versions: Sequence[FleetVersion]) -> Iterator[UnitCoefficients]:

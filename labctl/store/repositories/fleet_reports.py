@@ -137,7 +137,7 @@ class FleetReports:
         query = sa.select(f.axis, f.name, f.unit, sa.func.count()).join(tables.units, u.serial == f.serial)
         grouped = query.where(wanted.condition).group_by(f.axis, f.name, f.unit).order_by(f.axis, f.name)
         with self._database.reading() as connection:
-            return [tuple(row) for row in connection.execute(grouped)]
+            return [(axis, name, unit, n) for axis, name, unit, n in connection.execute(grouped)]
 
     def chart(
         self, wanted: FleetFilter, axis: str, name: str, factor: str, spans: int
@@ -160,7 +160,7 @@ def _condition(wanted: FleetFilter, model: str) -> sa.ColumnElement[bool]:
     return wanted.condition if not model else sa.and_(wanted.condition, newest_has_model(model))
 
 
-def _by_type(wanted: FleetFilter, now: datetime) -> dict[str, sa.Select[Any]]:
+def _by_type(wanted: FleetFilter, now: datetime) -> dict[str, sa.Select[*tuple[Any, ...]]]:
     """Return field of `TypeFigures` -> query of (type, key, units)."""
     u, x, a = tables.units.c, tables.fleet_units.c, tables.certifications.c
     results = sa.join(tables.units, tables.fleet_units, sa.and_(x.serial == u.serial, x.newest))
@@ -178,7 +178,9 @@ def _by_type(wanted: FleetFilter, now: datetime) -> dict[str, sa.Select[Any]]:
         else_="later",
     )  # fmt: skip
 
-    def grouped(key: sa.ColumnElement[Any], joined: sa.Join, *conditions: sa.ColumnElement[bool]) -> sa.Select[Any]:
+    def grouped(
+        key: sa.ColumnElement[Any], joined: sa.Join, *conditions: sa.ColumnElement[bool]
+    ) -> sa.Select[*tuple[Any, ...]]:
         query = sa.select(u.model, key, sa.func.count()).select_from(joined)
         return query.where(wanted.condition, *conditions).group_by(u.model, key)
 
@@ -192,7 +194,7 @@ def _by_type(wanted: FleetFilter, now: datetime) -> dict[str, sa.Select[Any]]:
 
 def _chart_query(
     joined: sa.Join, ours: sa.ColumnElement[bool], factor: str, first: datetime, width: timedelta
-) -> sa.Select[Any]:
+) -> sa.Select[*tuple[Any, ...]]:
     f = tables.fleet_coefficients.c
     level = {"bench": f.bench, "batch": tables.units.c.batch, "supplier": tables.units.c.supplier}[factor]
     instant = sa.type_coerce(f.measured_at, sa.BigInteger)
