@@ -8852,10 +8852,10 @@ export interface components {
              */
             coefficient: string;
             /**
-             * Z
-             * @description Distance from the expected value over its standard uncertainty, with sign, 1.
+             * T
+             * @description Distance from what the other units expect over its standard uncertainty, with sign, 1.
              */
-            z: number;
+            t: number;
             /**
              * Text
              * @description The finding in a sentence.
