@@ -29,7 +29,7 @@ from labctl.fitting.numeric.drift_noise import Drift, Scatter
 from labctl.fitting.numeric.least_squares import solve
 from labctl.recording import Recording, RecordingInfo
 
-UNITS, OF_LOOP, OF_LMFIT, PIECE = 100_000, 1000, 30, 10_000
+UNITS, OF_LOOP, OF_LMFIT, PIECE = 100_000, 1000, 100, 10_000
 RATES_DPS, LEVELS_C = np.linspace(-100.0, 100.0, 11), np.array([0.0, 12.0, 25.0, 38.0, 50.0])
 DRIFT = Drift(1e-3, 900.0)
 
@@ -63,6 +63,7 @@ def _cubic(*, peers: bool) -> dict[str, float]:
         ),
     }  # fmt: skip
     if peers:
+        _lmfit(rate, y[:, :2])  # it is imported before it is measured
         times["cubic_lmfit_s"] = UNITS / OF_LMFIT * _cpu_s(lambda: _lmfit(rate, y[:, :OF_LMFIT]), 1)
     return times
 

@@ -220,7 +220,7 @@ def _correlation(table: UnitTable, settled: Sequence[_Settled]) -> NDArray[np.fl
             for i, each in enumerate(settled)
         ]
     )
-    size = np.sqrt(np.maximum(tau**2, 1e-300))
+    size = np.where(tau > 0, tau, np.inf)  # what does not differ from unit to unit is correlated with nothing
     joint = (residual.T @ residual / len(table) - table.covariance.mean(axis=0)) / np.outer(size, size)
     share = np.maximum(tau**2 / np.maximum(tau**2 + table.variance.mean(axis=0), 1e-300), 1e-6)
     weight = np.outer(share, share) * (1.0 - np.eye(k))  # what is seen worse counts less
