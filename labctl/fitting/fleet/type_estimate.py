@@ -121,15 +121,16 @@ def _settled(table: UnitTable, k: int, found: RobustFit, level: float) -> _Settl
     y, variance, columns = table.values[:, k], table.variance[:, k], found.columns
     p = columns.shape[1]
     t = (y - found.fitted) / np.sqrt(variance + found.tau**2)
-    is_out = np.abs(t) > -float(stdtrit(max(ROBUST_SHARE * len(y) - p, MIN_FREEDOM), level))
+    wanted = np.abs(t) <= -float(stdtrit(max(ROBUST_SHARE * len(y) - p, MIN_FREEDOM), level))
+    kept = np.ones(len(y), dtype=bool)
     for _ in range(ROUNDS):
-        kept = ~is_out
+        if int(wanted.sum()) > p + MIN_FREEDOM:
+            kept = wanted
         spread = reml(y[kept], variance[kept], columns[kept])
         freedom = max(int(kept.sum()) - p - 1, MIN_FREEDOM)
         t = _studentised(y, variance, columns, spread, kept, freedom)
-        before, is_out = is_out, np.abs(t) > -float(stdtrit(freedom, level))
-        if np.array_equal(before, is_out) or int((~is_out).sum()) <= p + MIN_FREEDOM:
-            is_out = before
+        wanted = np.abs(t) <= -float(stdtrit(freedom, level))
+        if np.array_equal(wanted, kept):
             break
     return _Settled(found, spread, t, freedom, ~kept)
 
