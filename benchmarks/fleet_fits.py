@@ -7,6 +7,7 @@ the output, so that each unit has a design of its own, in three outputs of 165 d
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import resource
 import statistics
@@ -69,9 +70,7 @@ def _cubic(*, peers: bool) -> dict[str, float]:
 
 
 def _lmfit(rate: Array, y: NDArray[np.float64]) -> list[object]:
-    from lmfit.models import PolynomialModel  # type: ignore[import-not-found,unused-ignore]
-
-    model = PolynomialModel(3)
+    model = importlib.import_module("lmfit.models").PolynomialModel(3)
     return [model.fit(each, model.make_params(c0=0, c1=0, c2=0, c3=0), x=rate) for each in y.T]
 
 

@@ -28,8 +28,11 @@ def test_estimates_are_those_of_the_comparison_and_units_add_up() -> None:
         own = slice(begin, begin + len(shape.names))
         begin = own.stop
         every = zip(comparison.designs["z"].options, comparison.axes["z"].slices, strict=True)
-        solved = [solve_option(comparison.axes["z"].best, rows) for option, rows in every
-                  if option.candidate == shape.effect and option.names == shape.names and len(shape.names) == 1]  # fmt: skip
+        solved = [
+            solve_option(comparison.axes["z"].best, rows)
+            for option, rows in every
+            if option.candidate == shape.effect and option.names == shape.names and len(shape.names) == 1
+        ]
         if solved:
             compared += 1
             assert any(
