@@ -7,6 +7,7 @@ the output, so that each unit has a design of its own, in three outputs of 165 d
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import resource
 import statistics
@@ -29,7 +30,7 @@ from labctl.fitting.numeric.drift_noise import Drift, Scatter
 from labctl.fitting.numeric.least_squares import solve
 from labctl.recording import Recording, RecordingInfo
 
-UNITS, OF_LOOP, OF_LMFIT, PIECE = 100_000, 1000, 30, 10_000
+UNITS, OF_LOOP, OF_LMFIT, PIECE = 100_000, 1000, 100, 10_000
 RATES_DPS, LEVELS_C = np.linspace(-100.0, 100.0, 11), np.array([0.0, 12.0, 25.0, 38.0, 50.0])
 DRIFT = Drift(1e-3, 900.0)
 
@@ -63,14 +64,13 @@ def _cubic(*, peers: bool) -> dict[str, float]:
         ),
     }  # fmt: skip
     if peers:
+        _lmfit(rate, y[:, :2])  # it is imported before it is measured
         times["cubic_lmfit_s"] = UNITS / OF_LMFIT * _cpu_s(lambda: _lmfit(rate, y[:, :OF_LMFIT]), 1)
     return times
 
 
 def _lmfit(rate: Array, y: NDArray[np.float64]) -> list[object]:
-    from lmfit.models import PolynomialModel  # type: ignore[import-not-found,unused-ignore]
-
-    model = PolynomialModel(3)
+    model = importlib.import_module("lmfit.models").PolynomialModel(3)
     return [model.fit(each, model.make_params(c0=0, c1=0, c2=0, c3=0), x=rate) for each in y.T]
 
 

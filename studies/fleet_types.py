@@ -50,6 +50,11 @@ ALIKE_IN_TEMPERATURE: Mapping[str, tuple[float, float]] = {
     **DIFFERENT, "bias_t1": (2e-3, 3e-5), "bias_t2": (3e-5, 1e-6), "scale_factor_t1": (5e-5, 3e-7),
     "scale_factor_t2": (5e-7, 1e-8),
 }  # fmt: skip
+#: The same where units are alike in scale factor and alignment too, and only the bias differs.
+ALIKE_BUT_BIAS: Mapping[str, tuple[float, float]] = {
+    **ALIKE_IN_TEMPERATURE, "scale_factor": (2e-3, 2e-5), "misalignment_x": (0.0, 2e-5), "misalignment_y": (0.0, 2e-5),
+    "misalignment_z": (0.0, 2e-5),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,9 @@ class Campaign:
             HeatCourse.constant_in_steps(each[:, 1], PERIOD_S),
         )  # fmt: skip
         data = planned_data(sets, BODY_AXES, NOISE)
+        data = replace(
+            data, info=data.info.model_copy(update={"datasheet": {"bias_stability_dps": 2 * DRIFT.drift_dps}})
+        )
         model = replace(PRESET.build(data)[0], reference=Reference(25.0))
         designs = {axis: axis_design(data, model, axis) for axis in BODY_AXES}
         names: list[str] = []

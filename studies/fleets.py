@@ -4,7 +4,7 @@ Effects: units with an effect of z = 2 on one axis, of a shape that is not the c
 what the criticism would estimate of each unit is drawn by its own algebra for the schedule (z is the length of the
 signal that the model does not absorb, in units of the noise), and one fleet of each kind goes through the whole
 criticism. Benches, batches and priors: coefficients as a fit to the means of a campaign estimates them, with its
-covariance. Tables error and batch are of one spread of the units.
+covariance; sizes are in spreads of the units.
 `LABCTL_STUDY_FLEETS` is how many fleets each figure is of, `LABCTL_STUDY_SEED` the seed.
 """
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +20,23 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism import candidate_estimates
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.design.predicted_uncertainty import K, derivative_at_points, predicted_uncertainty
+from labctl.fitting.estimation.axis_solutions import solve_axes
 from labctl.fitting.estimation.prior import CoefficientPrior
 from labctl.fitting.fleet.population import Population, population_of
 from labctl.fitting.fleet.prior import fit_with_prior, prior_of
 from labctl.fitting.fleet.type_evidence import TypeCriticism, judged
 from labctl.fitting.fleet.type_sums import TypeSums
-from studies.fleet_types import ALIKE_IN_TEMPERATURE, DIFFERENT, NOISE, PRESET, USE, Campaign, Fleet, truths
+from studies.fleet_types import (
+    ALIKE_BUT_BIAS,
+    ALIKE_IN_TEMPERATURE,
+    DIFFERENT,
+    NOISE,
+    PRESET,
+    USE,
+    Campaign,
+    Fleet,
+    truths,
+)
 from studies.fleet_units import HIDDEN, Algebra, criticised, recording
 from studies.report_tables import wilson
 
@@ -36,7 +48,7 @@ UNITS, QUIET_PER_FLEET, Z = 200, 5, 2.0
 WHOLE_UNITS = 100
 #: Units that a prior is from, new units for each such fleet, and campaigns of a new unit: rates, temperatures.
 PRIOR_UNITS, NEW_UNITS = 50, 10
-FULL = (11, 5)
+FULL, SMALL = (11, 5), (5, 3)
 SMALLER = tuple((rates, levels) for rates in (2, 3, 5, 7, 9, 11) for levels in (1, 2, 3, 4, 5))
 
 Array = NDArray[np.float64]
@@ -89,7 +101,8 @@ def _whole(seed: int) -> Iterator[str]:
             alone += bool(names & set(found.verdict.named)) if hidden else bool(found.verdict.named)
             sums.add(candidate_estimates(found), f"bench {unit % 3}")
         of_type = judged(sums)
-        yield f"| {text} | {alone} of {WHOLE_UNITS} | {_named(of_type)} | {of_type.candidates[0].log_bayes_factor:.1f} |"
+        strongest = of_type.candidates[0].log_bayes_factor
+        yield f"| {text} | {alone} of {WHOLE_UNITS} | {_named(of_type)} | {strongest:.1f} |"
 
 
 def _named(found: TypeCriticism) -> str:
@@ -106,6 +119,9 @@ def _groups(fleets: int, seed: int) -> Iterator[str]:
         "batch 7 of 20: bias of x off by two spreads": (
             Fleet(DIFFERENT, UNITS, 0.0, {"x.bias": 2 * DIFFERENT["bias"][1]}), ("batch", "B07"),
         ),
+        "batch 7 of 20: bias of x off by three spreads": (
+            Fleet(DIFFERENT, UNITS, 0.0, {"x.bias": 3 * DIFFERENT["bias"][1]}), ("batch", "B07"),
+        ),
         "no group differs": (Fleet(DIFFERENT, UNITS), None),
     }  # fmt: skip
     yield f"| {UNITS} units | named, % | another group named, % | outliers, per fleet |"
@@ -120,40 +136,50 @@ def _groups(fleets: int, seed: int) -> Iterator[str]:
 
 
 def _priors(fleets: int, seed: int) -> Iterator[str]:
-    """Yield how many data sets a new unit needs with a prior, for the U of a full campaign without one."""
-    full = Campaign.of(*FULL)
-    alone = predicted_uncertainty(full.sets, BODY_AXES, PRESET, NOISE, USE).rms_dps
-    yield f"| prior from {PRIOR_UNITS} units; U of {len(full.sets)} data sets alone: {1e3 * alone:.3g} mdeg/s | " + (
-        "data sets needed | ratio | U, mdeg/s | covered by U, % | prior refused, % |"
+    """Yield how many data sets a new unit needs with a prior, for the U of a campaign without one."""
+    yield (
+        f"| prior from {PRIOR_UNITS} units | data sets alone | U, mdeg/s | covered, % | data sets with it | ratio "
+        "| U, mdeg/s | covered, % | prior refused, % |"
     )
-    yield "| --- | --- | --- | --- | --- | --- |"
-    for row, (title, kind) in enumerate({
-        "units alike in temperature": ALIKE_IN_TEMPERATURE, "units different in all": DIFFERENT
-    }.items()):  # fmt: skip
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    kinds = {
+        "alike in all but the bias": ALIKE_BUT_BIAS, "alike in temperature": ALIKE_IN_TEMPERATURE,
+        "different in all": DIFFERENT,
+    }  # fmt: skip
+    for row, ((title, kind), size) in enumerate(product(kinds.items(), (FULL, SMALL))):
+        full = Campaign.of(*size)
+        alone = predicted_uncertainty(full.sets, BODY_AXES, PRESET, NOISE, USE).rms_dps
         populations = [
             population_of(Fleet(kind, PRIOR_UNITS).drawn(full, np.random.default_rng([seed, 4, row, i])))
             for i in range(fleets)
         ]
-        campaign, u = smallest(prior_of(populations[0]), alone)
+        campaign, u = smallest(prior_of(populations[0]), alone, full)
         inside, places, refused = covered(populations, kind, campaign, seed)
+        inside_alone, _, _ = covered(populations, kind, full, seed, with_prior=False)
+        n, few = len(full.sets), len(campaign.sets)
         yield (
-            f"| {title} | {len(campaign.sets)} | {len(campaign.sets) / len(full.sets):.2f} | {1e3 * u:.3g} | "
-            f"{share(inside, places)} | {share(refused, fleets * NEW_UNITS)} |"
+            f"| {title} | {n} | {1e3 * alone:.3g} | {share(inside_alone, places)} | {few} | {few / n:.2f} "
+            f"| {1e3 * u:.3g} | {share(inside, places)} | {share(refused, fleets * NEW_UNITS)} |"
         )
 
 
-def smallest(prior: CoefficientPrior, u_dps: float) -> tuple[Campaign, float]:
+def smallest(prior: CoefficientPrior, u_dps: float, full: Campaign) -> tuple[Campaign, float]:
     """Return the campaign of the fewest data sets that reaches U by a prior, and its U, deg/s."""
     for rates, levels in sorted(SMALLER, key=lambda each: (each[0] * each[1], each[1])):
         campaign = Campaign.of(rates, levels)
         reached = predicted_uncertainty(campaign.sets, BODY_AXES, PRESET, NOISE, USE, prior).rms_dps
         if reached <= u_dps * 1.0001:
             return campaign, reached
-    return Campaign.of(*FULL), u_dps
+    return full, u_dps
 
 
 def covered(
-    populations: list[Population], kind: Mapping[str, tuple[float, float]], campaign: Campaign, seed: int
+    populations: list[Population],
+    kind: Mapping[str, tuple[float, float]],
+    campaign: Campaign,
+    seed: int,
+    *,
+    with_prior: bool = True,
 ) -> tuple[int, int, int]:
     """Return how many corrected rates of new units are within their U, of how many, and how many priors were refused.
 
@@ -164,13 +190,17 @@ def covered(
         rng = np.random.default_rng([seed, 5, i])
         prior = prior_of(population)
         for truth in truths(rng, kind, campaign.names, NEW_UNITS):
-            found = fit_with_prior(campaign.measured(rng, truth), PRESET, prior)
-            refused += not found.is_used
+            data = campaign.measured(rng, truth)
+            if with_prior:
+                found = fit_with_prior(data, PRESET, prior)
+                fits, refused = found.fitted.axes, refused + (not found.is_used)
+            else:
+                fits = solve_axes(data, campaign.model).fits
             begin = 0
             for axis, design in campaign.designs.items():
                 jacobian = derivative_at_points(campaign.model, USE, design, axis)
                 place = jacobian[rng.integers(len(jacobian))]
-                fit = found.fitted.axes[axis]
+                fit = fits[axis]
                 own = truth[begin : begin + len(place)]
                 begin += len(place)
                 off = float(place @ (fit.values.ravel() - own))

@@ -65,17 +65,21 @@ def _of_axis(options: list[CandidateShape], evidence: AxisEvidence) -> Candidate
     remaining = np.diag(base.gram)
     is_visible = remaining > MIN_REMAINING * np.maximum(base.squared_norms, 1e-300)
     shapes, places = [], []
+    keys: set[tuple[str, str, tuple[str, ...]]] = set()
     for option, rows in zip(options, evidence.slices, strict=True):
         own = np.arange(rows.start, rows.stop)[is_visible[rows]]
         if option.term is None or not len(own):
             continue
         names, units = np.array(option.names)[own - rows.start], np.array(option.units)[own - rows.start]
         kind = CATALOGUE.get(option.candidate)
-        shapes.append(EstimatedShape(
+        shape = EstimatedShape(
             option.candidate, _in_words(option), tuple(names.tolist()), tuple(units.tolist()),
             kind is not None and kind.exact,
-        ))  # fmt: skip
-        places.append(own)
+        )  # fmt: skip
+        if shape.key not in keys:  # two shapes that four digits of their parameters do not distinguish are one
+            keys.add(shape.key)
+            shapes.append(shape)
+            places.append(own)
     at = np.concatenate([np.zeros(0, dtype=np.int64), *places])
     size = np.sqrt(remaining[at])
     return CandidateEstimates(

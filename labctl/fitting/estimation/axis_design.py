@@ -41,12 +41,9 @@ class AxisDesign:
 
 
 def axis_design(
-    data: FitData,
-    model: ErrorModel,
-    axis: str,
-    at: Mapping[str, NDArray[np.float64]] | None = None,
+    data: FitData, model: ErrorModel, axis: str, at: Mapping[str, NDArray[np.float64]] | None = None,
     known: Collection[str] = (),
-) -> AxisDesign:
+) -> AxisDesign:  # fmt: skip
     """Return the design of one axis. Columns that the recording does not exercise are left out, unless they are held.
 
     Those of coefficients that are `known` beforehand, by name, stay: the recording need not show them.
@@ -86,16 +83,10 @@ def axis_design(
         names.append((owner, column.name, column.unit))
     held_part = held.part
     return AxisDesign(
-        np.concatenate(columns, axis=1),
-        block_diagonal(spread),
-        names,
-        turning_columns(data.info, data.channels, axis),
-        offset + held_part.error_dps,
-        held_part,
-        tuple(laws),
-        tuple(shifts_of(data.channels, axis)),
+        np.concatenate(columns, axis=1), block_diagonal(spread), names, turning_columns(data.info, data.channels, axis),
+        offset + held_part.error_dps, held_part, tuple(laws), tuple(shifts_of(data.channels, axis)),
         data.angle_columns(axis),
-    )
+    )  # fmt: skip
 
 
 def _refuse_too_many(data: FitData, model: ErrorModel, axis: str, unknowns: int) -> None:

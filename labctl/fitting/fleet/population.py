@@ -125,7 +125,7 @@ class Population:
         covariance = left @ of_type @ left.T + gain @ own_scaled @ gain.T
         return PooledUnit(
             unit.serial_number, self.names, true + size * (gain @ ((unit.values[rows] - seen) / size)),
-            covariance * np.outer(size, size), np.clip(np.diag(gain), 0.0, 1.0),
+            covariance * np.outer(size, size), np.asarray(np.clip(np.diag(gain), 0.0, 1.0), dtype=np.float64),
         )  # fmt: skip
 
     def _years(self, measured_at: datetime | None) -> float:

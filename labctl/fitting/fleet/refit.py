@@ -16,9 +16,6 @@ from labctl.fitting.fleet.batched import BatchedFit, batched_fit, batched_fit_of
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.numeric.drift_noise import Drift
 
-#: A law of the output of which the schedule shows only some columns cannot be refitted here: they differ by unit.
-NOT_BATCHED = "cannot be refitted together; fit each unit alone"
-
 
 @dataclass(frozen=True)
 class Refit:
@@ -105,7 +102,10 @@ def _refuse(data: FitData, model: ErrorModel, axis: str, design: AxisDesign) -> 
     elif model.argument == "output" and design.columns.shape[1] != _columns(data, model, axis):
         why = "the schedule does not show all of its effects"
     if why:
-        raise BadInput(f"{data.info.serial}, axis {axis}: model {model.name} {NOT_BATCHED}: {why}")
+        raise BadInput(
+            f"{data.info.serial}, axis {axis}: units cannot be refitted together by model {model.name}, because {why}; "
+            "fit each unit alone"
+        )
 
 
 def _columns(data: FitData, model: ErrorModel, axis: str) -> int:

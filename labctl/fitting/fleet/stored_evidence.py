@@ -62,7 +62,7 @@ def from_bytes(content: bytes, overlaps: Mapping[str, Overlaps] | None = None) -
         if overlap is None:
             raise BadInput(
                 f"evidence of {head['serial_number']}, axis {axis}: it has no overlap of its regressors, nor has any "
-                f"unit of its design {head['design']}; criticise a unit of the same recipe again"
+                f"unit of its design {head['design']}; give that of one, or run `labctl criticise` again"
             )
         axes[axis] = CandidateEstimates(
             tuple(EstimatedShape(effect, shape, tuple(names), tuple(units), is_exact)

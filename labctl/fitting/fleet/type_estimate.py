@@ -113,6 +113,12 @@ def _are_alike(table: UnitTable, direction: Direction, column: Array) -> bool:
     return float(chdtrc(len(values) - 1, chi2)) > CONSISTENT
 
 
+def _with_each_group(wanted: NDArray[np.bool_], columns: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which units count, with all units of a group of which none would: its shift is not known without them."""
+    lost = ~np.any(columns[wanted] != 0.0, axis=0)
+    return np.asarray(wanted | np.any(columns[:, lost] != 0.0, axis=1))
+
+
 def _settled(table: UnitTable, k: int, found: RobustFit, level: float) -> _Settled:
     """Return the spread beside the shifts that were found, without the units that are too far out for it.
 
@@ -121,15 +127,17 @@ def _settled(table: UnitTable, k: int, found: RobustFit, level: float) -> _Settl
     y, variance, columns = table.values[:, k], table.variance[:, k], found.columns
     p = columns.shape[1]
     t = (y - found.fitted) / np.sqrt(variance + found.tau**2)
-    is_out = np.abs(t) > -float(stdtrit(max(ROBUST_SHARE * len(y) - p, MIN_FREEDOM), level))
+    wanted = np.abs(t) <= -float(stdtrit(max(ROBUST_SHARE * len(y) - p, MIN_FREEDOM), level))
+    kept = np.ones(len(y), dtype=bool)
     for _ in range(ROUNDS):
-        kept = ~is_out
+        wanted = _with_each_group(wanted, columns)
+        if int(wanted.sum()) > p + MIN_FREEDOM:
+            kept = wanted
         spread = reml(y[kept], variance[kept], columns[kept])
         freedom = max(int(kept.sum()) - p - 1, MIN_FREEDOM)
         t = _studentised(y, variance, columns, spread, kept, freedom)
-        before, is_out = is_out, np.abs(t) > -float(stdtrit(freedom, level))
-        if np.array_equal(before, is_out) or int((~is_out).sum()) <= p + MIN_FREEDOM:
-            is_out = before
+        wanted = np.abs(t) <= -float(stdtrit(freedom, level))
+        if np.array_equal(wanted, kept):
             break
     return _Settled(found, spread, t, freedom, ~kept)
 
@@ -220,7 +228,7 @@ def _correlation(table: UnitTable, settled: Sequence[_Settled]) -> NDArray[np.fl
             for i, each in enumerate(settled)
         ]
     )
-    size = np.sqrt(np.maximum(tau**2, 1e-300))
+    size = np.where(tau > 0, tau, np.inf)  # what does not differ from unit to unit is correlated with nothing
     joint = (residual.T @ residual / len(table) - table.covariance.mean(axis=0)) / np.outer(size, size)
     share = np.maximum(tau**2 / np.maximum(tau**2 + table.variance.mean(axis=0), 1e-300), 1e-6)
     weight = np.outer(share, share) * (1.0 - np.eye(k))  # what is seen worse counts less

@@ -111,5 +111,5 @@ def test_a_published_model_is_refitted_as_the_fit_of_one_unit_does_it(data: FitD
 def test_a_model_that_is_not_linear_is_refused(data: FitData) -> None:
     model, _ = PRESETS["bias_scale"][0].build(data)
     held = Held({"x": {"bias": HeldCoefficient((0.1,), (0.01,), "deg/s", "bias")}})
-    with pytest.raises(BadInput, match="fit each unit alone: it holds coefficients"):
+    with pytest.raises(BadInput, match="because it holds coefficients; fit each unit alone"):
         refit(data, replace(model, held=held), {a: v[None] for a, v in data.outputs.items()}, {})
