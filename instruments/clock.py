@@ -91,6 +91,11 @@ def wait_s(clock: Clock, timeout_s: float) -> float:
     return look_every_s(clock) if stands_in_stalls(clock) else clock.wall_s(timeout_s)
 
 
+def processor_s() -> float:
+    """Return the processor time that this thread has taken so far, s."""
+    return time.thread_time()
+
+
 def sleep_until(clock: Clock, t_s: float) -> None:
     """Wait until the clock reads `t_s`; returns at once when it is already later."""
     clock.sleep(t_s - clock.now_s())

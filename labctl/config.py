@@ -15,6 +15,7 @@ SIGN_CERTIFICATE_VARIABLE = "LABCTL_SIGN_CERTIFICATE"
 SIGN_PASSWORD_VARIABLE = "LABCTL_SIGN_PASSWORD_FILE"  # noqa: S105  the name of the variable
 SIGNER_VARIABLE = "LABCTL_EXPECTED_SIGNER"
 LOG_LEVEL_VARIABLE = "LABCTL_LOG_LEVEL"
+FLEET_ENGINE_VARIABLE = "LABCTL_FLEET_ENGINE"
 
 
 def variable(name: str) -> str:
@@ -30,6 +31,11 @@ def key() -> str | None:
 def seal_key() -> str:
     """Return what names the key that signs manifests: a PEM file or a PKCS#11 URI; empty for none."""
     return variable(SEAL_KEY_VARIABLE)
+
+
+def fleet_engine() -> str:
+    """Return the cluster that a service may use for work on many units, as dask://HOST:PORT; empty for none."""
+    return variable(FLEET_ENGINE_VARIABLE)
 
 
 def os_user() -> str:

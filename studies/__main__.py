@@ -9,6 +9,7 @@ STUDIES = (
     "coverage",
     "use_coverage",
     "enough",
+    "fleets",
     "budget_coverage",
     "rate_vector_coverage",
     "indexing",

@@ -27,6 +27,7 @@ from labctl.api.routers import (
     certification,
     diagnoses,
     effects,
+    fleet,
     health,
     live,
     motions,
@@ -52,6 +53,7 @@ Calibrations of gyroscopes by serial number, the campaigns that measured them, a
 * `POST /api/campaigns` runs a recipe on this service's bench, now, at a time or on a cron line;
   `GET /api/campaigns/{id}/events` follows it, `GET /api/schedule` lists the scheduled starts.
 * `POST /api/units/{serial}/diagnoses` runs experiments until one missing effect is left.
+* `POST /api/fleet/jobs` fits or criticises many units; `GET /api/fleet/report` says what they have in common.
 * `POST /api/live/start` calibrates a unit while a person turns it; `GET /api/live/events` follows it.
 
 Rates are deg/s, temperatures deg C, times s, instants UTC. Errors are problem documents (RFC 9457).
@@ -63,7 +65,8 @@ certifying and keys for an approver's.
 #: In the order of the API's description, in which they are also asked: what is read most comes first.
 ROUTERS = (
     calibrations, certification, health, units, benches, effects, certificates, plans,
-    campaigns, schedule, diagnoses, live, recordings, motions, points, sensors, standards, validity, admin, swagger_ui,
+    campaigns, schedule, diagnoses, fleet, live, recordings, motions, points, sensors, standards, validity, admin,
+    swagger_ui,
 )  # fmt: skip
 #: Which of their routes take a key; every route of the others does.
 SAY_THEMSELVES = (health, swagger_ui)

@@ -24,6 +24,7 @@ from labctl.cli.commands import (
     diagnosis,
     effects,
     environment,
+    fleet,
     inspection,
     keys,
     live,
@@ -70,6 +71,7 @@ app.add_typer(standards.app, name="standards")
 app.add_typer(sensors.app, name="sensors")
 app.add_typer(environment.app, name="environment")
 app.add_typer(batches.app, name="batches")
+app.add_typer(fleet.app, name="fleet")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,

@@ -36,6 +36,8 @@ from labctl.services.diagnosis.in_service import ServiceLaboratory, criticise_to
 from labctl.services.diagnosis.watch import DiagnosisWatch
 from labctl.services.drafts.answers import with_drafts
 from labctl.services.drafts.watch import DraftWatch
+from labctl.services.fleet.engines import LOCAL, ComputationEngine, Engine, open_engine
+from labctl.services.fleet.watch import FleetWatch
 from labctl.services.live.live_stream import LiveEventStream
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
@@ -98,6 +100,7 @@ class LabService:
         self._diagnoses = DiagnosisWatch(
             store, clock, lambda: None if self.bench is None else self.bench.name, laboratory
         )
+        self._fleet = FleetWatch(store, clock, self._open_engine)
         self._opened_at = clock.utc()
         self._closed = False
         self._hooks = ExitStack()
@@ -119,6 +122,13 @@ class LabService:
         self.bench_access.start()
         self._drafts.background.start()
         self._diagnoses.background.start()
+        self._fleet.background.start()
+
+    def _open_engine(self, name: str) -> Engine:
+        """Open the engine of a fleet job; without worker processes its tasks are done as all others are."""
+        if name == LOCAL and isinstance(self.computation, InThreads):
+            return ComputationEngine(self.computation, 1)
+        return open_engine(name, self.store.address)
 
     def _draft(self, campaign: int) -> DraftsResponse:
         return self.execute(MAKE_DRAFTS, ToCampaign(campaign, DraftsRequest()))
@@ -127,6 +137,7 @@ class LabService:
         """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
         self._drafts.background.end_soon()
         self._diagnoses.background.end_soon()
+        self._fleet.background.end_soon()
         self.bench_access.end_soon()
         self.computation.end_soon()
 
@@ -139,9 +150,11 @@ class LabService:
             self.left = self.bench_access.close()
             self._drafts.background.end_soon()
             self._diagnoses.background.end_soon()
+            self._fleet.background.end_soon()
             self.computation.close()
             self._drafts.background.close()
             self._diagnoses.background.close()
+            self._fleet.background.close()
             self.fetches.write()
             self.store.close()
 

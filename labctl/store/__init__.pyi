@@ -64,6 +64,24 @@ from labctl.store.repositories.drafts.repository import (
 )
 from labctl.store.repositories.drafts.repository import Drafts as Drafts
 from labctl.store.repositories.fetches import FetchRow as FetchRow, Fetches as Fetches
+from labctl.store.repositories.fleet_jobs import (
+    FleetCoefficient as FleetCoefficient,
+    FleetCounts as FleetCounts,
+    FleetEvidence as FleetEvidence,
+    FleetFilter as FleetFilter,
+    FleetFit as FleetFit,
+    FleetJobRow as FleetJobRow,
+    FleetJobs as FleetJobs,
+    FleetResult as FleetResult,
+    FleetUnitRow as FleetUnitRow,
+    NewFleetJob as NewFleetJob,
+)
+from labctl.store.repositories.fleet_reports import (
+    ChartPoint as ChartPoint,
+    FleetReports as FleetReports,
+    FleetVersion as FleetVersion,
+    TypeFigures as TypeFigures,
+)
 from labctl.store.repositories.keys import Keys as Keys
 from labctl.store.repositories.leases import LeaseRow as LeaseRow, Leases as Leases
 from labctl.store.repositories.manifests import ManifestRow as ManifestRow, Manifests as Manifests

@@ -21,6 +21,8 @@ from labctl.store.repositories.check_gyros import CheckGyros
 from labctl.store.repositories.diagnoses import Diagnoses
 from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.fetches import Fetches
+from labctl.store.repositories.fleet_jobs import FleetJobs
+from labctl.store.repositories.fleet_reports import FleetReports
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import Leases
 from labctl.store.repositories.manifests import Manifests
@@ -55,6 +57,8 @@ class Store:
         self.fetches = Fetches(database)
         self.drafts = Drafts(database)
         self.diagnoses = Diagnoses(database)
+        self.fleet = FleetJobs(database)
+        self.fleet_reports = FleetReports(database)
         self.standards = Standards(database)
         self.check_gyros = CheckGyros(database)
         self.sensor_versions = SensorVersions(database)

@@ -1,3 +1,8 @@
+from labctl.fitting.criticism.estimated_shapes import (
+    CandidateEstimates as CandidateEstimates,
+    EstimatedShape as EstimatedShape,
+    candidate_estimates as candidate_estimates,
+)
 from labctl.fitting.criticism.criticism import (
     Criticism as Criticism,
     FittedMeans as FittedMeans,

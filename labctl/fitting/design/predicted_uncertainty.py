@@ -20,6 +20,8 @@ from labctl.fitting.design.planned_sets import PlannedSets, planned_data
 from labctl.fitting.design.range_of_use import RangeOfUse
 from labctl.fitting.effects import kind_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
+from labctl.fitting.estimation.axis_solutions import prior_rows
+from labctl.fitting.estimation.prior import CoefficientPrior
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.models.error_model import ErrorModel, is_exported
 from labctl.fitting.models.presets import Preset
@@ -48,19 +50,31 @@ class PredictedUncertainty:
 
 @single_threaded
 def predicted_uncertainty(
-    sets: PlannedSets, axes: tuple[str, ...], preset: Preset, noise: NoiseFigures, use: RangeOfUse
+    sets: PlannedSets,
+    axes: tuple[str, ...],
+    preset: Preset,
+    noise: NoiseFigures,
+    use: RangeOfUse,
+    prior: CoefficientPrior | None = None,
 ) -> PredictedUncertainty:
-    """Return what planned data sets will leave uncertain by a model. Raises NotEnoughData where they do not fit it."""
+    """Return what planned data sets will leave uncertain by a model. Raises NotEnoughData where they do not fit it.
+
+    `prior` is what is known of the coefficients by other units of the type; fewer data sets then suffice.
+    """
     data = planned_data(sets, axes, noise)
     model, rows = preset.build(data)
     kept = data.take(rows)
-    require_enough_data(kept, model)
+    if prior is None:
+        require_enough_data(kept, model)
+    else:
+        model = prior.referred(model)
     points, weights = use.points
     variances, of_heat, coefficients = [], [], 0
     for axis in axes:
-        design = axis_design(kept, model, axis)
+        design = axis_design(kept, model, axis, known=frozenset() if prior is None else prior.known(axis))
         jacobian = derivative_at_points(model, use, design, axis)
-        by_noise, by_heat = _variances(kept, design, jacobian, sets.slope_k_s[rows], axis, noise)
+        known = None if prior is None else prior_rows(design, model, axis, prior)[0]
+        by_noise, by_heat = _variances(kept, design, jacobian, sets.slope_k_s[rows], axis, noise, known)
         variances.append(by_noise + by_heat)
         of_heat.append(by_heat)
         coefficients += design.columns.shape[1]
@@ -90,23 +104,31 @@ def derivative_at_points(model: ErrorModel, use: RangeOfUse, design: AxisDesign,
 
 
 def _variances(
-    data: FitData, design: AxisDesign, jacobian: NDArray[np.float64], slope_k_s: Array, axis: str, noise: NoiseFigures
-) -> tuple[Array, Array]:
-    """Return the variance at each point (p,) by noise and drift, and by unsettled heat, (deg/s)^2."""
+    data: FitData, design: AxisDesign, jacobian: NDArray[np.float64], slope_k_s: Array, axis: str, noise: NoiseFigures,
+    known: NDArray[np.float64] | None,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return the variance at each point (p,) by noise and drift, and by unsettled heat, (deg/s)^2.
+
+    `known` are whitened rows (q, c) of a prior.
+    """
     figures, heat = noise.of(axis), noise.heat
     scatter = data.scatter(axis)
     assert scatter.white_var is not None
     size = np.linalg.norm(design.columns, axis=0)
+    size = np.where(size > 0, size, 1.0)  # what only a prior knows has no column
     unsettled = heat.element_u_s * np.column_stack(
         [heat.bias_per_k * slope_k_s, heat.scale_per_k * slope_k_s * data.true_rate_dps(axis)]
     )
     c = design.columns.shape[1]
     values = np.concatenate([design.columns / size, unsettled], axis=1)
     whole, _ = whitened(scatter, figures.drifts, scatter.white_var, values)
+    if known is not None:
+        below = np.column_stack([known / size, np.zeros((len(known), unsettled.shape[1]))])
+        whole = np.concatenate([whole, np.broadcast_to(below, (len(whole), *below.shape))], axis=1)
     by_noise, by_heat = np.zeros(len(jacobian)), np.zeros(len(jacobian))
     for rows in whole:
         q, r = np.linalg.qr(rows[:, :c])
-        diagonal = np.abs(np.diag(r))
+        diagonal = np.abs(np.diag(r)) if len(r) == c else np.zeros(1)
         if diagonal.min() < SINGULAR * diagonal.max():
             raise NotEnoughData(
                 "the planned data sets do not determine the coefficients of the model; plan more rates or temperatures"

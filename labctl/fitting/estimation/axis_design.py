@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,10 +41,12 @@ class AxisDesign:
 
 
 def axis_design(
-    data: FitData, model: ErrorModel, axis: str, at: Mapping[str, NDArray[np.float64]] | None = None
-) -> AxisDesign:
+    data: FitData, model: ErrorModel, axis: str, at: Mapping[str, NDArray[np.float64]] | None = None,
+    known: Collection[str] = (),
+) -> AxisDesign:  # fmt: skip
     """Return the design of one axis. Columns that the recording does not exercise are left out, unless they are held.
 
+    Those of coefficients that are `known` beforehand, by name, stay: the recording need not show them.
     A column with a law is its tangent at the coefficients `at`, name -> (nodes,), or where it starts.
     """
     channels = data.seen_by(model.argument)
@@ -55,14 +57,14 @@ def axis_design(
     held = HeldColumns(basis)
     offset = np.zeros(len(data))
     unknowns = 0
-    for owner, column in _exercised(data, model, channels, axis):
+    for owner, column in _exercised(data, model, channels, axis, known):
         values = column.values
         if (held_value := model.held.of(axis, owner, column.name)) is not None:
             held.add(held_value, held_value.spread(model.temperature), values)
             spread.append(np.zeros((nodes, 0)))
             names.append((owner, column.name, column.unit))
             continue
-        if not np.any(values):
+        if not np.any(values) and column.name not in known:
             continue
         if column.law is not None:
             values, beside = _tangent(column, basis @ at[column.name] if at and column.name in at else None)
@@ -73,22 +75,18 @@ def axis_design(
             continue  # an added polynomial repeats the powers that the model has already
         columns.append(added)
         unknowns += added.shape[1]
-        _refuse_too_many(data, model, axis, unknowns)  # before each further column is compared with all of them
+        _refuse_too_many(
+            data, model, axis, unknowns - len(known) * nodes
+        )  # before each further column is compared with all of them
         spread.append(np.ones((nodes, 1)) if owner in steady else np.eye(nodes))
         held.add_none()
         names.append((owner, column.name, column.unit))
     held_part = held.part
     return AxisDesign(
-        np.concatenate(columns, axis=1),
-        block_diagonal(spread),
-        names,
-        turning_columns(data.info, data.channels, axis),
-        offset + held_part.error_dps,
-        held_part,
-        tuple(laws),
-        tuple(shifts_of(data.channels, axis)),
+        np.concatenate(columns, axis=1), block_diagonal(spread), names, turning_columns(data.info, data.channels, axis),
+        offset + held_part.error_dps, held_part, tuple(laws), tuple(shifts_of(data.channels, axis)),
         data.angle_columns(axis),
-    )
+    )  # fmt: skip
 
 
 def _refuse_too_many(data: FitData, model: ErrorModel, axis: str, unknowns: int) -> None:
@@ -106,11 +104,13 @@ def _tangent(column: Column, at: Array | None) -> tuple[Array, Array]:
     return slope, column.error_dps(point) - slope * point
 
 
-def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) -> list[tuple[str, Column]]:
+def _exercised(
+    data: FitData, model: ErrorModel, channels: Channels, axis: str, known: Collection[str]
+) -> list[tuple[str, Column]]:
     """Return (effect id, regressor) without those that multiply the rate of an axis that had one rate throughout.
 
     At one rate the part of an effect that grows with the rate is the same as its part at rest, so only that is claimed.
-    A held coefficient is known whatever the recording exercises.
+    A held coefficient, or one that is `known` beforehand, is known whatever the recording exercises.
     """
     named_columns = model.columns(channels, axis)
     still = {name for name in channels.rates if data.distinct_rates(name) < TOLD_APART}
@@ -122,7 +122,7 @@ def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) 
     return [
         (owner, column)
         for (owner, column), (_, column_at_rest) in zip(named_columns, at_rest, strict=True)
-        if np.any(column_at_rest.values) or model.held.of(axis, owner, column.name) is not None
+        if np.any(column_at_rest.values) or column.name in known or model.held.of(axis, owner, column.name) is not None
     ]
 
 

@@ -25,6 +25,7 @@ from labctl.fitting.estimation.delay_and_bandwidth import (
     without_response,
 )
 from labctl.fitting.estimation.held import considered, joint_covariance
+from labctl.fitting.estimation.prior import CoefficientPrior, coefficient_names, with_coefficient_prior
 from labctl.fitting.estimation.reference_time import TimeErrors, time_errors
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.error_part import ErrorPart
@@ -80,26 +81,35 @@ class AxisSolutions:
         return {axis: axis_nuisance.turning for axis, axis_nuisance in self.nuisance.items()}
 
 
-def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None = None) -> AxisSolutions:
+def solve_axes(
+    data: FitData,
+    model: ErrorModel,
+    fixed: Mapping[str, Solution] | None = None,
+    prior: CoefficientPrior | None = None,
+) -> AxisSolutions:
     """Fit every axis of a model; with `fixed` the drift of each axis is that solution's and not searched for.
+
+    `prior` is what is known of the coefficients beside the data.
 
     Where angles of the mountings are separated, all axes are fitted once more with the rates of a unit that leans so:
     each output shows the rates about the others by its own coefficients.
 
     Raises NotEnoughData where the data sets do not determine the coefficients.
     """
-    solutions = _solve_each(data, model, fixed)
+    solutions = _solve_each(data, model, fixed, prior)
     if not any(each.angles_rad for each in solutions.nuisance.values()):
         return solutions
     rates = leaning(data, solutions.nuisance).channels.rates
-    again = _solve_each(replace(data, channels=data.channels.with_rates(rates)), model, fixed)
+    again = _solve_each(replace(data, channels=data.channels.with_rates(rates)), model, fixed, prior)
     return replace(again, nuisance={axis: solutions.nuisance[axis].plus(each) for axis, each in again.nuisance.items()})
 
 
-def _solve_each(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None) -> AxisSolutions:
+def _solve_each(
+    data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None, prior: CoefficientPrior | None
+) -> AxisSolutions:
     fits, solutions, nuisance = {}, {}, {}
     for axis in data.outputs:
-        design, solution, late = _converged(data, model, axis, fixed[axis] if fixed else None)
+        design, solution, late = _converged(data, model, axis, fixed[axis] if fixed else None, prior)
         solution = with_common_error(data, axis, design.columns, solution)
         fits[axis] = _axis_fit(design, solution, late)
         solutions[axis], nuisance[axis] = replace(solution, white_dps=data.white_dps(axis)), _nuisance(design, solution)
@@ -129,7 +139,7 @@ def leaning(data: FitData, nuisance: Mapping[str, Nuisance]) -> FitData:
 
 
 def _converged(
-    data: FitData, model: ErrorModel, axis: str, fixed: Solution | None
+    data: FitData, model: ErrorModel, axis: str, fixed: Solution | None, prior: CoefficientPrior | None
 ) -> tuple[AxisDesign, Solution, TimeErrors | None]:
     """Return the design at the solution, the solution, and the errors of the reference's time that are in it.
 
@@ -138,21 +148,22 @@ def _converged(
     """
     response = first_response(data, model, axis)
     data = data.through(response)
-    design = axis_design(data, model, axis)
-    solution = _solve_axis(data, model, axis, design, fixed)
+    known = frozenset[str]() if prior is None else prior.known(axis)
+    design = axis_design(data, model, axis, known=known)
+    solution = _solve_axis(data, model, axis, design, fixed, prior=prior)
     for _ in range(GAUSS_NEWTON_STEPS if design.laws else 0):
         before, at = solution.values, _law_coefficients(design, solution)
         if data.channels.profile is not None:
             u_s = _axis_fit(design, solution).u_of(TIME_CONSTANT)
             response = next_response(response, response_at(at), model, u_s)
             data, at = data.through(response), with_response(at, response)
-        design = axis_design(data, model, axis, at)
-        solution = _solve_axis(data, model, axis, design, fixed or solution)
+        design = axis_design(data, model, axis, at, known)
+        solution = _solve_axis(data, model, axis, design, fixed or solution, prior=prior)
         if np.allclose(solution.values, before, rtol=1e-7, atol=1e-14):
             break
     late = time_errors(data, axis)
     if design.laws or late is not None:
-        solution = _solve_axis(data, model, axis, design, fixed, late)
+        solution = _solve_axis(data, model, axis, design, fixed, late, prior)
     return design, solution, late
 
 
@@ -169,6 +180,7 @@ def _solve_axis(
     design: AxisDesign,
     fixed: Solution | None,
     late: TimeErrors | None = None,
+    prior: CoefficientPrior | None = None,
 ) -> Solution:
     if design.columns.shape[1] == 0:
         raise NotEnoughData(
@@ -177,7 +189,7 @@ def _solve_axis(
         )
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
     axis_scatter, random = data.scatter(axis), None
-    if design.shifts or len(design.angles):
+    if design.shifts or len(design.angles) or prior is not None:
         axis_scatter = _with_white_noise(design, y, axis_scatter)
     columns, y, scatter = with_known_size(design.columns, design.turning, y, axis_scatter, turning_size_dps(data.info))
     columns, y, scatter = with_prior(columns, design.angles.values, y, scatter, design.angles.size**2)
@@ -187,6 +199,8 @@ def _solve_axis(
         columns, y, scatter = with_prior(columns, values, y, scatter, wide**2)
         kinds = np.array([shift.kind for shift in design.shifts])
         random = RandomEffects(np.unique(kinds, return_inverse=True)[1], wide)
+    if prior is not None:
+        columns, y, scatter = with_coefficient_prior(columns, y, scatter, *prior_rows(design, model, axis, prior))
     columns, y, scatter, known_beside = considered(design.held, columns, y, scatter)
     if late is not None:
         known_beside = late.beside(known_beside, len(columns))
@@ -194,6 +208,14 @@ def _solve_axis(
         return solve(columns, y, scatter, fixed.drift if fixed else None, random, known_beside)
     except NotEnoughData as error:
         raise NotEnoughData(f"{data.info.serial}, axis {axis}, model {model.name}: {error}") from None
+
+
+def prior_rows(
+    design: AxisDesign, model: ErrorModel, axis: str, prior: CoefficientPrior
+) -> tuple[NDArray[np.float64], Array]:
+    """Return what a prior says of the estimated columns of an axis, as whitened rows (q, c) and values (q,)."""
+    owners, names = [owner for owner, _, _ in design.names], [name for _, name, _ in design.names]
+    return prior.whitened(design.spread, coefficient_names(model, axis, owners, names))
 
 
 def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter:

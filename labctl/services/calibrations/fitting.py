@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from datetime import date, datetime
 
 from labctl.answers.calibrations import (
@@ -15,7 +16,7 @@ from labctl.answers.calibrations import (
 )
 from labctl.answers.kept_answers import KeptFit
 from labctl.calibration import Calibration, build_calibration, read_calibration
-from labctl.fitting import fit
+from labctl.fitting import FitResult, fit
 from labctl.fitting.effects.response import IDS
 from labctl.fitting.models.memory import split_memory
 from labctl.fitting.uncertainty import evidence_of
@@ -46,6 +47,16 @@ def remembered_by(calibration: Calibration) -> list[Follower]:
     ]  # fmt: skip
 
 
+@dataclass(frozen=True)
+class FittedUnit:
+    """A fit of a unit that is not kept yet, and the version that it becomes under a number."""
+
+    build: Callable[[int], NewCalibration]
+    result: FitResult
+    rows: tuple[RecordingRow, ...]
+    bench: str | None  #: that of the campaign of the newest recording; None: it was imported
+
+
 def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is_draft: bool = False) -> FitResponse:
     """Fit a model to a unit's recording and keep it as the next version.
 
@@ -53,6 +64,13 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is
     DataRefused for data that are certainly wrong and for a fit that is worse than none. A draft (`is_draft`) is kept
     once: raises Conflict for another one.
     """
+    fitted = fitted_unit(store, serial, request, at, is_draft=is_draft)
+    kept_version = keep_next_version(store, serial, at, fitted.build)
+    return FitResponse.model_validate(kept_version.answer, extra="forbid")
+
+
+def fitted_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is_draft: bool = False) -> FittedUnit:
+    """Fit a model to a unit's recording and keep nothing. Raises what `fit_unit` raises."""
     measured = measurements_of(store, serial, request.recording, request.recordings)
     recording, campaign, recordings = measured.row.id, measured.row.campaign, measured.recordings
     job_title = f"fit of {measured.named} of {serial}"
@@ -86,8 +104,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is
             is_draft=is_draft,
         )  # fmt: skip
 
-    kept_version = keep_next_version(store, serial, at, build)
-    return FitResponse.model_validate(kept_version.answer, extra="forbid")
+    return FittedUnit(build, result, measured.rows, bench)
 
 
 def several(recordings: tuple[int, ...]) -> dict[str, list[int]]:

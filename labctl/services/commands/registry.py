@@ -38,6 +38,7 @@ from labctl.services.commands.diagnoses import (
     STOP_DIAGNOSIS,
 )
 from labctl.services.commands.encoding import log_file, recording_files
+from labctl.services.commands.fleet import CANCEL_FLEET_JOB, START_FLEET_JOB
 from labctl.services.commands.requests import (
     LogFile,
     RecordingFolder,
@@ -241,6 +242,7 @@ _ELSEWHERE: tuple[Command[Any, Any], ...] = (
     ADD_STANDARD, ADD_STANDARD_CERTIFICATE, ADD_STANDARD_CHECK, MARK_STANDARD_BAD, WITHDRAW_FINDING, SET_CHECK_GYRO,
     ADD_ENVIRONMENT, KEEP_ACCELEROMETER, KEEP_MAGNETOMETER,
     START_DIAGNOSIS, CONFIRM_EXPERIMENT, STOP_DIAGNOSIS, RESUME_DIAGNOSIS, END_DIAGNOSIS,
+    START_FLEET_JOB, CANCEL_FLEET_JOB,
 )  # fmt: skip
 #: All of them, in the order above.
 COMMANDS: tuple[Command[Any, Any], ...] = (

@@ -85,7 +85,7 @@ def carry_out(connection: Connection, task: Task) -> None:
     threading.Thread(target=_end_with_the_service, daemon=True).start()
     os.nice(task.limits.niceness)
     with _log_of(task):  # written out before the outcome is sent: the service that has it kills the worker
-        _bound_memory(task.limits.memory_mib)
+        bound_memory(task.limits.memory_mib)
         outcome = _outcome(connection, task)
     with suppress(BrokenPipeError):
         connection.send(outcome)
@@ -108,7 +108,7 @@ def _end_with_the_service() -> None:
         os._exit(1)
 
 
-def _bound_memory(memory_mib: int) -> None:
+def bound_memory(memory_mib: int) -> None:
     """Bound the address space to what is taken now and so much more; be the first to go where memory is short."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with suppress(OSError):  # no /proc here: the bound is then the whole address space

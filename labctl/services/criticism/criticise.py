@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -17,6 +17,7 @@ from labctl.services.recordings.loading import chosen_rows, passed_over, reading
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 if TYPE_CHECKING:
+    from labctl.fitting.criticism import Criticism
     from labctl.fitting.effects import Formula
 
 A = TypeVar("A", bound=ResponseModel)
@@ -46,6 +47,16 @@ def criticise_unit(
     from labctl.services.criticism.answer import with_warnings  # noqa: PLC0415  slow to import
 
     return with_warnings(answer, newer)
+
+
+def criticise_seen(
+    store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...], seen: Callable[[Criticism], None]
+) -> CriticismResponse:
+    """Compare a version with recordings, whatever is cached; `seen` is given the criticism itself. Raises BadInput."""
+    with reading_beside(store, measured) as decimated:
+        from labctl.services.criticism.evaluation import evaluate  # noqa: PLC0415  slow to import
+
+        return evaluate(store, row, measured, (), decimated, seen)[0]
 
 
 def _with_undistinguished(

@@ -5,7 +5,7 @@ A module of its own, because a kept answer needs none of it, and these libraries
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from labctl.answers.criticism import CriticismResponse, Experiment
 from labctl.answers.residuals import ResidualsResponse
@@ -52,10 +52,12 @@ def evaluate(
     recordings: tuple[RecordingRow, ...],
     competing: Sequence[Formula],
     decimated: Decimated | None = None,
+    seen: Callable[[Criticism], None] = lambda _: None,
 ) -> tuple[CriticismResponse, ResidualsResponse]:
     """Return the criticism of a version against recordings, and its residuals. Raises BadInput, NotEnoughData.
 
-    `competing` formulas are added to the catalogue. `decimated` gives readings that are being read already.
+    `competing` formulas are added to the catalogue. `decimated` gives readings that are being read already. `seen` is
+    given the criticism itself.
     """
     catalogue, measured = catalogue_with(competing), Measurements(store, recordings, decimated)
     report_stage("inspecting the recording")
@@ -74,6 +76,7 @@ def evaluate(
         job_title = f"criticism of version {calibration.version} on {measured.named}"
         refuse_wrong(warnings, job_title, accepted=False, insist=f"; without refitting, {error}")
         raise
+    seen(criticised)
     columns = residual_columns(criticised.data, criticised.residuals, measured.points, measured.row.id, criticised.base)
     serial, version = calibration.serial, calibration.version
     experiments = _experiments(store, recordings, criticised)

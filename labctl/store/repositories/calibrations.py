@@ -126,6 +126,33 @@ class NewCalibration:
         return tuple(sorted({*self.recordings, *one}))
 
 
+def add_version(connection: sa.Connection, serial: str, at: datetime, version: int, new: NewCalibration) -> None:
+    """Keep a unit's next version inside a transaction, with its audit row and its seal. Raises VersionTaken."""
+    values = {
+        "serial": serial, "version": version, "parent": new.parent, "recording_id": new.recording,
+        "model": new.model, "created_at": at, "hash": new.hash, "document": new.document, "answer": new.answer,
+    }  # fmt: skip
+    if _next_version(connection, serial) != version:
+        raise _taken(serial, version)
+    c = tables.calibrations.c
+    number = connection.scalar(sa.insert(tables.calibrations).values(**values).returning(c.id))
+    _add_recordings(connection, number, new.fitted_to)
+    if new.is_draft and new.recording is not None:
+        mark_fitted(connection, new.recording, version)
+    detail: dict[str, Any] = {
+        "model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash,
+    }  # fmt: skip
+    if len(new.fitted_to) > 1:
+        detail["recordings"] = list(new.fitted_to)
+    act = "fit" if new.parent is None else "improve"
+    append(connection, at, act, f"{serial} version {version}", detail)
+    seal(connection, (CALIBRATION.name, str(number)), at, act)
+
+
+def _taken(serial: str, version: int) -> VersionTaken:
+    return VersionTaken(f"{serial} version {version} was made by another fit in the meantime; fit again")
+
+
 class Calibrations:
     """Every calibration of every unit."""
 
@@ -144,32 +171,13 @@ class Calibrations:
         Raises VersionTaken when another one got the number meanwhile, Conflict when the draft of its recording was
         made meanwhile; nothing was changed.
         """
-        values = {
-            "serial": serial, "version": version, "parent": new.parent, "recording_id": new.recording,
-            "model": new.model, "created_at": at, "hash": new.hash, "document": new.document, "answer": new.answer,
-        }  # fmt: skip
-        taken_error = VersionTaken(f"{serial} version {version} was made by another fit in the meantime; fit again")
         try:
             with self._database.writing() as connection:
-                if _next_version(connection, serial) != version:
-                    raise taken_error
-                c = tables.calibrations.c
-                number = connection.scalar(sa.insert(tables.calibrations).values(**values).returning(c.id))
-                _add_recordings(connection, number, new.fitted_to)
-                if new.is_draft and new.recording is not None:
-                    mark_fitted(connection, new.recording, version)
-                detail: dict[str, Any] = {
-                    "model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash,
-                }  # fmt: skip
-                if len(new.fitted_to) > 1:
-                    detail["recordings"] = list(new.fitted_to)
-                act = "fit" if new.parent is None else "improve"
-                append(connection, at, act, f"{serial} version {version}", detail)
-                seal(connection, (CALIBRATION.name, str(number)), at, act)
+                add_version(connection, serial, at, version, new)
         except exc.IntegrityError as error:  # where several processes write: after the look, before the end
             if self.next_version(serial) == version:
                 raise
-            raise taken_error from error
+            raise _taken(serial, version) from error
         return CalibrationRecord(
             serial, version, new.parent, new.recording, new.model, at, new.hash, new.document, new.answer, new.fitted_to
         )

@@ -15,6 +15,7 @@ from labctl.store.schema.campaigns import campaigns, events, steps, timed_runs
 from labctl.store.schema.certificates import certificate_withdrawals, certificates
 from labctl.store.schema.diagnoses import diagnoses, diagnosis_rounds
 from labctl.store.schema.drafts import drafts
+from labctl.store.schema.fleet import fleet_coefficients, fleet_evidence, fleet_jobs, fleet_units
 from labctl.store.schema.keys import api_keys
 from labctl.store.schema.manifests import block_digests, manifest_head, manifests
 from labctl.store.schema.recordings import data_set_means, data_sets, environment, recordings, sample_blocks
@@ -52,6 +53,10 @@ __all__ = [
     "drafts",
     "environment",
     "events",
+    "fleet_coefficients",
+    "fleet_evidence",
+    "fleet_jobs",
+    "fleet_units",
     "leases",
     "manifest_head",
     "manifests",

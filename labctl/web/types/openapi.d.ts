@@ -1341,6 +1341,153 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/fleet/jobs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * All fleet jobs
+         * @description Every job, the newest first.
+         */
+        get: operations["all_jobs_api_fleet_jobs_get"];
+        put?: never;
+        /**
+         * Fit or criticise many units
+         * @description Begin a job with one task for each unit; answered at once, and carried out by the service.
+         *
+         *     Each result is written once; a fit becomes the next version of its unit and is not put in force. Units whose newest
+         *     result has the same recordings, model and program are skipped.
+         */
+        post: operations["start_api_fleet_jobs_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/fleet/jobs/{job}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * One fleet job
+         * @description How far it is, what it has cost, and how long it will still take.
+         */
+        get: operations["job_api_fleet_jobs__job__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/fleet/jobs/{job}/units": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Units of a fleet job
+         * @description What came of each unit, by serial number; of one that could not be computed, the reason.
+         */
+        get: operations["units_api_fleet_jobs__job__units_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/fleet/jobs/{job}/cancel": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Cancel a fleet job
+         * @description End a job before it is done; what was written stays, and the same request goes on there.
+         */
+        post: operations["cancel_api_fleet_jobs__job__cancel_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/fleet/types": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * All types of units in figures
+         * @description For each type: error over noise floor, verdicts, effects that units are missing, due dates; by name.
+         */
+        get: operations["types_api_fleet_types_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/fleet/chart": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Control chart of a coefficient
+         * @description A coefficient of the newest fits by fleet jobs over time: one point for each group and span of time.
+         */
+        get: operations["chart_api_fleet_chart_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/fleet/report": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Report on a type of units
+         * @description What the units of a type have in common, which batch, bench or unit differs, and what their model is missing.
+         */
+        get: operations["report_api_fleet_report_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/start": {
         parameters: {
             query?: never;
@@ -8200,6 +8347,743 @@ export interface components {
             only_of_model?: boolean;
         };
         /**
+         * FleetAgeing
+         * @description Change of one coefficient per year over the units of a type that were calibrated more than once.
+         */
+        FleetAgeing: {
+            /**
+             * Name
+             * @description Output axis and name of the coefficient.
+             */
+            name: string;
+            /**
+             * Unit
+             * @description Unit of the coefficient; the figures are per year.
+             */
+            unit: string;
+            /**
+             * Mean
+             * @description Mean change per year, in `unit`.
+             */
+            mean: number;
+            /**
+             * U Mean
+             * @description Standard uncertainty of the mean, in `unit`.
+             */
+            u_mean: number;
+            /**
+             * Spread
+             * @description Standard deviation of the changes of units, in `unit`.
+             */
+            spread: number;
+            /**
+             * Units
+             * @description Number of units with a history.
+             */
+            units: number;
+        };
+        /**
+         * FleetCancelRequest
+         * @description The end of a job before it is done.
+         */
+        FleetCancelRequest: {
+            /**
+             * By
+             * @description Name of the person who cancels it; empty: not stated.
+             * @default
+             */
+            by?: string;
+            /**
+             * Reason
+             * @description Reason for it; empty: not stated.
+             * @default
+             */
+            reason?: string;
+        };
+        /**
+         * FleetChartCoefficient
+         * @description A coefficient that a chart can show.
+         */
+        FleetChartCoefficient: {
+            /**
+             * Axis
+             * @description Output axis: x, y or z.
+             */
+            axis: string;
+            /**
+             * Name
+             * @description Name of the coefficient.
+             */
+            name: string;
+            /**
+             * Unit
+             * @description Unit of the coefficient.
+             */
+            unit: string;
+            /**
+             * Units
+             * @description Number of units that have it.
+             */
+            units: number;
+        };
+        /**
+         * FleetChartPoint
+         * @description A coefficient over the units of one group that were measured in one span of time.
+         */
+        FleetChartPoint: {
+            /**
+             * Level
+             * @description Name of the group; empty: not stated.
+             */
+            level: string;
+            /**
+             * At
+             * Format: date-time
+             * @description Mean time of the measurements.
+             */
+            at: string;
+            /**
+             * Units
+             * @description Number of units.
+             */
+            units: number;
+            /**
+             * Mean
+             * @description Mean of the coefficient, in its unit.
+             */
+            mean: number;
+            /**
+             * Low
+             * @description Least value, in its unit.
+             */
+            low: number;
+            /**
+             * High
+             * @description Largest value, in its unit.
+             */
+            high: number;
+            /**
+             * Mean U
+             * @description Mean standard uncertainty of a unit, in its unit; null: not known.
+             */
+            mean_u: number | null;
+        };
+        /**
+         * FleetChartResponse
+         * @description A control chart of a coefficient over time, by group.
+         */
+        FleetChartResponse: {
+            /**
+             * Type
+             * @description Type of the units: their model; empty: all.
+             */
+            type: string;
+            /**
+             * Axis
+             * @description Output axis: x, y or z; empty: no coefficient is known.
+             */
+            axis: string;
+            /**
+             * Name
+             * @description Name of the coefficient; empty: no coefficient is known.
+             */
+            name: string;
+            /**
+             * Unit
+             * @description Unit of the coefficient.
+             */
+            unit: string;
+            /**
+             * Factor
+             * @description What the points are grouped by: batch, bench or supplier.
+             */
+            factor: string;
+            /**
+             * Points
+             * @description Points, by group and time.
+             */
+            points: components["schemas"]["FleetChartPoint"][];
+            /**
+             * Coefficients
+             * @description Coefficients that the chart can show.
+             */
+            coefficients: components["schemas"]["FleetChartCoefficient"][];
+        };
+        /**
+         * FleetCoefficientFigures
+         * @description One coefficient over the units of a type.
+         */
+        FleetCoefficientFigures: {
+            /**
+             * Name
+             * @description Output axis and name of the coefficient, such as x.scale_factor.
+             */
+            name: string;
+            /**
+             * Unit
+             * @description Unit of the figures; empty: not stated.
+             */
+            unit: string;
+            /**
+             * Mean
+             * @description Mean over the units outside of the groups that differ, in `unit`.
+             */
+            mean: number;
+            /**
+             * Expanded U Mean
+             * @description Expanded uncertainty of the mean, 95.45 %, in `unit`.
+             */
+            expanded_u_mean: number;
+            /**
+             * Spread
+             * @description Standard deviation of the units' true values, in `unit`.
+             */
+            spread: number;
+            /**
+             * Spread Low
+             * @description Lower end of the 95 % interval of the spread, in `unit`.
+             */
+            spread_low: number;
+            /**
+             * Spread High
+             * @description Upper end of the 95 % interval of the spread, in `unit`.
+             */
+            spread_high: number;
+            /**
+             * Median U
+             * @description Median standard uncertainty of the units' own calibrations, in `unit`.
+             */
+            median_u: number;
+            /**
+             * Units
+             * @description Number of units, without outliers.
+             */
+            units: number;
+        };
+        /**
+         * FleetDue
+         * @description Units by the date until which their version in force is valid.
+         */
+        FleetDue: {
+            /**
+             * Overdue
+             * @description Units whose date has passed.
+             */
+            overdue: number;
+            /**
+             * Within 30 Days
+             * @description Units that are due within 30 days.
+             */
+            within_30_days: number;
+            /**
+             * Within 90 Days
+             * @description Units that are due within 90 days, but not within 30.
+             */
+            within_90_days: number;
+            /**
+             * Later
+             * @description Units that are due later.
+             */
+            later: number;
+            /**
+             * No Date
+             * @description Units with a version in force that has no date.
+             */
+            no_date: number;
+            /**
+             * None In Force
+             * @description Units without a version in force.
+             */
+            none_in_force: number;
+        };
+        /**
+         * FleetGroup
+         * @description A group of units that differs from the rest of its type.
+         */
+        FleetGroup: {
+            /**
+             * Factor
+             * @description batch, bench, supplier or date (a trend).
+             */
+            factor: string;
+            /**
+             * Level
+             * @description Name of the group; empty for a trend.
+             */
+            level: string;
+            /**
+             * Coefficients
+             * @description Coefficients that it shifts, all by the same amount.
+             */
+            coefficients: string[];
+            /**
+             * Shift
+             * @description Shift in `unit`; of a trend, per year.
+             */
+            shift: number;
+            /**
+             * U
+             * @description Standard uncertainty of the shift, in `unit`.
+             */
+            u: number;
+            /**
+             * Unit
+             * @description Unit of the coefficients; empty: not stated.
+             */
+            unit: string;
+            /**
+             * Units
+             * @description Number of units in the group; of a trend, with a date.
+             */
+            units: number;
+            /**
+             * P Value
+             * @description Probability that chance gives such a group anywhere in the type, 0 to 1.
+             */
+            p_value: number;
+            /**
+             * Of Bench
+             * @description Whether it is an error of a bench that all units on it share.
+             */
+            of_bench: boolean;
+            /**
+             * Text
+             * @description The finding in a sentence.
+             */
+            text: string;
+        };
+        /**
+         * FleetJobRequest
+         * @description A fit or a criticism of many units, one task for each unit.
+         */
+        FleetJobRequest: {
+            /**
+             * Type
+             * @description Only units of this type: their model, as their manufacturer names it; empty: of any.
+             * @default
+             */
+            type?: string;
+            /**
+             * Batch
+             * @description Only units of this batch; empty: of any.
+             * @default
+             */
+            batch?: string;
+            /**
+             * Supplier
+             * @description Only units of this supplier; empty: of any.
+             * @default
+             */
+            supplier?: string;
+            /**
+             * Search
+             * @description Only units whose serial number, type, technology, batch or supplier holds this text, in any case.
+             * @default
+             */
+            search?: string;
+            /**
+             * Kind
+             * @description fit: a model is fitted to the newest recording of each unit and kept as its next version, which is not put in force; criticise: the newest version of each unit is compared with its newest recording.
+             * @enum {string}
+             */
+            kind: "fit" | "criticise";
+            /**
+             * Model
+             * @description Name of the error model. For a fit: that is fitted. For a criticism: only units whose newest version is of this model; empty: of any.
+             * @default
+             */
+            model?: string;
+            /**
+             * Effects
+             * @description For a fit: ids of the effects of the model, or with `model` of effects to add to it; `name:2` sets the polynomial order to 2.
+             */
+            effects?: string[];
+            /**
+             * Accept Warnings
+             * @description Whether to fit data in which labctl found errors, and to keep fits worse than none.
+             * @default false
+             */
+            accept_warnings?: boolean;
+            /**
+             * Again
+             * @description Whether to compute units again whose newest result has the same recordings, model and program.
+             * @default false
+             */
+            again?: boolean;
+            /**
+             * Engine
+             * @description What computes: local (processes of this computer), dask (a cluster of Dask on this computer) or dask://HOST:PORT (the scheduler of a cluster).
+             * @default local
+             */
+            engine?: string;
+        };
+        /**
+         * FleetJobResponse
+         * @description A job: how far it is, what it has cost, and how long it will still take.
+         */
+        FleetJobResponse: {
+            /**
+             * Id
+             * @description Number of the job.
+             */
+            id: number;
+            /**
+             * Kind
+             * @description fit or criticise.
+             * @enum {string}
+             */
+            kind: "fit" | "criticise";
+            /** @description What was requested. */
+            request: components["schemas"]["FleetJobRequest"];
+            /**
+             * Engine
+             * @description What computes: local, dask or the address of a scheduler.
+             */
+            engine: string;
+            /**
+             * By
+             * @description Who requested it.
+             */
+            by: string;
+            /**
+             * Created At
+             * Format: date-time
+             * @description Time at which it was requested.
+             */
+            created_at: string;
+            /**
+             * Started At
+             * @description Time at which it was begun; null: not yet.
+             */
+            started_at: string | null;
+            /**
+             * Ended At
+             * @description Time of its end; null: it has not ended.
+             */
+            ended_at: string | null;
+            /**
+             * State
+             * @description waiting: not begun; running; done: every unit has a result or a reason; cancelled; failed: it could not go on, see `why`. What was written before a cancel or a failure stays, and the same request goes on there.
+             * @enum {string}
+             */
+            state: "waiting" | "running" | "done" | "cancelled" | "failed";
+            /**
+             * Ended
+             * @description Whether it has ended.
+             */
+            ended: boolean;
+            /**
+             * Why
+             * @description Why it was cancelled or failed; empty otherwise.
+             */
+            why: string;
+            /**
+             * Units
+             * @description Number of its units.
+             */
+            units: number;
+            /**
+             * Waiting
+             * @description Units that have no result yet.
+             */
+            waiting: number;
+            /**
+             * Done
+             * @description Units whose result was computed and written.
+             */
+            done: number;
+            /**
+             * Failed
+             * @description Units that could not be computed; the list of units says why.
+             */
+            failed: number;
+            /**
+             * Skipped
+             * @description Units whose newest result already has the same recordings, model and program.
+             */
+            skipped: number;
+            /**
+             * Processor S
+             * @description Processor time of all its units, s.
+             */
+            processor_s: number;
+            /**
+             * Processor S Per Unit
+             * @description Processor time divided by the number of units that were computed, s; null: none was.
+             */
+            processor_s_per_unit: number | null;
+            /**
+             * Left S
+             * @description Expected time to its end by the units finished since its begin, s; null: not known, or ended.
+             */
+            left_s: number | null;
+        };
+        /**
+         * FleetMissing
+         * @description An effect that the model of a type is missing, or several that cannot be distinguished.
+         */
+        FleetMissing: {
+            /**
+             * Effects
+             * @description Ids of the effects, the likeliest first.
+             */
+            effects: string[];
+            /**
+             * Log Bayes Factor
+             * @description Natural logarithm of the evidence against nothing missing, 1.
+             */
+            log_bayes_factor: number;
+            /**
+             * Common
+             * @description Whether units share the size; false: its sign differs from unit to unit.
+             */
+            common: boolean;
+            /**
+             * Sizes
+             * @description Its coefficients over the units.
+             */
+            sizes: components["schemas"]["FleetSize"][];
+            /**
+             * Rms Unit Z
+             * @description Root mean square of what single units show, in standard uncertainties, 1; 1 is noise alone.
+             */
+            rms_unit_z: number;
+            /**
+             * Of Bench
+             * @description The only bench whose units show it: the bench's error; null: none.
+             */
+            of_bench: string | null;
+            /**
+             * Text
+             * @description The finding in a sentence.
+             */
+            text: string;
+        };
+        /**
+         * FleetOutlier
+         * @description A unit that is not like its type in one coefficient.
+         */
+        FleetOutlier: {
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
+            serial: string;
+            /**
+             * Coefficient
+             * @description Output axis and name of the coefficient.
+             */
+            coefficient: string;
+            /**
+             * T
+             * @description Distance from what the other units expect over its standard uncertainty, with sign, 1.
+             */
+            t: number;
+            /**
+             * Text
+             * @description The finding in a sentence.
+             */
+            text: string;
+        };
+        /**
+         * FleetReportResponse
+         * @description What the units of a type have in common, which differ, and what their model is missing.
+         */
+        FleetReportResponse: {
+            /**
+             * Type
+             * @description Type of the units: their model.
+             */
+            type: string;
+            /** @description The units in figures. */
+            figures: components["schemas"]["FleetTypeResponse"];
+            /**
+             * Compared
+             * @description Units whose coefficients were compared.
+             */
+            compared: number;
+            /**
+             * Left Out
+             * @description Units with a version that were not compared: their coefficients are others.
+             */
+            left_out: number;
+            /**
+             * Coefficients
+             * @description Mean and spread of each coefficient.
+             */
+            coefficients: components["schemas"]["FleetCoefficientFigures"][];
+            /**
+             * Groups
+             * @description Groups that differ from the rest of the type, strongest first.
+             */
+            groups: components["schemas"]["FleetGroup"][];
+            /**
+             * Outliers
+             * @description Units that are not like their type, farthest first.
+             */
+            outliers: components["schemas"]["FleetOutlier"][];
+            /**
+             * Ageing
+             * @description Change per year of each coefficient; empty: too few histories.
+             */
+            ageing: components["schemas"]["FleetAgeing"][];
+            /**
+             * Evidence Units
+             * @description Units whose criticisms were added up for `missing`.
+             */
+            evidence_units: number;
+            /**
+             * Missing
+             * @description Effects that the model of the type is missing, strongest first.
+             */
+            missing: components["schemas"]["FleetMissing"][];
+            /**
+             * Text
+             * @description The report in sentences, and what could not be said and why.
+             */
+            text: string[];
+        };
+        /**
+         * FleetSize
+         * @description A coefficient of a missing effect over the units of a type.
+         */
+        FleetSize: {
+            /**
+             * Axis
+             * @description Output axis: x, y or z.
+             */
+            axis: string;
+            /**
+             * Name
+             * @description Name of the coefficient.
+             */
+            name: string;
+            /**
+             * Unit
+             * @description Unit of the figures.
+             */
+            unit: string;
+            /**
+             * Mean
+             * @description Mean over the units, in `unit`.
+             */
+            mean: number;
+            /**
+             * U Mean
+             * @description Standard uncertainty of the mean, in `unit`.
+             */
+            u_mean: number;
+            /**
+             * Spread
+             * @description Standard deviation of the units' sizes about the mean, in `unit`.
+             */
+            spread: number;
+        };
+        /**
+         * FleetTypeResponse
+         * @description The units of one type in figures: how many, how good, how judged, and when due.
+         */
+        FleetTypeResponse: {
+            /**
+             * Type
+             * @description Type of the units: their model; empty: not stated.
+             */
+            type: string;
+            /**
+             * Units
+             * @description Number of units.
+             */
+            units: number;
+            /**
+             * Error Over Floor
+             * @description RMS residual over noise floor of the newest version of each unit that a fleet job has fitted.
+             */
+            error_over_floor: components["schemas"]["RatioClass"][];
+            /**
+             * Fitted
+             * @description Units that a fleet job has fitted and whose noise floor is known.
+             */
+            fitted: number;
+            /**
+             * Verdicts
+             * @description Verdict -> units whose newest criticism by a fleet job gave it.
+             */
+            verdicts: {
+                [key: string]: number;
+            };
+            /**
+             * Criticised
+             * @description Units that a fleet job has criticised.
+             */
+            criticised: number;
+            /**
+             * Missing
+             * @description Id of an effect -> units whose newest criticism names it as missing, alone or with others.
+             */
+            missing: {
+                [key: string]: number;
+            };
+            /** @description Units by their due date. */
+            due: components["schemas"]["FleetDue"];
+        };
+        /**
+         * FleetUnitResponse
+         * @description What came of one unit of a job.
+         */
+        FleetUnitResponse: {
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
+            serial: string;
+            /**
+             * State
+             * @description waiting: not computed; done: a result was written; failed, skipped: see `reason`.
+             * @enum {string}
+             */
+            state: "waiting" | "done" | "failed" | "skipped";
+            /**
+             * Version
+             * @description Version that was made or judged; null: none.
+             */
+            version: number | null;
+            /**
+             * Reason
+             * @description Why it failed or was skipped; empty otherwise.
+             */
+            reason: string;
+            /**
+             * At
+             * @description Time of the result; null: none yet.
+             */
+            at: string | null;
+            /**
+             * Processor S
+             * @description Processor time of the unit, s; null: it was not computed.
+             */
+            processor_s: number | null;
+            /**
+             * Rms Dps
+             * @description RMS residual of the model on the data set means, deg/s; null: not known.
+             */
+            rms_dps: number | null;
+            /**
+             * Noise Floor Dps
+             * @description RMS residual that noise alone leaves, deg/s; null: not known.
+             */
+            noise_floor_dps: number | null;
+            /**
+             * Verdict
+             * @description Verdict of the criticism; null: there was none.
+             */
+            verdict: ("adequate" | "missing" | "ambiguous" | "unexplained" | "insufficient_data") | null;
+            /**
+             * Named
+             * @description Ids of the effects that the verdict is based on; null: no verdict.
+             */
+            named: string[] | null;
+        };
+        /**
          * Follower
          * @description An element that lags behind the temperature, or that is dragged along by it, and the error that it makes.
          */
@@ -11837,6 +12721,27 @@ export interface components {
              * @description Version of labctl that the service runs.
              */
             version: string;
+        };
+        /**
+         * RatioClass
+         * @description Units of one class of error over noise floor.
+         */
+        RatioClass: {
+            /**
+             * Low
+             * @description Least error over noise floor of the class, 1.
+             */
+            low: number;
+            /**
+             * High
+             * @description Error over noise floor that the class ends below, 1; null: no end.
+             */
+            high: number | null;
+            /**
+             * Units
+             * @description Number of units.
+             */
+            units: number;
         };
         /**
          * ReasonRequest
@@ -17775,6 +18680,301 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["DiagnosisResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    all_jobs_api_fleet_jobs_get: {
+        parameters: {
+            query?: {
+                /** @description Largest number of rows; default: all. The header Link names the next part. */
+                limit?: number | null;
+                /** @description Number of the last row of the part before; default: from the newest row. */
+                after?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetJobResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    start_api_fleet_jobs_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["FleetJobRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetJobResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    job_api_fleet_jobs__job__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetJobResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    units_api_fleet_jobs__job__units_get: {
+        parameters: {
+            query?: {
+                /** @description Only units in this state; default: all. */
+                state?: ("waiting" | "done" | "failed" | "skipped") | null;
+                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                search?: string;
+                /** @description Largest number of rows; default: all. The header Link names the next part. */
+                limit?: number | null;
+                /** @description Serial number of the last row of the part before. */
+                after?: string | null;
+            };
+            header?: never;
+            path: {
+                job: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetUnitResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    cancel_api_fleet_jobs__job__cancel_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["FleetCancelRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetJobResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    types_api_fleet_types_get: {
+        parameters: {
+            query?: {
+                /** @description Only units of this type; empty: of any. */
+                type?: string;
+                /** @description Only units of this batch; empty: of any. */
+                batch?: string;
+                /** @description Only units of this supplier; empty: of any. */
+                supplier?: string;
+                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                search?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetTypeResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    chart_api_fleet_chart_get: {
+        parameters: {
+            query?: {
+                /** @description Only units of this type; empty: of any. */
+                type?: string;
+                /** @description Output axis; empty: the first. */
+                axis?: string;
+                /** @description Name of the coefficient; empty: the first. */
+                name?: string;
+                /** @description What points are grouped by. */
+                factor?: string;
+                /** @description Only units of this batch; empty: of any. */
+                batch?: string;
+                /** @description Only units of this supplier; empty: of any. */
+                supplier?: string;
+                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                search?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetChartResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    report_api_fleet_report_get: {
+        parameters: {
+            query?: {
+                /** @description Only units of this type; empty: of any. */
+                type?: string;
+                /** @description Only units whose newest version is of this error model; empty: any. */
+                model?: string;
+                /** @description Only units of this batch; empty: of any. */
+                batch?: string;
+                /** @description Only units of this supplier; empty: of any. */
+                supplier?: string;
+                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                search?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetReportResponse"];
                 };
             };
             /** @description Validation Error */

@@ -50,7 +50,7 @@ def remote(service: LabService) -> HttpExecutor:
 
 def test_every_command_has_exactly_one_route_with_its_responses() -> None:
     described: Any = openapi_document()["paths"]
-    assert len(COMMANDS) == 40
+    assert len(COMMANDS) == 42
     assert len({(command.method, command.path) for command in COMMANDS}) == len(COMMANDS)
     for command in COMMANDS:
         responses = described[command.path][command.method.lower()]["responses"]

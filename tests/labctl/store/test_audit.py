@@ -294,6 +294,8 @@ ELSEWHERE = {
     "/api/live/start": "tests/labctl/services/live/test_live_sessions.py",
     "/api/live/end": "tests/labctl/services/live/test_live_sessions.py",
     "/api/environment": "tests/labctl/api/test_standards.py",
+    "/api/fleet/jobs": "tests/labctl/api/test_fleet.py",
+    "/api/fleet/jobs/{job}/cancel": "tests/labctl/api/test_fleet.py",
 }
 
 

@@ -51,6 +51,11 @@ route(
   withPlots(() => import("./pages/unit.js")),
 );
 route(
+  "/fleet",
+  "Fleet",
+  withPlots(() => import("./pages/fleet.js")),
+);
+route(
   "/explore",
   "Explore",
   withPlots(() => import("./pages/explore.js")),

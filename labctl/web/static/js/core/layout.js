@@ -12,6 +12,7 @@ const NAVIGATION = [
   ["/bench", "Bench", "M4 20h16M6 20V9l6-5 6 5v11M10 20v-5h4v5"],
   ["/campaigns", "Campaigns", "M4 5h16M4 12h10M4 19h7M17 14v6m-3-3h6"],
   ["/units", "Units", "M12 3l8 4.5v9L12 21l-8-4.5v-9zM4 7.5l8 4.5 8-4.5M12 12v9"],
+  ["/fleet", "Fleet", "M4 20V10h4v10M10 20V4h4v16M16 20v-7h4v7"],
   ["/explore", "Explore", "M4 19l5-7 4 3 7-10M4 5v14h16"],
   ["/recordings", "Recordings", "M3 12h3l2-6 4 12 3-9 2 3h4"],
   ["/effects", "Effects", "M5 4h11a3 3 0 013 3v13H8a3 3 0 01-3-3zM5 17a3 3 0 013-3h11"],

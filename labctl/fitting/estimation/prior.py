@@ -1,0 +1,109 @@
+"""What is known of coefficients before a fit, from other units of the type: as rows of the fit.
+
+A prior is a measurement like any other: the coefficients are its mean, up to its covariance. Fewer data sets then leave
+the same uncertainty. A unit that is not like its type contradicts the prior (`labctl.fitting.fleet.prior`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from labctl.fitting.effects import Reference
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.temperature import LagrangeTable
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.drift_noise import Scatter
+
+#: Size of the noise that the rows of a prior are scaled to, deg/s: no drift of a fit adds anything to it.
+ROW_DPS = 1e4
+#: Share of a variance that keeps a covariance invertible.
+TINY = 1e-10
+
+
+@dataclass(frozen=True)
+class CoefficientPrior:
+    """Expected value and covariance of the k coefficients of a unit before it is measured."""
+
+    names: tuple[str, ...]  #: (k,) as `coefficient_names` has them
+    mean: Array  #: (k,)
+    covariance: NDArray[np.float64]  #: (k, k)
+    units: int  #: of the type that it is from
+    reference_temperature_c: float | None = None  #: that they hold for; None: it has no part in them
+
+    def of(self, names: Sequence[str]) -> CoefficientPrior:
+        """Return the prior of those coefficients among `names` that it knows, in their order."""
+        places = [self.names.index(name) for name in names if name in self.names]
+        known = tuple(self.names[i] for i in places)
+        return replace(self, names=known, mean=self.mean[places], covariance=self.covariance[np.ix_(places, places)])
+
+    def known(self, axis: str) -> frozenset[str]:
+        """Return the names of the coefficients of an axis that it knows, without axis and temperature."""
+        return frozenset(name.split(".", 1)[1].split("@")[0] for name in self.names if name.startswith(f"{axis}."))
+
+    def referred(self, model: ErrorModel) -> ErrorModel:
+        """Return a model with the reference temperature that the prior holds for."""
+        if self.reference_temperature_c is None:
+            return model
+        return replace(model, reference=Reference(self.reference_temperature_c))
+
+    def whitened(self, spread: NDArray[np.float64], names: Sequence[str]) -> tuple[NDArray[np.float64], Array]:
+        """Return rows (q, c) and their values (q,), of noise 1, of c columns from which `spread` makes coefficients.
+
+        `spread` (k, c) leads from the estimated columns to the coefficients `names` (k,).
+        """
+        own = self.of(names)
+        if not own.names:
+            return np.zeros((0, spread.shape[1])), np.zeros(0)
+        size = np.sqrt(np.maximum(np.diag(own.covariance), 1e-300))
+        scaled = own.covariance / np.outer(size, size) + TINY * np.eye(len(size))
+        factor = np.linalg.cholesky(scaled)
+        chosen = spread[[list(names).index(name) for name in own.names]]
+        rows = solve_triangular(factor, np.column_stack([chosen, own.mean]) / size[:, None], lower=True)
+        return rows[:, :-1], rows[:, -1]
+
+
+def coefficient_names(model: ErrorModel, axis: str, owners: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return a name for each coefficient of an axis at each node of the temperature table, the nodes fastest.
+
+    `axis.name`; of a table `axis.name@temperature`, in whole deg C where these differ, since the levels of two units
+    are never exactly the same; "" for all but the first node of an effect that has one coefficient for all
+    temperatures. `owners` are the effects of the coefficients.
+    """
+    nodes = model.temperature.nodes_c if isinstance(model.temperature, LagrangeTable) else ()
+    places = [f"@{round(node)}" for node in nodes]
+    if len(set(places)) < len(places):
+        places = [f"@{node:.1f}" for node in nodes]
+    found = []
+    for owner, name in zip(owners, names, strict=True):
+        if owner in model.steady or not places:
+            found += [f"{axis}.{name}", *([""] * (len(places) - 1))]
+        else:
+            found += [f"{axis}.{name}{place}" for place in places]
+    return found
+
+
+def with_coefficient_prior(
+    columns: NDArray[np.float64], y: Array, scatter: Scatter, rows: NDArray[np.float64], values: Array
+) -> tuple[NDArray[np.float64], Array, Scatter]:
+    """Return design (m, c), y and scatter with whitened rows (q, c0) of a prior below, on the first c0 columns.
+
+    Without a known noise of the data sets nothing is added: a prior has no weight beside them.
+    """
+    q = len(values)
+    if q == 0 or scatter.white_var is None:
+        return columns, y, scatter
+    below = np.zeros((q, columns.shape[1]))
+    below[:, : rows.shape[1]] = ROW_DPS * rows
+    extended = replace(
+        scatter,
+        t_s=np.concatenate([scatter.t_s, np.zeros(q)]),
+        run=np.concatenate([scatter.run, min(int(scatter.run.min()), 0) - 1 - np.arange(q)]),
+        rate_dps=np.concatenate([scatter.rate_dps, np.zeros(q)]),
+        white_var=np.concatenate([scatter.white_var, np.full(q, ROW_DPS**2)]),
+    )
+    return np.vstack([columns, below]), np.concatenate([y, ROW_DPS * values]), extended

@@ -1,0 +1,389 @@
+"""Which effects a type is missing: the evidence of all of its units together, where no single unit shows any.
+
+Each shape of each effect may have a size that all units share, sizes that differ about 0 (the sign is each unit's own),
+or both; a Bayes factor with unit-information priors weighs them against nothing. Effects are compared as in the
+criticism of one unit: over shapes and axes, then those that cannot be distinguished are one group. What the leader and
+all of its shapes explain is taken off before the next effect is looked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from labctl.fitting.criticism import CandidateEstimates
+from labctl.fitting.fleet.type_sums import AxisSums, TypeSums
+from labctl.fitting.numeric.arrays import Array
+
+#: Log evidence, nats, without which nothing is named; and that of a further effect beside one.
+ENOUGH, ENOUGH_NEXT = 6.0, 9.0
+#: A lead of less than this leaves both; beyond `FAR` the evidence alone decides against what is hardly distinguished.
+LEAD, FAR = 3.0, 12.0
+#: A rival that leaves less than this of the leader's chi2 is not distinguished, nor one of no more coefficients that
+#: reproduces this share of it: no shape is known better than to about a fifth of its amplitude, and a fleet sees less.
+INDISTINGUISHABLE_CHI2, ALIKE = 7.0, 0.95
+#: A further effect takes off at least this share of the chi2 of the first one.
+MIN_NEXT_SHARE = 0.1
+#: Effects named at most, and units without which nothing is.
+MAX_EFFECTS, MIN_UNITS = 4, 5
+#: A direction that is left with less than this share beside what was found is taken as found.
+MIN_REMAINING = 1e-4
+#: An effect is a bench's where the others show none of it, and it differs from theirs, at this level.
+BENCH_LEVEL = 1e-3
+
+
+@dataclass(frozen=True)
+class UnitEvidence:
+    """What the criticism of one unit says of every candidate (`candidate_estimates`)."""
+
+    serial_number: str
+    axes: Mapping[str, CandidateEstimates]
+    bench: str | None = None
+
+
+@dataclass(frozen=True)
+class MeanSize:
+    """A coefficient of an effect over the units of a type."""
+
+    axis: str
+    name: str
+    unit: str
+    mean: float
+    u_mean: float  #: standard uncertainty of the mean
+    spread: float  #: standard deviation of the units' sizes about the mean
+    z: float  #: mean over its standard uncertainty
+    u_of_unit: float  #: standard uncertainty with which one unit shows it, typically
+
+
+@dataclass(frozen=True)
+class BenchSize:
+    """The first coefficient of an effect by the units of one bench."""
+
+    bench: str
+    units: int
+    mean: float
+    u_mean: float
+
+
+@dataclass(frozen=True)
+class TypeEffect:
+    """One effect that the type is missing, or several that cannot be distinguished."""
+
+    group: tuple[str, ...]  #: ids of the effects, the likeliest first
+    shape: str  #: order and parameters of the likeliest shape in words
+    log_bayes_factor: float  #: against nothing missing, nats
+    sizes: tuple[MeanSize, ...]
+    is_common: bool  #: whether units share the size; else its sign differs from unit to unit
+    axes: tuple[str, ...]  #: output axes on which it shows
+    rms_unit_z: float  #: root mean square of what the units show each, in standard uncertainties; 1 is noise alone
+    benches: tuple[BenchSize, ...]
+    of_bench: str | None  #: the only bench whose units show it: then it is the bench's error; None: no such bench
+
+
+@dataclass(frozen=True)
+class CandidateEvidence:
+    """One effect over all units, named or not."""
+
+    effect: str
+    log_bayes_factor: float  #: against nothing missing, nats
+    units: int  #: that can show it
+
+
+@dataclass(frozen=True)
+class TypeCriticism:
+    """What a type is missing by the evidence of its units together."""
+
+    units: int
+    named: tuple[TypeEffect, ...]  #: strongest first
+    candidates: tuple[CandidateEvidence, ...]  #: all effects, likeliest first, before any was taken off
+    noise_ratio: float  #: by which estimates scatter more than their uncertainties say, at least 1; it is allowed for
+    reason: str = ""  #: why nothing is said; "" where something is
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """Log Bayes factors of the shapes of one axis, nats, (S,) each."""
+
+    common: Array
+    varied: Array
+    gain: Array  #: chi2 that a common size takes off
+
+    @property
+    def log_bf(self) -> Array:
+        """Averaged over both."""
+        return np.asarray(np.logaddexp(self.common, self.varied) - np.log(2.0))
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """An effect over all axes."""
+
+    effect: str
+    log_bf: float
+    best: Mapping[str, int]  #: axis -> number of its best shape
+    gain: float
+
+
+def sums_of(units: Iterable[UnitEvidence]) -> TypeSums:
+    """Return the sums over units."""
+    sums = TypeSums()
+    for unit in units:
+        sums.add(unit.axes, unit.bench)
+    return sums
+
+
+def type_evidence(units: Iterable[UnitEvidence]) -> TypeCriticism:
+    """Return what a type is missing by its units."""
+    return judged(sums_of(units))
+
+
+def judged(sums: TypeSums) -> TypeCriticism:
+    """Return what a type is missing by the sums over its units."""
+    if sums.units < MIN_UNITS:
+        return TypeCriticism(
+            sums.units, (), (), 1.0, f"{sums.units} units are too few; criticise at least {MIN_UNITS} units of the type"
+        )
+    axes = sums.total()
+    ratio = _noise_ratio(axes)
+    first = candidates = _candidates(axes, ratio, common_only=False)
+    named: list[TypeEffect] = []
+    lead_gain = 0.0
+    left = axes
+    while candidates and len(named) < MAX_EFFECTS:
+        leader = candidates[0]
+        enough = ENOUGH if not named else ENOUGH_NEXT
+        if leader.log_bf < enough or leader.gain < MIN_NEXT_SHARE * lead_gain:
+            break
+        lead_gain = lead_gain or leader.gain
+        named.append(_type_effect(sums, left, candidates, ratio))
+        left = {axis: _without(each, named[-1].group) for axis, each in left.items()}
+        candidates = _candidates(left, ratio, common_only=True)
+    return TypeCriticism(
+        sums.units, tuple(named),
+        tuple(CandidateEvidence(c.effect, c.log_bf, _units_of(axes, c)) for c in first), ratio,
+    )  # fmt: skip
+
+
+def _units_of(axes: Mapping[str, AxisSums], candidate: _Candidate) -> int:
+    return int(max(axes[axis].units[shape] for axis, shape in candidate.best.items()))
+
+
+def _noise_ratio(axes: Mapping[str, AxisSums]) -> float:
+    """Return by how much estimates scatter more than they should: the median over all shapes, at least 1."""
+    ratios = [
+        (sums.squares - _gains(sums)) / np.maximum((sums.units - 1) * sums.directions, 1.0) for sums in axes.values()
+    ]
+    every = np.concatenate([np.ones(0), *ratios])
+    return float(np.sqrt(max(float(np.median(every)), 1.0))) if len(every) else 1.0
+
+
+def _gains(sums: AxisSums) -> Array:
+    """Return the chi2 that a common size of each shape takes off, (S,)."""
+    return np.array([_solved(sums, shape)[1] for shape in range(len(sums.shapes))])
+
+
+def _solved(sums: AxisSums, shape: int) -> tuple[Array, float, int]:
+    """Return the common size of a shape (k,), the chi2 that it takes off, and its directions."""
+    own = sums.slice_of(shape)
+    block, product = sums.information[own, own], sums.products[own]
+    size = np.sqrt(np.maximum(np.diag(block), 1e-300))
+    values, vectors = np.linalg.eigh(block / np.outer(size, size))
+    kept = values > MIN_REMAINING
+    inner = vectors[:, kept].T @ (product / size)
+    return vectors[:, kept] @ (inner / values[kept]) / size, float(np.sum(inner**2 / values[kept])), int(kept.sum())
+
+
+def _evidence(sums: AxisSums, ratio: float, *, common_only: bool) -> _Evidence:
+    """Return the evidence for each shape of one axis."""
+    solved = [_solved(sums, shape) for shape in range(len(sums.shapes))]
+    gain = np.array([each[1] for each in solved]) / ratio**2
+    k = np.array([each[2] for each in solved], dtype=np.float64)
+    n = np.maximum(sums.units, 1.0)
+    penalty = 0.5 * np.log1p(n)
+    common = np.where(k > 0, 0.5 * gain * n / (1 + n) - k * penalty, -np.inf)
+    if common_only:
+        return _Evidence(common, np.full(len(k), -np.inf), gain)
+    squares, many = sums.squares / ratio**2, n * np.maximum(sums.directions, 1.0)
+    about_zero = _of_spread(squares, many) - penalty
+    about_mean = _of_spread(squares - gain, np.maximum(many - k, 1.0)) - penalty
+    scale = np.maximum((squares - gain) / np.maximum(many - k, 1.0), 1.0)
+    with_mean = about_mean + 0.5 * gain / scale * n / (1 + n) - k * penalty
+    varied = np.where(k > 0, np.logaddexp(about_zero, with_mean) - np.log(2.0), -np.inf)
+    return _Evidence(common, varied, gain)
+
+
+def _of_spread(squares: Array, freedom: Array) -> Array:
+    """Return the largest log likelihood ratio, nats, of estimates that scatter more than their uncertainties."""
+    ratio = np.maximum(squares / freedom, 1.0)
+    return np.asarray(0.5 * freedom * (ratio - 1.0 - np.log(ratio)))
+
+
+def _candidates(axes: Mapping[str, AxisSums], ratio: float, *, common_only: bool) -> list[_Candidate]:
+    """Return every effect over its shapes and axes, the likeliest first: on all of its axes, or on one of them."""
+    evidence = {axis: _evidence(sums, ratio, common_only=common_only) for axis, sums in axes.items()}
+    effects = dict.fromkeys(shape.effect for sums in axes.values() for shape in sums.shapes)
+    found = []
+    for effect in effects:
+        best, per_axis, gain = {}, [], 0.0
+        for axis, sums in axes.items():
+            places = [i for i, shape in enumerate(sums.shapes) if shape.effect == effect]
+            values = evidence[axis].log_bf[places] if places else np.zeros(0)
+            if not np.any(np.isfinite(values)):
+                continue
+            best[axis] = places[int(np.argmax(values))]
+            per_axis.append(float(np.logaddexp.reduce(values) - np.log(np.isfinite(values).sum())))
+            gain += float(evidence[axis].gain[best[axis]])
+        if per_axis:
+            found.append(_Candidate(effect, _over_axes(per_axis), best, gain))
+    return sorted(found, key=lambda c: -c.log_bf)
+
+
+def _over_axes(per_axis: Sequence[float]) -> float:
+    n = len(per_axis)
+    if n == 1:
+        return per_axis[0]
+    alternatives = [sum(per_axis) - np.log(2.0), *(value - np.log(2.0 * n) for value in per_axis)]
+    return float(np.logaddexp.reduce(alternatives))
+
+
+def _type_effect(
+    sums: TypeSums, axes: Mapping[str, AxisSums], candidates: Sequence[_Candidate], ratio: float
+) -> TypeEffect:
+    """Return the leader with all that cannot be distinguished from it, and its sizes."""
+    leader = candidates[0]
+    group = (leader.effect, *(r.effect for r in candidates[1:] if _is_alike(axes, leader, r)))
+    evidence = {axis: _evidence(each, ratio, common_only=False) for axis, each in axes.items()}
+    shown = tuple(a for a, i in leader.best.items() if evidence[a].log_bf[i] >= LEAD) or tuple(leader.best)
+    strongest = max(shown, key=lambda a: evidence[a].log_bf[leader.best[a]])
+    place = leader.best[strongest]
+    sizes = tuple(size for axis in shown for size in _sizes(axes[axis], axis, leader.best[axis], ratio))
+    common = sum(evidence[a].common[leader.best[a]] for a in shown)
+    about = sum(
+        float(_of_spread(
+            axes[a].squares[[leader.best[a]]] / ratio**2,
+            axes[a].units[[leader.best[a]]] * np.maximum(axes[a].directions[[leader.best[a]]], 1.0),
+        )[0])
+        for a in shown
+    )  # fmt: skip
+    n = axes[strongest].units[place] * max(axes[strongest].directions[place], 1.0)
+    benches, of_bench = _by_bench(sums, strongest, axes[strongest].shapes[place].key, ratio)
+    return TypeEffect(
+        group, axes[strongest].shapes[place].shape, leader.log_bf, sizes,
+        bool(common >= about or max(abs(size.z) for size in sizes) > LEAD), shown,
+        float(np.sqrt(axes[strongest].squares[place] / max(n, 1.0))), benches, of_bench,
+    )  # fmt: skip
+
+
+def _sizes(sums: AxisSums, axis: str, shape: int, ratio: float) -> list[MeanSize]:
+    """Return mean and spread of the coefficients of a shape (DerSimonian and Laird 1986)."""
+    own = sums.slice_of(shape)
+    values, gain, directions = _solved(sums, shape)
+    weight = np.maximum(np.diag(sums.information)[own], 1e-300)
+    squared = sums.squared_weights[own]
+    freedom = max(sums.units[shape] * max(sums.directions[shape], 1.0) - directions, 1.0)
+    excess = max((sums.squares[shape] - gain) / ratio**2 / freedom - 1.0, 0.0)
+    mean_weight = weight / max(sums.units[shape], 1.0)
+    spread_var = excess * ratio**2 / mean_weight
+    inverse = np.linalg.pinv(sums.information[own, own] / np.sqrt(np.outer(weight, weight)), rcond=MIN_REMAINING)
+    variance = ratio**2 * np.diag(inverse) / weight + spread_var * squared / weight**2
+    shaped = sums.shapes[shape]
+    return [
+        MeanSize(
+            axis, name, unit, float(values[i]), float(np.sqrt(variance[i])), float(np.sqrt(spread_var[i])),
+            float(values[i] / np.sqrt(variance[i])), float(ratio / np.sqrt(mean_weight[i])),
+        )
+        for i, (name, unit) in enumerate(zip(shaped.names, shaped.units, strict=True))
+    ]  # fmt: skip
+
+
+def _is_alike(axes: Mapping[str, AxisSums], leader: _Candidate, rival: _Candidate) -> bool:
+    """Return whether the data cannot tell a rival from the leader."""
+    if rival.log_bf > leader.log_bf - LEAD:
+        return True
+    if rival.log_bf <= 0:
+        return False
+    part = whole = 0.0
+    for axis, shape in leader.best.items():
+        values, gain, _ = _solved(axes[axis], shape)
+        whole += gain
+        if axis in rival.best:
+            part += _reproduced(axes[axis], shape, values, rival.best[axis])
+    share = part / whole if whole > 0 else 0.0
+    exact = all(axes[axis].shapes[shape].is_exact for each in (leader, rival) for axis, shape in each.best.items())
+    if share > ALIKE and not exact and _directions(axes, rival) <= _directions(axes, leader):
+        return True
+    return rival.log_bf > leader.log_bf - FAR and (1.0 - share) * whole < INDISTINGUISHABLE_CHI2
+
+
+def _directions(axes: Mapping[str, AxisSums], candidate: _Candidate) -> float:
+    return float(sum(axes[axis].directions[shape] for axis, shape in candidate.best.items()))
+
+
+def _reproduced(sums: AxisSums, shape: int, values: Array, by: int) -> float:
+    """Return the part of a shape's common signal that another shape reproduces, in chi2."""
+    own, other = sums.slice_of(shape), sums.slice_of(by)
+    inner = sums.information[other, own] @ values
+    block = sums.information[other, other]
+    size = np.sqrt(np.maximum(np.diag(block), 1e-300))
+    values_of, vectors = np.linalg.eigh(block / np.outer(size, size))
+    kept = values_of > MIN_REMAINING
+    return float(np.sum((vectors[:, kept].T @ (inner / size)) ** 2 / values_of[kept]))
+
+
+def _without(sums: AxisSums, effects: Sequence[str]) -> AxisSums:
+    """Return sums beside all shapes of some effects with common sizes; only what a common size takes off is left."""
+    own = [i for i, shape in enumerate(sums.shapes) if shape.effect in effects]
+    if not own:
+        return sums
+    columns = np.concatenate([np.arange(s.start, s.stop) for s in map(sums.slice_of, own)])
+    size = np.sqrt(np.maximum(np.diag(sums.information), 1e-300))
+    scaled, product = sums.information / np.outer(size, size), sums.products / size
+    values, vectors = np.linalg.eigh(scaled[np.ix_(columns, columns)])
+    kept = values > MIN_REMAINING
+    basis = scaled[:, columns] @ (vectors[:, kept] / np.sqrt(values[kept]))
+    explained = (vectors[:, kept].T @ product[columns]) / np.sqrt(values[kept])
+    left = scaled - basis @ basis.T
+    gone = np.diag(left) < MIN_REMAINING
+    left[gone] = left[:, gone] = 0.0
+    rest = np.where(gone, 0.0, product - basis @ explained)
+    keep = [i for i in range(len(sums.shapes)) if i not in own and not np.all(gone[sums.slice_of(i)])]
+    return _taken(sums, keep, left * np.outer(size, size), rest * size)
+
+
+def _taken(sums: AxisSums, keep: Sequence[int], information: NDArray[np.float64], products: Array) -> AxisSums:
+    """Return some shapes of sums, with other inner products."""
+    at = np.concatenate([np.zeros(0, dtype=np.int64), *(
+        np.arange(s.start, s.stop) for s in map(sums.slice_of, keep)
+    )])  # fmt: skip
+    shapes = [sums.shapes[i] for i in keep]
+    starts = np.cumsum([0, *(len(shape.names) for shape in shapes)])[:-1].tolist()
+    return AxisSums(
+        shapes, {shape.key: i for i, shape in enumerate(shapes)}, starts, sums.units[list(keep)],
+        sums.squares[list(keep)], sums.directions[list(keep)], information[np.ix_(at, at)], products[at],
+        sums.squared_weights[at],
+    )  # fmt: skip
+
+
+def _by_bench(
+    sums: TypeSums, axis: str, key: tuple[str, str, tuple[str, ...]], ratio: float
+) -> tuple[tuple[BenchSize, ...], str | None]:
+    """Return the first coefficient of a shape by bench, and the only bench whose units show it."""
+    found = []
+    for bench, axes in sums.benches.items():
+        if not bench or axis not in axes or key not in axes[axis].places:
+            continue
+        shape = axes[axis].places[key]
+        size = _sizes(axes[axis], axis, shape, ratio)[0]
+        found.append(BenchSize(bench, int(axes[axis].units[shape]), size.mean, size.u_mean))
+    showing = [each for each in found if abs(each.mean) > LEAD * each.u_mean]
+    if len(found) < 2 or len(showing) != 1:
+        return tuple(found), None
+    weight = np.array([each.u_mean**-2.0 for each in found])
+    means = np.array([each.mean for each in found])
+    chi2 = float(weight @ (means - np.average(means, weights=weight)) ** 2)
+    differs = float(chdtrc(len(found) - 1, chi2)) < BENCH_LEVEL
+    return tuple(found), showing[0].bench if differs else None

@@ -1,0 +1,163 @@
+"""Findings on a type as answers: its coefficients, groups, outliers and ageing, and what its model is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from labctl.answers.fleet import (
+    FleetAgeing,
+    FleetCoefficientFigures,
+    FleetGroup,
+    FleetMissing,
+    FleetOutlier,
+    FleetSize,
+)
+from labctl.errors import NotEnoughData
+from labctl.fitting.fleet.ageing import ageing_of
+from labctl.fitting.fleet.findings import GroupEffect
+from labctl.fitting.fleet.group_effects import DATE
+from labctl.fitting.fleet.population import population_of
+from labctl.fitting.fleet.type_evidence import TypeEffect, judged
+from labctl.fitting.fleet.type_sums import TypeSums
+from labctl.fitting.fleet.unit_coefficients import UnitCoefficients
+from labctl.services.fleet.evidence import sums_in
+from labctl.store import Store
+
+#: Outliers of a report, at most; its text says how many there are.
+MAX_OUTLIERS = 100
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What the units have in common."""
+
+    units: int = 0
+    left_out: int = 0
+    coefficients: list[FleetCoefficientFigures] = field(default_factory=list)
+    groups: list[FleetGroup] = field(default_factory=list)
+    outliers: list[FleetOutlier] = field(default_factory=list)
+    text: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the model of a type is missing, by so many units."""
+
+    units: int = 0
+    missing: list[FleetMissing] = field(default_factory=list)
+    text: list[str] = field(default_factory=list)
+
+
+def population_in(units: Sequence[UnitCoefficients]) -> Compared:
+    """Compare the coefficients of units."""
+    try:
+        found = population_of(units)
+    except NotEnoughData as error:
+        return Compared(text=[f"{_capital(str(error))}."])
+    groups = [_group(each) for each in found.effects]
+    outliers = [
+        FleetOutlier(serial=each.serial_number, coefficient=each.coefficient, t=each.t, text=each.reason)
+        for each in found.outliers
+    ]
+    said = [f"{len(found.table)} units were compared."]
+    said += [each.text for each in groups] or ["No batch, bench, supplier or trend differs from the rest of the type."]
+    if outliers:
+        said.append(f"{len({each.serial for each in outliers})} units are not like their type.")
+    if found.left_out:
+        first = found.left_out[0]
+        said.append(f"{len(found.left_out)} units were left out, first {first.serial_number}: {first.reason}.")
+    return Compared(
+        len(found.table),
+        len(found.left_out),
+        [
+            FleetCoefficientFigures.model_validate(
+                {name: getattr(each, name) for name in FleetCoefficientFigures.model_fields}
+            )
+            for each in found.coefficients
+        ],
+        groups,
+        outliers[:MAX_OUTLIERS],
+        said,
+    )
+
+
+def _group(found: GroupEffect) -> FleetGroup:
+    named, per = ", ".join(found.coefficients), " per year" if found.factor == DATE else ""
+    by = f"{found.shift:.3g} {found.unit}{per} (u = {found.u:.2g}, {found.units} units, p = {found.p_value:.1g})"
+    if found.factor == DATE:
+        text = f"{named} changes with the date of the measurement by {by}."
+    elif found.is_of_bench:
+        text = (
+            f"Bench {found.level} shifts {named} of all units on it by {by}: an error of the bench, not of the units."
+        )
+    else:
+        text = f"{_capital(found.factor)} {found.level} differs in {named} by {by}."
+    if found.same_as:
+        others = ", ".join(f"{factor} {level}".strip() for factor, level in found.same_as)
+        text = f"{text[:-1]}; {others} would explain it as well."
+    return FleetGroup(
+        factor=found.factor, level=found.level, coefficients=list(found.coefficients), shift=found.shift, u=found.u,
+        unit=found.unit, units=found.units, p_value=found.p_value, of_bench=found.is_of_bench, text=text,
+    )  # fmt: skip
+
+
+def ageing_in(units: Sequence[UnitCoefficients]) -> tuple[list[FleetAgeing], list[str]]:
+    """Return the change per year of each coefficient, and a sentence on it."""
+    try:
+        found = ageing_of(units)
+    except NotEnoughData as error:
+        return [], [f"Ageing: {error}."]
+    answers = [
+        FleetAgeing.model_validate({name: getattr(each, name) for name in FleetAgeing.model_fields}) for each in found
+    ]
+    return answers, [f"Ageing was evaluated from units with calibrations {_years(found[0].over_years)} apart."]
+
+
+def _years(over: tuple[float, float]) -> str:
+    return f"{over[0]:.2g} to {over[1]:.2g} years"
+
+
+def evidence_in(store: Store, type_: str, model: str, *, whole: bool) -> Evidence:
+    """Add the evidence of all units of a type; `whole`: the report is on all of them."""
+    if not whole:
+        return Evidence(text=["What the type is missing is judged by all of its units; leave out the other filters."])
+    contents, not_current = store.fleet_reports.evidence(type_, model)
+    sums = TypeSums()
+    for content in contents:
+        sums.merge(sums_in(content))
+    found = judged(sums)
+    said = [f"What the model of the type is missing was judged by the criticisms of {sums.units} units."]
+    if found.reason:
+        said = [f"What the model is missing: {found.reason}; `labctl fleet criticise` does it."]
+    if not_current:
+        said.append(
+            f"The criticisms of {not_current} units do not count, as others that were added to them were made again; "
+            "`labctl fleet criticise --again` makes all again."
+        )
+    missing = [_missing(each) for each in found.named]
+    said += [each.text for each in missing]
+    if not missing and not found.reason:
+        said.append("No effect is named for the type by all units together.")
+    return Evidence(sums.units, missing, said)
+
+
+def _missing(found: TypeEffect) -> FleetMissing:
+    sizes = [
+        FleetSize(axis=s.axis, name=s.name, unit=s.unit, mean=s.mean, u_mean=s.u_mean, spread=s.spread)
+        for s in found.sizes
+    ]
+    size = "; ".join(f"{s.axis}.{s.name} {s.mean:.3g} {s.unit} (u = {s.u_mean:.2g})" for s in sizes[:3])
+    who = "The type is missing" if found.of_bench is None else f"Bench {found.of_bench} adds to all its units"
+    text = (
+        f"{who} {' or '.join(found.group)}: {size}; the Bayes factor of all units together is "
+        f"e^{found.log_bayes_factor:.0f}, while single units show {found.rms_unit_z:.1f} standard uncertainties."
+    )
+    return FleetMissing(
+        effects=list(found.group), log_bayes_factor=found.log_bayes_factor, common=found.is_common, sizes=sizes,
+        rms_unit_z=found.rms_unit_z, of_bench=found.of_bench, text=text,
+    )  # fmt: skip
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,90 @@
+// What the units of a type have in common: the report in sentences, what is missing, coefficients, units unlike others.
+
+import { card, cardWithHeader, table, chip } from "../core/components.js";
+import { h } from "../core/elements.js";
+import { count, idText, number, withUnit } from "../core/format.js";
+import { bars } from "./bars.js";
+
+/** @import { FleetReport } from "../../../types/api.js" */
+
+const effectLink = (/** @type {string} */ id) => h("a", { href: `/effects/${encodeURIComponent(id)}` }, idText(id));
+
+/** @param {FleetReport} report */
+export const reportCards = (report) => [missingCard(report), saidCard(report), coefficientCard(report)];
+
+/** @param {FleetReport} report */
+function missingCard(report) {
+  return card(
+    "What is missing",
+    h(
+      "div",
+      { class: "columns multiples" },
+      bars(
+        "Named in single units",
+        Object.entries(report.figures.missing).map(([id, units]) => ({ name: idText(id), units })),
+        "No single unit names an effect.",
+      ),
+      h(
+        "div",
+        { class: "stack" },
+        h("h3", {}, "Named for the type"),
+        report.missing.length
+          ? h(
+              "ul",
+              { class: "stack", "aria-label": "Named for the type" },
+              report.missing.map((each) =>
+                h(
+                  "li",
+                  {},
+                  each.effects.flatMap((id, k) => (k ? [" or ", effectLink(id)] : [effectLink(id)])),
+                  " ",
+                  chip(each.of_bench === null ? "all units" : `bench ${each.of_bench}`, each.of_bench ? "warn" : "bad"),
+                  h("p", { class: "muted" }, each.text),
+                ),
+              ),
+            )
+          : h("p", { class: "muted" }, `No effect, by the criticisms of ${count(report.evidence_units)} units.`),
+      ),
+    ),
+  );
+}
+
+/** @param {FleetReport} report */
+const saidCard = (report) =>
+  card(
+    "Report",
+    report.text.map((sentence) => h("p", {}, sentence)),
+  );
+
+/** @param {FleetReport} report */
+function coefficientCard(report) {
+  if (!report.coefficients.length) return null;
+  return cardWithHeader(
+    "Coefficients of the type",
+    chip(`${count(report.compared)} units`),
+    table(
+      [
+        { title: "Coefficient", cell: ({ name }) => name },
+        { title: "Mean", number: true, cell: ({ mean, unit }) => withUnit(mean, unit, 4) },
+        { title: "U of the mean", number: true, cell: ({ expanded_u_mean }) => number(expanded_u_mean, 2) },
+        { title: "Spread", number: true, cell: ({ spread }) => number(spread, 3) },
+        { title: "u of a unit", number: true, cell: ({ median_u }) => number(median_u, 2) },
+      ],
+      report.coefficients,
+      { label: "Coefficients of the type" },
+    ),
+    report.outliers.length
+      ? table(
+          [
+            {
+              title: "Unit",
+              cell: ({ serial }) => h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial),
+            },
+            { title: "Unlike its type", prose: true, cell: ({ text }) => text },
+          ],
+          report.outliers,
+          { label: "Units unlike their type" },
+        )
+      : null,
+  );
+}

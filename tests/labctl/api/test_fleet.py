@@ -1,0 +1,92 @@
+"""Fleet jobs over HTTP: begun at once, carried out by the service, cancelled, listed; and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from instruments.clock import VirtualClock
+from labctl.answers.fleet import FleetCancelRequest, FleetJobRequest
+from labctl.api import create_app
+from labctl.service_connection import ServiceConnection
+from labctl.services.commands.fleet import CANCEL_FLEET_JOB, START_FLEET_JOB, ToFleetJob
+from labctl.services.commands.remote import HttpExecutor
+from labctl.services.lab_service import LabService
+from labctl.store import Store
+from labctl.store.connection.database import Database
+from tests.helpers.fleets import AT, add_units
+from tests.helpers.service import service_of, transport_to
+
+UNITS = 3
+FIT = {"kind": "fit", "effects": ["bias", "scale_factor"]}
+
+
+@pytest.fixture
+def http(tmp_path: Path) -> Iterator[TestClient]:
+    """Return a client of a service whose jobs are carried out by the test, not by a thread."""
+    store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
+    add_units(store, UNITS)
+    service = LabService(store, VirtualClock(AT))
+    yield TestClient(create_app(service))  # not entered: no thread watches
+    service.close()
+
+
+def carry_out(http: TestClient) -> None:
+    service_of(http)._fleet.tick()
+
+
+def get(http: TestClient, path: str, **query: Any) -> Any:
+    return http.get(path, params=query).raise_for_status().json()
+
+
+def test_a_job_is_begun_at_once_and_carried_out_by_the_service(http: TestClient) -> None:
+    begun = http.post("/api/fleet/jobs", json=FIT)
+    assert begun.status_code == 201
+    assert (begun.json()["state"], begun.json()["units"], begun.json()["waiting"]) == ("waiting", UNITS, UNITS)
+    carry_out(http)
+    job = get(http, "/api/fleet/jobs/1")
+    assert (job["state"], job["ended"], job["done"], job["left_s"]) == ("done", True, UNITS, None)
+    listed = http.get("/api/fleet/jobs/1/units", params={"state": "done", "limit": 2})
+    assert [row["serial"] for row in listed.json()] == ["U00000", "U00001"]
+    assert listed.headers["X-Total-Count"] == str(UNITS)
+    assert "after=U00001" in listed.headers["Link"]
+    with ServiceConnection("http://testserver", transport=transport_to(http)) as connection:
+        service = HttpExecutor(connection)
+        assert service.execute(START_FLEET_JOB, FleetJobRequest.model_validate(FIT)).id == 2
+        cancelled = service.execute(CANCEL_FLEET_JOB, ToFleetJob(2, FleetCancelRequest(by="Ann", reason="not needed")))
+        assert (cancelled.state, cancelled.why) == ("cancelled", "cancelled by Ann: not needed")
+    assert [each["id"] for each in get(http, "/api/fleet/jobs")] == [2, 1]
+    carry_out(http)
+    assert get(http, "/api/fleet/jobs/2")["waiting"] == UNITS
+    actions = [row["action"] for row in get(http, "/api/audit", limit=100)]
+    assert {"fleet fit", "fleet cancel", "fleet end", "fit"} <= set(actions)
+
+
+def test_an_engine_is_used_only_where_the_service_was_started_with_it(
+    http: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    elsewhere = {**FIT, "engine": "dask://192.0.2.1:8786"}
+    refused = http.post("/api/fleet/jobs", json=elsewhere)
+    assert refused.status_code == 400
+    assert "LABCTL_FLEET_ENGINE=dask://192.0.2.1:8786" in refused.json()["detail"]
+    monkeypatch.setenv("LABCTL_FLEET_ENGINE", "dask://192.0.2.1:8786")
+    assert http.post("/api/fleet/jobs", json=elsewhere).status_code == 201
+    assert http.post("/api/fleet/jobs", json={**FIT, "engine": "sausage"}).status_code == 422
+    assert http.post("/api/fleet/jobs", json={**FIT, "type": "none"}).status_code == 404
+
+
+def test_types_chart_and_report_are_answered(http: TestClient) -> None:
+    http.post("/api/fleet/jobs", json=FIT).raise_for_status()
+    carry_out(http)
+    (figures,) = get(http, "/api/fleet/types")
+    assert (figures["type"], figures["units"], figures["fitted"]) == ("FOG-A", UNITS, UNITS)
+    chart = get(http, "/api/fleet/chart", type="FOG-A", factor="bench")
+    assert {each["name"] for each in chart["coefficients"]} == {"bias", "scale_factor"}
+    assert sum(point["units"] for point in chart["points"]) == UNITS
+    report = get(http, "/api/fleet/report")
+    assert (report["type"], report["compared"], report["missing"]) == ("FOG-A", 0, [])
+    assert any("at least 5" in sentence for sentence in report["text"])

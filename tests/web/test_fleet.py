@@ -1,0 +1,108 @@
+"""The page of many units: what is drawn is what the service answers, and a brush lists the groups inside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import sqlalchemy as sa
+
+from labctl.recording import RecordingInfo
+from labctl.store.schema import tables
+from tests.helpers.browser import NARROW, Service
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = pytest.mark.timeout(300)
+
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+#: Units of the type; every fourth one is of the batch that differs, and was measured later.
+UNITS = 40
+FIELDS = {"kind": "fit", "request": {"kind": "fit", "model": "bias"}, "engine": "local", "by": "Ann", "created_at": AT}
+
+
+@pytest.fixture
+def fleet(service: Service) -> None:
+    """Write a type of 40 units as fleet jobs leave it, and one unit of another type."""
+    store = service.lab_service.store
+    info = RecordingInfo.model_validate({"serial": "G", "axes": ["x"], "kind": "points", "started_at": AT})
+    head = info.model_dump(mode="json")
+    serials = [f"G{k:03d}" for k in range(UNITS)]
+    odd = {serial for k, serial in enumerate(serials) if k % 4 == 0}
+    units = [
+        {"serial": serial, "model": "FOG-A", "first_seen_at": AT, "batch": "B2" if serial in odd else "B1"}
+        for serial in serials
+    ] + [{"serial": "M", "model": "MEMS-B", "first_seen_at": AT, "batch": ""}]
+    recordings = [
+        {"serial": each["serial"], "kind": "points", "info": head, "channels": [], "created_at": AT} for each in units
+    ]  # fmt: skip
+    done: dict[str, Any] = {"state": "done", "newest": True, "version": 1, "noise_floor_dps": 0.001}
+    fits = [
+        {**done, "job_id": 1, "serial": serial, "kind": "fit", "rms_dps": 0.0012 if serial in odd else 0.001}
+        for serial in serials
+    ]
+    verdicts = [
+        {**done, "job_id": 2, "serial": serial, "kind": "criticise", "rms_dps": 0.001}
+        | ({"verdict": "missing", "named": ["warm_up"]} if serial in odd else {"verdict": "adequate", "named": []})
+        for serial in serials
+    ]
+    coefficients = [
+        {
+            "serial": serial, "axis": "x", "name": "scale_factor", "value": 0.01 if serial in odd else 0.0, "u": 1e-5,
+            "unit": "1", "model": "bias_scale", "version": 1, "bench": "",
+            "measured_at": AT + timedelta(days=30 if serial in odd else 0),
+        }
+        for serial in serials
+    ]  # fmt: skip
+    with store._database.writing() as connection:
+        connection.execute(sa.insert(tables.units), units)
+        connection.execute(sa.insert(tables.recordings), recordings)
+        for kind in ("fit", "criticise"):
+            connection.execute(
+                sa.insert(tables.fleet_jobs).values(**FIELDS | {"kind": kind}, units=UNITS, state="done")
+            )
+        connection.execute(sa.insert(tables.fleet_units), fits)
+        connection.execute(sa.insert(tables.fleet_units), verdicts)
+        connection.execute(sa.insert(tables.fleet_coefficients), coefficients)
+
+
+@pytest.mark.usefixtures("fleet")
+def test_types_are_small_multiples_and_a_type_has_its_chart_and_report(
+    service: Service, visit: Callable[..., Page]
+) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/fleet")
+    card = page.get_by_role("region", name="FOG-A: 40 units")
+    expect(card.get_by_role("list", name="Error over noise floor").get_by_role("listitem")).to_have_text(
+        ["0 to 1.130", "1.1 to 1.2510"]
+    )
+    expect(card.get_by_role("list", name="Verdict").get_by_role("listitem")).to_have_count(2)
+    expect(card.get_by_role("list", name="Due").get_by_role("listitem")).to_have_text(["none in force40"])
+    expect(page.get_by_role("region", name="MEMS-B: 1 unit")).to_be_visible()
+    card.get_by_role("link", name="Open FOG-A").click()
+    groups = page.get_by_role("group", name="Groups in the chosen time")
+    expect(groups.get_by_role("row")).to_have_count(3)
+    drawn = page.locator(".plot.js-plotly-plot").evaluate(
+        "plot => Object.fromEntries(plot.data.map(trace => [trace.name, [...trace.customdata]]))"
+    )
+    answer = service.get("/api/fleet/chart?type=FOG-A")
+    assert drawn == {"B1": [30], "B2": [10]}
+    assert {point["level"]: [point["units"]] for point in answer["points"]} == drawn
+    page.get_by_label("From", exact=True).fill("2026-02-01")
+    page.get_by_label("From", exact=True).dispatch_event("change")
+    expect(groups.get_by_role("row")).to_have_count(2)
+    expect(groups).to_contain_text("B2")
+    missing = page.get_by_role("region", name="What is missing")
+    expect(missing.get_by_role("list", name="Named in single units")).to_contain_text("warm up")
+    expect(page.get_by_role("region", name="Report")).to_contain_text("at least 5")
+
+
+@pytest.mark.usefixtures("fleet")
+def test_on_a_phone_nothing_is_wider_than_the_page(visit: Callable[..., Page]) -> None:
+    page = visit("/fleet?type=FOG-A", size=NARROW, dark=True)
+    page.get_by_role("region", name="Report").wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
