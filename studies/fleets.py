@@ -42,8 +42,9 @@ from studies.report_tables import wilson
 
 FLEETS = int(os.environ.get("LABCTL_STUDY_FLEETS", "20"))
 SEED = int(os.environ.get("LABCTL_STUDY_SEED", "36004"))
-#: Units of a fleet, fleets without anything hidden for each with, and the z of what is hidden.
-UNITS, QUIET_PER_FLEET, Z = 200, 5, 2.0
+#: Units of a fleet, and the z of what is hidden; fleets without an effect, and without a group, for each with one.
+UNITS, Z = 200, 2.0
+WITHOUT_EFFECT, WITHOUT_GROUP = 25, 5
 #: Units of the fleets that go through the whole criticism.
 WHOLE_UNITS = 100
 #: Units that a prior is from, new units for each such fleet, and campaigns of a new unit: rates, temperatures.
@@ -80,7 +81,7 @@ def _effects(fleets: int, seed: int) -> Iterator[str]:
             size = np.mean([len(each.named[0].group) for each in found if each.named] or [0])
             alike = "sign of each unit" if signed else "the same in all"
             yield f"| {title}, {alike} | {share(right, fleets)} | {share(wrong, fleets)} | {size:.1f} | algebra |"
-    quiet = fleets * QUIET_PER_FLEET
+    quiet = fleets * WITHOUT_EFFECT
     false = 0
     for i in range(quiet):
         false += bool(judged(algebra.fleet(np.random.default_rng([seed, 2, i]), benches)).named)
@@ -127,7 +128,7 @@ def _groups(fleets: int, seed: int) -> Iterator[str]:
     yield f"| {UNITS} units | named, % | another group named, % | outliers, per fleet |"
     yield "| --- | --- | --- | --- |"
     for row, (title, (fleet, truth)) in enumerate(cases.items()):
-        n = fleets if truth else fleets * QUIET_PER_FLEET
+        n = fleets if truth else fleets * WITHOUT_GROUP
         found = [population_of(fleet.drawn(campaign, np.random.default_rng([seed, 3, row, i]))) for i in range(n)]
         right = sum(any((e.factor, e.level) == truth for e in each.effects) for each in found)
         wrong = sum(any((e.factor, e.level) != truth for e in each.effects) for each in found)
