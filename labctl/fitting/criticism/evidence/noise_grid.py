@@ -10,9 +10,10 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, eigh_tridiagonal, solve_triangular
+from scipy.linalg import eigh_tridiagonal
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.triangular import lower_factor, solve_lower
 
 #: Drift time constants, s; 0 stands for equal parts of `MIXTURE_S`, close to the flicker of bias instability.
 TAUS_S = (0.0, 120.0, 900.0, 4000.0)
@@ -90,7 +91,7 @@ def factors(
         rows = np.flatnonzero(run == number)
         covariance = noise.size_dps**2 * correlation(t_s[rows], noise.tau_s)
         covariance[np.diag_indices(len(rows))] += white_var[rows]
-        factor = cholesky(covariance, lower=True, check_finite=False)
+        factor = lower_factor(covariance)
         blocks.append((rows, factor))
         log_determinant += 2.0 * float(np.log(np.diag(factor)).sum())
     return blocks, log_determinant
@@ -164,5 +165,5 @@ def whiten(
     """Return values (m,) or (m, k) whitened by the Cholesky factors of their covariance, run by run."""
     whitened = np.empty_like(values)
     for rows, factor in blocks:
-        whitened[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
+        whitened[rows] = solve_lower(factor, values[rows])
     return whitened
