@@ -127,7 +127,7 @@ class DriftModes:
         return 1.0 / np.sqrt(total), self.log_white + float(np.log(total).sum())
 
 
-@lru_cache(maxsize=2 * len(TAUS_S))
+@lru_cache(maxsize=3 * len(TAUS_S))
 def _modes(tau_s: float, white: bytes, times: bytes, runs: bytes) -> DriftModes:
     """Cached by the bytes of the arrays: axes, and the steps of a search, share the decomposition."""
     white_var, t_s = np.frombuffer(white, dtype=np.float64), np.frombuffer(times, dtype=np.float64)
