@@ -136,7 +136,8 @@ def status_of(program: Callable[[], None]) -> int:
         if thread is not threading.current_thread() and not thread.daemon:
             thread.join()
     try:
-        sys.stdout.flush(), sys.stderr.flush()
+        sys.stdout.flush()
+        sys.stderr.flush()
     except OSError:  # the reader has gone
         status = status or UNREAD
     return status
