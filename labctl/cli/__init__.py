@@ -1,5 +1,6 @@
 """The command line: it asks the services and prints what they say."""
 
+import atexit
 import gc
 import os
 import sys
@@ -29,6 +30,7 @@ def main() -> None:
         keep_memory()
     # imports make some hundred thousand objects that stay; to look through them again and again is a sixth of a start
     gc.set_threshold(COLLECTED_AFTER)
+    atexit.register(gc.freeze)  # nor are they looked through when the process ends: 0.4 s of a command that fits
     try:
         from labctl.cli.app import main as run
     except ModuleNotFoundError as error:  # labctl was installed as a library for robots

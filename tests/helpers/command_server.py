@@ -16,6 +16,8 @@ import select
 import signal
 import socket
 import sys
+import threading
+from collections.abc import Callable
 from typing import Any, TextIO, cast
 
 from tests.helpers import spare_processes
@@ -30,6 +32,9 @@ MODULES = (
     "labctl.services.commands.registry", "labctl.services.criticism.evaluation",
     "labctl.services.criticism.next_experiment", "labctl.services.lab_service", "labctl.services.simulation.visibility",
 )  # fmt: skip
+
+#: Exit status of a process whose output could not be written at its end, as Python's own.
+UNREAD = 120
 
 
 def serve(address: str) -> None:
@@ -112,6 +117,32 @@ def _become(request: dict[str, Any], streams: list[int]) -> None:
     sys.argv = ["labctl", *request["arguments"]]
 
 
+def status_of(program: Callable[[], None]) -> int:
+    """Run a program to its end, as Python runs that of a process; returns its exit status.
+
+    The memory is not taken apart afterwards: it is that of all commands, and each page that is written to is copied.
+    """
+    status = 0
+    try:
+        program()
+    except SystemExit as ended:
+        status = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+        if isinstance(ended.code, str):
+            sys.stderr.write(f"{ended.code}\n")
+    except BaseException as error:  # noqa: BLE001  as Python reports what nothing else has
+        sys.excepthook(type(error), error, error.__traceback__)
+        status = 1
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread() and not thread.daemon:
+            thread.join()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:  # the reader has gone
+        status = status or UNREAD
+    return status
+
+
 def _opened(number: int, mode: str) -> TextIO:
     return cast(TextIO, open(number, mode, buffering=1, encoding="utf-8", closefd=False))
 
@@ -121,5 +152,6 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["serve"]:
         spare_processes.provide()
     from labctl.cli import main
+    from labctl.processes.children import leave
 
-    main()
+    leave(status_of(main))

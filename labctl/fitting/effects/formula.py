@@ -63,11 +63,12 @@ class Formula(Effect):
         self.id = name
         self.sentence = sentence or f"The error follows {text}."
         self._tree = _parsed(name, text)
-        self.needs = tuple(sorted(_names(self._tree) - {OWN_RATE, "table_rate_dps", "temperature_c"}))
-        self.by_temperature = "temperature_c" in _names(self._tree)
-        self.shows_at_rest = _names(self._tree).isdisjoint(RATES)
-        names = {"table_rate_dps" if name == OWN_RATE else name for name in _names(self._tree)}
-        self.draws = tuple("time" if name == "t_s" else name for name in sorted(names))
+        names = _names(self._tree)
+        self.needs = tuple(sorted(names - {OWN_RATE, "table_rate_dps", "temperature_c"}))
+        self.by_temperature = "temperature_c" in names
+        self.shows_at_rest = names.isdisjoint(RATES)
+        drawn = {"table_rate_dps" if each == OWN_RATE else each for each in names}
+        self.draws = tuple("time" if each == "t_s" else each for each in sorted(drawn))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the text, which is read again."""
@@ -179,8 +180,9 @@ def _check(name: str, node: ast.AST) -> None:
 
 
 def _names(tree: ast.Expression) -> set[str]:
-    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in called}
+    nodes = list(ast.walk(tree))
+    called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
+    return {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called}
 
 
 def read_formulas(lines: Sequence[str]) -> list[Formula]:

@@ -27,7 +27,6 @@ from labctl.services.commands.command import LocalExecutor
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.service_control import NO_BENCH, ServiceControl
 from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
-from labctl.services.live.calibrate import calibrate_live
 from labctl.services.live.feeds import network_feed
 from labctl.services.live.gyro_source import GyroSource
 from labctl.services.live.line_source import LineSource, info_of
@@ -173,6 +172,8 @@ class LiveSessions:
 
     def _calibrate(self, record: SessionRecord, ending: EndingSource, runner: BenchRunner | None) -> LiveResponse:
         """Run to the end; the bench is given back, and what is kept in folders is known, before it is over."""
+        from labctl.services.live.calibrate import calibrate_live  # noqa: PLC0415  slow to import: a bench loads no fits
+
         assessor = InlineAssessor() if ending.is_simulated else BackgroundAssessor()  # a real stream goes on meanwhile
         commands = LocalExecutor(CommandContext(lambda: self._store, self._clock, ServiceControl(None)))
         stamp = f"{self._clock.utc():%Y%m%dT%H%M%S%f}Z"

@@ -26,6 +26,8 @@ from tests.helpers.certificates import AT, ORDER, SERIAL, add_version, request
 from tests.helpers.lab import Lab
 from tests.helpers.service import open_client, service_of
 
+#: Each test certifies one of the same versions: what its criticism says is tested elsewhere.
+pytestmark = pytest.mark.usefixtures("shared_answers")
 ADA, BOB = Actor("ada", "key"), Actor("bob", "key")
 ASKED = CertifyRequest(by="Ada A.", reason="meets the criteria of LAB-P-012, looked at by hand", override=True)
 SECOND = ReleaseRequest(by="Bob B.", reason="looked at the residuals")

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
 
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
 from labctl.fitting.criticism.evidence.gains import OptionPairs
 from labctl.fitting.criticism.evidence.noise_grid import DriftModes, Noise, factors, whiten
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.triangular import lower_factor, solve_lower
 
 
 def stack(rows: NDArray[np.float64], scale: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -124,9 +124,10 @@ def _projected(of_base: NDArray[np.float64], crossed: NDArray[np.float64]) -> tu
     if not len(of_base):
         return crossed, 0.0
     size = np.sqrt(np.maximum(np.diag(of_base), 1e-300))
-    scaled = of_base / np.outer(size, size) + 1e-10 * np.eye(len(size))
-    factor = cholesky(scaled, lower=True, check_finite=False)
-    projected = solve_triangular(factor, crossed / size[:, None], lower=True, check_finite=False)
+    scaled = of_base / (size[:, None] * size)
+    scaled[np.diag_indices(len(size))] += 1e-10
+    factor = lower_factor(scaled)
+    projected = solve_lower(factor, crossed / size[:, None])
     return projected, 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum())
 
 

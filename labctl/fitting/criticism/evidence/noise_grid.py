@@ -10,9 +10,10 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, eigh_tridiagonal, solve_triangular
+from scipy.linalg import eigh_tridiagonal
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.triangular import lower_factor, solve_lower
 
 #: Drift time constants, s; 0 stands for equal parts of `MIXTURE_S`, close to the flicker of bias instability.
 TAUS_S = (0.0, 120.0, 900.0, 4000.0)
@@ -90,7 +91,7 @@ def factors(
         rows = np.flatnonzero(run == number)
         covariance = noise.size_dps**2 * correlation(t_s[rows], noise.tau_s)
         covariance[np.diag_indices(len(rows))] += white_var[rows]
-        factor = cholesky(covariance, lower=True, check_finite=False)
+        factor = lower_factor(covariance)
         blocks.append((rows, factor))
         log_determinant += 2.0 * float(np.log(np.diag(factor)).sum())
     return blocks, log_determinant
@@ -126,7 +127,7 @@ class DriftModes:
         return 1.0 / np.sqrt(total), self.log_white + float(np.log(total).sum())
 
 
-@lru_cache(maxsize=2 * len(TAUS_S))
+@lru_cache(maxsize=3 * len(TAUS_S))
 def _modes(tau_s: float, white: bytes, times: bytes, runs: bytes) -> DriftModes:
     """Cached by the bytes of the arrays: axes, and the steps of a search, share the decomposition."""
     white_var, t_s = np.frombuffer(white, dtype=np.float64), np.frombuffer(times, dtype=np.float64)
@@ -164,5 +165,5 @@ def whiten(
     """Return values (m,) or (m, k) whitened by the Cholesky factors of their covariance, run by run."""
     whitened = np.empty_like(values)
     for rows, factor in blocks:
-        whitened[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
+        whitened[rows] = solve_lower(factor, values[rows])
     return whitened

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import combinations
 from statistics import NormalDist
@@ -75,15 +76,15 @@ def _is_exchanged(
         return False
     (before_a, u_before_a, after_a, u_after_a), (before_b, u_before_b, after_b, u_after_b) = one, other
     off = max(
-        abs(after_a - before_b) / float(np.hypot(np.hypot(u_after_a, u_before_b), LEVEL_SHARE * before_b)),
-        abs(after_b - before_a) / float(np.hypot(np.hypot(u_after_b, u_before_a), LEVEL_SHARE * before_a)),
+        abs(after_a - before_b) / math.hypot(u_after_a, u_before_b, LEVEL_SHARE * before_b),
+        abs(after_b - before_a) / math.hypot(u_after_b, u_before_a, LEVEL_SHARE * before_a),
     )
     if off > AGREES:
         return False
-    apart = abs(before_a - before_b) / float(np.hypot(u_before_a, u_before_b))
+    apart = abs(before_a - before_b) / math.hypot(u_before_a, u_before_b)
     changed = min(
-        abs(after_a - before_a) / float(np.hypot(u_after_a, u_before_a)),
-        abs(after_b - before_b) / float(np.hypot(u_after_b, u_before_b)),
+        abs(after_a - before_a) / math.hypot(u_after_a, u_before_a),
+        abs(after_b - before_b) / math.hypot(u_after_b, u_before_b),
     )
     return min(apart, changed) > CHANGES or _noises_are(series, names, part, row, noise_changes)
 

@@ -215,7 +215,8 @@ def runs(is_same: Rows) -> Iterator[tuple[int, int]]:
 
 def medians_of_five(values: Array) -> Array:
     """Return the median of each of (n,) values and the two on either side; the ends are repeated."""
-    a, b, c, d, e = (np.pad(values, 2, mode="edge")[k : k + len(values)] for k in range(5))
+    padded = np.pad(values, 2, mode="edge")
+    a, b, c, d, e = (padded[k : k + len(values)] for k in range(5))
     low_ab, high_ab, low_de, high_de = np.minimum(a, b), np.maximum(a, b), np.minimum(d, e), np.maximum(d, e)
     low, high = np.maximum(low_ab, low_de), np.minimum(high_ab, high_de)  # neither the least nor the largest of four
     return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))

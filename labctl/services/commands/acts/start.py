@@ -12,7 +12,6 @@ from labctl.services.commands.requests import CampaignStart
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.planning.loading import load_recipe
 from labctl.services.schedule import queue
-from labctl.services.simulation.effect_sizes import with_sizes
 
 
 def _start_in_service(control: ServiceBench, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
@@ -41,6 +40,8 @@ def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignRe
     if asked.body.fit:
         check_fit(load_recipe(asked.body.recipe))
     if asked.body.hide:
+        from labctl.services.simulation.effect_sizes import with_sizes  # noqa: PLC0415  slow to import
+
         asked = replace(asked, body=with_sizes(asked.body, context.control.bench_of(asked)))
     if queue.is_scheduled(asked.body):
         return SCHEDULE.execute(context, asked)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from labctl.services.certificates.evidence import NotVerified
 from labctl.services.certificates.issue import issue
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.simulation.plan_simulation import hidden_recording
-from labctl.store import Store, open_store
+from labctl.store import Store, copy_database, open_store
 from procedures.planning.plan import make_plan
 from procedures.recipe.rules import Verification
 from tests.helpers.certificates import AT, request
@@ -42,22 +43,39 @@ def recording() -> Recording:
     return hidden_recording(plan, bench, bench.gyros[0].model_copy(update={"sample_rate_hz": 1.0}), 4, {})
 
 
-def issued(store: Store, recording: Recording, **conformity: Any) -> Certificate:
-    """Import a recording, fit and certify it, and return its certificate."""
-    store.recordings.add_import(recording, AT)
-    version = fit_unit(store, SERIAL, FitRequest(model="yang2018"), AT).version
-    store.calibrations.certify(SERIAL, version, "certify", by="Ada", reason="meets the criteria", at=AT)
+def certify(path: Path, recording: Recording) -> Path:
+    """Make a database with a recording and a certified version that is fitted to it; returns its path."""
+    with open_store(str(path), write=True) as store:
+        store.recordings.add_import(recording, AT)
+        version = fit_unit(store, SERIAL, FitRequest(model="yang2018"), AT).version
+        store.calibrations.certify(SERIAL, version, "certify", by="Ada", reason="meets the criteria", at=AT)
+    return path
+
+
+@pytest.fixture(scope="module")
+def certified(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return certify(tmp_path_factory.mktemp("certified") / "lab.sqlite", recording)
+
+
+@pytest.fixture
+def store(certified: Path, tmp_path: Path) -> Iterator[Store]:
+    copy_database(str(certified), tmp_path / "lab.sqlite")
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as opened:
+        yield opened
+
+
+def issued(store: Store, **conformity: Any) -> Certificate:
+    """Return the certificate of the certified version."""
     ordered = {"specification": "S", "limit_dps": 2.0, "rule": "guard-band", **conformity}
-    issue(store, SERIAL, version, request(conformity=ordered), AT)
-    row = store.certificates.newest(SERIAL, version)
+    issue(store, SERIAL, 1, request(conformity=ordered), AT)
+    row = store.certificates.newest(SERIAL, 1)
     assert row is not None
     return Certificate.model_validate_json(store.certificates.forms(row.number).document)
 
 
-def test_it_states_each_error_that_was_verified(recording: Recording, tmp_path: Path) -> None:
-    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
-        certificate = issued(store, recording)
-        calibration = read_calibration(store.calibrations.document(SERIAL, 1)[0])
+def test_it_states_each_error_that_was_verified(recording: Recording, store: Store) -> None:
+    certificate = issued(store)
+    calibration = read_calibration(store.calibrations.document(SERIAL, 1)[0])
     found = certificate.conformity
     assert found is not None
     assert (found.passed, found.evidence, found.datasets, len(found.results)) == (True, "verification", 18, 54)
@@ -92,17 +110,16 @@ def test_it_states_each_error_that_was_verified(recording: Recording, tmp_path: 
 def test_an_error_that_only_the_verification_shows_fails(recording: Recording, tmp_path: Path) -> None:
     marked = np.asarray(recording.columns["verification"]) != 0
     columns = {n: v + 3.0 * marked if n == "gyro_y" else v for n, v in recording.columns.items()}
-    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
-        found = issued(store, replace(recording, columns=columns)).conformity
+    with open_store(str(certify(tmp_path / "lab.sqlite", replace(recording, columns=columns))), write=True) as store:
+        found = issued(store).conformity
     assert found is not None
     assert not found.passed
     assert {each.output for each in found.results if not each.passed} == {"y"}
     assert min(each.risk for each in found.results if each.output == "y") > 0.99
 
 
-def test_about_its_own_axis_an_output_is_judged_where_it_turned_about_it(recording: Recording, tmp_path: Path) -> None:
-    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
-        found = issued(store, recording, about="own axis").conformity
+def test_about_its_own_axis_an_output_is_judged_where_it_turned_about_it(store: Store) -> None:
+    found = issued(store, about="own axis").conformity
     assert found is not None
     assert found.evidence == "verification"
     for each in found.results:
@@ -110,19 +127,14 @@ def test_about_its_own_axis_an_output_is_judged_where_it_turned_about_it(recordi
         assert np.abs(others).max() < 0.01  # the Earth's rate
 
 
-@pytest.mark.parametrize(
-    ("part", "about"),
-    [(Verification(rates=4, positions=("z",)), "own axis"), (Verification(rates=4, positions=("z",)), "any axis")],
-)
-def test_a_verification_that_does_not_cover_the_use_decides_nothing(
-    part: Verification, about: Any, tmp_path: Path
-) -> None:
+def test_a_verification_that_does_not_cover_the_use_decides_nothing(tmp_path: Path) -> None:
+    part = Verification(rates=4, positions=("z",))
     recipe = load_recipe("table1-x-table2").model_copy(update={"verification": part})
     bench = load_bench("triaxial-sim")
     gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": 1.0})
     recording = hidden_recording(make_plan(recipe, limits_of(bench)), bench, gyro, 4, {})
-    with (
-        open_store(str(tmp_path / "lab.sqlite"), write=True) as store,
-        pytest.raises(NotVerified, match=r"output x was verified about x .* needs rates in the outer thirds"),
-    ):
-        issued(store, recording, about=about)
+    lacks = r"output x was verified about x .* needs rates in the outer thirds"
+    with open_store(str(certify(tmp_path / "lab.sqlite", recording)), write=True) as store:
+        for about in ("own axis", "any axis"):
+            with pytest.raises(NotVerified, match=lacks):
+                issued(store, about=about)
