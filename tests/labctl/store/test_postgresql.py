@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -37,25 +37,14 @@ from labctl.store import (
 from labctl.store.connection import postgresql_server
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
+from studies.postgresql_cluster import Cluster
 from tests.helpers import certificates, register
 from tests.helpers.certificates import simulated
 from tests.helpers.drifting_units import add_drifting_unit
-from tests.helpers.postgresql import Cluster, running_cluster
 
 pytestmark = pytest.mark.timeout(300)
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[Cluster]:
-    with running_cluster() as running:
-        yield running
-
-
-@pytest.fixture
-def url(cluster: Cluster) -> str:
-    return cluster.new_database()
 
 
 def note(store: Store, number: int) -> None:
