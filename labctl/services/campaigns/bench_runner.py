@@ -282,11 +282,11 @@ class BenchRunner:
             if answer.state is CampaignState.INTERRUPTED:
                 self._recovery.expect_resume()
         except StoreError as error:
-            self._recovery.expect_end(job.row.id, str(error))
+            self._recovery.expect_end(job.row.id, str(error), to_be_resumed=job.is_resumed_after(error))
             raise
         finally:
             job.control.leave_step()
-            self.stops.is_safe = job.control.is_at_rest(0.0) and not job.control.hindrance
+            self.stops.is_safe = job.is_safe
             self._job = None
             self.stops.settle()
             self._listeners.notify()

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 from instruments.clock import Clock
 from instruments.interfaces.table import RateTable
+from labctl.errors import DatabaseUnreachable, StoreError
 from labctl.services.campaigns.bench_lending import BenchLending
 from labctl.services.campaigns.preparation import Prepared
 from labctl.store import CampaignRow
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.control import Control
 from procedures.execution.safe_state import stop_table
 from procedures.monitoring.progress import Progress
@@ -36,6 +38,20 @@ class CampaignJob:
         threading.Thread(target=self._stop_if_stuck, name="stop", daemon=True).start()
         self.thread = threading.Thread(target=run, name=f"campaign-{self.prepared.id}")
         self.thread.start()
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether its table stands and nothing of its safe state is unconfirmed."""
+        return self.control.is_at_rest(0.0) and not self.control.hindrance
+
+    def is_resumed_after(self, error: StoreError) -> bool:
+        """Return whether it goes on by itself once its database answers again: nothing else has ended it.
+
+        Of one that was done only the end is written.
+        """
+        ended = None if self.progress is None else self.progress.state
+        is_open = ended in {CampaignState.INTERRUPTED, CampaignState.DONE}
+        return isinstance(error, DatabaseUnreachable) and is_open and self.is_safe
 
     def _stop_if_stuck(self) -> None:
         """Stop the table from here where the engine does not, because what it writes down first waits for its database.
