@@ -107,7 +107,8 @@ class Client:
     """A connection to one service, to be closed or used in a `with` statement.
 
     `url` is the address of the service. `api_key` defaults to the environment variable `LABCTL_KEY`; a service on
-    loopback needs none unless it was started with `--require-keys`. `timeout_s` bounds each answer, in seconds.
+    loopback needs none unless it was started with `--require-keys`. `timeout_s` bounds each answer, in seconds, and for
+    how long a service that computes for others (429) is asked again, each time when its `Retry-After` says.
     """
 
     def __init__(
@@ -119,8 +120,8 @@ class Client:
         transport: httpx.BaseTransport | None = None,
         clock: Clock | None = None,
     ) -> None:
-        self._connection = ServiceConnection(url, api_key, timeout_s=timeout_s, transport=transport)
         self._clock = clock or SystemClock()
+        self._connection = ServiceConnection(url, api_key, timeout_s=timeout_s, transport=transport, clock=self._clock)
 
     def __enter__(self) -> Client:
         return self
