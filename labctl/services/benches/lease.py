@@ -234,8 +234,9 @@ def _is_dead(lease: LeaseRow) -> bool:
         return False
     try:
         os.kill(lease.pid, 0)
+        state = Path(f"/proc/{lease.pid}/stat").read_text(encoding="latin-1").rpartition(")")[2].split()[0]
     except ProcessLookupError:
         return True
-    except OSError:
+    except (OSError, IndexError):
         return False
-    return False
+    return state in {"Z", "X"}  # it has ended, and its parent has not asked how (proc(5))
