@@ -20,6 +20,8 @@ from procedures.monitoring.progress import Progress
 #: An engine that does not make its bench safe within this from a stop, s, may be waiting for its database; another
 #: thread then takes the bench from it while it writes. Who asked for the stop waits longer before the process is ended.
 LEAVES_WITHIN_S, STUCK_S = 0.3, 60.0
+#: How often it is read, beside the engine, whether the bench may still be driven, s of wall time.
+LOSS_READ_S = 1.0
 
 
 @dataclass
@@ -58,7 +60,8 @@ class CampaignJob:
 
         The stop may come from a person, a signal, or the lease of the bench, lost to another.
         """
-        self.control.wait_for_end()
+        while not self.control.wait_for_end(LOSS_READ_S):
+            self.control.interrupt_if_lost()
         table = self.prepared.bench.table
         if table is None or self.control.has_left_step(LEAVES_WITHIN_S):
             return
