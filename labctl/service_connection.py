@@ -5,7 +5,7 @@ from __future__ import annotations
 import ssl
 from types import TracebackType
 from typing import Any, Literal, TypeVar
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 import httpx
 from pydantic import BaseModel
@@ -143,3 +143,9 @@ def json_of(response: httpx.Response) -> Any:
 
 def _without_none(query: dict[str, str | int | float | None]) -> dict[str, str | int | float]:
     return {name: value for name, value in query.items() if value is not None}
+
+
+def query_string(**values: str | int | None) -> str:
+    """Return a query string; values that are None or empty are left out."""
+    given = {name: value for name, value in values.items() if value not in (None, "")}
+    return f"?{urlencode(given)}" if given else ""
