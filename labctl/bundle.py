@@ -111,7 +111,7 @@ class Bundle:
         try:
             archive = zipfile.ZipFile(where)
         except (zipfile.BadZipFile, OSError) as error:
-            raise BadCalibrationFile(f"{where}: not a bundle of calibrations ({error}); fetch it again") from error
+            raise BadCalibrationFile(f"{where}: not a bundle of calibrations ({error}); get it again") from error
         try:
             content = _member(where, archive, MANIFEST, MAX_MANIFEST_BYTES)
             if key is not None:
@@ -152,7 +152,7 @@ class Bundle:
         """
         if (gone := self._withdrawn.get(serial)) is not None:
             text = f"calibration of {serial} version {gone.version} must not be used: {gone.notice.text}"
-            raise CalibrationWithdrawn(f"{text}; have the unit calibrated again, then export a new bundle", gone.notice)
+            raise CalibrationWithdrawn(f"{text}; calibrate the unit again, then export a new bundle", gone.notice)
         if (entry := self._entries.get(serial)) is None:
             raise NotFound(
                 f"{self._path}: no calibration of unit {serial!r} among {len(self._entries)}; check the serial number, "
@@ -162,7 +162,7 @@ class Bundle:
         if (found := hashlib.sha256(content).hexdigest()) != entry.sha256:
             raise BadCalibrationFile(
                 f"{self._path}: {entry.file} of unit {serial} has the SHA-256 {found}, the manifest names "
-                f"{entry.sha256}: the file was changed; fetch the bundle again"
+                f"{entry.sha256}: the file was changed; get the bundle again"
             )
         return content
 
@@ -195,9 +195,9 @@ def _member(path: Path, archive: zipfile.ZipFile, name: str, max_bytes: int) -> 
         with archive.open(name) as opened:
             content = opened.read(max_bytes + 1)
     except UNREADABLE as error:
-        raise BadCalibrationFile(f"{path}: {name} cannot be read ({error}); fetch the bundle again") from error
+        raise BadCalibrationFile(f"{path}: {name} cannot be read ({error}); get the bundle again") from error
     if len(content) > max_bytes:
-        raise BadCalibrationFile(f"{path}: {name} has more than {max_bytes} bytes, the limit; fetch the bundle again")
+        raise BadCalibrationFile(f"{path}: {name} has more than {max_bytes} bytes, the limit; get the bundle again")
     return content
 
 
@@ -211,11 +211,11 @@ def _refuse_unsigned(path: Path, archive: zipfile.ZipFile, manifest: bytes, key:
         said = json.loads(_member(path, archive, SIGNATURE, MAX_BYTES))
         signature, by = bytes.fromhex(said["signature"]), str(said["fingerprint"])
     except (ValueError, LookupError, TypeError) as error:
-        raise BadCalibrationFile(f"{path}: {SIGNATURE} is not whole; fetch the bundle again") from error
+        raise BadCalibrationFile(f"{path}: {SIGNATURE} is not whole; get the bundle again") from error
     if not key.fits(signature, signed_digest(manifest)):
         raise BadCalibrationFile(
             f"{path}: the signature of the bundle, by the key {by[:64]}, is none of the key {key.fingerprint} over "
-            "this content: the bundle was changed, or is another laboratory's; fetch it again"
+            "this content: the bundle was changed, or is another laboratory's; get it again"
         )
 
 
@@ -235,7 +235,7 @@ def _manifest(path: Path, content: bytes) -> BundleManifest:
             tuple(_withdrawn(each) for each in said["withdrawn"]),
         )  # fmt: skip
     except (ValueError, LookupError, TypeError, RecursionError) as error:
-        raise BadCalibrationFile(f"{path}: {MANIFEST} is not whole ({error}); fetch the bundle again") from error
+        raise BadCalibrationFile(f"{path}: {MANIFEST} is not whole ({error}); get the bundle again") from error
 
 
 def _withdrawn(said: Mapping[str, Any]) -> WithdrawnEntry:

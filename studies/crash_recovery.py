@@ -24,7 +24,7 @@ from studies.databases import close_server, new_database
 
 KILLS = int(os.environ.get("LABCTL_STUDY_KILLS", "240"))
 SEED = 20
-#: How often it is said how far the study is: one that is cut short has judged what it says.
+#: How often it is said how far the study is: one that is interrupted has judged what it says.
 SHOWN_EACH = 20
 #: Every kind of step: two mountings, two powered sessions and a power cycle, in under two hours of bench time.
 RECIPE = """

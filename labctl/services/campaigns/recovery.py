@@ -139,7 +139,7 @@ class CampaignRecovery:
                     continue
             except BenchBusy:  # another process was quicker, or the lease was lost just now
                 return
-            except DatabaseUnreachable:  # it passes: tried again with the next look at the schedule
+            except DatabaseUnreachable:  # it passes: tried again when the schedule is read next
                 secure()
                 return
             except (LabctlError, InstrumentError) as error:

@@ -130,9 +130,10 @@ def refuse_other_bench(store: Store, row: CampaignRow, bench: str) -> None:
     Its service resumes what is unfinished on its bench, and could not know that the campaign runs on another one.
     """
     if store.is_shared and bench != row.bench_name:
+        advice = whereabouts(store, row.bench_name)
         raise Conflict(
             f"campaign {row.id} was begun on bench {row.bench_name}, not {bench}, and several services write to this "
-            f"database: the campaign is resumed on its own bench only; {whereabouts(store, row.bench_name)}"
+            f"database: the campaign is resumed on its own bench only; {advice}"
         )
 
 

@@ -70,7 +70,8 @@ def not_running(store: Store, campaign: int, action: str) -> Conflict:
     """Return the refusal of an action that only a running campaign can take. Raises NotFound."""
     row = store.campaigns.get(campaign)
     if store.is_shared and row.state not in ENDED and row.bench_name in driven_benches(store):
-        return Conflict(f"campaign {campaign} does not run in this process; {whereabouts(store, row.bench_name)}")
+        advice = whereabouts(store, row.bench_name)
+        return Conflict(f"campaign {campaign} does not run in this process; {advice}")
     return Conflict(
         f"campaign {campaign} is {row.state} and no process runs it, so it is not possible to {action}; "
         f"`labctl campaign resume {campaign}` continues it"

@@ -26,7 +26,8 @@ def _refuse_elsewhere(context: CommandContext, diagnosis: int) -> None:
         return
     own = context.control.own_bench()
     if own is None or own.name != bench:
-        raise Conflict(f"diagnosis {diagnosis} is not carried out here; {whereabouts(store, bench)}")
+        advice = whereabouts(store, bench)
+        raise Conflict(f"diagnosis {diagnosis} is not carried out here; {advice}")
 
 
 def _confirm(context: CommandContext, asked: ToDiagnosis[ConfirmExperimentRequest]) -> DiagnosisResponse:
