@@ -20,6 +20,7 @@ from types import TracebackType
 from typing import Any
 
 from instruments.clock import Clock, SystemClock
+from labctl.answers.json_object import JsonObject
 from labctl.calibration import Calibration, read_calibration
 from labctl.calibration.document import MAX_BYTES
 from labctl.compensator import Compensator, Outside
@@ -67,7 +68,7 @@ class BundleManifest:
     calibrations: tuple[BundleEntry, ...]
     withdrawn: tuple[WithdrawnEntry, ...]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> JsonObject:
         """Return it as the document in `manifest.json`."""
         return {
             "format": FORMAT, "model": self.model, "made_at": self.made_at.isoformat(),
