@@ -15,7 +15,7 @@ from datetime import datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Literal
-from urllib.parse import quote, urlencode
+from urllib.parse import quote
 
 import httpx
 from httpx_sse import ServerSentEvent, connect_sse
@@ -41,14 +41,16 @@ from labctl.answers.recordings import ImportResponse, RecordingResponse
 from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.schedule import ScheduledResponse
 from labctl.answers.units import UnitResponse, UnitState
+from labctl.bundle import Bundle
 from labctl.calibration import Calibration, read_calibration
 from labctl.calibration.certification import warn
 from labctl.errors import CalibrationWithdrawn
 from labctl.recording.files import recording_parts
-from labctl.service_connection import TIMEOUT_S, ServiceConnection, ServiceRefused, json_of, refusal
+from labctl.service_connection import TIMEOUT_S, ServiceConnection, ServiceRefused, json_of, query_string, refusal
 from labctl.withdrawal import HEADER, Withdrawn, read_withdrawn
 
 __all__ = [
+    "Bundle",
     "CalibrationFile",
     "CalibrationRow",
     "CalibrationStateResponse",
@@ -107,7 +109,8 @@ class Client:
     """A connection to one service, to be closed or used in a `with` statement.
 
     `url` is the address of the service. `api_key` defaults to the environment variable `LABCTL_KEY`; a service on
-    loopback needs none unless it was started with `--require-keys`. `timeout_s` bounds each answer, in seconds.
+    loopback needs none unless it was started with `--require-keys`. `timeout_s` bounds each answer, in seconds, and for
+    how long a service that computes for others (429) is asked again, each time when its `Retry-After` says.
     """
 
     def __init__(
@@ -119,8 +122,8 @@ class Client:
         transport: httpx.BaseTransport | None = None,
         clock: Clock | None = None,
     ) -> None:
-        self._connection = ServiceConnection(url, api_key, timeout_s=timeout_s, transport=transport)
         self._clock = clock or SystemClock()
+        self._connection = ServiceConnection(url, api_key, timeout_s=timeout_s, transport=transport, clock=self._clock)
 
     def __enter__(self) -> Client:
         return self
@@ -145,7 +148,7 @@ class Client:
         `batch` those of a batch, with `search` those whose serial number, model, technology, batch or supplier holds
         it.
         """
-        query = _query(
+        query = query_string(
             due_within=due_within, calibration=calibration, verdict=verdict, batch=batch, search=search, limit=limit
         )
         return self._connection.get_list(f"/api/units{query}", UnitResponse)
@@ -212,7 +215,7 @@ class Client:
 
         With `search` those whose serial number or notes hold it.
         """
-        query = _query(unit=unit, search=search, limit=limit)
+        query = query_string(unit=unit, search=search, limit=limit)
         return self._connection.get_list(f"/api/recordings{query}", RecordingResponse)
 
     def import_recording(self, folder: Path | str) -> ImportResponse:
@@ -277,7 +280,7 @@ class Client:
 
         With `search` those whose recipe, bench, state or units' serial numbers hold it.
         """
-        return self._connection.get_list(f"/api/campaigns{_query(search=search, limit=limit)}", CampaignResponse)
+        return self._connection.get_list(f"/api/campaigns{query_string(search=search, limit=limit)}", CampaignResponse)
 
     def campaign(self, campaign: int) -> CampaignResponse:
         """Return state, step, progress and temperatures of one campaign."""
@@ -385,12 +388,6 @@ def _warning(field: str) -> str:
 def _withdrawn(what: str, notice: Withdrawn, content: bytes | None = None) -> CalibrationWithdrawn:
     text = f"{what} must not be used: {notice.text}; fetch the version in force, or have the unit calibrated again"
     return CalibrationWithdrawn(text, notice, content)
-
-
-def _query(**values: str | int | None) -> str:
-    """Return a query string; values that are None or empty are left out."""
-    given = {name: value for name, value in values.items() if value not in (None, "")}
-    return f"?{urlencode(given)}" if given else ""
 
 
 def _part(serial: str) -> str:

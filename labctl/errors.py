@@ -12,6 +12,8 @@ LabctlError              exit 2, HTTP 400
 ├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
 │   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
 ├── CalibrationWithdrawn     a calibration was revoked, or its certificate was withdrawn: do not use it    exit 1
+├── CalibrationOverdue       a calibration in a bundle is past its due date            exit 1
+├── BundleExpired            a bundle is older than it may be                       exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
 ├── Conflict             another process holds it, or it is already so             HTTP 409
 │   ├── CertificationRefused   there are objections to a version; they can be overridden      HTTP 409
@@ -169,6 +171,20 @@ class NotCertified(NotFound):
 
     exit_status = 1
     slug = "not-certified"
+
+
+class CalibrationOverdue(LabctlError):
+    """A calibration in a bundle is past the date until which it is valid."""
+
+    exit_status = 1
+    slug = "calibration-overdue"
+
+
+class BundleExpired(LabctlError):
+    """A bundle of calibrations is past the date until which it may be used."""
+
+    exit_status = 1
+    slug = "bundle-expired"
 
 
 class CalibrationWithdrawn(LabctlError):

@@ -5,16 +5,19 @@ from __future__ import annotations
 import ssl
 from types import TracebackType
 from typing import Any, Literal, TypeVar
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 import httpx
 from pydantic import BaseModel
 
+from instruments.clock import Clock, SystemClock
 from labctl.config import KEY_VARIABLE, key, os_user
 from labctl.errors import LabctlError, NotCertified, StoreError
 
 #: How long an answer may take, s: a fit or an import is answered when it is done.
 TIMEOUT_S = 300.0
+#: A service that is busy and does not say until when is asked again after so long, s.
+RETRY_AFTER_S = 1.0
 #: Header in which a caller without a key names its user.
 USER_HEADER = "Labctl-User"
 
@@ -36,7 +39,10 @@ def _trust(url: str) -> ssl.SSLContext | Literal[True]:
 
 
 class ServiceConnection:
-    """Requests to one service. `api_key` defaults to `$LABCTL_KEY`; without one the user's name is sent."""
+    """Requests to one service. `api_key` defaults to `$LABCTL_KEY`; without one the user's name is sent.
+
+    `timeout_s` bounds each answer, and for how long a service that is busy is asked again.
+    """
 
     def __init__(
         self,
@@ -45,8 +51,10 @@ class ServiceConnection:
         *,
         timeout_s: float = TIMEOUT_S,
         transport: httpx.BaseTransport | None = None,
+        clock: Clock | None = None,
     ) -> None:
         self.url = url
+        self._timeout_s, self._clock = timeout_s, clock or SystemClock()
         sent_key = api_key or key()
         # without a key, the name only says who claims to ask; a service that wants a key does not read it
         identity = {"Authorization": f"Bearer {sent_key}"} if sent_key else {USER_HEADER: quote(os_user())}
@@ -73,12 +81,22 @@ class ServiceConnection:
         Raises ServiceRefused when the service refuses it, StoreError when it does not answer.
         """
         try:
-            response = self.http.request(method, path, **content)
+            response = self._send(self.http.build_request(method, path, **content))
         except httpx.HTTPError as error:
             raise self.silent(error) from error
         if response.is_error:
             raise refusal(response)
         return response
+
+    def _send(self, request: httpx.Request) -> httpx.Response:
+        """Send a request; a service that has no place for it (429) is asked again when it says, for `timeout_s`."""
+        end_s = self._clock.now_s() + self._timeout_s
+        while True:
+            response = self.http.send(request)
+            wait_s = _retry_after_s(response)
+            if response.status_code != httpx.codes.TOO_MANY_REQUESTS or self._clock.now_s() + wait_s > end_s:
+                return response
+            self._clock.sleep(wait_s)
 
     def get(self, path: str, kind: type[ModelT], **query: str | int | float | None) -> ModelT:
         """Return the answer to a GET as a model."""
@@ -94,6 +112,12 @@ class ServiceConnection:
             f"the service at {self.url} does not answer ({error}); check that `labctl serve` runs and that the "
             "address is right"
         )
+
+
+def _retry_after_s(response: httpx.Response) -> float:
+    """Return after how long a service that is busy wants to be asked again, s."""
+    said = response.headers.get("retry-after", "")
+    return float(said) if said.isascii() and said.isdigit() else RETRY_AFTER_S
 
 
 def refusal(response: httpx.Response) -> ServiceRefused:
@@ -119,3 +143,9 @@ def json_of(response: httpx.Response) -> Any:
 
 def _without_none(query: dict[str, str | int | float | None]) -> dict[str, str | int | float]:
     return {name: value for name, value in query.items() if value is not None}
+
+
+def query_string(**values: str | int | None) -> str:
+    """Return a query string; values that are None or empty are left out."""
+    given = {name: value for name, value in values.items() if value not in (None, "")}
+    return f"?{urlencode(given)}" if given else ""

@@ -40,6 +40,7 @@ STUDIES = (
     "crash_recovery",
     "process_kill",
     "process_pairs",
+    "benches",
     "busy_campaigns",
     "stops",
     "stop_sequences",

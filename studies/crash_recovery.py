@@ -24,6 +24,8 @@ from studies.databases import close_server, new_database
 
 KILLS = int(os.environ.get("LABCTL_STUDY_KILLS", "240"))
 SEED = 20
+#: How often it is said how far the study is: one that is interrupted has judged what it says.
+SHOWN_EACH = 20
 #: Every kind of step: two mountings, two powered sessions and a power cycle, in under two hours of bench time.
 RECIPE = """
 format = "labctl-recipe/1"
@@ -232,7 +234,12 @@ def run_kills(count: int) -> dict[str, float]:
     close_server()  # the workers would share it, and a power cut in one of them would be a power cut in all
     kills = drawn(instants, count)
     with ProcessPoolExecutor(max_workers=2) as pool:
-        verdicts = list(pool.map(one, [(kill, expected) for kill in kills], chunksize=4))
+        verdicts = []
+        for verdict in pool.map(one, [(kill, expected) for kill in kills], chunksize=4):
+            verdicts.append(verdict)
+            if not verdict.well or len(verdicts) % SHOWN_EACH == 0:
+                well = sum(each.well for each in verdicts)
+                print(f"   {well} of {len(verdicts)} as promised; the last: {verdict}", flush=True)
     return {
         "instants": float(instants),
         "kills": float(len(kills)),

@@ -92,6 +92,11 @@ class Cluster:
         """Return the URL of one of its databases."""
         return f"postgresql+psycopg://{USER}@/{database}?host={self._sockets}"
 
+    @property
+    def socket(self) -> Path:
+        """The Unix socket that the server listens on."""
+        return self._sockets / ".s.PGSQL.5432"
+
     def new_database(self) -> str:
         """Make an empty database; returns its URL."""
         name = f"t{uuid4().hex[:12]}"

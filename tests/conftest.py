@@ -25,6 +25,7 @@ from tests.helpers.signal_defaults import default_signals
 #: The same examples every time and on every machine; a busy machine is slow, not wrong.
 settings.register_profile("labctl", derandomize=True, deadline=None, database=None)
 settings.load_profile("labctl")
+pytest_plugins = ["tests.helpers.postgresql"]
 #: How long a coroutine of a test may take, seconds.
 LOOP_S = 60.0
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

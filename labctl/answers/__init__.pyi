@@ -65,6 +65,7 @@ from labctl.answers.budget import (
     UncertaintyJson as UncertaintyJson,
     VectorBoundJson as VectorBoundJson,
 )
+from labctl.answers.bundle import BundleResponse as BundleResponse
 from labctl.answers.calibration_file import (
     AxisEvidenceJson as AxisEvidenceJson,
     CalibrationJson as CalibrationJson,

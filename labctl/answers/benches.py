@@ -38,8 +38,25 @@ class BenchStop(ResponseModel):
     text: str = Field(description="How far the stop is, and what keeps it, in words.")
 
 
+class BenchDriver(ResponseModel):
+    """The process that has reserved a bench, or had and is gone."""
+
+    url: str | None = Field(description="Address of the service that drives the bench; null: a process at a terminal.")
+    host: str = Field(description="Name of the computer on which the process runs.")
+    pid: int = Field(description="Number of the process on that computer.")
+    since: datetime = Field(description="Time since which the process has the bench.")
+    last_sign_at: datetime = Field(
+        description="Time at which the process last renewed its reservation; it does so every 10 s."
+    )
+    alive: bool = Field(
+        description="Whether the process drives the bench now. false: it has ended without releasing the bench, or has "
+        "not renewed its reservation for 120 s."
+    )
+    text: str = Field(description="The same as a sentence; if the process is gone, what to do.")
+
+
 class BenchStatus(ResponseModel):
-    """A bench, and what its last safe state could not confirm."""
+    """A bench, what its last safe state could not confirm, and which process drives it."""
 
     name: BenchName
     last_used_at: datetime = Field(description="Time at which the bench was last used.")
@@ -66,6 +83,11 @@ class BenchStatus(ResponseModel):
     )
     stop: BenchStop | None = Field(
         default=None, description="The newest stop that is not carried out yet, or not taken back; null: none."
+    )
+    driver: BenchDriver | None = Field(
+        default=None,
+        description="The process that has reserved the bench; null: none has, or the bench is simulated and the "
+        "database a file, to which no other process can write.",
     )
 
 

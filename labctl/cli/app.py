@@ -16,6 +16,7 @@ from labctl.cli.commands import (
     audit,
     batches,
     bench,
+    bundle,
     calibrations,
     campaign,
     campaign_control,
@@ -60,6 +61,7 @@ app.add_typer(plugins.driver_app, name="driver")
 app.add_typer(campaign.app, name="campaign")
 campaign.app.add_typer(schedule.app, name="schedule")
 campaign_control.add_to(campaign.app)
+recordings.export_app.command("bundle")(bundle.export_bundle)
 app.add_typer(recordings.export_app, name="export")
 app.add_typer(keys.app, name="key")
 app.add_typer(audit.app, name="audit")

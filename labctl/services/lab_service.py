@@ -18,6 +18,7 @@ from labctl.answers.live import LiveStateResponse
 from labctl.answers.service import HealthResponse, HeartbeatResponse, PulseResponse
 from labctl.services.bench_access import BenchAccess
 from labctl.services.benches.bench_left import BenchLeft
+from labctl.services.benches.drivers import driven_benches
 from labctl.services.benches.start_confirmation import start_questions
 from labctl.services.calibrations.fetch_log import FetchLog
 from labctl.services.campaigns.bench_runner import BenchRunner
@@ -184,7 +185,7 @@ class LabService:
         answer = access.status(campaign)
         if answer is None:
             row = self.store.campaigns.get(campaign)
-            answer = mark_abandoned(from_rows(self.store, row), attended=access.runs(campaign))
+            answer = mark_abandoned(from_rows(self.store, row), attended=self._is_attended(campaign, row.bench_name))
         if access.bench is None:
             return answer.model_copy(update={"resumable": False, "resume_reason": NO_BENCH})
         return with_resume(self.store, answer, access.bench, lambda: access.running)
@@ -199,7 +200,14 @@ class LabService:
         if stored.state in ENDED:
             return stored
         live = self.bench_access.status(stored.id)
-        return live or mark_abandoned(stored, attended=self.bench_access.runs(stored.id))
+        return live or mark_abandoned(stored, attended=self._is_attended(stored.id, stored.bench))
+
+    def _is_attended(self, campaign: int, bench: str) -> bool:
+        """Return whether a process runs a campaign: this service on its own bench, or another one on another bench."""
+        is_own = self.bench is not None and self.bench.name == bench
+        if is_own or not self.store.is_shared:
+            return self.bench_access.runs(campaign)
+        return bench in driven_benches(self.store)
 
     def follow(self, campaign: int, after: int) -> AsyncIterator[EventResponse | CampaignResponse | None]:
         """Yield where a campaign is, as `CampaignEventStream.follow` does, until it ends or this service does."""

@@ -15,7 +15,7 @@ from labctl.store.integrity.migration import (
 )
 from labctl.store.integrity.move import Moved as Moved, move_database as move_database
 from labctl.store.manifests.chain import ChainHead as ChainHead
-from labctl.store.manifests.signatures import PublicKey as PublicKey, read_public_key as read_public_key
+from labctl.public_keys import PublicKey as PublicKey, read_public_key as read_public_key
 from labctl.store.records import (
     AuditRow as AuditRow,
     CalibrationRecord as CalibrationRecord,

@@ -86,6 +86,11 @@ class Store:
         return self._database.writes and not is_url(self.location)
 
     @property
+    def is_shared(self) -> bool:
+        """Whether several processes may write to the database at the same time, each with a bench of its own."""
+        return is_url(self.location)
+
+    @property
     def address(self) -> StoreAddress:
         """The address by which another process opens the same database."""
         return StoreAddress(self.location, self._database.writer)

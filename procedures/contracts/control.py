@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ def _no_loss() -> str:
 class Control:
     """A request that any thread may read and change. An abort is final.
 
-    `loss` returns why the bench may no longer be driven from here, and an empty text while it may. Only `poll` calls
-    it; reading `request` changes nothing.
+    `loss` returns why the bench may no longer be driven from here, and an empty text while it may. Only `poll` and
+    `interrupt_if_lost` call it; reading `request` changes nothing.
     """
 
     def __init__(self, loss: Callable[[], str] = _no_loss) -> None:
@@ -92,10 +92,25 @@ class Control:
         """Wait until the table is confirmed to stand after a request to end, s of wall time; returns whether it is."""
         return self._at_rest.wait(within_s)
 
-    def wait_for_end(self) -> None:
-        """Wait until the end was asked for, or the campaign has come to its end by itself."""
-        self._ending.get()
+    def wait_for_end(self, within_s: float) -> bool:
+        """Wait until the end was asked for, or the campaign has come to its end by itself, s of wall time.
+
+        Returns whether either came.
+        """
+        try:
+            self._ending.get(timeout=within_s)
+        except Empty:
+            return False
         self._ending.put(None)  # for who else waits
+        return True
+
+    def interrupt_if_lost(self) -> None:
+        """Interrupt the campaign if the bench may no longer be driven, for a thread that does not drive the bench.
+
+        The one that drives it polls, but not while it waits for its database.
+        """
+        if reason := self._loss():
+            self.interrupt(reason)
 
     def has_left_step(self, within_s: float) -> bool:
         """Wait until what drives the bench makes it safe, s of wall time; returns whether it does.

@@ -35,6 +35,7 @@ class Engine:
     campaign time: that of `time` for a resumed campaign, else seconds since `run` was called. Without `guards` the
     recipe's own rules are compared with the limits of the bench. `notices` are recorded as the campaign starts.
     `sufficiency` is asked after each data set whether the campaign may end before its plan does; None: it does not.
+    `passing` are errors of the journal that pass by themselves: they interrupt the campaign, to be resumed later.
     """
 
     def __init__(
@@ -51,11 +52,12 @@ class Engine:
         time: CampaignTime | None = None,
         notices: Sequence[Event] = (),
         sufficiency: SufficiencyMonitor | None = None,
+        passing: tuple[type[Exception], ...] = (),
     ) -> None:
         self.plan = plan
         self._sufficiency = sufficiency
         self._enough = ""
-        self._notices = notices
+        self._notices, self._passing = notices, passing
         self.control = control or Control()
         self._tracker = ProgressTracker(plan, clock, observer)
         self._recorder = CampaignRecorder(journal, clock, self._tracker, time or CampaignTime(clock))
@@ -110,6 +112,9 @@ class Engine:
             state, reason = self._failed(error)
         except (KeyboardInterrupt, SystemExit):
             state, reason = CampaignState.ABORTED, "interrupted (Ctrl-C or a signal)"
+            raise
+        except self._passing as error:
+            state, reason = CampaignState.INTERRUPTED, f"interrupted: {error}"
             raise
         except BaseException as error:
             reason = f"{type(error).__name__}: {error}"

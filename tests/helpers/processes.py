@@ -76,9 +76,11 @@ class ServiceProcess:
         log: Path | None = None,
         shell: str = "",
         loads: bool = False,
+        bench: Path | str = "single-axis-sim",
     ) -> None:
-        self.database = database
-        command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json", *options]
+        """Serve a database; `bench` is a shipped bench, or a file that has the name of its bench."""
+        self.database, self._bench = database, Path(bench).stem
+        command = ["serve", "--bench", str(bench), "--speed", "30", "--port", "0", "--json", *options]
         if shell or loads:
             before = ["/bin/sh", "-c", f'{shell}; exec "$0" "$@"'] if shell else []
             self.process = begin([*before, *labctl(database, *command)], log)
@@ -140,7 +142,7 @@ class ServiceProcess:
             holder = holder_of(location)
             return holder.pid if holder else self.bench_pid
         with open_store(location, write=False) as store:
-            lease = store.leases.holder("single-axis-sim")
+            lease = store.leases.holder(self._bench)
             return lease.pid if lease else self.bench_pid
 
 

@@ -54,6 +54,33 @@ def test_a_calibration_that_is_held_is_not_fetched_again(client: Client) -> None
     assert (header.media_type.partition(";")[0], header.content[:2]) == ("text/x-c", b"/*")
 
 
+@pytest.mark.parametrize(("timeout_s", "asked"), [(20.0, 4), (8.0, 3)])
+def test_a_service_that_is_busy_is_asked_again_when_it_says(timeout_s: float, asked: int) -> None:
+    bodies: list[bytes] = []
+    busy = [{"retry-after": "3"}, {}, {"retry-after": "5"}]
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        bodies.append(request.read())
+        if len(bodies) <= len(busy):
+            problem = {"type": "urn:labctl:problem:too-busy", "detail": "24 computations wait"}
+            return httpx.Response(429, json=problem, headers=busy[len(bodies) - 1])
+        return httpx.Response(201, json={"serial": FOG, "recording": 7, "datasets": 1, "readings": 2, "warnings": []})
+
+    clock = VirtualClock()
+    began_s = clock.now_s()
+    with Client("http://busy", timeout_s=timeout_s, transport=httpx.MockTransport(answer), clock=clock) as client:
+        if asked > len(busy):
+            assert client.import_recording(EXAMPLES / "osu-fog").recording == 7
+        else:
+            with pytest.raises(ServiceRefused, match="24 computations wait") as refused:
+                client.import_recording(EXAMPLES / "osu-fog")
+            assert refused.value.status == 429
+    assert clock.now_s() - began_s == (9.0 if asked == 4 else 4.0)
+    assert len(bodies) == asked
+    assert len({len(body) for body in bodies}) == 1  # each time the whole recording was sent
+    assert len(bodies[0]) > 10_000
+
+
 def test_a_refusal_has_the_services_words_and_a_slug_for_programs(client: Client) -> None:
     with pytest.raises(ServiceRefused, match="unit 'X'") as unknown:
         client.unit("X")

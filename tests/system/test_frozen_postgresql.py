@@ -20,7 +20,6 @@ from labctl.answers.admin import KeyRequest, Role
 from labctl.services.admin.api_keys import create_key
 from labctl.store import open_store
 from studies.postgresql_cluster import Cluster
-from tests.helpers.postgresql import running_cluster
 from tests.helpers.processes import WAIT_S, ServiceProcess, running
 from tests.helpers.simulator_process import Simulator
 from tests.helpers.stopped_table import ended, stopped, stops, turning
@@ -29,12 +28,6 @@ pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 #: More requests that wait for the database than any pool of threads of the web process has threads.
 CROWD = 60
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[Cluster]:
-    with running_cluster() as made:
-        yield made
 
 
 @pytest.fixture

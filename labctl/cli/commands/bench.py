@@ -150,7 +150,9 @@ def wiggle(
 
 @app.command("status")
 def status(as_json: Json = False, database: Database = None) -> None:
-    """List the benches that were not confirmed safe when their last campaign ended or its process was lost."""
+    """List the benches: their last safe state, what a lost process left, and which service drives each; exit 1 where
+    a bench is not confirmed safe or its service is gone.
+    """
     from labctl.services.campaigns.bench_status import bench_statuses
     from labctl.services.read_access import open_readonly
 
@@ -174,9 +176,10 @@ def status(as_json: Json = False, database: Database = None) -> None:
                     f"labctl confirmed the safe state at {bench.confirmed_at}; a person must still inspect the "
                     "bench, then run `labctl bench clear`",
                 )
-            for line in filter(None, remarks if any(remarks) else ["the safe state is confirmed"]):
+            driver = None if bench.driver is None else bench.driver.text
+            for line in filter(None, [*(remarks if any(remarks) else ["the safe state is confirmed"]), driver]):
                 console.print(f"{bench.name:18} {line}", soft_wrap=True)
-    if any(bench.unconfirmed or bench.left for bench in benches):
+    if any(bench.unconfirmed or bench.left or (bench.driver and not bench.driver.alive) for bench in benches):
         raise typer.Exit(1)
 
 

@@ -60,17 +60,20 @@ def diagnose(
     A diagnosis that was stopped is continued. On a bench that is not simulated each experiment has to be confirmed.
     """
     from labctl.answers.diagnosis import DiagnosisRequest
-    from labctl.services.commands.open import service_url
+    from labctl.config import default_database
+    from labctl.services.commands.open import diagnosis_service_url
+    from labctl.store.connection.location import is_url
 
     with one_clear_line():
         given = {"version": version, "recordings": recording_numbers(recording)}
         request = DiagnosisRequest.model_validate(given if hours is None else {**given, "hours": hours})
         printer = DiagnosisPrinter(quiet=as_json)
-        url = service_url(database)
+        url = diagnosis_service_url(database, serial, bench)
         if end:
             answer = _end(database, url, serial)
         elif url is not None:
-            answer = _follow(url, serial, request, bench, printer)
+            is_shared = is_url(database or default_database())  # there the service was found by its bench
+            answer = _follow(url, serial, request, None if is_shared else bench, printer)
         else:
             answer = _run(database, serial, request, bench, printer)
     if as_json:

@@ -26,13 +26,16 @@ def list_(
     database: Database = None,
 ) -> None:
     """List the scheduled starts, the next first. A start that was missed is listed until it is cancelled."""
+    from labctl.services.benches.drivers import driven_benches
     from labctl.services.commands.open import service_url
     from labctl.services.read_access import open_readonly
     from labctl.services.schedule.queue import list_starts
 
     with one_clear_line(), open_readonly(database) as store:
         answers = list_starts(store, ended=ended)
-        served = service_url(database) is not None
+        waiting = {answer.bench for answer in answers if answer.due_at is not None}
+        unserved = sorted(waiting - driven_benches(store)) if store.is_shared else []
+        served = store.is_shared or service_url(database) is not None
     if as_json:
         print_json(answers)
         return
@@ -45,6 +48,12 @@ def list_(
             str(answer.priority),
         )  # fmt: skip
     console.print(rows)
+    for bench in unserved:
+        stderr.print(
+            f"no service drives bench {bench}, so no start that is scheduled there will begin; run `labctl serve "
+            "--bench FILE`",
+            style="yellow",
+        )
     if answers and not served:
         stderr.print(
             "no service uses this database, so no scheduled start will begin; run `labctl serve`", style="yellow"

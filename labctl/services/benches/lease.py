@@ -203,7 +203,12 @@ def open_for(bench: BenchFile, location: str) -> Iterator[Store]:
 def driver_of(store: Store, bench_name: str, now: datetime) -> LeaseRow | None:
     """Return the lease of the process that drives a bench now; None where no process does."""
     holder = store.leases.holder(bench_name)
-    return None if holder is None or holder.expires_at <= now or _is_dead(holder) else holder
+    return None if holder is None or is_over(holder, now) else holder
+
+
+def is_over(lease: LeaseRow, now: datetime) -> bool:
+    """Return whether the holder of a lease no longer drives the bench: its time is over, or its process."""
+    return lease.expires_at <= now or _is_dead(lease)
 
 
 def described(lease: LeaseRow) -> str:
@@ -229,8 +234,9 @@ def _is_dead(lease: LeaseRow) -> bool:
         return False
     try:
         os.kill(lease.pid, 0)
+        state = Path(f"/proc/{lease.pid}/stat").read_text(encoding="latin-1").rpartition(")")[2].split()[0]
     except ProcessLookupError:
         return True
-    except OSError:
+    except (OSError, IndexError):
         return False
-    return False
+    return state in {"Z", "X"}  # it has ended, and its parent has not asked how (proc(5))

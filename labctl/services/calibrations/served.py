@@ -140,7 +140,7 @@ def calibration_file(
     if served is None:
         document, hash_ = store.calibrations.document(serial, version)  # says why there is none
         served = ServedCalibration(document, hash_, None, in_force=False)
-    certification = _certification(served)
+    certification = certification_of(served)
     number = served.act.version if served.act else version or store.calibrations.certified_version(serial)
     content, tag = (
         (served.document, served.hash) if certification is None else _certified(served.document, certification)
@@ -172,7 +172,7 @@ def calibration_state(store: Store, serial: str, calibration_hash: str) -> Calib
             f"unit {serial!r} has no calibration with the hash {calibration_hash[:64]!r}; give `calibration_hash` of a "
             "calibration file (64 hexadecimal digits)"
         )
-    certification, gone = _certification(served), notice_of(served)
+    certification, gone = certification_of(served), notice_of(served)
     return CalibrationStateResponse(
         serial=known_serial, version=version, calibration_hash=served.hash,
         state=certification.state if certification else NOT_CERTIFIED,
@@ -197,7 +197,8 @@ def notice_of(served: ServedCalibration) -> Withdrawn | None:
     return None
 
 
-def _certification(served: ServedCalibration) -> Certification | None:
+def certification_of(served: ServedCalibration) -> Certification | None:
+    """Return the certification that a version's file has; None where the version was never certified."""
     if (act := served.act) is None:
         return None
     state: State = "in-force" if served.in_force else "revoked" if act.act == "revoke" else "superseded"

@@ -25,9 +25,10 @@ from labctl.services.campaigns.live_loan import LiveLoan
 from labctl.services.campaigns.preparation import Prepared, refuse_unconfirmed
 from labctl.services.campaigns.recorded_campaigns import RecordedCampaigns
 from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
-from labctl.services.campaigns.resume import with_original_simulation
+from labctl.services.campaigns.resume import refuse_other_bench, with_original_simulation
 from labctl.services.campaigns.status import answer_of, campaign_status, outlives_its_process
 from labctl.services.campaigns.stop_execution import StopExecution
+from labctl.services.campaigns.unattended import not_on_bench
 from labctl.services.planning.loading import with_drivers
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.services.standards.agreement import with_register
@@ -205,8 +206,10 @@ class BenchRunner:
                     raise Conflict(f"campaign {campaign} is running, so there is nothing to resume; let it run")
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:
+                row = self._store.campaigns.get(campaign)
+                refuse_other_bench(self._store, row, self._bench.name)
                 self._refuse_unless_free()
-                bench = with_original_simulation(self._store.campaigns.get(campaign), self._bench)
+                bench = with_original_simulation(row, self._bench)
                 self._let_move(request.by if attended else None, stop_known)
                 control = self._new_control()
                 clock = stoppable(self._make_clock(), control)
@@ -266,11 +269,7 @@ class BenchRunner:
         job = self._job
         over = job is not None and job.progress is not None and job.progress.state in ENDED
         if job is None or job.row.id != campaign or over:
-            state = self._store.campaigns.get(campaign).state
-            raise Conflict(
-                f"campaign {campaign} does not run on bench {self._bench.name} now (its state: {state}); check "
-                "the number of the campaign"
-            )
+            raise not_on_bench(self._store, campaign, self._bench.name)
         return job
 
     def _run(self, job: CampaignJob, prepared: Prepared) -> None:
@@ -283,11 +282,11 @@ class BenchRunner:
             if answer.state is CampaignState.INTERRUPTED:
                 self._recovery.expect_resume()
         except StoreError as error:
-            self._recovery.expect_end(job.row.id, str(error))
+            self._recovery.expect_end(job.row.id, str(error), to_be_resumed=job.is_resumed_after(error))
             raise
         finally:
             job.control.leave_step()
-            self.stops.is_safe = job.control.is_at_rest(0.0) and not job.control.hindrance
+            self.stops.is_safe = job.is_safe
             self._job = None
             self.stops.settle()
             self._listeners.notify()

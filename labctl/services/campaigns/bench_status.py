@@ -7,6 +7,7 @@ from datetime import datetime
 
 from labctl.answers.benches import BenchStatus, ClearRequest
 from labctl.errors import Conflict
+from labctl.services.benches.drivers import bench_drivers
 from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.status import abandoned_campaigns, describe_interrupted, outlives_its_process
 from labctl.store import BenchRow, Store
@@ -45,7 +46,10 @@ def bench_statuses(store: Store) -> list[BenchStatus]:
     for answer in abandoned_campaigns(store):
         if outlives_its_process(store.campaigns.get(answer.id)):
             campaigns_left.setdefault(answer.bench, []).append(describe_interrupted(answer))
+    drivers = bench_drivers(store)
     return [
-        bench_status(store, row).model_copy(update={"left": campaigns_left.get(row.name, [])})
+        bench_status(store, row).model_copy(
+            update={"left": campaigns_left.get(row.name, []), "driver": drivers.get(row.name)}
+        )
         for row in store.benches.all()
     ]

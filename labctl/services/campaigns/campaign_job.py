@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 from instruments.clock import Clock
 from instruments.interfaces.table import RateTable
+from labctl.errors import DatabaseUnreachable, StoreError
 from labctl.services.campaigns.bench_lending import BenchLending
 from labctl.services.campaigns.preparation import Prepared
 from labctl.store import CampaignRow
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.control import Control
 from procedures.execution.safe_state import stop_table
 from procedures.monitoring.progress import Progress
@@ -18,6 +20,8 @@ from procedures.monitoring.progress import Progress
 #: An engine that does not make its bench safe within this from a stop, s, may be waiting for its database; another
 #: thread then takes the bench from it while it writes. Who asked for the stop waits longer before the process is ended.
 LEAVES_WITHIN_S, STUCK_S = 0.3, 60.0
+#: How often it is read, beside the engine, whether the bench may still be driven, s of wall time.
+LOSS_READ_S = 1.0
 
 
 @dataclass
@@ -37,12 +41,27 @@ class CampaignJob:
         self.thread = threading.Thread(target=run, name=f"campaign-{self.prepared.id}")
         self.thread.start()
 
+    @property
+    def is_safe(self) -> bool:
+        """Whether its table stands and nothing of its safe state is unconfirmed."""
+        return self.control.is_at_rest(0.0) and not self.control.hindrance
+
+    def is_resumed_after(self, error: StoreError) -> bool:
+        """Return whether it goes on by itself once its database answers again: nothing else has ended it.
+
+        Of one that was done only the end is written.
+        """
+        ended = None if self.progress is None else self.progress.state
+        is_open = ended in {CampaignState.INTERRUPTED, CampaignState.DONE}
+        return isinstance(error, DatabaseUnreachable) and is_open and self.is_safe
+
     def _stop_if_stuck(self) -> None:
         """Stop the table from here where the engine does not, because what it writes down first waits for its database.
 
         The stop may come from a person, a signal, or the lease of the bench, lost to another.
         """
-        self.control.wait_for_end()
+        while not self.control.wait_for_end(LOSS_READ_S):
+            self.control.interrupt_if_lost()
         table = self.prepared.bench.table
         if table is None or self.control.has_left_step(LEAVES_WITHIN_S):
             return

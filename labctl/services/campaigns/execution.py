@@ -14,7 +14,7 @@ from labctl.acting_user import actor
 from labctl.answers.campaigns import BENCH_CHECKS, CampaignResponse, StartRequest
 from labctl.answers.wire_logs import RecordedSession
 from labctl.config import default_database
-from labctl.errors import Conflict, DiskFull, Stopped, StoreError
+from labctl.errors import Conflict, DatabaseUnreachable, DiskFull, Stopped, StoreError
 from labctl.log import get_logger
 from labctl.log.context import for_campaign
 from labctl.log.logged_journal import LoggedJournal
@@ -98,6 +98,7 @@ def _engine(
         observer=with_pace_watch(prepared.clock, observe),
         time=prepared.time,
         sufficiency=sufficiency_of(store, prepared, is_simulated=bench.is_simulated),
+        passing=(DatabaseUnreachable,),
         notices=(*overdue_events(bench.standards, today), *register_events(store, standards_of(bench), today)),
     )
 

@@ -12,7 +12,7 @@ from instruments.bench import open_bench
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
-from labctl.errors import BenchBusy, LabctlError
+from labctl.errors import BenchBusy, DatabaseUnreachable, LabctlError
 from labctl.log import get_logger
 from labctl.services.campaigns.resumability import retries_exhausted
 from labctl.services.campaigns.status import from_rows, how_far
@@ -84,9 +84,12 @@ class CampaignRecovery:
         """Note that a campaign was interrupted and is to be resumed."""
         self._unfinished = True
 
-    def expect_end(self, campaign: int, why: str) -> None:
-        """Note that the end of a campaign could not be written."""
-        self._unwritten = _UnwrittenEnd(campaign, why)
+    def expect_end(self, campaign: int, why: str, *, to_be_resumed: bool = False) -> None:
+        """Note that the end of a campaign could not be written, or that of one `to_be_resumed`, whose bench is safe."""
+        if to_be_resumed:
+            self._unfinished = True
+        else:
+            self._unwritten = _UnwrittenEnd(campaign, why)
 
     def record_end(self) -> None:
         """Write the end of a campaign that could not be written when it came. Raises StoreError."""
@@ -135,6 +138,9 @@ class CampaignRecovery:
                     resumed = row.id
                     continue
             except BenchBusy:  # another process was quicker, or the lease was lost just now
+                return
+            except DatabaseUnreachable:  # it passes: tried again when the schedule is read next
+                secure()
                 return
             except (LabctlError, InstrumentError) as error:
                 why_not = f"not resumed: {error}"

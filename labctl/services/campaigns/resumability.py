@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from instruments.bench_config import BenchFile
 from labctl.answers.campaigns import CampaignResponse
+from labctl.services.benches.drivers import whereabouts
 from labctl.store import ResumePoint, Store
 from procedures.contracts.campaign_state import CampaignState
 
@@ -58,6 +59,8 @@ def _standing(
 def _refusal(store: Store, answer: CampaignResponse, bench: BenchFile | None, running: int | None) -> str:
     """Return why a resume would be refused, empty when it would not."""
     name = answer.bench if bench is None else bench.name
+    if bench is not None and store.is_shared and name != answer.bench:
+        return f"the campaign is resumed on its own bench only; {whereabouts(store, answer.bench)}"
     if bench is not None and {gyro.serial for gyro in bench.gyros} != set(answer.recordings):
         return f"bench {name} has other units than those that the campaign measures; name the bench of the campaign"
     if running not in {None, answer.id}:  # its own end is being written: by the time of a resume it is over

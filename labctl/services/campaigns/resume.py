@@ -18,6 +18,7 @@ from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.log import get_logger
 from labctl.services.benches.confirmation import SafeStateRetry
+from labctl.services.benches.drivers import whereabouts
 from labctl.services.benches.identity import pinned, reported_in
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed
@@ -90,6 +91,7 @@ def prepare_resume(
     row = store.campaigns.get(campaign)
     if row.state is CampaignState.DONE:
         raise Conflict(f"campaign {campaign} is done and cannot be resumed; start a new one")
+    refuse_other_bench(store, row, bench_file.name)
     bench_file = _same_units(row, bench_file)
     refuse_unconfirmed(store, bench_file.name)
     standing, plan = store.resume_points.of_campaign(campaign), plan_of(store, row)
@@ -120,6 +122,19 @@ def prepare_resume(
     return Prepared(
         campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, CampaignTime(clock, t_s)
     )
+
+
+def refuse_other_bench(store: Store, row: CampaignRow, bench: str) -> None:
+    """Raise Conflict for another bench than the campaign's where that bench may have a service of its own.
+
+    Its service resumes what is unfinished on its bench, and could not know that the campaign runs on another one.
+    """
+    if store.is_shared and bench != row.bench_name:
+        advice = whereabouts(store, row.bench_name)
+        raise Conflict(
+            f"campaign {row.id} was begun on bench {row.bench_name}, not {bench}, and several services write to this "
+            f"database: the campaign is resumed on its own bench only; {advice}"
+        )
 
 
 def _mark_resumed(store: Store, row: CampaignRow, standing: ResumePoint, how: Resumption) -> None:

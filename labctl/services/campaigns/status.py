@@ -18,6 +18,7 @@ from labctl.answers.campaign_parts import (
 )
 from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.services.benches.bench_clock import has_simulated_time
+from labctl.services.benches.drivers import driven_benches
 from labctl.services.benches.identity import reported_in
 from labctl.services.campaigns.failure_advice import advice_of
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
@@ -149,12 +150,21 @@ def _statuses(store: Store, read: Callable[[], list[CampaignRow]]) -> list[Campa
     tested: rows are read again before a campaign is called abandoned.
     """
     rows = read()
-    unfinished = {row.id for row in rows if row.state not in ENDED}
-    if unfinished and store.is_held:
-        unfinished.clear()
-    if unfinished:
+    left = _unattended(store, rows)
+    if left:
         rows = read()
-    return [mark_abandoned(answer, attended=answer.id not in unfinished) for answer in statuses_of(store, rows)]
+    return [mark_abandoned(answer, attended=answer.id not in left) for answer in statuses_of(store, rows)]
+
+
+def _unattended(store: Store, rows: Sequence[CampaignRow]) -> set[int]:
+    """Return the campaigns that have not ended and that no process runs."""
+    unfinished = {row.id: row.bench_name for row in rows if row.state not in ENDED}
+    if not unfinished:
+        return set()
+    if store.is_shared:
+        driven = driven_benches(store)
+        return {campaign for campaign, bench in unfinished.items() if bench not in driven}
+    return set() if store.is_held else set(unfinished)
 
 
 def abandoned_campaigns(store: Store) -> list[CampaignResponse]:

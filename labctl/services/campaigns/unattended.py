@@ -7,6 +7,7 @@ from datetime import datetime
 from labctl.answers.campaigns import CampaignResponse
 from labctl.errors import Conflict
 from labctl.log import get_logger
+from labctl.services.benches.drivers import driven_benches, whereabouts
 from labctl.services.benches.lease import described, driver_of
 from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.status import campaign_status, outlives_its_process
@@ -57,10 +58,21 @@ def abort_abandoned(
     return campaign_status(store, campaign)
 
 
+def not_on_bench(store: Store, campaign: int, bench: str) -> Conflict:
+    """Return the refusal of an act on a campaign that does not run on this process's bench. Raises NotFound."""
+    row = store.campaigns.get(campaign)
+    elsewhere = store.is_shared and row.bench_name != bench and row.state not in ENDED
+    advice = whereabouts(store, row.bench_name) if elsewhere else "check the number of the campaign"
+    return Conflict(f"campaign {campaign} does not run on bench {bench} now (its state: {row.state}); {advice}")
+
+
 def not_running(store: Store, campaign: int, action: str) -> Conflict:
     """Return the refusal of an action that only a running campaign can take. Raises NotFound."""
-    state = store.campaigns.get(campaign).state
+    row = store.campaigns.get(campaign)
+    if store.is_shared and row.state not in ENDED and row.bench_name in driven_benches(store):
+        advice = whereabouts(store, row.bench_name)
+        return Conflict(f"campaign {campaign} does not run in this process; {advice}")
     return Conflict(
-        f"campaign {campaign} is {state} and no process runs it, so it is not possible to {action}; `labctl campaign "
-        f"resume {campaign}` continues it"
+        f"campaign {campaign} is {row.state} and no process runs it, so it is not possible to {action}; "
+        f"`labctl campaign resume {campaign}` continues it"
     )

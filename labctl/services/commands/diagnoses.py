@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from labctl.answers.campaigns import ReasonRequest, ResumeRequest
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
+from labctl.errors import Conflict
+from labctl.services.benches.drivers import driven_benches, whereabouts
 from labctl.services.commands.acts.abort import ABORT
 from labctl.services.commands.acts.resume import RESUME
 from labctl.services.commands.command import Command
@@ -17,12 +19,24 @@ def _start(context: CommandContext, asked: ToUnit[DiagnosisRequest]) -> Diagnosi
     return begin.begin(context.store, asked.serial, asked.body, context.control.own_bench(), context.now())
 
 
+def _refuse_elsewhere(context: CommandContext, diagnosis: int) -> None:
+    """Raise Conflict where the service of another bench carries out the diagnosis: its campaign runs there."""
+    store, bench = context.store, context.store.diagnoses.get(diagnosis).bench_name
+    if not store.is_shared or bench not in driven_benches(store):
+        return
+    own = context.control.own_bench()
+    if own is None or own.name != bench:
+        advice = whereabouts(store, bench)
+        raise Conflict(f"diagnosis {diagnosis} is not carried out here; {advice}")
+
+
 def _confirm(context: CommandContext, asked: ToDiagnosis[ConfirmExperimentRequest]) -> DiagnosisResponse:
     return begin.answer_experiment(context.store, asked.diagnosis, asked.body, context.now())
 
 
 def _stop(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
     """Write the stop down first: else the end of the campaign would be taken for that of the experiment."""
+    _refuse_elsewhere(context, asked.diagnosis)
     answer = begin.stop(context.store, asked.diagnosis, asked.body.text, context.now())
     _abort_campaign(context, asked)
     return answer
@@ -30,6 +44,7 @@ def _stop(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> Diagnos
 
 def _resume(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
     """Resume the campaign first: else its end would be taken for that of the experiment."""
+    _refuse_elsewhere(context, asked.diagnosis)
     if (
         campaign := begin.open_campaign(context.store, asked.diagnosis)
     ) is not None and campaign.state is CampaignState.ABORTED:
@@ -39,6 +54,7 @@ def _resume(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> Diagn
 
 
 def _end(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
+    _refuse_elsewhere(context, asked.diagnosis)
     answer = begin.end(context.store, asked.diagnosis, asked.body.text, context.now())
     _abort_campaign(context, asked)
     return answer

@@ -36,11 +36,33 @@ def service_url(database: str | None, campaign: int | None = None) -> str | None
 
 
 def _url_of_driver(location: str, campaign: int) -> str | None:
+    with open_readonly(location) as store:
+        return _driver_url(store, store.campaigns.get(campaign).bench_name)
+
+
+def _driver_url(store: Store, bench: str) -> str | None:
     from labctl.services.benches.lease import driver_of  # noqa: PLC0415  loads drivers
 
-    with open_readonly(location) as store:
-        driver = driver_of(store, store.campaigns.get(campaign).bench_name, SystemClock().utc())
+    driver = driver_of(store, bench, SystemClock().utc())
     return None if driver is None else driver.url
+
+
+def diagnosis_service_url(database: str | None, serial: str, bench: str | None) -> str | None:
+    """Return the address of the service that diagnoses a unit; None where this process does it.
+
+    On a database to which several processes write it is the service of the diagnosis that has not ended, else of the
+    bench that is named, else of the unit's last campaign. Raises BadInput, Conflict as a diagnosis does.
+    """
+    location = database or default_database()
+    if not is_url(location):
+        return service_url(location)
+    from labctl.services.diagnosis.experiment_bench import bench_of_unit  # noqa: PLC0415  loads drivers
+    from labctl.services.planning.loading import load_bench  # noqa: PLC0415  as above
+
+    with open_readonly(location) as store:
+        if (unfinished := store.diagnoses.open_of_unit(serial)) is not None:
+            return _driver_url(store, unfinished.bench_name)
+        return _driver_url(store, bench_of_unit(store, serial, None if bench is None else load_bench(bench)).name)
 
 
 @contextmanager

@@ -25,8 +25,8 @@ class Addressed:
         """Return all fields but the body, by name."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "body"}
 
-    def to_driver(self) -> Self:
-        """Return the request as the service that drives the bench takes it."""
+    def to_driver(self, bench: str) -> Self:  # noqa: ARG002  for requests that name a bench
+        """Return the request as the service that drives `bench` takes it."""
         return self
 
 
@@ -79,6 +79,10 @@ class ToBench(Addressed, Generic[BodyT_co]):
     bench: str
     body: BodyT_co
 
+    def to_driver(self, bench: str) -> Self:
+        """Return the request with the name of the bench: what a person gives may be a file."""
+        return replace(self, bench=bench)
+
 
 @dataclass(frozen=True)
 class ToKey(Addressed, Generic[BodyT_co]):
@@ -125,7 +129,7 @@ class CampaignStart(Addressed):
     simulated_start: datetime | None = None  #: aware
     wire_log: Path | None = None  #: file that gets every byte between labctl and the bench
 
-    def to_driver(self) -> Self:
+    def to_driver(self, bench: str) -> Self:  # noqa: ARG002  as above
         """Return the request without its bench, which is the service's own."""
         return replace(self, bench=None)
 
@@ -142,7 +146,7 @@ class CampaignResume(Addressed):
     speed: float | None = None
     wire_log: Path | None = None  #: file that gets every byte between labctl and the bench
 
-    def to_driver(self) -> Self:
+    def to_driver(self, bench: str) -> Self:  # noqa: ARG002  as above
         """Return the request without its bench, which is the service's own."""
         return replace(self, bench=None)
 

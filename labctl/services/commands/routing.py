@@ -6,9 +6,20 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 
 from instruments.clock import Clock
+from labctl.answers.benches import CheckRequest
+from labctl.answers.diagnosis import DiagnosisRequest
 from labctl.services.benches.lease import driver_of
 from labctl.services.commands.command import Command, CommandExecutor, RequestT, ResponseT
-from labctl.services.commands.requests import Addressed, CampaignResume, CampaignStart, ToCampaign
+from labctl.services.commands.requests import (
+    Addressed,
+    CampaignResume,
+    CampaignStart,
+    ToBench,
+    ToCampaign,
+    ToDiagnosis,
+    ToUnit,
+)
+from labctl.services.diagnosis.experiment_bench import bench_of_unit
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.store import Store
 
@@ -21,6 +32,12 @@ def bench_of(store: Store, request: object) -> str | None:
         return load_bench(request.bench or bench_for(load_recipe(request.body.recipe))).name
     if isinstance(request, ToCampaign | CampaignResume) and request.campaign is not None:
         return store.campaigns.get(request.campaign).bench_name
+    if isinstance(request, ToDiagnosis):
+        return store.diagnoses.get(request.diagnosis).bench_name
+    if isinstance(request, ToBench):
+        return load_bench(request.bench).name if isinstance(request.body, CheckRequest) else request.bench
+    if isinstance(request, ToUnit) and isinstance(request.body, DiagnosisRequest):
+        return bench_of_unit(store, request.serial, None).name
     return None
 
 
@@ -37,8 +54,8 @@ class RoutedExecutor:
         with self._open_store() as store:
             bench = bench_of(store, request)
             driver = None if bench is None else driver_of(store, bench, self._clock.utc())
-        if driver is None or driver.url is None:
+        if bench is None or driver is None or driver.url is None:
             return self._local.execute(command, request)
         if isinstance(request, Addressed):
-            request = request.to_driver()
+            request = request.to_driver(bench)
         return self._remote(driver.url).execute(command, request)

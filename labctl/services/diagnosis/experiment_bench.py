@@ -6,6 +6,7 @@ from datetime import datetime, time, timedelta
 
 from instruments.bench_config import BenchFile
 from labctl.errors import BadInput, Conflict
+from labctl.services.benches.drivers import whereabouts
 from labctl.services.campaigns.resume import with_original_simulation
 from labctl.store import CampaignRow, Store
 
@@ -23,10 +24,10 @@ def bench_of_unit(store: Store, serial: str, named: BenchFile | None) -> BenchFi
     bench = _same_simulation(last, named) if named is not None else _bench_of(last, serial)
     serials = [gyro.serial for gyro in bench.gyros if gyro.serial is not None]
     if serials and serial not in serials:
-        raise Conflict(
-            f"bench {bench.name} carries the units {', '.join(sorted(serials))}, not {serial}; name the bench that "
-            "carries the unit with --bench FILE"
-        )
+        advice = "name the bench that carries the unit with --bench FILE"
+        if store.is_shared and last is not None and last.bench_name != bench.name:
+            advice = whereabouts(store, last.bench_name)
+        raise Conflict(f"bench {bench.name} carries the units {', '.join(sorted(serials))}, not {serial}; {advice}")
     return bench
 
 

@@ -140,6 +140,7 @@ class Database:
         self.address = address
         self._clock = clock or WallClock()
         self._turn = WriterTurn(self._shown)
+        self._is_away = False  #: whether the server was waited for in vain, and has not answered since
         self.on_growth: Callable[[ChainHead], None] | None = None  #: called when manifests were added and committed
         self._backend = self._open_backend(address, as_it_is=as_it_is)
         self._engine, self._reader = self._backend.engines()
@@ -219,16 +220,22 @@ class Database:
     def outlast(self, work: Callable[[], ResultT]) -> ResultT:
         """Do something again for as long as the server does not answer, at most `patience_s`.
 
-        Returns what `work` does. Raises DatabaseUnreachable after that time; then, too, nothing was stored.
+        Returns what `work` does. Raises DatabaseUnreachable after that time; then, too, nothing was stored. From then
+        on, until it has answered again, the server is asked once: what a campaign writes down as it ends must not keep
+        its table turning for as long again each time.
         """
-        end_s = self._clock.now_s() + self._backend.patience_s
+        end_s = self._clock.now_s() + (0.0 if self._is_away else self._backend.patience_s)
         while True:
             try:
-                return work()
+                done = work()
             except DatabaseUnreachable:
                 if self._clock.now_s() >= end_s:
+                    self._is_away = True
                     raise
                 self._clock.sleep(RETRY_S)
+            else:
+                self._is_away = False
+                return done
 
     @contextmanager
     def writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sqlalchemy import exc
 
 from labctl.errors import BadCalibrationFile, StoreError
+from labctl.public_keys import PublicKey
 from labctl.store import migrate, sample_codec
 from labctl.store.connection.anchor_file import anchor_path, read_anchor
 from labctl.store.connection.commit_seal import missing
@@ -24,7 +25,6 @@ from labctl.store.integrity.check_means import MeansCheck
 from labctl.store.manifests.chain import ChainHead
 from labctl.store.manifests.digests import block_digests
 from labctl.store.manifests.parts import BlockParts, Parts
-from labctl.store.manifests.signatures import PublicKey
 from labctl.store.repositories.audit import Head, first_broken
 from labctl.store.schema import tables
 

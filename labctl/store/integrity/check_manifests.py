@@ -10,11 +10,11 @@ from typing import Any
 import sqlalchemy as sa
 
 from labctl.errors import StoreError
+from labctl.public_keys import PublicKey
 from labctl.store.manifests import chain
 from labctl.store.manifests.chain import ChainHead
 from labctl.store.manifests.contents import KINDS, Kind
 from labctl.store.manifests.parts import BlockParts, Parts, differing, parts_of
-from labctl.store.manifests.signatures import PublicKey
 from labctl.store.schema import tables
 
 #: Manifests that are in memory at a time.

@@ -11,7 +11,7 @@ from sqlalchemy import exc
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.connection.writer_lock import ServiceAddress
-from labctl.store.repositories.records_by_name import record_of
+from labctl.store.repositories.records_by_name import record_of, records_of
 from labctl.store.schema import tables
 
 
@@ -42,6 +42,13 @@ class Leases:
     def address(self) -> ServiceAddress:
         """Where this process is reached, for the leases that it takes."""
         return self._database.address
+
+    def all(self) -> list[LeaseRow]:
+        """Return every lease, by the name of its bench; also those of processes that are gone."""
+        x = tables.leases.c
+        query = sa.select(*(x[field.name] for field in fields(LeaseRow))).order_by(x.bench_name)
+        with self._database.reading() as connection:
+            return records_of(LeaseRow, connection.execute(query))
 
     def holder(self, bench_name: str) -> LeaseRow | None:
         """Return who holds a bench; None when it is free."""

@@ -294,6 +294,15 @@ class Certifications:
                 rows = [row for some in parts_of(serials) for row in connection.execute(some_of, {"serials": some})]
         return {row.serial: _act(row.serial, row) for row in rows}
 
+    def newest_versions(self, model: str | None = None) -> list[tuple[str, int]]:
+        """Return serial number and version of each unit's newest act, also a revocation; of one model, or of all."""
+        last = sa.select(sa.func.max(_X.id)).group_by(_X.serial)
+        query = sa.select(_X.serial, _X.version).where(_X.id.in_(last)).order_by(_X.serial)
+        if model is not None:
+            query = query.join(tables.units, tables.units.c.serial == _X.serial).where(tables.units.c.model == model)
+        with self._database.reading() as connection:
+            return [(row.serial, row.version) for row in connection.execute(query)]
+
     def verdicts(self, serials: Sequence[str]) -> dict[str, str | None]:
         """Return serial number -> the verdict with which its version in force was certified, where one is in force."""
         last = sa.select(sa.func.max(_X.id)).where(_X.serial.in_(sa.bindparam("serials", expanding=True)))

@@ -12,8 +12,8 @@ from labctl.config import SEAL_KEY_VARIABLE
 from labctl.errors import BadInput
 from labctl.extras import needs_extra
 from labctl.private_keys import SCHEME, KeyUse, TokenUri, open_session, refuse_open_key, token_uri
+from labctl.public_keys import PublicKey, public_key, signed_text
 from labctl.store.connection.private_files import FILE
-from labctl.store.manifests.signatures import PublicKey, public_key, signed_text
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey

@@ -3739,6 +3739,49 @@ export interface components {
             speed_reached: number | null;
         };
         /**
+         * BenchDriver
+         * @description The process that has reserved a bench, or had and is gone.
+         */
+        BenchDriver: {
+            /**
+             * Url
+             * @description Address of the service that drives the bench; null: a process at a terminal.
+             */
+            url: string | null;
+            /**
+             * Host
+             * @description Name of the computer on which the process runs.
+             */
+            host: string;
+            /**
+             * Pid
+             * @description Number of the process on that computer.
+             */
+            pid: number;
+            /**
+             * Since
+             * Format: date-time
+             * @description Time since which the process has the bench.
+             */
+            since: string;
+            /**
+             * Last Sign At
+             * Format: date-time
+             * @description Time at which the process last renewed its reservation; it does so every 10 s.
+             */
+            last_sign_at: string;
+            /**
+             * Alive
+             * @description Whether the process drives the bench now. false: it has ended without releasing the bench, or has not renewed its reservation for 120 s.
+             */
+            alive: boolean;
+            /**
+             * Text
+             * @description The same as a sentence; if the process is gone, what to do.
+             */
+            text: string;
+        };
+        /**
          * BenchResponse
          * @description The bench of a service, and what a person is asked before a campaign starts there.
          */
@@ -3809,7 +3852,7 @@ export interface components {
         };
         /**
          * BenchStatus
-         * @description A bench, and what its last safe state could not confirm.
+         * @description A bench, what its last safe state could not confirm, and which process drives it.
          */
         BenchStatus: {
             /**
@@ -3857,6 +3900,8 @@ export interface components {
             left: string[];
             /** @description The newest stop that is not carried out yet, or not taken back; null: none. */
             stop: components["schemas"]["BenchStop"] | null;
+            /** @description The process that has reserved the bench; null: none has, or the bench is simulated and the database a file, to which no other process can write. */
+            driver: components["schemas"]["BenchDriver"] | null;
         };
         /**
          * BenchStop

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterator
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,21 +22,10 @@ from labctl.store.connection.database import Database
 from labctl.store.integrity import move
 from labctl.store.integrity.move import move_database
 from labctl.store.schema import tables
-from tests.helpers.postgresql import Cluster, running_cluster
+from studies.postgresql_cluster import Cluster
 
 pytestmark = pytest.mark.timeout(300)
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[Cluster]:
-    with running_cluster() as running:
-        yield running
-
-
-@pytest.fixture
-def url(cluster: Cluster) -> str:
-    return cluster.new_database()
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -14,7 +14,7 @@ import psycopg
 import pytest
 import sqlalchemy as sa
 
-from labctl.answers.campaigns import StartRequest
+from labctl.answers.campaigns import CampaignRequest, StartRequest
 from labctl.answers.certification import RevokeRequest
 from labctl.errors import DatabaseUnreachable, StoreError
 from labctl.services.calibrations.certification import revoke
@@ -23,6 +23,8 @@ from labctl.services.calibrations.stability import Stability, stability_of
 from labctl.services.campaigns.execution import run_here
 from labctl.services.certificates.issue import issue
 from labctl.services.certificates.states import list_certificates
+from labctl.services.planning.loading import load_bench
+from labctl.services.schedule.queue import add_start
 from labctl.store import (
     CheckGyroRow,
     FetchRow,
@@ -37,25 +39,15 @@ from labctl.store import (
 from labctl.store.connection import postgresql_server
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
+from studies.postgresql_cluster import Cluster
 from tests.helpers import certificates, register
 from tests.helpers.certificates import simulated
 from tests.helpers.drifting_units import add_drifting_unit
-from tests.helpers.postgresql import Cluster, running_cluster
+from tests.helpers.schedule_lab import Lab
 
 pytestmark = pytest.mark.timeout(300)
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[Cluster]:
-    with running_cluster() as running:
-        yield running
-
-
-@pytest.fixture
-def url(cluster: Cluster) -> str:
-    return cluster.new_database()
 
 
 def note(store: Store, number: int) -> None:
@@ -124,6 +116,21 @@ def test_the_audit_trail_of_several_writers_is_one_chain(url: str) -> None:
     with open_store(url, write=False) as store:
         assert store.audit.first_broken() is None
         assert sorted(subjects(store)) == sorted(f"row {k}" for k in range(40))
+
+
+def test_a_start_that_two_services_find_due_is_begun_once(url: str) -> None:
+    """A service that has lost its bench to another may still read the schedule."""
+    with open_store(url, write=True) as one, open_store(url, write=True) as other:
+        labs = [Lab(one), Lab(other)]
+        starts = [labs[0].enter(at="now") for _ in range(6)]
+        elsewhere = load_bench("triaxial-sim")
+        add_start(one, CampaignRequest(recipe="verified-triaxial", at="now"), elsewhere, labs[0].clock.utc())
+        with ThreadPoolExecutor(2) as threads:
+            list(threads.map(lambda lab: lab.scheduler.tick(), labs))
+        assert sum(len(lab.begun) for lab in labs) == len(starts)
+        assert [labs[0].outcomes(each) for each in starts] == [["refused"]] * len(starts)
+        assert [row.bench_name for row in one.starts.all(ended=False)] == [elsewhere.name]
+        assert one.audit.first_broken() is None
 
 
 def test_a_reader_can_change_nothing(url: str) -> None:

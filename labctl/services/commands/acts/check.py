@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from labctl.answers.benches import BenchCheckResponse, CheckRequest
 from labctl.errors import NotFound
+from labctl.services.benches.drivers import whereabouts
 from labctl.services.commands.command import Command
 from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToBench
@@ -15,9 +16,11 @@ def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) ->
     """Check this service's bench. Raises NotFound for another one, BenchBusy while a campaign runs."""
     runner = control.bench_runner()
     if asked.bench != runner.bench.name:
+        shared = context.store.is_shared
+        advice = whereabouts(context.store, asked.bench) if shared else f"name bench {runner.bench.name}"
         raise NotFound(
-            f"this service drives bench {runner.bench.name}, not {asked.bench!r}, and can check "
-            f"only its own bench; name bench {runner.bench.name}, or ask the service of the other bench"
+            f"this service drives bench {runner.bench.name}, not {asked.bench!r}, and can check only its own bench; "
+            f"{advice}"
         )
     found = runner.check()
     context.store.audit.record(context.now(), "bench check", f"bench {found.bench}", {"ok": found.ok})

@@ -130,16 +130,18 @@ def test_only_one_of_two_takeovers_succeeds(shared: Store) -> None:
     assert shared.leases.holder(BENCH) == heir
 
 
-def test_a_holder_of_this_machine_that_has_ended_is_replaced_at_once(shared: Store) -> None:
+@pytest.mark.parametrize("waited_for", [True, False])
+def test_a_holder_of_this_machine_that_has_ended_is_replaced_at_once(shared: Store, waited_for: bool) -> None:
     clock = VirtualClock(AT)
     ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
+    os.waitid(os.P_PID, ended.pid, os.WEXITED | (0 if waited_for else os.WNOWAIT))
     lease = replace(far(clock), machine=this_machine(), pid=ended.pid)
     shared.leases.claim(lease, replacing=None)
     hold = BenchHold(shared, BENCH, clock)
     if not this_machine():
         pytest.skip("this system does not say where a process number means something")
     hold.take()
+    ended.wait()
     assert clock.now_s() == 0
     living = replace(far(clock), bench_name="another", machine=this_machine(), pid=os.getpid())
     shared.leases.claim(living, replacing=None)

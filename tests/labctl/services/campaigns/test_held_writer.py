@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ReasonRequest
 from labctl.errors import StoreError
+from labctl.services.benches.lease import BenchHold
 from labctl.services.campaigns import campaign_job
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
@@ -25,6 +26,7 @@ from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
 from labctl.store.connection import writer_turn
 from labctl.store.repositories.campaign_journal import StoreJournal
+from procedures.contracts.control import Control
 from procedures.contracts.journal import StepResult
 from procedures.execution import shutdown
 from tests.helpers.held_writer import held_writer
@@ -76,11 +78,24 @@ def test_an_engine_that_cannot_write_stops_its_table(store: Store, monkeypatch: 
     assert runner.free
 
 
-@pytest.mark.parametrize("by_signal", [False, True])
+class Lease:
+    """A lease on the bench that can be lost."""
+
+    held = True
+
+    def check(self) -> None:
+        """Allow everything."""
+
+    def control(self) -> Control:
+        return Control(lambda: "" if self.held else "the lease is lost")
+
+
+@pytest.mark.parametrize("by", ["a person", "a signal", "a lost lease"])
 def test_a_stop_stops_the_table_while_the_engine_waits_for_the_writer(
-    store: Store, monkeypatch: pytest.MonkeyPatch, *, by_signal: bool
+    store: Store, monkeypatch: pytest.MonkeyPatch, by: str
 ) -> None:
     monkeypatch.setattr(campaign_job, "LEAVES_WITHIN_S", 0.1)
+    monkeypatch.setattr(campaign_job, "LOSS_READ_S", 0.05)
     stopped = threading.Event()
     moved: list[bool] = []
     real = campaign_job.stop_table
@@ -93,7 +108,8 @@ def test_a_stop_stops_the_table_while_the_engine_waits_for_the_writer(
         return complaint
 
     monkeypatch.setattr(campaign_job, "stop_table", stop_table)
-    runner = BenchRunner(store, BENCH, VirtualClock, safe_within_s=0.0)
+    lease = Lease()
+    runner = BenchRunner(store, BENCH, VirtualClock, cast(BenchHold, lease), safe_within_s=0.0)
     turns = threading.Event()
     with held_writer(store) as hold:
 
@@ -109,8 +125,10 @@ def test_a_stop_stops_the_table_while_the_engine_waits_for_the_writer(
         assert turns.wait(60.0)
         job = runner._job
         assert job is not None
-        if by_signal:
+        if by == "a signal":
             runner.end_soon()
+        elif by == "a lost lease":
+            lease.held = False
         else:
             runner.abort(campaign, StopRequest.new("Ada", "key", "a hand in the bench", campaign))
         assert stopped.wait(15.0)  # before the writer's deadline
@@ -119,7 +137,7 @@ def test_a_stop_stops_the_table_while_the_engine_waits_for_the_writer(
         assert job.thread.is_alive()
         stop()
     job.thread.join()
-    assert store.campaigns.get(campaign).state == "aborted"
+    assert store.campaigns.get(campaign).state == ("interrupted" if by == "a lost lease" else "aborted")
 
 
 def test_what_a_stopped_step_writes_down_does_not_keep_the_table_turning(

@@ -47,6 +47,7 @@ class World:
     session: int = 1  #: that is in force at the step where it resumes
     position: str | None = "z"
     fails_at: str = ""
+    is_shared: bool = False
     unfinished: list[CampaignRow] = field(default_factory=list)
     acts: list[Any] = field(default_factory=list)
     resumptions: list[Resumption] = field(default_factory=list)
@@ -59,6 +60,8 @@ class World:
     @property
     def store(self) -> Any:
         return SimpleNamespace(
+            is_shared=self.is_shared,
+            leases=SimpleNamespace(holder=lambda name: {self.row.bench_name: None}[name]),
             campaigns=SimpleNamespace(get=lambda number: {7: self.row}[number], unfinished=lambda: self.unfinished),
             resume_points=SimpleNamespace(of_campaign=lambda number: {7: self.point}[number],
                                           mark_resumed=self.mark_resumed),
@@ -119,6 +122,17 @@ def test_a_resumed_campaign_goes_on_where_it_was_at_its_own_time(world: World) -
     (how,) = world.resumptions
     reason = "resumed by Ada after 60 s without supervision; the power failed during the interruption"
     assert how == Resumption(160.0, BEGUN + timedelta(seconds=160), reason, 2, new_session=True, boot_id="boot")
+
+
+def test_on_a_shared_database_a_campaign_is_resumed_on_its_own_bench_only(world: World) -> None:
+    other = SIMULATED.model_copy(update={"name": "another"})
+    resumed(world, other)
+    world.is_shared = True
+    resumed(world)
+    world.acts.clear()
+    with pytest.raises(Conflict, match=r"begun on bench single-axis-sim, not another, .*; no service drives bench"):
+        resumed(world, other)
+    assert world.acts == ["loaded"]
 
 
 def test_a_soak_that_was_owed_is_owed_still(world: World) -> None:

@@ -16,10 +16,10 @@ from typer.testing import CliRunner
 from labctl.cli.app import app
 from labctl.errors import BadInput
 from labctl.private_keys import token_uri
+from labctl.public_keys import public_key
 from labctl.services.admin.seal_keys import create_seal_key, sign
 from labctl.store import Store, check, open_store, read_public_key, signer_of
 from labctl.store.connection.database import Database
-from labctl.store.manifests.signatures import public_key
 from labctl.store.sealing import signing
 from labctl.store.sealing.signers import SEAL_KEY, Signer
 

@@ -23,7 +23,6 @@ from labctl.store.connection.anchor_file import anchor_path, write_anchor
 from tests.helpers.certifying import REASON
 from tests.helpers.commands import local_executor
 from tests.helpers.paths import EXAMPLES
-from tests.helpers.postgresql import running_cluster
 from tests.helpers.tampering import EDITS, by_hand, write_chain_anew
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -199,12 +198,10 @@ def test_an_anchor_that_lags_behind_is_no_finding(location: str) -> None:
     assert "the anchor file is damaged" in found.remarks[0]
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[str]:
-    with running_cluster() as cluster:
-        url = cluster.new_database()
-        fill(url)
-        yield url
+@pytest.fixture
+def server(url: str) -> str:
+    fill(url)
+    return url
 
 
 @pytest.mark.timeout(300)

@@ -3,12 +3,13 @@
 import { get } from "../core/http/api.js";
 import { Problem } from "../core/http/errors.js";
 import { h } from "../core/elements.js";
-import { chip, pageHeader, notice } from "../core/components.js";
+import { card, chip, pageHeader, notice } from "../core/components.js";
 import { setTrouble } from "../core/freshness/line.js";
 import { show } from "../core/router.js";
 import { clearButton, linkButton } from "../bench/actions.js";
 import { campaignInstant } from "../campaigns/campaign_time.js";
 import { checkCard } from "../bench/check_card.js";
+import { otherBenches } from "../bench/driver_text.js";
 import { idleBench, noBenchCard } from "../bench/idle_bench.js";
 import { runningCampaign } from "../bench/running_campaign.js";
 import { canResume, isRunning } from "../campaigns/states.js";
@@ -31,7 +32,7 @@ export async function page({ query, signal }) {
     get("/api/schedule", { signal }),
   ]);
   const bench = benches[0];
-  if (!bench) return h("div", { class: "page" }, pageHeader("Bench"), noBenchCard());
+  if (!bench) return h("div", { class: "page" }, pageHeader("Bench"), noBenchCard(), othersCard(states, undefined));
   const now = bench.campaign
     ? await get("/api/campaigns/{campaign}", { path: { campaign: bench.campaign }, signal })
     : campaigns.find((campaign) => campaign.bench === bench.name && isRunning(campaign));
@@ -85,7 +86,28 @@ export async function page({ query, signal }) {
     element.append(checkCard(bench, !bench.unconfirmed, show));
     watchForChange(Boolean(bench.unconfirmed), signal);
   }
+  if (query.wall !== "1") element.append(...[othersCard(states, bench.name)].filter((each) => each !== null));
   return element;
+}
+
+/**
+ * The other benches of a database that several services share, each with the service that drives it.
+ * @param {BenchStatus[]} states
+ * @param {string | undefined} own
+ */
+function othersCard(states, own) {
+  const lines = otherBenches(states, own);
+  if (!lines.length) return null;
+  return card(
+    "Other benches of this database",
+    h(
+      "ul",
+      {},
+      lines.map(({ name, text, isFault }) =>
+        h("li", {}, h("strong", {}, name), isFault ? [" ", chip("no service", "bad")] : null, `: ${text}`),
+      ),
+    ),
+  );
 }
 
 /**
