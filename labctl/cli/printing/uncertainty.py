@@ -9,9 +9,8 @@ from labctl.cli.output import console, format_number, stderr, table
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from labctl.answers.budget import BudgetJson, BudgetLineJson
+    from labctl.answers.budget import AnyAxisUncertainty, BudgetJson, BudgetLineJson
     from labctl.answers.uncertainty import (
-        AnyAxisUncertainty,
         UncertaintyResponse,
         VectorUncertainty,
     )

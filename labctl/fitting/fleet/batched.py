@@ -16,7 +16,8 @@ from scipy.linalg import solve_triangular
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import Drift, Scatter, whitened
+from labctl.fitting.numeric.drift_noise import Drift, Scatter
+from labctl.fitting.numeric.drift_whitening import whitened
 from labctl.fitting.numeric.least_squares import rank_of
 
 #: Numbers of an array that are in work at a time: memory does not grow with the units.

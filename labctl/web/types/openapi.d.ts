@@ -5081,10 +5081,9 @@ export interface components {
             release_reason: string | null;
             /**
              * Uncertainty Unknown
-             * @description Only in the answer to a certification: why the uncertainty in use is unknown; empty: it is known.
-             * @default
+             * @description Why the uncertainty in use was unknown at the certification; empty: it was known; null: not kept.
              */
-            uncertainty_unknown: string;
+            uncertainty_unknown: string | null;
             /**
              * Withdrawn Certificates
              * @description Only in the answer to a revocation: certificates that it withdrew.

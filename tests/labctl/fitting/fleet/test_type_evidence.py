@@ -7,9 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from labctl.errors import BadInput
 from labctl.fitting.criticism import CandidateEstimates, EstimatedShape
-from labctl.fitting.fleet.stored_evidence import design_of, from_bytes, to_bytes
 from labctl.fitting.fleet.type_evidence import UnitEvidence, judged, sums_of, type_evidence
 from labctl.fitting.fleet.type_sums import TypeSums
 
@@ -128,19 +126,3 @@ def test_too_few_units_say_nothing() -> None:
     found = type_evidence(units({0: 20.0}, n=4))
     assert not found.named
     assert found.reason == "4 units are too few; criticise at least 5 units of the type"
-
-
-def test_evidence_is_read_as_it_was_stored_and_units_of_a_design_share_the_overlap() -> None:
-    first, second = units({0: Z}, n=2)
-    whole, small = to_bytes(first, with_overlap=True), to_bytes(second, with_overlap=False)
-    read = from_bytes(whole)
-    assert read.serial_number == "U0"
-    assert read.bench == "bench 0"
-    assert read.axes["x"].shapes == SHAPES
-    assert read.axes["x"].z == pytest.approx(first.axes["x"].z, rel=1e-6)
-    overlaps = {design_of(read): {axis: each.overlap for axis, each in read.axes.items()}}
-    again = from_bytes(small, overlaps)
-    assert again.axes["x"].overlap == pytest.approx(overlap(), abs=1e-6)
-    assert again.axes["x"].u == pytest.approx(np.full(8, U), rel=1e-6)
-    with pytest.raises(BadInput, match="evidence of U1, axis x: it has no overlap of its regressors"):
-        from_bytes(small)
