@@ -22,9 +22,11 @@ NEWTON_STEPS, SLOPE_STEP_DPS, MIN_SLOPE = 40, 1e-4, 1e-3
 DEAD_BAND_SLOPE = 0.1
 #: Bisection: rounds over the axes, halvings of an interval, and the step in deg/s at which the rounds have converged.
 ROUNDS, HALVINGS, ROUND_STEP_DPS = 8, 50, 1e-9
-#: How far from an output its rate may be: this share of the largest output, which holds that of any gain from 0.5 on,
-#: plus this many deg/s. It is looked for from the first distance on, in so many steps.
-REACH_SHARE, REACH_DPS, FIRST_REACH_DPS, REACH_STEPS = 1.0, 10.0, 1e-3, 60
+#: Half of the interval of a bisection: this share of the largest output, plus this many deg/s; where it holds no root
+#: the second share is tried, which holds that of any gain from 0.5 on.
+REACH_SHARES, REACH_DPS = (0.02, 1.0), 10.0
+#: The root nearest an output is looked for in so many steps, the first of so many deg/s.
+STEPS, FIRST_STEP_DPS = 60, 1e-3
 
 
 class NotConverged(LabctlError):
@@ -89,7 +91,7 @@ def _by_newton(outputs: Mapping[str, Array], error_dps: ErrorOfRates) -> dict[st
 
 def _are_near(rates: Mapping[str, Array], outputs: Mapping[str, Array]) -> bool:
     """Return whether every rate is one that a gyro with such an output can have had."""
-    return not any(np.any(np.abs(rates[axis] - output) > _reach(output)) for axis, output in outputs.items())
+    return not any(np.any(np.abs(rates[axis] - output) > _reach(output)[-1]) for axis, output in outputs.items())
 
 
 def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: str) -> dict[str, Array]:
@@ -119,26 +121,33 @@ def _require_roots(outputs: Mapping[str, Array], outside: Mapping[str, NDArray[n
             row = int(np.argmax(rows))
             raise NotConverged(
                 f"model {name!r} cannot be inverted: on axis {axis}, no true rate within "
-                f"{_reach(outputs[axis]):.3g} deg/s of the output explains the output "
+                f"{_reach(outputs[axis])[-1]:.3g} deg/s of the output explains the output "
                 f"{outputs[axis][row]:.6g} deg/s ({int(rows.sum())} of {len(rows)} rows); check sign, unit and "
                 "axes of the output: these coefficients are implausible for a gyro"
             )
 
 
-def _reach(output: Array) -> float:
-    """Return how far from an output a rate may be, deg/s."""
-    return REACH_SHARE * float(np.max(np.abs(output[np.isfinite(output)]), initial=0.0)) + REACH_DPS
+def _reach(output: Array) -> list[float]:
+    """Return half intervals to try, deg/s, the narrow one first."""
+    largest = float(np.max(np.abs(output[np.isfinite(output)]), initial=0.0))
+    return [share * largest + REACH_DPS for share in REACH_SHARES]
 
 
 def _bisected(
     output: Array, error_dps: ErrorOfRates, rates: Mapping[str, Array], axis: str
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the rates of one axis, (n,) deg/s, and where no rate near the output has that output, (n,)."""
+    """Return the rates of one axis, (n,) deg/s, and where the interval holds none, (n,)."""
 
     def excess(at: Array) -> Array:
         return np.asarray(at + error_dps({**rates, axis: at}, axis) - output)
 
-    low, high, outside = _bracket(output, excess)
+    low, high, outside = output, output, np.ones(len(output), dtype=np.bool_)
+    for reach in _reach(output):
+        low, high = np.where(outside, output - reach, low), np.where(outside, output + reach, high)
+        outside = np.asarray((excess(low) > 0) | (excess(high) < 0))
+        if not outside.any():
+            break
+    low, high = _nearest(output, low, high, excess)
     rising = excess(low) <= 0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -147,27 +156,27 @@ def _bisected(
     return np.asarray(0.5 * (low + high)), outside
 
 
-def _bracket(output: Array, excess: Callable[[Array], Array]) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return an interval about a root for each output, (n,) deg/s each, and where there is none, (n,).
+def _nearest(output: Array, low: Array, high: Array, excess: Callable[[Array], Array]) -> tuple[Array, Array]:
+    """Return the part of each interval that holds the root nearest the output, (n,) deg/s each.
 
-    Several rates may have one output: in a dead band all have the same. The interval nearest the output is taken, as
-    an error is far smaller than the rate; where the law rises from one end of the reach to the other, there is one.
+    Several rates may have one output: in a dead band all have the same. The nearest is taken, as an error is far
+    smaller than the rate.
     """
-    low, high, outside = output.copy(), output.copy(), ~np.isnan(output)
-    last_step = 0.0
+    reach = high - output
+    found, last_step = np.isnan(output), 0.0
     below = above = excess(output)
-    for step in np.geomspace(FIRST_REACH_DPS, _reach(output), REACH_STEPS):
+    for step in np.geomspace(FIRST_STEP_DPS, float(np.nanmax(reach, initial=FIRST_STEP_DPS)), STEPS):
         next_below, next_above = excess(output - step), excess(output + step)
-        for turned, ends in (
-            (below * next_below <= 0, (output - step, output - last_step)),
-            (above * next_above <= 0, (output + last_step, output + step)),
+        for turned, begin, end in (
+            (below * next_below <= 0, output - step, output - last_step),
+            (above * next_above <= 0, output + last_step, output + step),
         ):
-            first = outside & turned
-            low, high, outside = np.where(first, ends[0], low), np.where(first, ends[1], high), outside & ~first
-        if not outside.any():
+            first = turned & ~found & (step <= reach)
+            low, high, found = np.where(first, begin, low), np.where(first, end, high), found | first
+        if found.all():
             break
         below, above, last_step = next_below, next_above, float(step)
-    return low, high, outside
+    return low, high
 
 
 def _largest_change(rates: Mapping[str, Array], before: Mapping[str, Array]) -> float:
