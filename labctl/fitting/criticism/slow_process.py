@@ -6,6 +6,7 @@ thermometer of a unit is not where the heat of its electronics, of a hand or of 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -57,7 +58,7 @@ def _time_constant_s(course: Array, t_s: Array, run: NDArray[np.int64]) -> float
     spacing_s = float(np.median(np.diff(t_s)[same]))
     for lag in range(1, len(course) // 2):
         together = run[lag:] == run[:-lag]
-        if not together.any() or float(np.mean((course[lag:] * course[:-lag])[together])) < size / np.e:
+        if not together.any() or float(np.mean((course[lag:] * course[:-lag])[together])) < size / math.e:
             return lag * spacing_s
     return len(course) / 2 * spacing_s
 
