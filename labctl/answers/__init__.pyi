@@ -34,6 +34,7 @@ from labctl.answers.base import (
 from labctl.answers.benches import (
     BenchCheckResponse as BenchCheckResponse,
     BenchDescription as BenchDescription,
+    BenchDriver as BenchDriver,
     BenchResponse as BenchResponse,
     BenchStatus as BenchStatus,
     BenchStop as BenchStop,
@@ -264,6 +265,7 @@ from labctl.answers.fleet import (
     FleetCancelRequest as FleetCancelRequest,
     FleetChartCoefficient as FleetChartCoefficient,
     FleetChartPoint as FleetChartPoint,
+    FleetChartRequest as FleetChartRequest,
     FleetChartResponse as FleetChartResponse,
     FleetCoefficientFigures as FleetCoefficientFigures,
     FleetDue as FleetDue,

@@ -233,8 +233,8 @@ class CorrelationTimes(TypedDict):
 
     drift_tau_s: float | None
     """Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown."""
-    drift_shortest_tau_s: NotRequired[float]
-    """Shortest correlation time of flicker, of which each decade has an equal part, s; absent: there is only one."""
+    drift_shortest_tau_s: NotRequired[float | None]
+    """Shortest correlation time of flicker, of which each decade has an equal part, s; absent or null: only one."""
 
 
 class AxisNoiseJson(CorrelationTimes):

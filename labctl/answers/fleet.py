@@ -134,6 +134,16 @@ class FleetReportRequest(FleetUnits):
     )
 
 
+class FleetChartRequest(FleetUnits):
+    """Which coefficient a control chart is of, and of which units."""
+
+    axis: str = Field(default="", max_length=10, description="Output axis; empty: the first.")
+    name: str = Field(default="", max_length=100, description="Name of the coefficient; empty: the first.")
+    factor: str = Field(
+        default="batch", max_length=10, description="What points are grouped by: batch, bench, supplier."
+    )
+
+
 class RatioClass(ResponseModel):
     """Units of one class of error over noise floor."""
 

@@ -124,7 +124,7 @@ def test_a_person_without_a_mouse_gets_there(visit: Callable[..., Page]) -> None
     page.wait_for_function("() => window.Plotly")  # loaded while the page is idle, for the next one
     page.keyboard.press("Tab")
     expect(page.get_by_role("link", name="To the page")).to_be_focused()
-    for _ in range(6):
+    for _ in range(7):
         page.keyboard.press("Tab")
     expect(page.get_by_role("link", name="Recordings")).to_be_focused()
     page.keyboard.press("Enter")

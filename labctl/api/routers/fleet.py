@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from labctl.answers.fleet import (
     FleetCancelRequest,
+    FleetChartRequest,
     FleetChartResponse,
     FleetJobRequest,
     FleetJobResponse,
@@ -76,48 +77,21 @@ def cancel(job: int, request: FleetCancelRequest, service: ServiceDep) -> FleetJ
     return service.execute(CANCEL_FLEET_JOB, ToFleetJob(job, request))
 
 
-Type = Annotated[str, Query(alias="type", max_length=200, description="Only units of this type; empty: of any.")]
-Batch = Annotated[str, Query(max_length=100, description="Only units of this batch; empty: of any.")]
-Supplier = Annotated[str, Query(max_length=200, description="Only units of this supplier; empty: of any.")]
-
-
 @router.get("/fleet/types", summary="All types of units in figures")
-def types(
-    service: ServiceDep, type_: Type = "", batch: Batch = "", supplier: Supplier = "", search: Search = ""
-) -> list[FleetTypeResponse]:
+def types(service: ServiceDep, wanted: Annotated[FleetUnits, Query()]) -> list[FleetTypeResponse]:
     """For each type: error over noise floor, verdicts, effects that units are missing, due dates; by name."""
-    wanted = FleetUnits(type=type_, batch=batch, supplier=supplier, search=search)
     return type_figures(service.store, wanted, service.clock.utc())
 
 
 @router.get("/fleet/chart", summary="Control chart of a coefficient")
-def chart(
-    service: ServiceDep,
-    type_: Type = "",
-    axis: Annotated[str, Query(max_length=10, description="Output axis; empty: the first.")] = "",
-    name: Annotated[str, Query(max_length=100, description="Name of the coefficient; empty: the first.")] = "",
-    factor: Annotated[str, Query(max_length=10, description="What points are grouped by.")] = "batch",
-    batch: Batch = "",
-    supplier: Supplier = "",
-    search: Search = "",
-) -> FleetChartResponse:
+def chart(service: ServiceDep, wanted: Annotated[FleetChartRequest, Query()]) -> FleetChartResponse:
     """A coefficient of the newest fits by fleet jobs over time: one point for each group and span of time."""
-    wanted = FleetUnits(type=type_, batch=batch, supplier=supplier, search=search)
-    return fleet_chart(service.store, wanted, axis, name, factor)
+    return fleet_chart(service.store, wanted)
 
 
 @router.get("/fleet/report", summary="Report on a type of units")
 async def report(
-    request: Request,
-    service: ServiceDep,
-    type_: Type = "",
-    model: Annotated[
-        str, Query(max_length=200, description="Only units whose newest version is of this error model; empty: any.")
-    ] = "",
-    batch: Batch = "",
-    supplier: Supplier = "",
-    search: Search = "",
+    request: Request, service: ServiceDep, wanted: Annotated[FleetReportRequest, Query()]
 ) -> FleetReportResponse:
     """What the units of a type have in common, which batch, bench or unit differs, and what their model is missing."""
-    asked = FleetReportRequest(type=type_, model=model, batch=batch, supplier=supplier, search=search)
-    return await while_connected(request, service, fleet_report, asked, service.clock.utc())
+    return await while_connected(request, service, fleet_report, wanted, service.clock.utc())

@@ -7,6 +7,7 @@ from datetime import datetime
 from labctl.answers.fleet import (
     FleetChartCoefficient,
     FleetChartPoint,
+    FleetChartRequest,
     FleetChartResponse,
     FleetDue,
     FleetTypeResponse,
@@ -62,8 +63,9 @@ def _answer(found: TypeFigures) -> FleetTypeResponse:
     )  # fmt: skip
 
 
-def fleet_chart(store: Store, request: FleetUnits, axis: str, name: str, factor: str) -> FleetChartResponse:
+def fleet_chart(store: Store, request: FleetChartRequest) -> FleetChartResponse:
     """Return the control chart of a coefficient; without a name of the first one. Raises BadInput."""
+    axis, name, factor = request.axis, request.name, request.factor
     if factor not in FACTORS:
         raise BadInput(f"factor {factor!r}: choose one of {', '.join(FACTORS)}")
     wanted = filter_of(request)

@@ -3411,9 +3411,9 @@ export interface components {
             drift_tau_s: number | null;
             /**
              * Drift Shortest Tau S
-             * @description Shortest correlation time of flicker, of which each decade has an equal part, s; absent: there is only one.
+             * @description Shortest correlation time of flicker, of which each decade has an equal part, s; absent or null: only one.
              */
-            drift_shortest_tau_s?: number;
+            drift_shortest_tau_s?: number | null;
             /**
              * White Dps
              * @description Standard deviation of a data set mean by white noise, RMS, deg/s; null: only the total is known.
@@ -6238,9 +6238,9 @@ export interface components {
             drift_tau_s: number | null;
             /**
              * Drift Shortest Tau S
-             * @description Shortest correlation time of flicker, of which each decade has an equal part, s; absent: there is only one.
+             * @description Shortest correlation time of flicker, of which each decade has an equal part, s; absent or null: only one.
              */
-            drift_shortest_tau_s?: number;
+            drift_shortest_tau_s?: number | null;
             /**
              * White Dps
              * @description Standard deviation of a data set mean by white noise, RMS over the axes, deg/s; null: unknown.
@@ -18913,13 +18913,13 @@ export interface operations {
     types_api_fleet_types_get: {
         parameters: {
             query?: {
-                /** @description Only units of this type; empty: of any. */
+                /** @description Only units of this type: their model, as their manufacturer names it; empty: of any. */
                 type?: string;
                 /** @description Only units of this batch; empty: of any. */
                 batch?: string;
                 /** @description Only units of this supplier; empty: of any. */
                 supplier?: string;
-                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                /** @description Only units whose serial number, type, technology, batch or supplier holds this text, in any case. */
                 search?: string;
             };
             header?: never;
@@ -18951,20 +18951,20 @@ export interface operations {
     chart_api_fleet_chart_get: {
         parameters: {
             query?: {
-                /** @description Only units of this type; empty: of any. */
+                /** @description Only units of this type: their model, as their manufacturer names it; empty: of any. */
                 type?: string;
-                /** @description Output axis; empty: the first. */
-                axis?: string;
-                /** @description Name of the coefficient; empty: the first. */
-                name?: string;
-                /** @description What points are grouped by. */
-                factor?: string;
                 /** @description Only units of this batch; empty: of any. */
                 batch?: string;
                 /** @description Only units of this supplier; empty: of any. */
                 supplier?: string;
-                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                /** @description Only units whose serial number, type, technology, batch or supplier holds this text, in any case. */
                 search?: string;
+                /** @description Output axis; empty: the first. */
+                axis?: string;
+                /** @description Name of the coefficient; empty: the first. */
+                name?: string;
+                /** @description What points are grouped by: batch, bench, supplier. */
+                factor?: string;
             };
             header?: never;
             path?: never;
@@ -18995,16 +18995,16 @@ export interface operations {
     report_api_fleet_report_get: {
         parameters: {
             query?: {
-                /** @description Only units of this type; empty: of any. */
+                /** @description Only units of this type: their model, as their manufacturer names it; empty: of any. */
                 type?: string;
-                /** @description Only units whose newest version is of this error model; empty: any. */
-                model?: string;
                 /** @description Only units of this batch; empty: of any. */
                 batch?: string;
                 /** @description Only units of this supplier; empty: of any. */
                 supplier?: string;
-                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                /** @description Only units whose serial number, type, technology, batch or supplier holds this text, in any case. */
                 search?: string;
+                /** @description Only units whose newest version is of this error model; empty: of any. */
+                model?: string;
             };
             header?: never;
             path?: never;

@@ -37,8 +37,9 @@ FITS = {
     "1": ("--model", "ojeda2000"),
     "2": ("--effects", "bias,bias_temperature:2,scale_factor,scale_factor_temperature:2"),
 }
-#: A coefficient of a fit with another estimate of the noise may differ by so much of its uncertainty.
-FITTED_WITHIN = 0.02
+#: A coefficient of a fit with another estimate of the noise may differ by so much of its uncertainty: where the model
+#: holds, and where it leaves hundreds of times the noise, so that the values hang on how the data sets are weighted.
+FITTED_WITHIN, UNFITTED_WITHIN, MAX_SCALE = 0.15, 1.0, 10.0
 of_each_entry = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
 
 
@@ -231,8 +232,9 @@ def test_its_recordings_are_fitted_as_they_were(
         shutil.copy(file, tmp_path)
     made = Lab(tmp_path).json("fit", SERIAL, "--recording", number, *model)
     now = made["axes"]["z"]["coefficients"]
+    within = FITTED_WITHIN if made["noise"]["z"]["covariance_scale"] < MAX_SCALE else UNFITTED_WITHIN
     for name, was in entry.answers["fits"][number]["axes"]["z"]["coefficients"].items():
-        assert now[name]["value"] == pytest.approx(was["value"], rel=SAME, abs=FITTED_WITHIN * was["u"]), name
+        assert now[name]["value"] == pytest.approx(was["value"], rel=SAME, abs=within * was["u"]), name
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from datetime import timedelta
 
 import pytest
 
-from labctl.answers.fleet import FleetReportRequest, FleetReportResponse, FleetUnits
+from labctl.answers.fleet import FleetChartRequest, FleetReportRequest, FleetReportResponse, FleetUnits
 from labctl.errors import BadInput
 from labctl.services.fleet.evidence import content_of, sums_in
 from labctl.services.fleet.figures import fleet_chart, type_figures
@@ -75,7 +75,7 @@ def test_figures_count_each_unit_once(store: Store, report: FleetReportResponse)
 
 
 def test_a_chart_shows_each_unit_once_by_batch_over_time(store: Store) -> None:
-    chart = fleet_chart(store, FleetUnits(type="FOG-A"), "x", "scale_factor", "batch")
+    chart = fleet_chart(store, FleetChartRequest(type="FOG-A", axis="x", name="scale_factor"))
     assert {point.level: point.units for point in chart.points}.keys() == set(BATCHES)
     assert sum(point.units for point in chart.points) == UNITS
     of_b1 = [point.mean for point in chart.points if point.level == "B1"]
@@ -86,9 +86,9 @@ def test_a_chart_shows_each_unit_once_by_batch_over_time(store: Store) -> None:
         AT + timedelta(days=n) for n in BATCHES["B1"]
     ]
     with pytest.raises(BadInput, match="is not known"):
-        fleet_chart(store, FleetUnits(), "x", "sausage", "batch")
+        fleet_chart(store, FleetChartRequest(axis="x", name="sausage"))
     with pytest.raises(BadInput, match="choose one of"):
-        fleet_chart(store, FleetUnits(), "x", "scale_factor", "colour")
+        fleet_chart(store, FleetChartRequest(axis="x", name="scale_factor", factor="colour"))
 
 
 def test_a_report_is_on_one_type(store: Store) -> None:
