@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from datetime import datetime
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from labctl.answers.base import Request, ResponseModel
 from labctl.answers.common_fields import CriticismVerdict, Serial
+from labctl.errors import BadInput
 
 #: What a job does with each unit.
 FleetKind = Literal["fit", "criticise"]
@@ -23,6 +25,16 @@ _SUPPLIER = "Only units of this supplier; empty: of any."
 _SEARCH = "Only units whose serial number, type, technology, batch or supplier holds this text, in any case."
 _RMS = "RMS residual of the model on the data set means, deg/s; null: not known."
 _FLOOR = "RMS residual that noise alone leaves, deg/s; null: not known."
+
+
+#: What computes, as a pattern.
+ENGINE = r"^(local|dask|dask://[A-Za-z0-9_.\-\[\]:]+)$"
+
+
+def _known_engine(engine: str) -> str:
+    if not re.match(ENGINE, engine):
+        raise BadInput(f"engine {engine!r} is not known; choose local, dask or dask://HOST:PORT, as dask://lab-3:8786")
+    return engine
 
 
 class FleetUnits(Request):
@@ -60,10 +72,10 @@ class FleetJobRequest(FleetUnits):
         default=False,
         description="Whether to compute units again whose newest result has the same recordings, model and program.",
     )
-    engine: str = Field(
+    engine: Annotated[str, AfterValidator(_known_engine)] = Field(
         default="local",
         max_length=300,
-        pattern=r"^(local|dask|dask://[A-Za-z0-9_.\-\[\]:]+)$",
+        json_schema_extra={"pattern": ENGINE},
         description="What computes: local (processes of this computer), dask (a cluster of Dask on this computer) or "
         "dask://HOST:PORT (the scheduler of a cluster).",
     )

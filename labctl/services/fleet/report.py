@@ -11,7 +11,7 @@ from labctl.errors import BadInput
 from labctl.progress import report_stage
 from labctl.services.cache import cached
 from labctl.services.fleet.figures import figures_of, filter_of, type_figures
-from labctl.store import FleetVersion, Store
+from labctl.store import FleetFilter, FleetVersion, Store
 
 if TYPE_CHECKING:
     from labctl.fitting.fleet.unit_coefficients import UnitCoefficients
@@ -37,8 +37,10 @@ def _the_type(store: Store, request: FleetReportRequest, now: datetime) -> str:
     found = [each.type for each in store.fleet_reports.types(filter_of(request), now)]
     if request.type or len(found) == 1:
         if request.type and request.type not in found:
+            others = [each.type for each in store.fleet_reports.types(FleetFilter(), now)]
             raise BadInput(
-                f"no unit of type {request.type!r} matches; the units are of {_listed(found) or 'no type: import them'}"
+                f"no unit of type {request.type!r} matches; the units of this database are of "
+                f"{_listed(others) or 'no type: import them'}"
             )
         return request.type or found[0]
     raise BadInput(
