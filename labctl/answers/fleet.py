@@ -7,10 +7,10 @@ from datetime import datetime
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
 
 from labctl.answers.base import Request, ResponseModel
 from labctl.answers.common_fields import CriticismVerdict, Serial
-from labctl.errors import BadInput
 
 #: What a job does with each unit.
 FleetKind = Literal["fit", "criticise"]
@@ -33,7 +33,7 @@ ENGINE = r"^(local|dask|dask://[A-Za-z0-9_.\-\[\]:]+)$"
 
 def _known_engine(engine: str) -> str:
     if not re.match(ENGINE, engine):
-        raise BadInput(f"engine {engine!r} is not known; choose local, dask or dask://HOST:PORT, as dask://lab-3:8786")
+        raise PydanticCustomError("engine", "choose local, dask or dask://HOST:PORT, as dask://lab-3:8786")
     return engine
 
 

@@ -75,7 +75,8 @@ def test_an_engine_is_used_only_where_the_service_was_started_with_it(
     assert "LABCTL_FLEET_ENGINE=dask://192.0.2.1:8786" in refused.json()["detail"]
     monkeypatch.setenv("LABCTL_FLEET_ENGINE", "dask://192.0.2.1:8786")
     assert http.post("/api/fleet/jobs", json=elsewhere).status_code == 201
-    assert http.post("/api/fleet/jobs", json={**FIT, "engine": "sausage"}).status_code == 422
+    unknown = http.post("/api/fleet/jobs", json={**FIT, "engine": "sausage"})
+    assert (unknown.status_code, "choose local, dask or dask://" in unknown.text) == (422, True)
     assert http.post("/api/fleet/jobs", json={**FIT, "type": "none"}).status_code == 404
 
 
