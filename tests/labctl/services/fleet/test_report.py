@@ -94,7 +94,7 @@ def test_a_chart_shows_each_unit_once_by_batch_over_time(store: Store) -> None:
 def test_a_report_is_on_one_type(store: Store) -> None:
     with pytest.raises(BadInput, match="'FOG-A', 'MEMS-B'"):
         fleet_report(store, FleetReportRequest(), NOW)
-    with pytest.raises(BadInput, match="no unit of type 'FOG-Z' matches; .* are of 'FOG-A', 'MEMS-B'"):
+    with pytest.raises(BadInput, match=r"no unit of type 'FOG-Z' matches; .* are of 'FOG-A', 'MEMS-B'"):
         fleet_report(store, FleetReportRequest(type="FOG-Z"), NOW)
     alone = fleet_report(store, FleetReportRequest(type="MEMS-B"), NOW)
     assert (alone.compared, alone.missing, alone.groups) == (0, [], [])
