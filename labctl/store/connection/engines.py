@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
+from urllib.parse import quote
 
 import sqlalchemy as sa
 from sqlalchemy import event as sa_event
@@ -25,10 +26,13 @@ CONNECTION = {
 
 
 def sqlite_engine(location: str, *, write: bool) -> sa.Engine:
-    """Return an engine for a database by path; without `write` it refuses to change anything."""
+    """Return an engine for a database by path; without `write` it refuses to change anything, and makes no file."""
     options: dict[str, Any] = {"poolclass": StaticPool} if write else {}
+    # a reader that connects just when the file was deleted would else put an empty one in its place
+    to_read = {"mode": "rw", "uri": "true"}
+    url = sa.URL.create("sqlite", database=location if write else f"file:{quote(location)}")
     engine = sa.create_engine(
-        f"sqlite:///{location}",
+        url if write else url.set(query=to_read),
         connect_args={"check_same_thread": False, "timeout": BUSY_MS / 1000},
         **options,
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy.exc import OperationalError
 from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
@@ -19,6 +20,7 @@ from labctl.services.campaigns.execution import run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store, open_store
+from labctl.store.connection.engines import sqlite_engine
 from labctl.store.connection.sqlite_file import first_damage
 from procedures.execution import safe_state
 from tests.helpers.service import open_client
@@ -199,3 +201,17 @@ def test_blocks_of_readings_of_a_large_database_are_left_to_the_check(
             assert first_damage(connection) == ""
     assert "PRAGMA quick_check('campaigns')" in asked
     assert not any("sample_blocks" in text for text in asked)
+
+
+@pytest.mark.parametrize("name", ["lab.sqlite", "lab 1#2 %41?.sqlite"])
+def test_a_reader_makes_no_file_where_there_was_one(tmp_path: Path, name: str) -> None:
+    with open_store(str(tmp_path / name), write=True) as store:
+        record(store)
+    engine = sqlite_engine(str(tmp_path / name), write=False)
+    with engine.connect() as connection:
+        assert connection.exec_driver_sql("SELECT count(*) FROM audit").scalar() == 1
+    engine.dispose()
+    (tmp_path / name).unlink()
+    with pytest.raises(OperationalError, match="unable to open"), engine.connect() as connection:
+        connection.exec_driver_sql("SELECT 1 FROM audit")
+    assert not (tmp_path / name).exists()
