@@ -23,7 +23,7 @@ TAU_SPACINGS = (0.25, 3.0, 12.0, 50.0, 200.0)
 DRIFT_SIZES = (0.0, 0.35, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2)
 #: Further sizes of a slow drift: most of it passes for bias and temperature, and little is left in the scatter.
 HIDDEN_SIZES = (4.5, 6.5, 9.0)
-#: A drift is slow where its time constant is more than this share of the time between the first data set and the last.
+#: A drift is slow where its time constant is more than this share of the longest powered run.
 SLOW_SHARE = 0.05
 #: Neighbouring time constants of flicker differ by about this factor: their sum is that of a continuum to some percent.
 FLICKER_RATIO = 4.0
@@ -110,10 +110,14 @@ def hidden(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> l
 
 
 def _times_s(scatter: Scatter) -> tuple[float, float]:
-    """Return the median spacing of data sets, and the time from the first to the last."""
+    """Return the median spacing of data sets, and the length of the longest powered run: a drift ends with its run."""
     in_time = np.sort(scatter.t_s)
     spacing = float(np.median(np.diff(in_time))) if len(in_time) > 1 else 1.0
-    return max(spacing, 1e-3), float(in_time[-1] - in_time[0])
+    _, of_run = np.unique(scatter.run, return_inverse=True)
+    first, last = np.full(of_run.max() + 1, np.inf), np.full(of_run.max() + 1, -np.inf)
+    np.minimum.at(first, of_run, scatter.t_s)
+    np.maximum.at(last, of_run, scatter.t_s)
+    return max(spacing, 1e-3), float(np.max(last - first))
 
 
 def _points(

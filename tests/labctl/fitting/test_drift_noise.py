@@ -7,7 +7,7 @@ import pytest
 
 from labctl.fitting.criticism.criticism import LARGE_DRIFT
 from labctl.fitting.data.noise_floor import correlation_times
-from labctl.fitting.numeric.drift_noise import Drift, Scatter
+from labctl.fitting.numeric.drift_noise import Drift, Scatter, grid, hidden
 from labctl.fitting.numeric.drift_whitening import whitened
 from labctl.fitting.numeric.least_squares import drift_beside
 from studies.drift_shapes import SCHEDULES, TRUTHS, share_inside
@@ -81,3 +81,11 @@ def test_flicker_is_reported_with_its_shortest_and_longest_time_constant() -> No
     known = Scatter(t_s, np.ones(m, dtype=np.int64), np.zeros(m), np.full(m, 1e-9), 2e-3)
     found = correlation_times(drift_beside(np.full((m, 1), m**-0.5), y, known))
     assert found == {"drift_tau_s": 100.0 * (m - 1), "drift_shortest_tau_s": 100.0}
+
+
+def test_no_drift_is_longer_than_a_powered_run() -> None:
+    run = np.repeat([1, 2], 30)
+    t_s = np.concatenate([60.0 * np.arange(30), 1e7 + 60.0 * np.arange(30)])  # the second power-on is months later
+    known = Scatter(np.asarray(t_s, dtype=np.float64), run, np.zeros(60), np.full(60, 1e-6), 2e-3)
+    assert {drift.tau_s for drift in (*grid(known, 1e-3), *hidden(known, 1e-3)) if drift.shortest_tau_s} == {29 * 60.0}
+    assert max(drift.tau_s for drift in hidden(known, 1e-3)) <= 200 * 60.0
