@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ class Drift:
     least_dps: float = 0.0  #: of a drift that was found: `MAX_EVIDENCE` is for this size or a larger one
     shortest_tau_s: float | None = None  #: flicker: equal parts with time constants from this to `tau_s`
 
-    @property
+    @cached_property
     def taus_s(self) -> tuple[float, ...]:
         """The time constants of its equal parts."""
         if self.shortest_tau_s is None:

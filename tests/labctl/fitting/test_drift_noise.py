@@ -8,7 +8,7 @@ import pytest
 from labctl.fitting.criticism.criticism import LARGE_DRIFT
 from labctl.fitting.data.noise_floor import correlation_times
 from labctl.fitting.numeric.drift_noise import Drift, Scatter, grid, hidden
-from labctl.fitting.numeric.drift_whitening import whitened
+from labctl.fitting.numeric.drift_whitening import MAX_FACTORED, whitened
 from labctl.fitting.numeric.least_squares import drift_beside
 from studies.drift_shapes import SCHEDULES, TRUTHS, share_inside
 
@@ -23,18 +23,19 @@ DRIFTS = [
 
 def scatter(rng: np.random.Generator, m: int) -> Scatter:
     """Two powered runs, in no order, one time twice."""
-    t_s = np.sort(rng.uniform(0, 9000, m))
+    t_s = np.sort(rng.uniform(0, 75 * m, m))
     t_s[5] = t_s[4]
     mixed = rng.permutation(m)
     runs = np.repeat([1, 2], m // 2)
     return Scatter(t_s[mixed], runs[mixed], rng.normal(0, 50, m), rng.uniform(0.5, 2, m) ** 2)
 
 
+@pytest.mark.parametrize("rows_of_run", [60, MAX_FACTORED + 1], ids=["by factors", "by the filter"])
 @pytest.mark.parametrize("point", range(len(DRIFTS)))
-def test_the_same_inner_products_and_determinant_as_by_the_covariance(point: int) -> None:
-    rng = np.random.default_rng(1)
-    known, drift = scatter(rng, 120), DRIFTS[point]
-    values = rng.normal(size=(120, 5))
+def test_the_same_inner_products_and_determinant_as_by_the_covariance(point: int, rows_of_run: int) -> None:
+    rng, m = np.random.default_rng(1), 2 * rows_of_run
+    known, drift = scatter(rng, m), DRIFTS[point]
+    values = rng.normal(size=(m, 5))
     assert known.white_var is not None
     rows, log_det = whitened(known, DRIFTS, known.white_var, values)
     lag = np.abs(known.t_s[:, None] - known.t_s)
