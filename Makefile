@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: install demo test mutants lint types docs bench study attack lock clean
+.PHONY: install demo test test-slow mutants lint types docs bench study attack lock clean
 
 install: $(VENV)/.installed
 demo: install
@@ -14,7 +14,12 @@ demo: install
 
 test: $(VENV)/.tested
 	@scripts/install-test-dependencies
-	@$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
+	@$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder -m "not slow"
+
+# The tests of seconds each: searches, coverage over many draws, campaigns in real time. `.ci/run` runs them after `make test`.
+test-slow: $(VENV)/.tested
+	@scripts/install-test-dependencies
+	@$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder -m slow
 
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .

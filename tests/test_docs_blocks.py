@@ -35,6 +35,7 @@ def text_of(page: Path) -> str:
     return page.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     "name", [name for name in NAMES if name not in ELSEWHERE and FENCE.search(text_of(ROOT / name))]

@@ -44,6 +44,7 @@ def build(docs: Path, out: Path) -> str:
     return built.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     assert not build(ROOT / "docs", tmp_path)

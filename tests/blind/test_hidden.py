@@ -38,6 +38,7 @@ def criticised(protocol: str, recording: Recording) -> Criticism:
     return criticise(recording, model, full=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("protocol", "effect", "z"), SINGLE)
 def test_what_is_hidden_is_named_alone_or_among_its_likes(protocol: str, effect: str, z: int) -> None:
     found = criticised(protocol, campaign(protocol, 600 + z, {effect: sizes(protocol)[effect][f"{z:g}"]}))
@@ -50,6 +51,7 @@ def test_nothing_is_named_where_nothing_is_hidden(protocol: str, seed: int) -> N
     assert criticised(protocol, campaign(protocol, seed, {})).verdict.form == "adequate"
 
 
+@pytest.mark.slow
 def test_nothing_is_named_on_three_axes() -> None:
     assert criticised("Y", campaign("Y", 707, {})).verdict.form == "adequate"
 

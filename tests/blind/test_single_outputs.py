@@ -29,6 +29,7 @@ def recording() -> Any:
     return of_one_output(campaign("Y", 5100, hidden), "x")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "axis"), [("scale_factor_odd", "x"), ("mounting_shift", "z"), ("supply_sensitivity", "y")]
 )

@@ -82,6 +82,7 @@ def fit_all(store: Store, engine: Engine, worker: Callable[[], int]) -> None:
     assert after == [versions + 1 for versions in before]
 
 
+@pytest.mark.slow
 def test_a_cluster_and_processes_of_this_computer_give_the_same_coefficients_though_a_worker_is_killed(
     store: Store, cluster: Cluster
 ) -> None:

@@ -72,6 +72,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["wheel", "wheel of the sdist", "editable"])
 def test_an_installed_labctl_creates_a_database_by_its_own_migrations(
     kind: str, built: dict[str, Path], tmp_path: Path

@@ -31,6 +31,7 @@ def without_scatter(per_set: int, step_dps: float) -> Recording:
     return Recording(info, columns)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_data_without_scatter_pass_through_fit_and_criticism(tmp_path: Path, case: str) -> None:
     write_recording(without_scatter(*CASES[case]), tmp_path / "made")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 from typing import Any
@@ -38,8 +38,8 @@ UNIT = "OSU-FOG-2024"
 THERE = {"serial": UNIT, "version": 1, "recording": 1}
 #: Seconds of work each: of these only few reach a version that is there.
 COSTLY = ("/criticism", "/improve", "/preview", "/residuals", "/pictures", "/assessment", "/certify")
-#: Of each operation; drawn from the same seed every time.
-EXAMPLES_EACH, SEED = 10, 1
+#: Of each operation, in a run of the quick tests and of all; drawn from the same seed every time.
+FEW, MANY, SEED = 4, 20, 1
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,16 @@ def schema_of(document: dict[str, Any]) -> Any:
     return schema
 
 
-@settings(max_examples=EXAMPLES_EACH, suppress_health_check=list(HealthCheck))
+def asking(examples: int) -> Callable[..., None]:
+    """Return what asks so many examples."""
+
+    @settings(max_examples=examples, suppress_health_check=list(HealthCheck))
+    def asked(case: Any, application: Any, statuses: set[int]) -> None:
+        ask(case, application, statuses)
+
+    return asked
+
+
 def ask(case: Any, application: Any, statuses: set[int]) -> None:
     for name, there in THERE.items():  # half of what is asked is asked of what is there
         dear = 16 if name == "version" and case.path.endswith(COSTLY) else 2
@@ -96,8 +105,9 @@ def ask(case: Any, application: Any, statuses: set[int]) -> None:
         assert answer.json()["detail"]
 
 
+@pytest.mark.parametrize("examples", [FEW, pytest.param(MANY, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("method", "path"), operations())
-def test_nothing_that_is_sent_is_a_server_error(method: str, path: str, application: Any) -> None:
+def test_nothing_that_is_sent_is_a_server_error(method: str, path: str, examples: int, application: Any) -> None:
     """Build the requests of an operation when it is tested.
 
     `parametrize` of the whole description builds those of all operations in every worker while it collects, and with
@@ -105,7 +115,7 @@ def test_nothing_that_is_sent_is_a_server_error(method: str, path: str, applicat
     """
     schema = schema_of(openapi_document() | {"paths": {path: {method: openapi_document()["paths"][path][method]}}})
     asked = build_operation_test(
-        config=schema.config, operation=schema[path][method.upper()], test_func=ask, given_kwargs={},
+        config=schema.config, operation=schema[path][method.upper()], test_func=asking(examples), given_kwargs={},
         feedback=FeedbackSources(constants_value_source=make_constants_value_source(schema)),
     )  # fmt: skip
     statuses: set[int] = set()

@@ -5,11 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, cast
 
+import pytest
+
 from labctl.cli.demo.find_missing_effect import HIDDEN, SERIAL, simulated_gyro
 from labctl.cli.demo.runner import DemoRunner, maybe_silent
 from labctl.store import open_store
 
 
+@pytest.mark.slow
 def test_an_experiment_names_the_hidden_effect_and_the_error_falls_to_the_floor(tmp_path: Path) -> None:
     with maybe_silent(True) as console, open_store(str(tmp_path / "demo.sqlite"), write=True) as store:
         demo = DemoRunner(store, tmp_path, console, quiet=True)

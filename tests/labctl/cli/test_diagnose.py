@@ -35,6 +35,7 @@ def ambiguous(tmp_path_factory: pytest.TempPathFactory) -> Lab:
     return lab
 
 
+@pytest.mark.slow
 def test_one_experiment_names_the_cause(ambiguous: Lab, tmp_path: Path) -> None:
     lab = ambiguous.copy(tmp_path)
     output = lab.run("diagnose", UNIT, "--hours", "4").output

@@ -194,6 +194,7 @@ def judged(lab: Lab, number: str) -> dict[str, Any]:
     return {**kept, **error, "first_suspect": suspects[0]["effect"] if suspects else None}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("once")
 @pytest.mark.parametrize("number", ["1", "2"])
 @of_each_entry

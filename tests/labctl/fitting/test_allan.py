@@ -80,6 +80,7 @@ def test_a_warm_up_is_taken_off_and_not_read_as_a_random_walk(hours: int) -> Non
         assert figures(still).trend_dps == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("warm_up_dps", [0.0, 0.12])
 def test_values_are_within_their_intervals_and_bounds_above_the_truth(warm_up_dps: float) -> None:
     true = {"N": 2e-3 * DEG_PER_ROOT_HOUR, "B": 3e-4 * DEG_PER_HOUR, "K": 3e-5 * K_UNIT}

@@ -42,6 +42,7 @@ def second_order(of_nyquist: float) -> Filter:
     return lambda rates: lfilter(*butter(2, of_nyquist), rates)[1000:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "smooth",
     [first_order(0.5), first_order(5), first_order(30), moving_average(3), moving_average(20), second_order(0.5),
@@ -73,6 +74,7 @@ def test_the_smoothing_of_a_filter_is_the_mean_distance_of_the_instants_it_weigh
     assert noise_of(white(1)).smoothing_s == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hertz", [0.3, 3.0, 13.0, 47.0])
 def test_beside_a_vibration_the_angle_random_walk_or_its_bound_holds_the_truth(hertz: float) -> None:
     for seed in range(4):

@@ -160,6 +160,7 @@ def without_gain(recording: Recording) -> Recording:
     )
 
 
+@pytest.mark.slow
 def test_a_fault_of_the_verification_part_refuses_no_fit_but_the_certification(
     recording: Recording, tmp_path: Path
 ) -> None:

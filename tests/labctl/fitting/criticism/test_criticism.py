@@ -66,6 +66,7 @@ def test_what_cannot_be_told_apart_is_said_together() -> None:
     assert {"earth_rate_tilt", "magnetic_sensitivity"} <= set(found.verdict.named)
 
 
+@pytest.mark.slow
 def test_gravity_in_yangs_three_positions_is_an_alias_group() -> None:
     """Three mountings, each in a powered run of its own: no statistics can split gravity from run and mounting."""
     found = held(three_axes(5, g_sensitivity=0.015), "yang2018")

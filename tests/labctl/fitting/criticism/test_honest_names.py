@@ -110,6 +110,7 @@ def test_a_step_in_time_is_no_re_mounting() -> None:
     assert not is_better_than_smooth(compared, compared, effect, smooth, discrepancies(compared, effect))
 
 
+@pytest.mark.slow
 def test_a_channel_times_the_rate_is_that_channel_upside_down_too() -> None:
     verdict = added("humidity_scale", "informative", "yang2018", 0.03)
     assert (verdict.form, verdict.named) == ("unexplained", ())
@@ -142,17 +143,20 @@ def hidden(protocol: str, effect: str, z: int, seed: int) -> Verdict:
     return held(campaign(protocol, seed, {effect: size}), MODELS[protocol]).verdict
 
 
+@pytest.mark.slow
 def test_a_table_may_be_out_of_level_without_a_bearing_that_wobbles() -> None:
     """Its one wave per turn is that of the Earth's rate, which was named without it where the second is too small."""
     verdict = hidden("Y", "table_tilt", 5, 20_020)
     assert verdict.groups == (("earth_rate_tilt", "magnetic_sensitivity", "table_tilt"),)
 
 
+@pytest.mark.slow
 def test_an_effect_of_much_less_evidence_does_not_take_the_place_of_one_that_predicts_worse() -> None:
     verdict = hidden("Y+", "warm_up", 5, 20_024)
     assert (verdict.form, verdict.named, verdict.depends_on[0]) == ("unexplained", (), "temperature_c")
 
 
+@pytest.mark.slow
 def test_the_delay_of_an_effect_of_the_temperature_is_no_second_effect() -> None:
     verdict = hidden("Y+", "temperature_rate", 100, 20_021)
     assert verdict.groups == (("temperature_rate",),)

@@ -25,6 +25,7 @@ def criticised(recording: Recording, effects: list[str], *, full: bool = False) 
     return criticise(recording, model, full=full)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "named", "parameters"),
     [

@@ -69,6 +69,7 @@ def test_what_another_channel_does_to_the_scale_factor_depends_on_that_channel(k
     assert channel in {verdict.depends_on[0], *verdict.confounded}
 
 
+@pytest.mark.slow
 def test_an_effect_that_a_technology_cannot_have_is_not_named() -> None:
     """The sine of an open-loop interferometer is alike a cubic, and no MEMS gyro has one."""
     found = held(three_axes(1, scale_factor_odd=3e-9), "yang2018")
@@ -94,6 +95,7 @@ def test_a_model_that_leaves_less_than_the_noise_is_adequate_whatever_is_like_th
     assert all(suspect.share_removed < 1 for suspect in found.suspects)
 
 
+@pytest.mark.slow
 def test_the_search_ends_where_the_data_say_nothing_more() -> None:
     """The real fibre gyro whose cause was added: what is left is weak, takes off hardly anything, and may be noise."""
     recording = read_recording(EXAMPLES / "osu-fog")
@@ -126,6 +128,7 @@ def test_one_name_that_explains_only_a_part_stays_ambiguous() -> None:
     assert (verdict.form, verdict.groups) == ("ambiguous", (("sine_response",),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["dead_band=z10", "scale_factor_asymmetry=z10"])
 def test_a_small_cause_of_the_error_is_still_named(effect: str) -> None:
     request = SimulateRequest(recipe="ojeda2000-121", seed=4, hide=[effect], sample_rate_hz=4.0)
@@ -133,6 +136,7 @@ def test_a_small_cause_of_the_error_is_still_named(effect: str) -> None:
     assert effect.partition("=")[0] in found.verdict.named
 
 
+@pytest.mark.slow
 def test_axes_may_have_different_causes() -> None:
     recording = made("quick-triaxial")
     columns = dict(recording.columns)
@@ -181,6 +185,7 @@ def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_what_is_not_physical_is_suspected_last_with_probability_0() -> None:
     """A MEMS unit has no open-loop interferometer: its sine is alike a cubic, and comes after what a MEMS can have."""
     recording = three_axes(1, scale_factor_odd=3e-9)

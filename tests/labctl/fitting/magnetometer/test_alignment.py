@@ -33,6 +33,7 @@ def aligned(session: Session) -> FieldAlignment:
     return align_field(*session[:4])
 
 
+@pytest.mark.slow
 def test_the_uncertainty_covers_known_turns() -> None:
     found = [scores(seed, 14) for seed in range(40, 46)]
     for kind in ("magnetometer", "bias", "scale factor", "misalignment", "hard iron", "soft iron"):

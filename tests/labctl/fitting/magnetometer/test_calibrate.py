@@ -20,6 +20,7 @@ def truth(field_ut: float | None) -> np.ndarray:
     return np.array([*HARD_IRON_UT, *(scale * SOFT_IRON[place] for place in PLACES), scale * FIELD_UT])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("field_ut", "noise_ut", "memory"), [(FIELD_UT, 0.4, 0.0), (None, 0.4, 0.0), (FIELD_UT, 1.5, 0.0), (None, 0.4, 0.8)]
 )

@@ -96,6 +96,7 @@ def test_the_scatter_is_what_the_dense_likelihood_says() -> None:
     assert found.variances == pytest.approx(np.exp(best.x), rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_errors_of_the_fit_are_as_large_as_stated_and_no_larger_where_the_scatter_is() -> None:
     """By the weights u is true, and no larger where the error is; equal weights make errors of three times that u."""
     rng = np.random.default_rng(4)

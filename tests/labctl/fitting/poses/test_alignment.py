@@ -61,6 +61,7 @@ def solved(unit: TurnedUnit) -> Solved:
     return solve(readings_of(Recording(INFO, {"dataset": np.ones(len(columns["t_s"]), dtype=np.int64), **columns})))
 
 
+@pytest.mark.slow
 def test_the_uncertainty_covers_known_turns() -> None:
     z = []
     for seed in range(8):

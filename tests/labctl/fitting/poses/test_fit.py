@@ -37,6 +37,7 @@ def agrees(result: FitResult, truth: Truth) -> bool:
     return bool(np.all(np.abs(value - truth.gyro) < 4 * u))
 
 
+@pytest.mark.slow
 def test_coefficients_cover_the_truth_and_held_out_moves_their_error() -> None:
     scores: dict[str, list[float]] = defaultdict(list)
     within, figures = [], []

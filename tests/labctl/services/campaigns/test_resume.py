@@ -44,7 +44,7 @@ def whole() -> tuple[int, Any]:
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("number", range(KILLS))
+@pytest.mark.parametrize("number", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, KILLS))])
 def test_a_kill_at_any_instant_loses_nothing_and_repeats_nothing(whole: tuple[int, Any], number: int) -> None:
     instants, expected = whole
     kill = crash_recovery.drawn(instants, KILLS, seed=5)[number]
@@ -52,6 +52,7 @@ def test_a_kill_at_any_instant_loses_nothing_and_repeats_nothing(whole: tuple[in
     assert verdict.well, f"{kill}: {verdict}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(FAULTY))
 def test_a_faulty_bench_ends_the_campaign_or_not_but_never_hangs_and_never_lies(seed: int) -> None:
     end = faults.one(seed)

@@ -25,6 +25,7 @@ def lab(tmp_path: Path) -> Lab:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(400)
 def test_gravity_is_told_from_run_and_mounting_by_the_inverted_mounting(lab: Lab) -> None:
     """Yang's three positions, each powered and mounted anew, then each upside down inside one powered run."""

@@ -30,6 +30,7 @@ def laws(found: Criticism) -> list[Law]:
     return laws_of(found)
 
 
+@pytest.mark.slow
 def test_the_likeliest_law_is_the_true_one(found: Criticism, laws: list[Law]) -> None:
     assert found.verdict.form == "unexplained"
     assert len(laws[0].formulas) == 1
