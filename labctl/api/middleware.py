@@ -82,11 +82,16 @@ class AccessMiddleware:
         return uploads
 
     async def _admit(self, scope: Scope) -> Caller | None:
-        """Return the caller; None at a path that is open without a key. Raises NotIdentified, NotAllowed, BadInput."""
+        """Return the caller; None at a path that is open without a key.
+
+        Raises NotIdentified, NotAllowed, ReadOnly, BadInput.
+        """
         if "\x00" in scope["path"] or b"%00" in scope["query_string"]:
             raise BadInput("the address holds a NUL character; remove it")
         try:
             caller = await self._caller(scope)
+            if self._access.read_only is not None:
+                self._access.read_only.refuse_act(scope["method"], scope["path"])
             require_role(caller, role_needed(scope["method"], scope["path"]))
         except NotAllowed:
             proven = scope["path"] in PROVEN and b"calibration=" in scope["query_string"]
