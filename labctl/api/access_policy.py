@@ -11,7 +11,7 @@ from fastapi.security import HTTPBearer
 from labctl.answers.admin import Role
 from labctl.errors import ReadOnly
 from labctl.services.admin.api_keys import require_role
-from labctl.services.read_access import where_to_act
+from labctl.services.read_access import acting_service
 
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Paths that may need a computation; everything else that is read is a file or a few figures.
@@ -43,11 +43,11 @@ class ReadOnlyAccess:
     acts_at: str | None = None  #: address of the service that acts, where it is known
 
     def refuse_act(self, method: str, path: str) -> None:
-        """Raise ReadOnly for a request that would change something, whoever sends it."""
+        """Raise ReadOnly for a request that would change something, whatever the role of its caller."""
         if role_needed(method, path) is not Role.VIEWER:
             raise ReadOnly(
-                f"{method} {path}: this service is read-only, nothing was changed and nothing was stopped; "
-                f"{where_to_act(self.acts_at)}",
+                f"{method} {path}: this service is read-only, nothing was changed and nothing was stopped; send the "
+                f"request to {acting_service(self.acts_at)}",
                 self.acts_at,
             )
 

@@ -23,6 +23,7 @@ from labctl.processes.supervisor import Ready, ending_signals
 from labctl.processes.waker import Waker
 from labctl.processes.web_keeper import WebKeeper
 from labctl.services.campaigns.stop_requests import StopElsewhere
+from labctl.services.read_access import acting_service
 from labctl.stop.latch import StopRequest
 from labctl.stop.wire import Stopping
 
@@ -71,7 +72,10 @@ def _keeper(request: ServeRequest, at: Listening, waker: Waker, folder: Path) ->
 
 def _respond(request: ServeRequest, _: StopRequest) -> Stopping:
     """Answer a stop that came over HTTP while no web process answered."""
-    return StopElsewhere(f"this service is read-only and drives no bench; {request.where_to_act}", stands=True)
+    return StopElsewhere(
+        f"this service is read-only and drives no bench; send the request to {acting_service(request.acts_at)}",
+        stands=True,
+    )
 
 
 def _serve(keepers: list[WebKeeper], at: Listening, waker: Waker, ready: Callable[[Ready], None]) -> None:

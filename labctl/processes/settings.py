@@ -9,7 +9,6 @@ from pathlib import Path
 
 from labctl.config import default_database
 from labctl.errors import BadInput
-from labctl.services.read_access import where_to_act
 from labctl.stop.page import PageAccess
 
 SIMULATED_BENCH = "triaxial-sim"
@@ -62,11 +61,6 @@ class ServeRequest:
     def bench_name(self) -> str | None:
         """The bench to drive, if any."""
         return self.bench or (SIMULATED_BENCH if self.simulate else None)
-
-    @property
-    def where_to_act(self) -> str:
-        """Where a request is to be sent that a service that only reads refuses, as the end of a sentence."""
-        return where_to_act(self.acts_at)
 
     def check(self) -> None:
         """Raise BadInput for a number that is out of its range, and for options that exclude each other."""

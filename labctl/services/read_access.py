@@ -11,11 +11,9 @@ from labctl.errors import StoreError
 from labctl.store import Store, is_url, open_store
 
 
-def where_to_act(acts_at: str | None) -> str:
-    """Return where a request that changes something is to be sent, as the end of a refusal of a read-only service."""
-    if acts_at is not None:
-        return f"send the request to {acts_at}"
-    return "send the request to a service that writes to this database; `labctl bench status` lists those with a bench"
+def acting_service(acts_at: str | None) -> str:
+    """Return the name of the service that takes what a service that only reads refuses; `acts_at` is its address."""
+    return acts_at or "a service that writes to this database; `labctl bench status` lists those with a bench"
 
 
 @contextmanager

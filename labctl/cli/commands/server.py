@@ -121,6 +121,7 @@ def _serve(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
 def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> None:
     """Print the address of a service and the state of its bench at the start."""
     from labctl.answers.service import ServiceReady
+    from labctl.services.read_access import acting_service
 
     named, start_at = request.bench_name, request.simulated_start
     unconfirmed, cut_short = ("", "") if named is None else _found(named, request.database)
@@ -131,7 +132,8 @@ def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> Non
     console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)")
     if request.read_only:
         console.print(
-            f"read-only: every request that changes something is refused; {request.where_to_act}", soft_wrap=True
+            f"read-only: every request that changes something is refused; send it to {acting_service(request.acts_at)}",
+            soft_wrap=True,
         )
     if start_at is not None:
         console.print(f"the date of this service is simulated: {start_at:%Y-%m-%d %H:%M} UTC")

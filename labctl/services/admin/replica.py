@@ -9,7 +9,7 @@ from labctl.store import Store
 
 
 class ReplicaWatch:
-    """The age of the data, as the database told it last. While it does not answer, the data grow older."""
+    """The age of the data, as the database reported it last. While it does not answer, the data grow older."""
 
     def __init__(self, store: Store, clock: Clock) -> None:
         self._store, self._clock = store, clock

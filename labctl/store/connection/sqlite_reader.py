@@ -63,7 +63,9 @@ class SqliteReader:
         try:
             file = Path(self._location).stat()
         except OSError as error:
-            raise StoreError(f"{self._location}: the database cannot be read ({error.strerror})") from error
+            raise StoreError(
+                f"{self._location}: the database cannot be read ({error.strerror}); put it there again"
+            ) from error
         return FileState(file.st_dev, file.st_ino, file.st_size, file.st_mtime_ns, self._is_immutable())
 
     def engines(self) -> tuple[sa.Engine, sa.Engine]:

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 
 from labctl.store.connection.database import Database
 
-# The view has a row while the replica is connected to its server; everyone may see that, not the rest of the row.
+# The view has a row while the replica is connected to its server; every user sees that, not the rest of the row.
 _STATE = sa.text(
     """
     SELECT pg_last_xact_replay_timestamp() AS last_change_at,
