@@ -83,7 +83,7 @@ def test_the_client_has_a_method_for_each_request(http: TestClient) -> None:
         assert refused.value.status == 404
         kind = http.get("/api/units").json()[0]["model"]
         report = client.fleet_report(FleetReportRequest(type=kind))
-        assert (report.type, report.units) == (kind, UNITS)
+        assert (report.type, report.figures.units) == (kind, UNITS)
 
 
 def test_an_engine_is_used_only_where_the_service_was_started_with_it(
