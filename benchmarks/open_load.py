@@ -12,6 +12,7 @@ import json
 import sys
 from collections import deque
 from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
 import uvloop
@@ -34,8 +35,7 @@ class Link(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Keep the transport."""
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self._transport = cast(asyncio.Transport, transport)  # uvloop's has no base class
 
     def ask(self, serial: str, due_s: float) -> None:
         """Send a request."""
@@ -62,6 +62,13 @@ async def load(port: int, rate_per_s: float, seconds: float, units: int, seed: i
     times, begun_late, done = [], [], asyncio.Event()
     waiting: deque[tuple[str, float]] = deque()
     free: deque[Link] = deque()
+    failures: list[object] = []
+
+    def failed(_: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        failures.append(context.get("exception") or context["message"])
+        done.set()
+
+    loop.set_exception_handler(failed)
 
     def answered(link: Link) -> None:
         times.append(loop.time() - link.due_s)
@@ -93,6 +100,7 @@ async def load(port: int, rate_per_s: float, seconds: float, units: int, seed: i
 
     due()
     await asyncio.wait_for(done.wait(), seconds + LAST_S)
+    assert not failures, failures[0]
     p50, p99, most = np.percentile(1e3 * np.array(times), [50, 99, 100])
     late = float(np.mean(1e3 * np.array(begun_late) > LATE_MS))
     answered_per_s = len(times) / (loop.time() - begin_s)

@@ -41,6 +41,7 @@ from labctl.services.drafts.answers import with_drafts
 from labctl.services.drafts.watch import DraftWatch
 from labctl.services.fleet.engines import LOCAL, ComputationEngine, Engine, open_engine
 from labctl.services.fleet.watch import FleetWatch
+from labctl.services.joint_reads import JointReads
 from labctl.services.live.live_stream import LiveEventStream
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
@@ -93,6 +94,8 @@ class LabService:
         self.clock = clock
         self.acts_at = acts_at
         self.fetches = FetchLog(store)
+        self.in_force = JointReads(store.certifications.served_together)
+        self.keys = JointReads(store.keys.by_digests)
         self.bench_access: BenchAccess = access or LocalBench(store, clock, runner)
         self._executor = LocalExecutor(CommandContext(lambda: store, clock, self.bench_access.control))
         self._event_stream = CampaignEventStream(store, self.status, self.bench_access.listen)

@@ -80,7 +80,7 @@ def test_the_client_has_a_method_for_each_request(http: TestClient) -> None:
         assert len(client.fleet_units(1, limit=2)) == 2
         with pytest.raises(ServiceRefused, match="no unit of type 'none'") as refused:
             client.fleet_report(FleetReportRequest(type="none"))
-        assert refused.value.status == 404
+        assert refused.value.status == 400
         kind = http.get("/api/units").json()[0]["model"]
         report = client.fleet_report(FleetReportRequest(type=kind))
         assert (report.type, report.figures.units) == (kind, UNITS)
