@@ -16,13 +16,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from instruments.clock import Clock, SystemClock
 from labctl.answers.json_object import JsonObject
 from labctl.calibration import Calibration, read_calibration
 from labctl.calibration.document import MAX_BYTES
+from labctl.closing import ClosedAtEnd
 from labctl.compensator import Compensator, Outside
 from labctl.errors import BadCalibrationFile, BundleExpired, CalibrationOverdue, CalibrationWithdrawn, NotFound
 from labctl.public_keys import PublicKey, read_public_key
@@ -89,7 +89,7 @@ def signed_digest(manifest: bytes) -> str:
     return hashlib.sha256(FORMAT.encode() + b"\n" + manifest).hexdigest()
 
 
-class Bundle:
+class Bundle(ClosedAtEnd):
     """An open bundle. `serials` are its units; `is_signature_checked` says whether a public key was given."""
 
     def __init__(
@@ -127,14 +127,6 @@ class Bundle:
             archive.close()
             raise
         return cls(where, archive, manifest, checked=key is not None, clock=now_clock)
-
-    def __enter__(self) -> Bundle:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Close the file."""

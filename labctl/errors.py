@@ -21,6 +21,7 @@ LabctlError              exit 2, HTTP 400
 │   └── BenchBusy        another campaign or process drives the bench now             HTTP 409
 ├── NotAllowed           the key's role may not do this, or the request came a way it may not    HTTP 403
 │   └── NotIdentified    no key was given, or it is not one in force                             HTTP 401
+├── ReadOnly             this process only reads the database: what would change something is refused   HTTP 403
 ├── TooLarge             a request carries more than this service takes              HTTP 413
 ├── BenchSilent          the bench process does not answer; the bench may move       HTTP 503
 │   └── NotStopped       a stop was asked for, and it is not known that the bench stands    HTTP 503, exit 1
@@ -300,6 +301,25 @@ class NotIdentified(NotAllowed):
 
     status = 401
     slug = "not-identified"
+
+
+class ReadOnly(LabctlError):
+    """This service only reads; nothing was changed.
+
+    `acts_at`: the address of the service that takes the request, None where it is not known here.
+    """
+
+    status = 403
+    slug = "read-only"
+
+    def __init__(self, text: str, acts_at: str | None = None) -> None:
+        super().__init__(text)
+        self.acts_at = acts_at
+
+    @property
+    def members(self) -> JsonObject:
+        """The address."""
+        return {"acts_at": self.acts_at}
 
 
 class TooLarge(LabctlError):

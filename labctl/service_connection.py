@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ssl
-from types import TracebackType
 from typing import Any, Literal, TypeVar
 from urllib.parse import quote, urlencode
 
@@ -11,6 +10,7 @@ import httpx
 from pydantic import BaseModel
 
 from instruments.clock import Clock, SystemClock
+from labctl.closing import ClosedAtEnd
 from labctl.config import KEY_VARIABLE, key, os_user
 from labctl.errors import LabctlError, NotCertified, StoreError
 
@@ -38,7 +38,7 @@ def _trust(url: str) -> ssl.SSLContext | Literal[True]:
     return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if url.startswith("http://") else True
 
 
-class ServiceConnection:
+class ServiceConnection(ClosedAtEnd):
     """Requests to one service. `api_key` defaults to `$LABCTL_KEY`; without one the user's name is sent.
 
     `timeout_s` bounds each answer, and for how long a service that is busy is asked again.
@@ -62,14 +62,6 @@ class ServiceConnection:
         self.http = httpx.Client(
             base_url=url, timeout=timeout_s, headers=identity, trust_env=False, transport=transport, verify=_trust(url)
         )
-
-    def __enter__(self) -> ServiceConnection:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Close the connection."""

@@ -1,4 +1,4 @@
-"""Free texts that people type: reasons, names, notes. What a terminal, a list or a file would obey is found here."""
+"""Free texts that people type, in which what a terminal, a list or a file would obey is found; and counts in words."""
 
 from __future__ import annotations
 
@@ -10,6 +10,11 @@ _DIRECTIONS = frozenset(map(chr, (*range(0x202A, 0x202F), *range(0x2066, 0x206A)
 _CATEGORIES = frozenset({"Cc", "Zl", "Zp", "Cs"})
 #: What a text of several lines may have of these.
 _LINES = frozenset("\n\r\t")
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number of things in words, such as "1 calibration" and "2 calibrations"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def control_character(text: str, *, lines: bool = False) -> str:

@@ -29,19 +29,17 @@ def programs() -> Path | None:
     return None if where is None else Path(where).parent
 
 
-class Cluster:
-    """A server. PostgreSQL refuses to run as root, so as root it runs as the package's own user."""
+#: The port that names the socket of a cluster, and that of its replica.
+PORT, REPLICA_PORT = 5432, 5433
 
-    def __init__(self, folder: Path, bin_folder: Path) -> None:
-        self._folder, self._bin = folder, bin_folder
-        self._data, self._sockets = folder / "data", folder / "s"
-        self._sockets.mkdir()
+
+class Server:
+    """A server of a folder. PostgreSQL refuses to run as root, so as root it runs as the package's own user."""
+
+    def __init__(self, folder: Path, bin_folder: Path, data: str, port: int) -> None:
+        self._folder, self._bin, self._port = folder, bin_folder, port
+        self._data, self._sockets = folder / data, folder / "s"
         self._user = "postgres" if os.geteuid() == 0 else None
-        if self._user is not None:
-            owner = pwd.getpwnam(self._user)
-            for path in (folder, self._sockets):
-                os.chown(path, owner.pw_uid, owner.pw_gid)
-        self._run("initdb", "-D", self._data, "-U", USER, "-A", "trust", "-E", "UTF8", "--no-sync", "--no-instructions")
 
     def _run(self, program: str, *arguments: object) -> None:
         command = [str(self._bin / program), *map(str, arguments)]
@@ -56,11 +54,12 @@ class Cluster:
         settings = {
             "listen_addresses": "''",
             "unix_socket_directories": self._sockets,
+            "port": self._port,
             "max_connections": 200,
             "fsync": "off",
         }
         options = " ".join(f"-c {name}={value}" for name, value in settings.items())
-        self._run("pg_ctl", "-D", self._data, "-w", "-t", START_S, "-l", self._folder / "log", "-o", options, "start")
+        self._run("pg_ctl", "-D", self._data, "-w", "-t", START_S, "-l", f"{self._data}.log", "-o", options, "start")
 
     def stop(self, *, how: str = "fast") -> None:
         """Stop the server: `fast` ends every connection in order, `immediate` is a crash."""
@@ -90,12 +89,39 @@ class Cluster:
 
     def url(self, database: str = "postgres") -> str:
         """Return the URL of one of its databases."""
-        return f"postgresql+psycopg://{USER}@/{database}?host={self._sockets}"
+        return f"postgresql+psycopg://{USER}@/{database}?host={self._sockets}&port={self._port}"
 
     @property
     def socket(self) -> Path:
         """The Unix socket that the server listens on."""
-        return self._sockets / ".s.PGSQL.5432"
+        return self._sockets / f".s.PGSQL.{self._port}"
+
+
+class Cluster(Server):
+    """A server with databases of its own."""
+
+    def __init__(self, folder: Path, bin_folder: Path) -> None:
+        super().__init__(folder, bin_folder, "data", PORT)
+        self._sockets.mkdir()
+        if self._user is not None:
+            owner = pwd.getpwnam(self._user)
+            for path in (folder, self._sockets):
+                os.chown(path, owner.pw_uid, owner.pw_gid)
+        self._run("initdb", "-D", self._data, "-U", USER, "-A", "trust", "-E", "UTF8", "--no-sync", "--no-instructions")
+
+    @contextmanager
+    def replica(self) -> Iterator[Server]:
+        """Copy the server, let the copy follow it by streaming for the block, and remove it."""
+        made = Server(self._folder, self._bin, "replica", REPLICA_PORT)
+        source = ("-h", self._sockets, "-p", self._port, "-U", USER)
+        self._run("pg_basebackup", *source, "-D", made._data, "-R", "-X", "stream", "-c", "fast", "--no-sync")  # noqa: SLF001
+        made.start()
+        try:
+            yield made
+        finally:
+            with suppress(subprocess.SubprocessError):
+                made.stop(how="immediate")
+            shutil.rmtree(made._data, ignore_errors=True)  # noqa: SLF001
 
     def new_database(self) -> str:
         """Make an empty database; returns its URL."""

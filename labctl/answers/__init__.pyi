@@ -421,6 +421,7 @@ from labctl.answers.service import (
     HealthResponse as HealthResponse,
     HeartbeatResponse as HeartbeatResponse,
     PulseResponse as PulseResponse,
+    ReplicaResponse as ReplicaResponse,
     ServiceReady as ServiceReady,
     SimulatorReady as SimulatorReady,
 )

@@ -9,7 +9,9 @@ from fastapi import Depends, Request, Security
 from fastapi.security import HTTPBearer
 
 from labctl.answers.admin import Role
+from labctl.errors import ReadOnly
 from labctl.services.admin.api_keys import require_role
+from labctl.services.read_access import acting_service
 
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Paths that may need a computation; everything else that is read is a file or a few figures.
@@ -35,6 +37,22 @@ MIB = 1 << 20
 
 
 @dataclass(frozen=True)
+class ReadOnlyAccess:
+    """The access to a service that only reads."""
+
+    acts_at: str | None = None  #: address of the service that acts, where it is known
+
+    def refuse_act(self, method: str, path: str) -> None:
+        """Raise ReadOnly for a request that would change something, whatever the role of its caller."""
+        if role_needed(method, path) is not Role.VIEWER:
+            raise ReadOnly(
+                f"{method} {path}: this service is read-only, nothing was changed and nothing was stopped; send the "
+                f"request to {acting_service(self.acts_at)}",
+                self.acts_at,
+            )
+
+
+@dataclass(frozen=True)
 class AccessPolicy:
     """Which callers are admitted, and the largest body of a request.
 
@@ -48,6 +66,7 @@ class AccessPolicy:
     body_bytes: int = MIB
     upload_bytes: int = 2048 * MIB
     held_bytes: int = 64 * MIB  #: of bodies that are held in memory for all requests together
+    read_only: ReadOnlyAccess | None = None  #: None: requests may change something
 
     def largest_body(self, path: str) -> int:
         """Return the largest body of a request to a path, in bytes."""

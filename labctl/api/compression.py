@@ -9,6 +9,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 #: A shorter answer fits into a network packet as it is.
 MIN_COMPRESSED_BYTES = 1400
 EVENTS = "text/event-stream"
+ACCEPTED = b"accept-encoding"
 #: Events of a computation: some stages, then a large answer. Those that go on for hours pass as they are.
 ENDING_STREAMS = ("/criticism/events",)
 #: Half the time of the highest level, for a twentieth more bytes.
@@ -26,7 +27,7 @@ class CompressionMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
-        if scope["type"] == "http" and "gzip" in Headers(scope=scope).get("accept-encoding", ""):
+        if scope["type"] == "http" and any(b"gzip" in value for name, value in scope["headers"] if name == ACCEPTED):
             ends = scope["path"].endswith(ENDING_STREAMS)
             passing = tuple(kind for kind in DEFAULT_EXCLUDED_CONTENT_TYPES if not (ends and kind == EVENTS))
             responder = _Responder(self._app, MIN_COMPRESSED_BYTES, LEVEL, exclude_content_types=passing)

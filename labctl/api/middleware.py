@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from urllib.parse import unquote
 
-from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -82,11 +81,16 @@ class AccessMiddleware:
         return uploads
 
     async def _admit(self, scope: Scope) -> Caller | None:
-        """Return the caller; None at a path that is open without a key. Raises NotIdentified, NotAllowed, BadInput."""
+        """Return the caller; None at a path that is open without a key.
+
+        Raises NotIdentified, NotAllowed, ReadOnly, BadInput.
+        """
         if "\x00" in scope["path"] or b"%00" in scope["query_string"]:
             raise BadInput("the address holds a NUL character; remove it")
         try:
             caller = await self._caller(scope)
+            if self._access.read_only is not None:
+                self._access.read_only.refuse_act(scope["method"], scope["path"])
             require_role(caller, role_needed(scope["method"], scope["path"]))
         except NotAllowed:
             proven = scope["path"] in PROVEN and b"calibration=" in scope["query_string"]
@@ -100,8 +104,7 @@ class AccessMiddleware:
         if (authorization := headers.get("authorization")) is not None:
             if self._keys is not None and scope["method"] == "POST" and STOPS.fullmatch(scope["path"]):
                 return await self._keys.caller_of(authorization)
-            # in a thread: a database that does not answer must not keep the loop from passing on a stop
-            return await run_in_threadpool(identify, self._service.store, authorization)
+            return await identify(self._service.keys, authorization)
         if self._access.keys:
             raise NotIdentified(
                 "this service requires an API key: send `Authorization: Bearer KEY`; `labctl key create` makes one"

@@ -21,15 +21,25 @@ class Listening:
     name: str  #: of the host, as a Host header has it
     url: str
 
+    @property
+    def port(self) -> int:
+        """The TCP port."""
+        return int(self.socket.getsockname()[1])
+
 
 @contextmanager
-def listening(host: str, port: int, ask_for_it: Callable[[], None] = lambda: None) -> Iterator[Listening]:
+def listening(
+    host: str, port: int, ask_for_it: Callable[[], None] = lambda: None, *, shared: bool = False
+) -> Iterator[Listening]:
     """Listen at an address while the block runs; port 0 takes a free one. Raises BadInput.
 
     `ask_for_it` asks the process that answers there, in place of a service that is gone, to give the address back.
+    With `shared` further sockets of this user may listen at the same address.
     """
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if shared:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         try:
             _bind(listener, (host, port), ask_for_it)
         except socket.gaierror as error:
@@ -41,6 +51,12 @@ def listening(host: str, port: int, ask_for_it: Callable[[], None] = lambda: Non
         name = f"[{host}]" if ":" in host else host
         listener.listen(BACKLOG)  # a client that reads the address may connect at once
         yield Listening(listener, name, f"http://{name}:{listener.getsockname()[1]}")
+
+
+def refuse_taken(host: str, port: int) -> None:
+    """Raise BadInput where another service listens at an address: a shared one would be given to both."""
+    with listening(host, port):
+        pass
 
 
 def _bind(listener: socket.socket, at: tuple[str, int], ask_for_it: Callable[[], None]) -> None:

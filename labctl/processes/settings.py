@@ -13,6 +13,7 @@ from labctl.stop.page import PageAccess
 
 SIMULATED_BENCH = "triaxial-sim"
 LAST_PORT = 65535
+MAX_PROCESSES = 64
 #: Names of the sockets in the folder of a bench process.
 CALLS, STOP = "calls", "stop"
 #: Name of the file in that folder with the digests of the keys, for a process that answers without a database.
@@ -42,6 +43,9 @@ class ServeRequest:
     require_keys: bool = False
     max_upload_mib: int = 2048
     wire_logs: Path | None = None  #: folder for a log of each campaign
+    read_only: bool = False  #: drive no bench, and change nothing in the database
+    acts_at: str | None = None  #: address of the service that acts, which one that only reads names
+    processes: int = 1  #: web processes of a service that only reads
 
     @property
     def location(self) -> str:
@@ -59,7 +63,8 @@ class ServeRequest:
         return self.bench or (SIMULATED_BENCH if self.simulate else None)
 
     def check(self) -> None:
-        """Raise BadInput for a number that is out of its range."""
+        """Raise BadInput for a number that is out of its range, and for options that exclude each other."""
+        self._check_reading()
         if not 0 <= self.speed < float("inf"):
             raise BadInput(f"--speed {self.speed}: give a positive number, or 0 for as fast as possible")
         if self.simulated_start is not None and self.bench_name is None:
@@ -76,6 +81,24 @@ class ServeRequest:
             raise BadInput(f"--port {self.port}: give a port from 1 to {LAST_PORT}, or 0 for a free port")
         if not 1 <= self.max_upload_mib <= 1 << 20:
             raise BadInput(f"--max-upload-mib {self.max_upload_mib}: give a size from 1 to {1 << 20} MiB")
+
+    def _check_reading(self) -> None:
+        if self.read_only and self.bench_name is not None:
+            raise BadInput(
+                f"--read-only: a service that only reads drives no bench, but {self.bench_name} is named; leave "
+                "--bench and --simulate out, or leave --read-only out"
+            )
+        if not self.read_only and self.acts_at is not None:
+            raise BadInput(f"--acts-at {self.acts_at}: this service acts itself; give --read-only, or leave it out")
+        if self.acts_at is not None and not self.acts_at.startswith(("http://", "https://")):
+            raise BadInput(f"--acts-at {self.acts_at}: give an address that begins with http:// or https://")
+        if not 1 <= self.processes <= MAX_PROCESSES:
+            raise BadInput(f"--processes {self.processes}: give a number from 1 to {MAX_PROCESSES}")
+        if self.processes > 1 and not self.read_only:
+            raise BadInput(
+                f"--processes {self.processes}: a service that may write has one web process; give --read-only, or "
+                "leave the option out"
+            )
 
 
 @dataclass(frozen=True)

@@ -64,8 +64,9 @@ class Ready:
     """Where a service answers, and its processes."""
 
     url: str
-    bench_pid: int
+    bench_pid: int | None  #: None for a service that only reads
     web_pid: int
+    web_pids: tuple[int, ...]  #: of all web processes
 
 
 #: A bench process that answers at the address of its service gives it back within this, s.
@@ -141,7 +142,7 @@ class Supervisor:
         try:
             web.open()
             log.info("process.started", url=self._at.url, bench_pid=bench.pid, web_pid=web.pid)
-            ready(Ready(self._at.url, bench.pid, web.pid))
+            ready(Ready(self._at.url, bench.pid, web.pid, (web.pid,)))
             bench.tell("begin")
             web.keep()
             systemd.ready()

@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection
 import uvicorn
 
 from instruments.clock import WallClock
-from labctl.api.access_policy import MIB, AccessPolicy
+from labctl.api.access_policy import MIB, AccessPolicy, ReadOnlyAccess
 from labctl.api.app import create_app
 from labctl.api.connection_limits import limits_for, raise_open_files
 from labctl.api.http_protocol import bounded_http
@@ -50,8 +50,16 @@ WORKER_MODULES = (
 
 
 def create_service(settings: WebSettings) -> LabService:
-    """Open the store for reading and the bench process for writing. Raises BadBench, StoreError."""
+    """Open the store for reading and, unless the service only reads, the bench process for writing.
+
+    Raises BadBench, StoreError.
+    """
     request, folder = settings.request, settings.folder
+    if request.read_only:
+        reading = Store(Database(request.location, write=False, read_only=True))
+        return LabService(
+            reading, WallClock(), computation=InWorkers(reading, preload=WORKER_MODULES), acts_at=request.acts_at
+        )
     bench = load_bench(request.bench_name) if request.bench_name is not None else None
     store = Store(Database(request.location, write=False, writer=RemoteWriter(folder)))
     store.imports.discard_unfinished()  # of a web process that was killed
@@ -63,16 +71,16 @@ def create_service(settings: WebSettings) -> LabService:
 
 def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:
     """Return who is admitted: on loopback this machine's users, elsewhere callers with a key. Raises BadInput."""
-    upload = request.max_upload_mib * MIB
+    upload, read_only = request.max_upload_mib * MIB, ReadOnlyAccess(request.acts_at) if request.read_only else None
     if not request.asks_for_keys:
-        return AccessPolicy(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload)
+        return AccessPolicy(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload, read_only=read_only)
     asked = (
         "--require-keys"
         if is_loopback(request.host)
         else f"--host {request.host}: this address can be reached from other computers"
     )
     require_an_api_key(store, asked)
-    return AccessPolicy(keys=True, upload_bytes=upload)
+    return AccessPolicy(keys=True, upload_bytes=upload, read_only=read_only)
 
 
 def _end_with(line: Connection) -> None:

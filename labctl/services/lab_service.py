@@ -16,6 +16,8 @@ from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.answers.drafts import DraftsRequest, DraftsResponse
 from labctl.answers.live import LiveStateResponse
 from labctl.answers.service import HealthResponse, HeartbeatResponse, PulseResponse
+from labctl.services.admin.replica import ReplicaWatch, replica
+from labctl.services.background import BackgroundWork
 from labctl.services.bench_access import BenchAccess
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.drivers import driven_benches
@@ -39,6 +41,7 @@ from labctl.services.drafts.answers import with_drafts
 from labctl.services.drafts.watch import DraftWatch
 from labctl.services.fleet.engines import LOCAL, ComputationEngine, Engine, open_engine
 from labctl.services.fleet.watch import FleetWatch
+from labctl.services.joint_reads import JointReads
 from labctl.services.live.live_stream import LiveEventStream
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
@@ -80,12 +83,19 @@ class LabService:
         computation: Computation | None = None,
         *,
         access: BenchAccess | None = None,
+        acts_at: str | None = None,
     ) -> None:
-        """Serve a store; what takes long is done by `computation`, default: in the threads that ask for it."""
+        """Serve a store; what takes long is done by `computation`, default: in the threads that ask for it.
+
+        `acts_at` is the address of the service that acts, where this one only reads its store.
+        """
         self.store = store
         self.computation = computation or InThreads(store)
         self.clock = clock
+        self.acts_at = acts_at
         self.fetches = FetchLog(store)
+        self.in_force = JointReads(store.certifications.served_together)
+        self.keys = JointReads(store.keys.by_digests)
         self.bench_access: BenchAccess = access or LocalBench(store, clock, runner)
         self._executor = LocalExecutor(CommandContext(lambda: store, clock, self.bench_access.control))
         self._event_stream = CampaignEventStream(store, self.status, self.bench_access.listen)
@@ -102,6 +112,9 @@ class LabService:
             store, clock, lambda: None if self.bench is None else self.bench.name, laboratory
         )
         self._fleet = FleetWatch(store, clock, self._open_engine)
+        self._replica = ReplicaWatch(store, clock)
+        watches = (self._replica,) if store.is_read_only else (self._drafts, self._diagnoses, self._fleet)
+        self._backgrounds: tuple[BackgroundWork, ...] = tuple(watch.background for watch in watches)
         self._opened_at = clock.utc()
         self._closed = False
         self._hooks = ExitStack()
@@ -121,9 +134,8 @@ class LabService:
         self._hooks.enter_context(shutdown_hook(self.end_soon))
         remove_abandoned()
         self.bench_access.start()
-        self._drafts.background.start()
-        self._diagnoses.background.start()
-        self._fleet.background.start()
+        for background in self._backgrounds:
+            background.start()
 
     def _open_engine(self, name: str) -> Engine:
         """Open the engine of a fleet job; without worker processes its tasks are done as all others are."""
@@ -136,9 +148,8 @@ class LabService:
 
     def end_soon(self) -> None:
         """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
-        self._drafts.background.end_soon()
-        self._diagnoses.background.end_soon()
-        self._fleet.background.end_soon()
+        for background in self._backgrounds:
+            background.end_soon()
         self.bench_access.end_soon()
         self.computation.end_soon()
 
@@ -149,13 +160,11 @@ class LabService:
         self._closed = True
         with self._hooks:
             self.left = self.bench_access.close()
-            self._drafts.background.end_soon()
-            self._diagnoses.background.end_soon()
-            self._fleet.background.end_soon()
+            for background in self._backgrounds:
+                background.end_soon()
             self.computation.close()
-            self._drafts.background.close()
-            self._diagnoses.background.close()
-            self._fleet.background.close()
+            for background in self._backgrounds:
+                background.close()
             self.fetches.write()
             self.store.close()
 
@@ -205,6 +214,8 @@ class LabService:
     def _is_attended(self, campaign: int, bench: str) -> bool:
         """Return whether a process runs a campaign: this service on its own bench, or another one on another bench."""
         is_own = self.bench is not None and self.bench.name == bench
+        if self.store.is_read_only and not self.store.is_shared:
+            return self.store.is_held
         if is_own or not self.store.is_shared:
             return self.bench_access.runs(campaign)
         return bench in driven_benches(self.store)
@@ -225,7 +236,10 @@ class LabService:
     def heartbeat(self) -> HeartbeatResponse:
         """Return what every open page asks once a second: that the service answers; reads no database."""
         access = self.bench_access
-        return HeartbeatResponse(version=VERSION, heard_s=round(access.heard_s, 1), not_stopped=access.not_stopped)
+        return HeartbeatResponse(
+            version=VERSION, heard_s=round(access.heard_s, 1), not_stopped=access.not_stopped,
+            read_only=self.store.is_read_only, acts_at=self.acts_at, replica=self._replica.state(),
+        )  # fmt: skip
 
     def stop_bench(self, reason: str) -> StopResponse:
         """Stop whatever runs on the bench of this service. Raises NotStopped, Conflict without a bench."""
@@ -242,6 +256,9 @@ class LabService:
             since=self._opened_at.isoformat(),
             bench=bench,
             schedule_trouble=self.bench_access.schedule_trouble,
+            read_only=self.store.is_read_only,
+            acts_at=self.acts_at,
+            replica=replica(self.store),
         )
 
     def metrics(self) -> ServiceFigures:

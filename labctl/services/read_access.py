@@ -11,6 +11,11 @@ from labctl.errors import StoreError
 from labctl.store import Store, is_url, open_store
 
 
+def acting_service(acts_at: str | None) -> str:
+    """Return the name of the service that takes what a service that only reads refuses; `acts_at` is its address."""
+    return acts_at or "a service that writes to this database; `labctl bench status` lists those with a bench"
+
+
 @contextmanager
 def open_readonly(database: str | None) -> Iterator[Store]:
     """Open the store for reading, also while another process writes."""

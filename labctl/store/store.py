@@ -29,6 +29,7 @@ from labctl.store.repositories.manifests import Manifests
 from labctl.store.repositories.recording_writer import Imports
 from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.releases import ReleaseRequests
+from labctl.store.repositories.replication import Replication
 from labctl.store.repositories.resume_points import ResumePoints
 from labctl.store.repositories.room_environment import RoomEnvironment
 from labctl.store.repositories.scheduled_starts import Starts
@@ -68,6 +69,7 @@ class Store:
         self.starts = Starts(database)
         self.leases = Leases(database)
         self.manifests = Manifests(database)
+        self.replication = Replication(database)
         self._signing = begin_signing(database, seal_key()) if database.writes else None
 
     @property
@@ -79,6 +81,11 @@ class Store:
     def is_held(self) -> bool:
         """Whether a process, perhaps this one, holds the database for writing."""
         return self._database.writes or is_url(self.location) or holder_of(self.location) is not None
+
+    @property
+    def is_read_only(self) -> bool:
+        """Whether this process may never change the database."""
+        return self._database.is_read_only
 
     @property
     def is_sole_writer(self) -> bool:
@@ -93,7 +100,7 @@ class Store:
     @property
     def address(self) -> StoreAddress:
         """The address by which another process opens the same database."""
-        return StoreAddress(self.location, self._database.writer)
+        return StoreAddress(self.location, self._database.writer, self.is_read_only)
 
     def note_address(self, address: ServiceAddress) -> None:
         """Write down at which address the service that holds this database is reached now."""
@@ -117,16 +124,22 @@ class Store:
 
 @contextmanager
 def open_store(
-    location: str, *, write: bool, address: ServiceAddress = NO_SERVICE, writer: Writer | None = None
+    location: str,
+    *,
+    write: bool,
+    address: ServiceAddress = NO_SERVICE,
+    writer: Writer | None = None,
+    read_only: bool = False,
 ) -> Iterator[Store]:
     """Open a database by path or URL, made on first use; `write` holds it for this process.
 
-    Without, transactions run by `writer`, the process that holds it.
+    Without, transactions run by `writer`, the process that holds it. With `read_only` every transaction is refused, and
+    no database is made.
 
     Raises Conflict when another process holds it, StoreError when it is newer than the code or damaged, OldSchema
     when it has to be migrated first.
     """
-    store = Store(Database(location, write=write, address=address, writer=writer))
+    store = Store(Database(location, write=write, address=address, writer=writer, read_only=read_only))
     try:
         if write:
             store.imports.discard_unfinished()
@@ -141,14 +154,15 @@ class StoreAddress:
 
     location: str  #: path or URL
     writer: Writer | None = None  #: the process that writes for others
+    read_only: bool = False  #: no process that opens it so may change it
 
     @property
     def can_write(self) -> bool:
         """Whether a store opened by this address can be written to while another process has the database."""
-        return self.writer is not None or is_url(self.location)
+        return not self.read_only and (self.writer is not None or is_url(self.location))
 
     @contextmanager
     def open(self) -> Iterator[Store]:
         """Open the store; without a writer for reading. Raises StoreError."""
-        with open_store(self.location, write=False, writer=self.writer) as store:
+        with open_store(self.location, write=False, writer=self.writer, read_only=self.read_only) as store:
             yield store

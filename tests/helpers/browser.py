@@ -18,7 +18,7 @@ import uvicorn
 
 from instruments.clock import Clock, SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.api.middleware import AccessPolicy
+from labctl.api.access_policy import AccessPolicy, ReadOnlyAccess
 from labctl.processes.web_process import WORKER_MODULES
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.computation import InWorkers, Limits
@@ -115,18 +115,21 @@ class Service:
     url: str = ""
     clock: Callable[[], Clock] = VirtualClock  #: of the bench
     limits: Limits | None = None  #: of worker processes; without, it computes in threads
+    acts_at: str | None = None  #: it only reads, and another service acts
     lab_service: LabService = field(init=False)
 
     def start(self) -> None:
         """Begin to answer."""
-        store = Store(Database(str(self.folder / "lab.sqlite"), write=True))
-        runner = BenchRunner(store, load_bench(self.bench), self.clock) if self.bench else None
+        reads = self.acts_at is not None
+        store = Store(Database(str(self.folder / "lab.sqlite"), write=not reads, read_only=reads))
+        runner = BenchRunner(store, load_bench(self.bench), self.clock) if self.bench and not reads else None
         computation = InWorkers(store, self.limits, preload=WORKER_MODULES) if self.limits else None
-        self.lab_service = LabService(store, SystemClock(), runner, computation)
+        self.lab_service = LabService(store, SystemClock(), runner, computation, acts_at=self.acts_at)
         listener = listening(self.port)
         self.port = listener.getsockname()[1]
         self.url = f"http://{LOOPBACK}:{self.port}"
-        app = create_app(self.lab_service, AccessPolicy(keys=self.keys))
+        access = AccessPolicy(keys=self.keys, read_only=ReadOnlyAccess(self.acts_at) if reads else None)
+        app = create_app(self.lab_service, access)
         self._server = Server(uvicorn.Config(app, log_level="error", lifespan="on", timeout_graceful_shutdown=GRACE_S))
         self._thread = threading.Thread(target=self._server.serve_until_stopped, args=(listener,), name="test service")
         self._thread.start()

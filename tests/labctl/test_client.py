@@ -10,7 +10,6 @@ import pytest
 
 from instruments.clock import VirtualClock
 from labctl.client import (
-    RECONNECT_AFTER_S,
     CampaignRequest,
     CampaignResponse,
     Client,
@@ -19,6 +18,7 @@ from labctl.client import (
     ScheduledResponse,
     ServiceRefused,
 )
+from labctl.client.campaigns import RECONNECT_AFTER_S
 from labctl.compensator import Compensator
 from labctl.errors import BadRecording, StoreError
 from tests.helpers.paths import EXAMPLES

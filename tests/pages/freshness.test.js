@@ -7,6 +7,7 @@ import {
   ago,
   BENCH_STALE_S,
   freshnessWords,
+  readOnlyWords,
   STALE_MS,
   stalenessOf,
 } from "../../labctl/web/static/js/core/freshness/state.js";
@@ -65,4 +66,16 @@ test("a silent bench, an answer that does not fit and a hidden tab each say what
 test("two minutes and more are in minutes", () => {
   assert.equal(ago(119.9), "119 s ago");
   assert.equal(ago(120), "2 min ago");
+});
+
+test("a service that only reads says so, and how old the data of a replica are", () => {
+  assert.equal(readOnlyWords({}), "");
+  assert.equal(readOnlyWords({ read_only: true, replica: null }), "This service only reads.");
+  /** @param {number | null} age_s */
+  const words = (age_s, is_connected = true) => readOnlyWords({ read_only: true, replica: { age_s, is_connected } });
+  assert.equal(words(3.2), "This service only reads: the data are those of a replica, not older than 4 s.");
+  assert.match(words(150), /not older than 3 min\.$/);
+  assert.match(words(7300), /not older than 3 h\.$/);
+  assert.match(words(null), /of unknown age\.$/);
+  assert.match(words(60, false), /a replica, which is not connected to its server now, not older than 60 s\.$/);
 });

@@ -34,7 +34,7 @@ from labctl.fitting.effects import read_formulas
 from labctl.services.calibrations import fitting as services
 from labctl.services.calibrations.fetch_log import ANONYMOUS, fetched_by
 from labctl.services.calibrations.revision import preview_unit
-from labctl.services.calibrations.served import calibration_file
+from labctl.services.calibrations.served import calibration_file, own_file
 from labctl.services.calibrations.served import calibration_state as state_of
 from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
@@ -45,7 +45,6 @@ from labctl.services.criticism.criticise import criticise_unit, residuals_unit
 from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
 from labctl.services.criticism.verification.of_version import verify_unit
-from labctl.store import is_url
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 OtherUnit = Annotated[bool, Query(description="Accept a recording of another unit than the one in the address.")]
@@ -86,13 +85,17 @@ async def calibration(
     or not-certified, `X-Labctl-Due` the date until which it is valid; `Warning` says that it is overdue or revoked.
     `X-Labctl-Withdrawn` says when, by whom and why the version was revoked or its certificate withdrawn. Who fetches is
     recorded, by the name of the key.
-    What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each. JSON is a
-    point read of tens of microseconds: it runs in the event loop, without a switch to a thread; others compute.
+    What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each.
     """
-    # a server that does not answer would keep the loop from passing on a stop
-    if format == "json" and not option and not is_url(service.store.location):
+    # JSON from a file is a point read of tens of microseconds: it runs in the event loop, without a switch to a thread
+    file = None
+    if format == "json" and not option and not service.store.is_shared:
         file = calibration_file(service.store, serial, version, format)
-    else:
+    elif format == "json" and not option and version is None:
+        served = await service.in_force.get(serial)
+        if served is not None and served.act is not None:
+            file = own_file(serial, served.act.version, served)
+    if file is None:  # it computes, or says why there is none
         file = await run_in_threadpool(calibration_file, service.store, serial, version, format, option or [])
     headers = file.headers(service.clock.utc())
     is_known = if_none_match and f'"{file.etag}"' in if_none_match

@@ -12,6 +12,7 @@ from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr
 from labctl.errors import BadInput
+from labctl.texts import counted
 
 
 def export_bundle(
@@ -49,6 +50,8 @@ def export_bundle(
         print_json(answer)
         return
     signed = "without a signature" if answer.signed_by is None else f"signed by the key {answer.signed_by}"
-    console.print(f"{answer.calibrations} calibrations -> {answer.file}, {signed}", soft_wrap=True)
+    console.print(f"{counted(answer.calibrations, 'calibration')} -> {answer.file}, {signed}", soft_wrap=True)
     if answer.withdrawn:
-        stderr.print(f"{answer.withdrawn} units are named as withdrawn, without a calibration", style="yellow")
+        verb = "is" if answer.withdrawn == 1 else "are"
+        text = f"{counted(answer.withdrawn, 'unit')} {verb} named as withdrawn, without a calibration"
+        stderr.print(text, style="yellow")

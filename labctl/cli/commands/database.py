@@ -10,6 +10,7 @@ import typer
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr
+from labctl.texts import counted
 
 if TYPE_CHECKING:
     from labctl.answers.admin import CheckResponse
@@ -83,9 +84,9 @@ def check(
             console.print(f"{finding.part}: {finding.text}", soft_wrap=True)
         for text in (*answer.remarks, *answer.kept_readings, *_of_manifests(answer)):
             console.print(text, soft_wrap=True)
-        looked = f"{answer.blocks} blocks, {answer.calibrations} calibrations, {answer.audit_rows} audit rows"
-        number = len(answer.findings)
-        verdict = "no damage found" if answer.ok else f"{number} finding{'s' if number > 1 else ''}"
+        read = ((answer.blocks, "block"), (answer.calibrations, "calibration"), (answer.audit_rows, "audit row"))
+        looked = ", ".join(counted(number, noun) for number, noun in read)
+        verdict = "no damage found" if answer.ok else counted(len(answer.findings), "finding")
         console.print(f"{answer.database}: {looked}: {verdict}", soft_wrap=True)
     if not answer.ok:
         raise typer.Exit(1)

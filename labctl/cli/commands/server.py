@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -39,6 +40,26 @@ RequireKeys = Annotated[
 ]
 
 
+ReadOnlyService = Annotated[
+    bool,
+    typer.Option(
+        "--read-only",
+        help="Serve pages and answers only: drive no bench and change nothing in the database; it may be a replica.",
+    ),
+]
+
+ActsAt = Annotated[
+    str | None,
+    typer.Option(
+        "--acts-at", metavar="URL", help="Address of the service that acts; a read-only service names it in refusals."
+    ),
+]
+
+Processes = Annotated[
+    int, typer.Option("--processes", metavar="N", help="Processes of a read-only service that answer at the same port.")
+]
+
+
 def serve(
     bench: BenchName = None,
     simulate: Annotated[
@@ -56,19 +77,22 @@ def serve(
     require_keys: RequireKeys = False,
     max_upload_mib: MaxUpload = 2048,
     wire_logs: WireLogs = None,
+    read_only: ReadOnlyService = False,
+    acts_at: ActsAt = None,
+    processes: Processes = 1,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
     """Serve calibrations over HTTP and run campaigns on the bench. Ctrl-C stops it and leaves the bench in its
     safe state."""
     from labctl.processes.settings import ServeRequest
-    from labctl.processes.supervisor import serve_forever
 
     with one_clear_line():
         start_at = simulated_start(simulated_from)
     request = ServeRequest(
         bench=bench, simulate=simulate, speed=speed, simulated_start=start_at, host=host, port=port, database=database,
-        require_keys=require_keys, max_upload_mib=max_upload_mib, wire_logs=wire_logs,
+        require_keys=require_keys, max_upload_mib=max_upload_mib, wire_logs=wire_logs, read_only=read_only,
+        acts_at=acts_at, processes=processes,
     )  # fmt: skip
 
     def ready(service: Ready) -> None:
@@ -76,16 +100,28 @@ def serve(
 
     with one_clear_line(), log_of_command("supervisor", default="info", location=request.location):
         try:
-            _migrated(request.location)
-            unconfirmed = serve_forever(request, ready)
+            unconfirmed = _serve(request, ready)
         finally:
             give_up_blocked_stderr()
     stderr.print(f"labctl: stopped{'; ' if unconfirmed else ''}{unconfirmed}")
 
 
+def _serve(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
+    """Serve until interrupted; returns how the bench was left."""
+    if request.read_only:
+        from labctl.processes.read_only_supervisor import serve_read_only
+
+        return serve_read_only(request, ready)
+    from labctl.processes.supervisor import serve_forever
+
+    _migrated(request.location)
+    return serve_forever(request, ready)
+
+
 def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> None:
     """Print the address of a service and the state of its bench at the start."""
     from labctl.answers.service import ServiceReady
+    from labctl.services.read_access import acting_service
 
     named, start_at = request.bench_name, request.simulated_start
     unconfirmed, cut_short = ("", "") if named is None else _found(named, request.database)
@@ -94,6 +130,11 @@ def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> Non
         print_json(service_ready, one_line=True)
         return
     console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)")
+    if request.read_only:
+        console.print(
+            f"read-only: every request that changes something is refused; send it to {acting_service(request.acts_at)}",
+            soft_wrap=True,
+        )
     if start_at is not None:
         console.print(f"the date of this service is simulated: {start_at:%Y-%m-%d %H:%M} UTC")
     for text in filter(None, (unconfirmed, cut_short)):

@@ -9,6 +9,7 @@ from datetime import datetime
 
 from labctl.answers.admin import Caller, KeyRequest, KeyResponse, NewKeyResponse, Role
 from labctl.errors import BadInput, NotAllowed, NotIdentified
+from labctl.services.joint_reads import JointReads
 from labctl.store import KeyRow, Store
 
 PREFIX = "labctl_"
@@ -43,11 +44,11 @@ def digest_of(key: str) -> str:
     return hashlib.sha256(key.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def identify(store: Store, authorization: str) -> Caller:
-    """Return whose key an Authorization header carries. Raises NotIdentified."""
+async def identify(keys: JointReads[str, KeyRow], authorization: str) -> Caller:
+    """Return whose key an Authorization header carries; `keys` reads keys by their digests. Raises NotIdentified."""
     scheme, _, key = authorization.partition(" ")
     digest = digest_of(key.strip())
-    row = store.keys.by_digest(digest) if scheme.lower() == SCHEME else None
+    row = await keys.get(digest) if scheme.lower() == SCHEME else None
     if row is None or row.revoked_at is not None or not hmac.compare_digest(row.digest, digest):
         raise unknown_key()
     return Caller(row.name, Role(row.role), "key")

@@ -35,7 +35,12 @@ class FetchLog:
         self._pending: dict[_Key, FetchRow] = {}
 
     def note(self, serial: str, version: int, who: str, at: datetime) -> bool:
-        """Note a fetch at an aware time; returns whether `write` is to be called now."""
+        """Note a fetch at an aware time; returns whether `write` is to be called now.
+
+        A service that only reads notes none.
+        """
+        if self._store.is_read_only:
+            return False
         key = (serial, version, who)
         with self._lock:
             pending = self._pending.get(key)

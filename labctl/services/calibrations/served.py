@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import lru_cache
 from typing import Final
 
 from labctl.answers.certification import CalibrationStateResponse, WithdrawnResponse
@@ -90,8 +89,6 @@ def noise_options(axes: Sequence[AllanJson]) -> dict[str, str]:
 
 #: State of a version that was never certified.
 NOT_CERTIFIED: Final = "not-certified"
-#: Calibration files with their certifications in memory; one has some 20 kB.
-MAX_FILES = 256
 
 
 @dataclass(frozen=True)
@@ -140,25 +137,24 @@ def calibration_file(
     if served is None:
         document, hash_ = store.calibrations.document(serial, version)  # says why there is none
         served = ServedCalibration(document, hash_, None, in_force=False)
-    certification = certification_of(served)
     number = served.act.version if served.act else version or store.calibrations.certified_version(serial)
-    content, tag = (
-        (served.document, served.hash) if certification is None else _certified(served.document, certification)
-    )
+    own = own_file(serial, number, served)
     if format_name == "json" and not options:
-        return CalibrationFile(
-            content, "application/json", tag, serial, number, certification, withdrawn=notice_of(served)
-        )
-    file = exported(store, content, format_name, options)
+        return own
+    file = exported(store, own.content, format_name, options)
+    return replace(
+        own, content=file.content, media_type=file.media_type, etag=f"{own.etag}-{file.tag}", losses=file.losses
+    )
+
+
+def own_file(serial: str, version: int, served: ServedCalibration) -> CalibrationFile:
+    """Return a version of a unit in labctl's own format, with its certification in it where it was ever certified."""
+    certification = certification_of(served)
+    content, tag = served.document, served.hash
+    if certification is not None:
+        content, tag = with_certification(content, certification)
     return CalibrationFile(
-        file.content,
-        file.media_type,
-        f"{tag}-{file.tag}",
-        serial,
-        number,
-        certification,
-        file.losses,
-        notice_of(served),
+        content, "application/json", tag, serial, version, certification, withdrawn=notice_of(served)
     )
 
 
@@ -203,7 +199,3 @@ def certification_of(served: ServedCalibration) -> Certification | None:
         return None
     state: State = "in-force" if served.in_force else "revoked" if act.act == "revoke" else "superseded"
     return Certification(state, act.by, act.reason, act.at, act.due_at, served.hash)
-
-
-#: Files of certified versions, with their hashes, as they were served last.
-_certified = lru_cache(maxsize=MAX_FILES)(with_certification)

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 
 from instruments.bench_config import BenchFile, is_simulated_address
 from labctl.errors import StoreError
+from labctl.texts import counted
 from procedures.contracts.steps import CheckHome, Home, Mount, MoveChamber
 from procedures.planning.earlier_times import ChamberMoves, DoneStep, EarlierTimes, earlier_times
 
@@ -58,7 +59,7 @@ def learned_texts(earlier: EarlierTimes | None, *, needs_person: bool) -> Iterat
     """Yield what the expected time of a plan takes from earlier campaigns, in words."""
     if earlier is None:
         return
-    source = f"from {earlier.campaigns} campaign{'s' if earlier.campaigns != 1 else ''} on this bench"
+    source = f"from {counted(earlier.campaigns, 'campaign')} on this bench"
     if earlier.home_s is not None:
         yield f"homing takes {earlier.home_s:.0f} s, {source}"
     if earlier.check_home_s is not None:

@@ -12,11 +12,12 @@ from sqlalchemy import exc
 from sqlalchemy.exc import DatabaseError
 
 from instruments.clock import Clock, WallClock
-from labctl.errors import DatabaseUnreachable, DiskFull, OldSchema, StoreError
+from labctl.errors import DatabaseUnreachable, DiskFull, OldSchema, ReadOnly, StoreError
 from labctl.store import migrate
 from labctl.store.connection.location import is_url, shown
 from labctl.store.connection.postgresql_server import PostgresqlServer
 from labctl.store.connection.sqlite_file import SqliteFile
+from labctl.store.connection.sqlite_reader import FileState, SqliteReader
 from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress
 from labctl.store.connection.writer_turn import WriterTurn
 from labctl.store.manifests import chain
@@ -46,6 +47,14 @@ class Backend(Protocol):
 
     def refuse_other(self) -> None:
         """Raise StoreError when the database is no longer the one that was opened."""
+        ...
+
+    def state_read(self) -> FileState | None:
+        """Return the state of the database that is read now; None where every reading sees one state anyway."""
+        ...
+
+    def refuse_changed(self, before: FileState | None) -> None:
+        """Raise StoreError when the database is no longer in the state that was read."""
         ...
 
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
@@ -121,7 +130,8 @@ class Database:
     other processes who holds it, and into the leases that it takes. `clock` times how long a server that does not
     answer is asked again.
 
-    `as_it_is` opens a database without making or migrating it: the file may be of any kind.
+    `as_it_is` opens a database without making or migrating it: the file may be of any kind. `read_only` opens one that
+    this process may never change, nor make: its transactions are refused here and by the database itself.
     """
 
     def __init__(
@@ -132,10 +142,11 @@ class Database:
         address: ServiceAddress = NO_SERVICE,
         writer: Writer | None = None,
         as_it_is: bool = False,
+        read_only: bool = False,
         clock: Clock | None = None,
     ) -> None:
         self.location, self._shown = location, shown(location)
-        self.writes = write
+        self.writes, self.is_read_only = write, read_only
         self.writer = writer
         self.address = address
         self._clock = clock or WallClock()
@@ -154,7 +165,9 @@ class Database:
 
     def _open_backend(self, address: ServiceAddress, *, as_it_is: bool) -> Backend:
         if is_url(self.location):
-            return PostgresqlServer(self.location, write=self.writes)
+            return PostgresqlServer(self.location, write=self.writes, read_only=self.is_read_only)
+        if self.is_read_only:
+            return SqliteReader(self.location)
         if not as_it_is:
             Path(self.location).parent.mkdir(parents=True, exist_ok=True)
         if not self.writes and not Path(self.location).exists():
@@ -171,6 +184,11 @@ class Database:
     def _refuse_old(self) -> None:
         """Make the tables of an empty database; one of an earlier version is only migrated when a person asks."""
         revision = self.revision()
+        if revision is None and self.is_read_only:
+            raise StoreError(
+                f"{self._shown}: the database has no tables of labctl, and a service that only reads makes none; name "
+                "the database of a labctl service with --database"
+            )
         if revision is None:
             if not self.writes and not is_url(self.location):
                 Database(self.location, write=True).close()
@@ -245,6 +263,11 @@ class Database:
         a log is written in order, so that one carries all before it to the disk. Raises StoreError, naming who holds
         the connection, when it does not come free within 20 s, and DatabaseUnreachable.
         """
+        if self.is_read_only:
+            raise ReadOnly(
+                f"{self._shown}: this process only reads the database, nothing was stored; send the request to a "
+                "service that writes to it"
+            )
         if self.writer is not None:
             raise StoreError(f"{self._shown}: another process is writing to the database; wait until that process ends")
         number, ended, grown = 0, False, None
@@ -293,9 +316,11 @@ class Database:
     def reading(self) -> Iterator[sa.Connection]:
         """Yield a connection to read with. Raises StoreError."""
         self._backend.refuse_other()  # a new connection would make an empty file, or read another one's rows
+        state = self._backend.state_read()
         try:
             with self.outlast(self._connect_reader) as connection:
                 yield connection
+            self._backend.refuse_changed(state)
         except exc.DatabaseError as error:
             raise self._unread(error) from error
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sqlite3
+from collections.abc import Callable
 from typing import Any
 from urllib.parse import quote
 
 import sqlalchemy as sa
 from sqlalchemy import event as sa_event
 from sqlalchemy import exc
-from sqlalchemy.pool import StaticPool
+from sqlalchemy.pool import QueuePool, StaticPool
 
 from labctl.errors import BadInput
 from labctl.store.connection.location import shown
@@ -54,8 +56,28 @@ def sqlite_engine(location: str, *, write: bool) -> sa.Engine:
     return engine
 
 
-def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> sa.Engine:
+def sqlite_reading_engine(uri: Callable[[], str]) -> sa.Engine:
+    """Return an engine for an SQLite file that is only read; `uri` names the file each time that it is opened."""
+
+    def connect() -> sqlite3.Connection:
+        connection = sqlite3.connect(uri(), uri=True, check_same_thread=False, timeout=BUSY_MS / 1000)
+        connection.isolation_level = None  # as above
+        connection.execute("PRAGMA query_only=ON")
+        return connection
+
+    engine = sa.create_engine("sqlite://", creator=connect, poolclass=QueuePool, max_overflow=15)
+
+    @sa_event.listens_for(engine, "begin")
+    def begin(connection: sa.Connection) -> None:
+        connection.exec_driver_sql("BEGIN")
+
+    return engine
+
+
+def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float, read_only: bool = False) -> sa.Engine:
     """Return an engine for a database by URL. Raises BadInput for a URL that cannot be used.
+
+    With `read_only` the server itself refuses every change (PostgreSQL 15 documentation, 20.11.1).
 
     The server ends a statement that waits longer than `lock_timeout_s` for a lock, and a connection that is idle in a
     transaction for longer than `idle_timeout_s`. A connection is tried before it is used, and one whose other end is
@@ -64,6 +86,8 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> 
     advice = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
     limits = {"lock_timeout": lock_timeout_s, "idle_in_transaction_session_timeout": idle_timeout_s}
     options = " ".join(f"-c {name}={round(1000 * limit_s)}" for name, limit_s in limits.items())
+    if read_only:
+        options += " -c default_transaction_read_only=on"
     arguments = {**CONNECTION, "options": options}
     try:
         if sa.make_url(url).get_backend_name() == "postgresql":

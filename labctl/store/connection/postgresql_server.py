@@ -39,10 +39,12 @@ _STATUS = sa.text("SELECT pg_xact_status(CAST(:number AS xid8))")
 class PostgresqlServer:
     """The backend of a database by URL. No process holds it; with `write` an absent server is waited for longer."""
 
-    def __init__(self, url: str, *, write: bool) -> None:
-        """Raise BadInput for a URL that is not known here."""
+    def __init__(self, url: str, *, write: bool, read_only: bool = False) -> None:
+        """With `read_only` the server refuses every change. Raises BadInput for a URL that is not known here."""
         self.patience_s = WRITER_PATIENCE_S if write else READER_PATIENCE_S
-        self._engine = server_engine(url, lock_timeout_s=LOCK_TIMEOUT_S, idle_timeout_s=IDLE_TIMEOUT_S)
+        self._engine = server_engine(
+            url, lock_timeout_s=LOCK_TIMEOUT_S, idle_timeout_s=IDLE_TIMEOUT_S, read_only=read_only
+        )
 
     def engines(self) -> tuple[sa.Engine, sa.Engine]:
         """Return two engines that share connections; a reader sees one state of the database and changes nothing."""
@@ -61,6 +63,12 @@ class PostgresqlServer:
 
     def refuse_other(self) -> None:
         """Do nothing: a connection is to one database."""
+
+    def state_read(self) -> None:
+        """Return None: a reader sees one state of the database."""
+
+    def refuse_changed(self, before: object) -> None:
+        """Do nothing."""
 
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
         """Do nothing: a transaction announces itself."""

@@ -170,6 +170,12 @@ class SqliteFile:
         if self._identity is not None and (text := self._identity.changed()):
             raise StoreError(f"{text}. Nothing was stored; try again", cause=text)
 
+    def state_read(self) -> None:
+        """Return None: a reader sees one state of the database."""
+
+    def refuse_changed(self, before: object) -> None:
+        """Do nothing."""
+
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
         """Make the next commits reach the disk before they return, or with a later one: the log is written in order."""
         if synced == self._synced:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 from contextlib import suppress
@@ -50,12 +51,22 @@ def holder_of(location: str) -> Holder | None:
     """Return who holds a database file for writing; None when it is free."""
     if is_url(location):
         return None
-    lock = FileLock(_lock_path(location), mode=FILE)
+    return _read_note(location) if _is_locked(location) else None
+
+
+def _is_locked(location: str) -> bool:
+    """Return whether a process has the lock; makes no file, so that a database that may only be read can be asked."""
     try:
-        with lock.acquire(timeout=0):
-            return None
-    except Timeout:
-        return _read_note(location)
+        lock = os.open(_lock_path(location), os.O_RDONLY)
+    except FileNotFoundError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)  # as FileLock takes it (flock(2))
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(lock)
+    return False
 
 
 def _lock_path(location: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 
 import sqlalchemy as sa
@@ -10,16 +11,17 @@ from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import KEY
+from labctl.store.paging import padded
 from labctl.store.records import KeyRow
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.records_by_name import record_of, records_of
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import changing, seal
 
 _k = tables.api_keys.c
 _ALL = sa.select(_k.name, _k.role, _k.digest, _k.created_at, _k.revoked_at)
 #: Built once: the query behind every request that carries a key.
-_BY_DIGEST = _ALL.where(_k.digest == sa.bindparam("digest"))
+_BY_DIGEST = _ALL.where(_k.digest.in_(sa.bindparam("digests", expanding=True)))
 
 
 class Keys:
@@ -64,8 +66,8 @@ class Keys:
         with self._database.reading() as connection:
             return records_of(KeyRow, connection.execute(_ALL.order_by(_k.name)))
 
-    def by_digest(self, digest: str) -> KeyRow | None:
-        """Return the key of a digest, in force or not; None when there is none."""
+    def by_digests(self, digests: Sequence[str]) -> dict[str, KeyRow]:
+        """Return digest -> key, in force or not, where there is one."""
         with self._database.reading() as connection:
-            row = connection.execute(_BY_DIGEST, {"digest": digest}).mappings().first()
-        return None if row is None else record_of(KeyRow, row)
+            rows = records_of(KeyRow, connection.execute(_BY_DIGEST, {"digests": padded(digests)}))
+        return {row.digest: row for row in rows}

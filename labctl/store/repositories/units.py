@@ -15,7 +15,7 @@ from labctl.acting_user import acting_key
 from labctl.errors import NotFound
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
-from labctl.store.paging import Page, PageRequest, parts_of, rows_to_read
+from labctl.store.paging import Page, PageRequest, padded, parts_of, rows_to_read
 from labctl.store.records import CertificationRow, ServedCalibration, Unit, UnitHoldings, Withdrawal
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.records_by_name import record_of, records_of
@@ -237,6 +237,18 @@ def _served_in_force() -> sa.Select[*tuple[Any, ...]]:
     )
 
 
+def _served_together() -> sa.Select[*tuple[Any, ...]]:
+    of = sa.and_(_X.serial == _C.serial, _X.version == _C.version)
+    inner = tables.certifications.alias()
+    some_of = inner.c.serial.in_(sa.bindparam("serials", expanding=True))
+    last = sa.select(sa.func.max(inner.c.id)).where(some_of).group_by(inner.c.serial)
+    return (
+        sa.select(_C.serial, _C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_ACT, *_CERTIFICATE)
+        .select_from(_with_certificate(tables.calibrations.join(tables.certifications, of)))
+        .where(_X.id.in_(last), _X.act == "certify")
+    )
+
+
 def _served_version() -> sa.Select[*tuple[Any, ...]]:
     inner = tables.certifications.alias()
     newest = (
@@ -252,7 +264,7 @@ def _served_version() -> sa.Select[*tuple[Any, ...]]:
 
 
 #: Built once: the queries behind every GET of a calibration.
-_IN_FORCE, _VERSION = _served_in_force(), _served_version()
+_IN_FORCE, _VERSION, _TOGETHER = _served_in_force(), _served_version(), _served_together()
 
 
 class Certifications:
@@ -268,14 +280,16 @@ class Certifications:
                 row = connection.execute(_IN_FORCE, {"serial": serial}).first()
             else:
                 row = connection.execute(_VERSION, {"serial": serial, "version": version}).first()
-        if row is None:
-            return None
-        act = None if row.act_id is None else _act(serial, row)
-        in_force = act is not None and act.act == "certify" and row.act_id == row.last_id
-        gone = None
-        if row.w_by is not None:
-            gone = Withdrawal(row.w_by, row.w_key, row.w_reason, row.w_at, row.w_act)
-        return ServedCalibration(bytes(row.document), str(row.hash), act, in_force, row.certificate, gone, row.act_id)
+        return None if row is None else _served(serial, row)
+
+    def served_together(self, serials: Sequence[str]) -> dict[str, ServedCalibration]:
+        """Return serial number -> the version in force, with the newest act on it, where there is one: one query.
+
+        `serials` are as many as one statement takes (`MAX_PARAMETERS`).
+        """
+        with self._database.reading() as connection:
+            rows = connection.execute(_TOGETHER, {"serials": padded(serials)}).all()
+        return {row.serial: _served(row.serial, row) for row in rows}
 
     def in_force(self, serials: Sequence[str] | None = None) -> dict[str, CertificationRow]:
         """Return serial number -> the act that put its version in force, for every unit that has a version in force.
@@ -313,6 +327,15 @@ class Certifications:
                 for some in parts_of(serials)
                 for row in connection.execute(query, {"serials": some})
             }
+
+
+def _served(serial: str, row: sa.Row[*tuple[Any, ...]]) -> ServedCalibration:
+    act = None if row.act_id is None else _act(serial, row)
+    in_force = act is not None and act.act == "certify" and row.act_id == row.last_id
+    gone = None
+    if row.w_by is not None:
+        gone = Withdrawal(row.w_by, row.w_key, row.w_reason, row.w_at, row.w_act)
+    return ServedCalibration(bytes(row.document), str(row.hash), act, in_force, row.certificate, gone, row.act_id)
 
 
 def _act(serial: str, row: sa.Row[*tuple[Any, ...]]) -> CertificationRow:

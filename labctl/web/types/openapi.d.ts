@@ -9280,6 +9280,19 @@ export interface components {
              * @description Why the schedule could not be read; empty when all is well.
              */
             schedule_trouble: string;
+            /**
+             * Read Only
+             * @description Whether this service only reads: every act is refused.
+             * @default false
+             */
+            read_only: boolean;
+            /**
+             * Acts At
+             * @description Address of the service that acts, as a service that only reads was given it; null: not given.
+             */
+            acts_at: string | null;
+            /** @description How old the data are; null: the database is no replica. */
+            replica: components["schemas"]["ReplicaResponse"] | null;
         };
         /**
          * HeartbeatResponse
@@ -9309,6 +9322,19 @@ export interface components {
              * @default
              */
             not_stopped: string;
+            /**
+             * Read Only
+             * @description Whether this service only reads: every act is refused.
+             * @default false
+             */
+            read_only: boolean;
+            /**
+             * Acts At
+             * @description Address of the service that acts, as a service that only reads was given it; null: not given.
+             */
+            acts_at: string | null;
+            /** @description How old the data were when they were last asked for, at most some seconds ago; null: the database is no replica, or it has not answered yet. */
+            replica: components["schemas"]["ReplicaResponse"] | null;
         };
         /**
          * HeldCoefficientJson
@@ -13297,6 +13323,27 @@ export interface components {
              * @description Difference of the residuals of each pair of `datasets`, second minus first, deg/s.
              */
             difference_dps: (number | null)[];
+        };
+        /**
+         * ReplicaResponse
+         * @description How old the data of a replica of a PostgreSQL database are.
+         */
+        ReplicaResponse: {
+            /**
+             * Last Change At
+             * @description When the newest change that the replica has was made; null: none since the replica was started.
+             */
+            last_change_at: string | null;
+            /**
+             * Age S
+             * @description Time since then by the clock of the replica, s; the data are not older than that. Null: not known.
+             */
+            age_s: number | null;
+            /**
+             * Is Connected
+             * @description Whether the replica is connected to the server that it copies.
+             */
+            is_connected: boolean;
         };
         /**
          * ResidualColumns

@@ -10,8 +10,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from instruments.clock import VirtualClock
-from labctl.answers.fleet import FleetCancelRequest, FleetJobRequest
+from labctl.answers.fleet import FleetCancelRequest, FleetJobRequest, FleetReportRequest
 from labctl.api import create_app
+from labctl.client import Client, ServiceRefused
 from labctl.service_connection import ServiceConnection
 from labctl.services.commands.fleet import CANCEL_FLEET_JOB, START_FLEET_JOB, ToFleetJob
 from labctl.services.commands.remote import HttpExecutor
@@ -64,6 +65,25 @@ def test_a_job_is_begun_at_once_and_carried_out_by_the_service(http: TestClient)
     assert get(http, "/api/fleet/jobs/2")["waiting"] == UNITS
     actions = [row["action"] for row in get(http, "/api/audit", limit=100)]
     assert {"fleet fit", "fleet cancel", "fleet end", "fit"} <= set(actions)
+
+
+def test_the_client_has_a_method_for_each_request(http: TestClient) -> None:
+    with Client("http://testserver", transport=transport_to(http)) as client:
+        begun = client.start_fleet_job(FleetJobRequest.model_validate(FIT))
+        assert (begun.id, begun.state) == (1, "waiting")
+        second = client.start_fleet_job(FleetJobRequest(kind="criticise", search="U00001"))
+        assert client.cancel_fleet_job(second.id, "not needed", by="Ann").why == "cancelled by Ann: not needed"
+        carry_out(http)
+        assert client.fleet_job(1).done == UNITS
+        assert [job.id for job in client.fleet_jobs(limit=1)] == [2]
+        assert [unit.serial for unit in client.fleet_units(1, state="done", search="u00002")] == ["U00002"]
+        assert len(client.fleet_units(1, limit=2)) == 2
+        with pytest.raises(ServiceRefused, match="no unit of type 'none'") as refused:
+            client.fleet_report(FleetReportRequest(type="none"))
+        assert refused.value.status == 400
+        kind = http.get("/api/units").json()[0]["model"]
+        report = client.fleet_report(FleetReportRequest(type=kind))
+        assert (report.type, report.figures.units) == (kind, UNITS)
 
 
 def test_an_engine_is_used_only_where_the_service_was_started_with_it(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import shutil
@@ -19,6 +20,7 @@ from pyarrow import parquet
 
 from labctl.recording.recording import Recording
 from labctl.services.admin.api_keys import identify
+from labctl.services.joint_reads import JointReads
 from labctl.store import migrate, open_store
 from tests.helpers.corpus import ENTRIES, SAME, SERIAL, Entry, migrated, wrongly_named
 from tests.helpers.lab import Lab
@@ -249,5 +251,5 @@ def test_it_verifies_the_calibration_as_it_did(labs: Callable[[Entry], Lab], ent
 @pytest.mark.parametrize("entry", [entry for entry in ENTRIES if "key" in entry.answers], ids=lambda each: each.name)
 def test_its_api_key_is_still_known(labs: Callable[[Entry], Lab], entry: Entry) -> None:
     with open_store(str(labs(entry).database), write=False) as store:
-        caller = identify(store, f"Bearer {entry.answers['key']}")
+        caller = asyncio.run(identify(JointReads(store.keys.by_digests), f"Bearer {entry.answers['key']}"))
     assert (caller.name, caller.role.value) == ("ada", "approver")

@@ -73,6 +73,11 @@ def test_simulate_never_takes_a_real_bench(tmp_path: Path) -> None:
     (ServeRequest(speed=float("inf")), "--speed inf"),
     (ServeRequest(port=70000), "--port 70000"),
     (ServeRequest(max_upload_mib=0), "--max-upload-mib 0"),
+    (ServeRequest(read_only=True, simulate=True), "--read-only"),
+    (ServeRequest(acts_at="http://lab:8420"), "--acts-at http://lab:8420: this service acts itself"),
+    (ServeRequest(read_only=True, acts_at="lab:8420"), "--acts-at lab:8420: give an address"),
+    (ServeRequest(processes=2), "--processes 2: a service that may write has one web process"),
+    (ServeRequest(read_only=True, processes=65), "--processes 65: give a number from 1 to 64"),
 ])  # fmt: skip
 def test_numbers_out_of_range_are_refused_before_anything_starts(asked: ServeRequest, said: str) -> None:
     with pytest.raises(BadInput, match=said):

@@ -3,7 +3,7 @@
 import { get, post } from "../core/http/api.js";
 import { messageOf } from "../core/http/errors.js";
 import { h } from "../core/elements.js";
-import { button, toast } from "../core/components.js";
+import { actButton, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { navigate } from "../core/router.js";
 import { stopCampaign, tableStands, unconfirmedStop } from "../core/stop/overlay.js";
@@ -61,7 +61,7 @@ export function stopAgain() {
  */
 export const stopButton = (campaign) =>
   Object.assign(
-    button(
+    actButton(
       "Safe stop",
       async () => {
         const answers = await askOperator(
@@ -96,7 +96,7 @@ export const stopButton = (campaign) =>
  * @param {(body: { by: string, reason: string }) => Promise<unknown>} send
  */
 export const askingButton = (label, question, send) =>
-  button(label, async () => {
+  actButton(label, async () => {
     const fields = [operatorNameField(), { name: "reason", label: "Why" }];
     const answers = await askOperator(question, fields, { confirm: label });
     if (answers) await send({ by: answers.by, reason: answers.reason });
@@ -157,7 +157,7 @@ export function resumeControl(campaign) {
  * @param {{ whole?: boolean, kind?: string }} [options]
  */
 export const resumeButton = (campaign, { whole = false, kind = "primary" } = {}) =>
-  button(
+  actButton(
     whole ? "Resume where it stopped" : "Continue",
     async () => {
       const answers = await askOperator(
@@ -186,7 +186,7 @@ export const resumeButton = (campaign, { whole = false, kind = "primary" } = {})
  */
 export const answerButtons = (campaign, prompt) => [
   ...(prompt.kind === "turn" ? turnButtons(campaign, prompt) : [doneButton(campaign, prompt)]),
-  button("Cannot be done", async () => {
+  actButton("Cannot be done", async () => {
     const answers = await askOperator(
       "Answer that this action cannot be done?",
       [operatorNameField(), { name: "reason", label: "Why" }],
@@ -207,7 +207,7 @@ export const answerButtons = (campaign, prompt) => [
  * @param {Prompt} prompt
  */
 const doneButton = (campaign, prompt) =>
-  button(
+  actButton(
     "Done",
     async () => {
       const answers = await askOperator("Is it done?", [operatorNameField()], {
@@ -236,7 +236,7 @@ function turnButtons(campaign, prompt) {
     const body = { prompt: prompt.id, by, confirmed: !again, again };
     await post("/api/campaigns/{campaign}/confirm", { path: { campaign }, body });
   };
-  return [button("Done", answer(false), { kind: "primary" }), button("Turn again", answer(true))];
+  return [actButton("Done", answer(false), { kind: "primary" }), actButton("Turn again", answer(true))];
 }
 
 /**
@@ -245,7 +245,7 @@ function turnButtons(campaign, prompt) {
  * @param {() => unknown} then
  */
 export const clearButton = (bench, then) =>
-  button(
+  actButton(
     "I have inspected the bench, and it is safe",
     async () => {
       const answers = await askOperator(

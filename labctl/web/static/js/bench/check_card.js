@@ -3,7 +3,7 @@
 import { post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { count, instant } from "../core/format.js";
-import { button, cardWithHeader, chip } from "../core/components.js";
+import { actButton, cardWithHeader, chip } from "../core/components.js";
 import { STATE_KINDS, STATE_WORDS, summaryOf } from "./check_text.js";
 
 /** @import { Bench, BenchCheck, DeviceCheck } from "../../../types/api.js" */
@@ -14,7 +14,7 @@ import { STATE_KINDS, STATE_WORDS, summaryOf } from "./check_text.js";
  * @param {() => void} again shows the page again
  */
 export function checkCard(bench, free, again) {
-  const act = button(
+  const act = actButton(
     "Check the bench",
     async () => {
       await post("/api/benches/{bench}/check", { path: { bench: bench.name }, body: {} });

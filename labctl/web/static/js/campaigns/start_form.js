@@ -4,7 +4,7 @@ import { post } from "../core/http/api.js";
 import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { instant } from "../core/format.js";
-import { button, card, notice, toast } from "../core/components.js";
+import { actButton, card, notice, toast } from "../core/components.js";
 import { labelledField, toggleGroup } from "../core/fields.js";
 import { navigate } from "../core/router.js";
 import { askBenchClear } from "../bench/actions.js";
@@ -125,7 +125,7 @@ export function startForm(bench, order) {
     h(
       "div",
       { class: "row" },
-      button(`Start on ${there.name}`, () => now(there), { kind: "primary large" }),
+      actButton(`Start on ${there.name}`, () => now(there), { kind: "primary large" }),
     ),
   ];
   /** @type {Record<When, () => Child>} */
@@ -149,7 +149,7 @@ export function startForm(bench, order) {
         ),
         zones,
       ),
-      h("div", { class: "row" }, button("Add to the schedule", later, { kind: "primary large" })),
+      h("div", { class: "row" }, actButton("Add to the schedule", later, { kind: "primary large" })),
     ],
     cron: () => [
       h(
@@ -169,7 +169,7 @@ export function startForm(bench, order) {
         ),
         zones,
       ),
-      h("div", { class: "row" }, button("Add to the schedule", later, { kind: "primary large" })),
+      h("div", { class: "row" }, actButton("Add to the schedule", later, { kind: "primary large" })),
     ],
     simulation: () => [
       h(
@@ -181,7 +181,7 @@ export function startForm(bench, order) {
         "div",
         { class: "row", style: "align-items: end" },
         labelledField("Seed", seed, "Seed of the random numbers; the same seed gives the same recording."),
-        button("Simulate the recording", simulated, { kind: "primary large" }),
+        actButton("Simulate the recording", simulated, { kind: "primary large" }),
       ),
     ],
   };

@@ -184,6 +184,13 @@ export function button(text, act, { kind = "", done } = {}) {
 }
 
 /**
+ * A button that changes something: not shown by a service that only reads.
+ * @type {typeof button}
+ */
+export const actButton = (text, act, options = {}) =>
+  button(text, act, { ...options, kind: `act ${options.kind ?? ""}`.trim() });
+
+/**
  * Error page: title, message, and a button to try again.
  * @param {unknown} error
  * @param {() => unknown} [again]

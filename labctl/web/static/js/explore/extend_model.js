@@ -3,7 +3,7 @@
 import { post } from "../core/http/api.js";
 import { scrollTo, setChildren, h } from "../core/elements.js";
 import { capitalised, number, idText } from "../core/format.js";
-import { button, fitWarnings, cardWithHeader, notice, table, toast } from "../core/components.js";
+import { actButton, button, fitWarnings, cardWithHeader, notice, table, toast } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
 import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
@@ -164,7 +164,7 @@ export function extendModel(state, effects) {
       h(
         "div",
         { class: "row" },
-        button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }),
+        actButton(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }),
         h(
           "span",
           { class: "muted small" },

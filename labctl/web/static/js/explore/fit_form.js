@@ -2,7 +2,7 @@
 
 import { post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { button } from "../core/components.js";
+import { actButton } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
@@ -33,7 +33,7 @@ export function fitForm(serial, chosen, motion, text) {
         model = models.find((each) => each.id === value) ?? models[0];
       },
     ),
-    button(
+    actButton(
       text,
       async () => {
         const of = chosen();

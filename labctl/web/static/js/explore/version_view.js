@@ -3,7 +3,7 @@
 import { get, getFollowed, post } from "../core/http/api.js";
 import { isAbort } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
-import { busyIndicator, button, errorPage, notice } from "../core/components.js";
+import { actButton, busyIndicator, errorPage, notice } from "../core/components.js";
 import { option, toggleGroup } from "../core/fields.js";
 import { idText } from "../core/format.js";
 import { navigate } from "../core/router.js";
@@ -154,7 +154,7 @@ function nextSteps({ unit, calibration }, criticism) {
     h(
       "div",
       { class: "row" },
-      button("Certify", certify, { kind: isEnd ? "primary" : "" }),
+      actButton("Certify", certify, { kind: isEnd ? "primary" : "" }),
       h(
         "a",
         {

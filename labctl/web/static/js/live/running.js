@@ -4,7 +4,7 @@ import { get, post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { count, duration, number, plainNumber, unitText } from "../core/format.js";
 import { axisColour, figure } from "../core/figure.js";
-import { button, card, chip, table } from "../core/components.js";
+import { actButton, card, chip, table } from "../core/components.js";
 import { poseDrawing } from "./pose_drawing.js";
 import { offText, sharesOfLimits, stillText, unusedTexts } from "./texts.js";
 
@@ -163,8 +163,8 @@ export function runningLive(first, signal) {
   const ends = h(
     "div",
     { class: "row" },
-    button("End and keep the recording", () => end(false)),
-    button("End and fit a version", () => end(true)),
+    actButton("End and keep the recording", () => end(false)),
+    actButton("End and fit a version", () => end(true)),
   );
   const element = h(
     "div",

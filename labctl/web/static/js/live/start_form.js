@@ -3,7 +3,7 @@
 import { post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { labelledField, selectField, toggleGroup } from "../core/fields.js";
-import { button, card, notice } from "../core/components.js";
+import { actButton, card, notice } from "../core/components.js";
 import { show } from "../core/router.js";
 
 /** @import { Bench } from "../../../types/api.js" */
@@ -112,6 +112,6 @@ export function startForm(bench, serial) {
       unwatched,
       "End it, and keep the recording, when no page has followed it for 30 s",
     ),
-    h("div", { class: "row" }, button("Begin", begin, { kind: "primary large" })),
+    h("div", { class: "row" }, actButton("Begin", begin, { kind: "primary large" })),
   );
 }

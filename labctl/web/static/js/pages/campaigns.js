@@ -4,7 +4,7 @@ import { get, getPart, remove } from "../core/http/api.js";
 import { Problem } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
-import { button, card, chip, emptyState, pageHeader, table } from "../core/components.js";
+import { actButton, card, chip, emptyState, pageHeader, table } from "../core/components.js";
 import { longList } from "../core/long_list.js";
 import { setTrouble } from "../core/freshness/line.js";
 import { linkButton } from "../bench/actions.js";
@@ -194,7 +194,7 @@ function scheduleCard(rows, again) {
         {
           title: h("span", { class: "visually-hidden" }, "Cancel"),
           cell: (row) =>
-            button(
+            actButton(
               row.state === "missed" ? "Remove" : "Cancel",
               async () => {
                 await remove("/api/schedule/{start}", { path: { start: row.id } });

@@ -2,7 +2,7 @@
 
 import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { button, card, pageHeader } from "../core/components.js";
+import { actButton, card, pageHeader } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
@@ -46,8 +46,8 @@ export async function page({ signal }) {
       h(
         "div",
         { class: "row" },
-        button("Open the real gyro", () => openExample(), { kind: "primary" }),
-        button("Show me around", () => openExample("1")),
+        actButton("Open the real gyro", () => openExample(), { kind: "primary" }),
+        actButton("Show me around", () => openExample("1")),
       ),
     ),
     h("h2", {}, "Other ways to begin"),
@@ -61,7 +61,7 @@ export async function page({ signal }) {
           {},
           "A simulated gyro with an effect that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect the model lacks.",
         ),
-        button("Simulate a recording", openSimulated),
+        actButton("Simulate a recording", openSimulated),
       ),
       card(
         "Import your own data",
@@ -169,9 +169,9 @@ function overview(units, found) {
           "div",
           { class: "row" },
           h("a", { class: "button", href: "/recordings" }, "Import a recording"),
-          button("Simulate a hidden effect", openSimulated),
-          button("Open the real gyro", () => openExample()),
-          button("Tour", () => openExample("1")),
+          actButton("Simulate a hidden effect", openSimulated),
+          actButton("Open the real gyro", () => openExample()),
+          actButton("Tour", () => openExample("1")),
         ),
       ),
     ),

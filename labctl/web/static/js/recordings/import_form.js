@@ -54,7 +54,7 @@ export function importForm(taken) {
   const zone = h(
     "div",
     {
-      class: "drop stack",
+      class: "drop stack act",
       ondragover: over,
       ondragenter: over,
       ondragleave: (event) =>

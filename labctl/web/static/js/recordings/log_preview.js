@@ -6,7 +6,7 @@ import { saveBlob } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { count, duration } from "../core/format.js";
-import { busyIndicator, button, notice, table } from "../core/components.js";
+import { actButton, busyIndicator, button, notice, table } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
 import { choose, leaveOutChoices } from "./leave_out.js";
 import { entryOf, logFields, withKey, withTarget, withUnit } from "./log_map.js";
@@ -70,7 +70,7 @@ export function logPreview(file, taken) {
   function show(seen) {
     /** @type {MapDocument} */
     const map = seen.column_map;
-    const act = button(
+    const act = actButton(
       "Import",
       async () => {
         try {

@@ -1,7 +1,7 @@
 // The batch and the supplier of a unit, and the dialog that states them.
 
 import { post } from "../core/http/api.js";
-import { button, toast } from "../core/components.js";
+import { actButton, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { show } from "../core/router.js";
 
@@ -20,7 +20,7 @@ export const unitLine = (unit) =>
  * The button that asks for the batch.
  * @param {Unit} unit
  */
-export const batchButton = (unit) => button("State batch", () => askBatch(unit));
+export const batchButton = (unit) => actButton("State batch", () => askBatch(unit));
 
 /** @param {Unit} unit */
 async function askBatch(unit) {

@@ -2,7 +2,7 @@
 
 import { download, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { button, notice } from "../core/components.js";
+import { actButton, button, notice } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { Problem } from "../core/http/errors.js";
 import { show } from "../core/router.js";
@@ -57,7 +57,7 @@ const FIELDS = [
  */
 export function certificateFiles(serial, version, issued) {
   const newest = issued.find((each) => each.version === version);
-  if (!newest) return button("Issue certificate", () => askCertificate(serial, version), { kind: "tiny" });
+  if (!newest) return actButton("Issue certificate", () => askCertificate(serial, version), { kind: "tiny" });
   return h(
     "div",
     { class: "stack", role: "group", "aria-label": `Certificate ${newest.number}` },
@@ -81,7 +81,7 @@ export function certificateFiles(serial, version, issued) {
         ),
       ),
     ),
-    button("Amend", () => askCertificate(serial, version, newest), { kind: "tiny quiet" }),
+    actButton("Amend", () => askCertificate(serial, version, newest), { kind: "tiny quiet" }),
   );
 }
 

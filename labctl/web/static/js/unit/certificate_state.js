@@ -3,7 +3,7 @@
 import { post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { instant } from "../core/format.js";
-import { button, chip, table } from "../core/components.js";
+import { actButton, chip, table } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { show } from "../core/router.js";
 
@@ -48,7 +48,7 @@ export function certificateTable(issued) {
       {
         title: "Action",
         cell: (row) =>
-          row.state === "withdrawn" ? null : button("Withdraw", () => askWithdrawal(row.number), { kind: "tiny" }),
+          row.state === "withdrawn" ? null : actButton("Withdraw", () => askWithdrawal(row.number), { kind: "tiny" }),
       },
     ],
     issued,

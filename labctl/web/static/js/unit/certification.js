@@ -3,7 +3,7 @@
 import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { instant, number } from "../core/format.js";
-import { button, chip, factList, notice, table, toast } from "../core/components.js";
+import { actButton, chip, factList, notice, table, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { show } from "../core/router.js";
 
@@ -153,7 +153,7 @@ export const waitingNotice = (waiting) =>
               h("strong", {}, `Version ${each.version} waits for a second person. `),
               `${each.by} (key ${each.by_key}): ${each.reason}`,
             ),
-            button("Release", () => askRelease(each), { kind: "tiny" }),
+            actButton("Release", () => askRelease(each), { kind: "tiny" }),
           ),
         ),
       )

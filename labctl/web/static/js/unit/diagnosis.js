@@ -2,7 +2,7 @@
 
 import { get, post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { button, cardWithHeader, chip, table } from "../core/components.js";
+import { actButton, cardWithHeader, chip, table } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { askBenchClear, askingButton } from "../bench/actions.js";
 import { diagnosisState, lineOfRound, suspectColumns } from "./diagnosis_rounds.js";
@@ -111,7 +111,7 @@ function confirmButtons(diagnosis, again) {
   const path = { diagnosis: diagnosis.id };
   const round = diagnosis.rounds.length;
   return [
-    button(
+    actButton(
       "Run this experiment",
       async () => {
         const bench = (await get("/api/benches")).find((each) => each.name === diagnosis.bench);
@@ -134,7 +134,7 @@ function confirmButtons(diagnosis, again) {
  * @param {() => Promise<void>} again
  */
 const startButton = (serial, again) =>
-  button("Diagnose", async () => {
+  actButton("Diagnose", async () => {
     const answers = await dialog(
       "Run experiments until one missing effect is left?",
       [{ name: "hours", label: "Hours on the bench, at most", value: "24" }],

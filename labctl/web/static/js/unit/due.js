@@ -3,7 +3,7 @@
 import { post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { day, instant } from "../core/format.js";
-import { button, notice, toast } from "../core/components.js";
+import { actButton, notice, toast } from "../core/components.js";
 import { navigate } from "../core/router.js";
 import { askBenchClear } from "../bench/actions.js";
 
@@ -21,7 +21,7 @@ export function recalibrateButton(unit, benches) {
   const again = unit.recalibration;
   const bench = again && benches.find((each) => each.name === again.bench);
   if (!again || !bench) return null;
-  return button(
+  return actButton(
     "Recalibrate",
     async () => {
       const clear = await askBenchClear(bench, { later: true });

@@ -3,7 +3,7 @@
 import { get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { count, instant, number } from "../core/format.js";
-import { button, cardWithHeader, chip, loadInto, modelName, table } from "../core/components.js";
+import { actButton, button, cardWithHeader, chip, loadInto, modelName, table } from "../core/components.js";
 import { askCertification, askRevocation, fetchTable } from "./certification.js";
 import { certificateFiles } from "./certificate.js";
 import { exportFiles } from "./export_files.js";
@@ -52,8 +52,8 @@ export function versionsCard(unit, rows, issued, explore) {
  */
 const act = (unit, row) =>
   row.certified
-    ? button("Revoke", () => askRevocation(unit.serial, row.version), { kind: "tiny" })
-    : button("Certify", () => askCertification(unit.serial, row.version), { kind: "tiny" });
+    ? actButton("Revoke", () => askRevocation(unit.serial, row.version), { kind: "tiny" })
+    : actButton("Certify", () => askCertification(unit.serial, row.version), { kind: "tiny" });
 
 /**
  * @param {Unit} unit

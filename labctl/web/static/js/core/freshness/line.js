@@ -4,7 +4,7 @@
 import { h, setChildren } from "../elements.js";
 import { reportStop } from "../stop/overlay.js";
 import { setAlarm } from "../tab_mark.js";
-import { freshnessWords, stalenessOf } from "./state.js";
+import { freshnessWords, readOnlyWords, stalenessOf } from "./state.js";
 
 /** @import { Heartbeat } from "../../../../types/api.js" */
 /** @import { Child } from "../../../../types/pages.js" */
@@ -26,7 +26,7 @@ let answered = null;
 let [asking, askedAt, paused, trouble, notStopped] = [false, -ASK_MS, false, "", false];
 /** @type {Staleness | null} */
 let state = null;
-/** @type {{ text: HTMLElement, announcement: HTMLElement } | null} */
+/** @type {{ text: HTMLElement, announcement: HTMLElement, reading: HTMLElement } | null} */
 let line = null;
 
 async function ask() {
@@ -39,6 +39,7 @@ async function ask() {
     answered = { at: now(), on: new Date(), bench_s: answer.heard_s ?? null };
     notStopped = Boolean(answer.not_stopped);
     reportStop(answer.not_stopped);
+    showReadOnly(answer);
     window.dispatchEvent(new CustomEvent("labctl:heard"));
   } catch {
     // not heard: the time since the last answer grows
@@ -61,6 +62,19 @@ function known() {
     trouble,
     clock: answered?.on.toLocaleTimeString("en-GB") ?? null,
   };
+}
+
+/**
+ * Say that the service only reads, how old its data are, and where to act.
+ * @param {Heartbeat} answer
+ */
+function showReadOnly(answer) {
+  document.documentElement.toggleAttribute("data-read-only", Boolean(answer.read_only));
+  const words = readOnlyWords(answer);
+  if (!line || line.reading.dataset.words === words) return;
+  line.reading.dataset.words = words;
+  const there = words && answer.acts_at ? h("a", { href: answer.acts_at }, answer.acts_at) : null;
+  setChildren(line.reading, words, there ? [" To change something: ", there, "."] : null);
 }
 
 /** The service answers, but not with what this page shows: stale, until it is called with nothing. */
@@ -93,7 +107,8 @@ function draw() {
 /** The line at the head of every page. Called once. */
 export function freshnessLine() {
   const [text, announcement] = [h("span", {}), h("span", { class: "visually-hidden", role: "status" })];
-  line = { text, announcement };
+  const reading = h("p", { class: "read-only", "data-read-only-words": "" });
+  line = { text, announcement, reading };
   const tick = () => {
     if (document.hidden) return;
     if (!asking && now() - askedAt >= ASK_MS) ask();
@@ -107,7 +122,7 @@ export function freshnessLine() {
   window.addEventListener("labctl:moved", () => setTrouble());
   setInterval(tick, DRAW_MS);
   tick();
-  return h("div", { class: "freshness", "data-freshness": "" }, text, announcement);
+  return h("div", { class: "freshness", "data-freshness": "" }, text, announcement, reading);
 }
 
 /**

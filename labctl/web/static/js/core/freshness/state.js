@@ -65,3 +65,24 @@ export function freshnessWords(found, { service_s, bench_s, trouble, clock }) {
   if (service_s === null || bench_s === null) return { stale: false, text: service };
   return { stale: false, text: `Last answer of the service ${ago(service_s)}, bench ${bench}.` };
 }
+
+/**
+ * What a service that only reads says of itself, "" for any other. A replica that is not connected has old data.
+ * @param {{ read_only?: boolean, replica?: { age_s?: number | null, is_connected: boolean } | null }} answer
+ */
+export function readOnlyWords({ read_only, replica }) {
+  if (!read_only) return "";
+  if (!replica) return "This service only reads.";
+  const age_s = replica.age_s ?? null;
+  const age = age_s === null ? "of unknown age" : `not older than ${span(age_s)}`;
+  const cut = replica.is_connected ? "" : ", which is not connected to its server now";
+  return `This service only reads: the data are those of a replica${cut}, ${age}.`;
+}
+
+/** @param {number} seconds */
+const span = (seconds) =>
+  seconds < 120
+    ? `${Math.ceil(seconds)} s`
+    : seconds < 7200
+      ? `${Math.ceil(seconds / 60)} min`
+      : `${Math.ceil(seconds / 3600)} h`;

@@ -1,0 +1,146 @@
+"""An SQLite file that this process may only read: beside the process that writes it, as a copy, or on a read-only disk.
+
+A database in the mode WAL is read through two files beside it. Where the folder may not be written and neither is
+there, SQLite can only read a file that it takes for immutable (sqlite.org/wal.html, 6; sqlite.org/uri.html, 3.4). Such
+a file is compared before and after each reading: what was changed meanwhile is refused, and the next reads it anew.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import quote
+
+import sqlalchemy as sa
+from sqlalchemy import exc
+
+from labctl.errors import StoreError
+from labctl.store.connection.engines import sqlite_reading_engine
+from labctl.store.connection.writer_lock import ServiceAddress
+from labctl.store.manifests.chain import ChainHead
+
+
+class FileState(NamedTuple):
+    """What tells whether a file has changed."""
+
+    device: int
+    inode: int
+    size: int
+    changed_ns: int
+    is_immutable: bool  #: whether SQLite is made to take the file for one that does not change
+
+
+class SqliteReader:
+    """The backend of a database by path that is only read: no lock, no note and no file is made beside it."""
+
+    patience_s = 0.0  #: a file is there, or it is not
+
+    def __init__(self, location: str) -> None:
+        """Raise StoreError for a file that is not there."""
+        self._location = location
+        if not Path(location).is_file():
+            raise StoreError(
+                f"{location}: there is no such file, and a service that only reads makes none; name the database with "
+                "--database"
+            )
+        self._state = self._file_state()
+        self._engine = sqlite_reading_engine(self._uri)
+
+    def _uri(self) -> str:
+        """Return how the file is opened now."""
+        return f"file:{quote(self._location)}?mode=ro" + ("&immutable=1" if self._is_immutable() else "")
+
+    def _is_immutable(self) -> bool:
+        """Return whether SQLite could not read the file in any other way."""
+        if os.access(Path(self._location).absolute().parent, os.W_OK):
+            return False
+        log, shared = Path(f"{self._location}-wal"), Path(f"{self._location}-shm")
+        return not log.exists() or (log.stat().st_size == 0 and not shared.exists())
+
+    def _file_state(self) -> FileState:
+        try:
+            file = Path(self._location).stat()
+        except OSError as error:
+            raise StoreError(
+                f"{self._location}: the database cannot be read ({error.strerror}); put it there again"
+            ) from error
+        return FileState(file.st_dev, file.st_ino, file.st_size, file.st_mtime_ns, self._is_immutable())
+
+    def engines(self) -> tuple[sa.Engine, sa.Engine]:
+        """Return the engine that reads, twice."""
+        return self._engine, self._engine
+
+    def before_opening(self, connection: sa.Connection) -> None:
+        """Do nothing: a damaged file is not damaged further by reading it."""
+
+    def before_migration(self, connection: sa.Connection) -> None:
+        """Do nothing: nothing is migrated."""
+
+    def opened(self, engine: sa.Engine) -> None:
+        """Do nothing: nothing is written."""
+
+    def refuse_other(self) -> None:
+        """Open the file anew where another one has taken its place, or where its log has come or gone.
+
+        Raises StoreError for a file that is gone.
+        """
+        state, before = self._file_state(), self._state
+        is_same = state[:2] == before[:2] and state.is_immutable == before.is_immutable
+        if not is_same or (state.is_immutable and state != before):
+            self._state = state
+            self._engine.dispose()
+
+    def state_read(self) -> FileState:
+        """Return the state of the file now."""
+        return self._file_state()
+
+    def refuse_changed(self, before: FileState | None) -> None:
+        """Raise StoreError where a file that was taken for immutable has changed since."""
+        if before is not None and before.is_immutable and self._file_state()[:4] != before[:4]:
+            raise StoreError(f"{self._location}: the database was changed while it was read; ask again")
+
+    def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
+        """Do nothing: nothing is written."""
+
+    def begun(self, connection: sa.Connection, *, synced: bool) -> int:  # noqa: ARG002
+        """Do nothing."""
+        return 0
+
+    def before_commit(self, connection: sa.Connection, *, synced: bool) -> int:  # noqa: ARG002
+        """Do nothing."""
+        return 0
+
+    def committed(self, commits: int) -> None:
+        """Do nothing."""
+
+    @property
+    def anchor_fits(self) -> bool:
+        """Return True: nothing is added to the chain."""
+        return True
+
+    def grown(self, head: ChainHead) -> None:
+        """Do nothing."""
+
+    def is_unreachable(self, error: exc.DatabaseError) -> bool:  # noqa: ARG002
+        """Return False: every error is about the file itself."""
+        return False
+
+    def is_disk_full(self, error: exc.DatabaseError) -> bool:
+        """Return whether SQLite says SQLITE_FULL."""
+        return getattr(error.orig, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
+
+    def words_for(self, error: exc.DatabaseError) -> str:  # noqa: ARG002
+        """Return an empty text: SQLite's own message is enough."""
+        return ""
+
+    def was_committed(self, number: int) -> bool:  # noqa: ARG002
+        """Return False: nothing is committed."""
+        return False
+
+    def note_address(self, address: ServiceAddress) -> None:
+        """Do nothing: a reader does not hold the file."""
+
+    def close(self) -> None:
+        """Do nothing: no lock is held."""
