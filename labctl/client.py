@@ -8,14 +8,13 @@ Every method sends one HTTP request and returns a typed answer. Three errors are
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Literal
-from urllib.parse import quote
 
 import httpx
 from httpx_sse import ServerSentEvent, connect_sse
@@ -36,20 +35,30 @@ from labctl.answers.common_fields import CriticismVerdict
 from labctl.answers.design import DesignRequest, DesignResponse
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
 from labctl.answers.fixed_coefficients import FixedCoefficients
-from labctl.answers.points import PointFigure, PointResponse
-from labctl.answers.recordings import ImportResponse, RecordingResponse
+from labctl.answers.points import FigurePointResponse, PointResponse
+from labctl.answers.recordings import AllanResponse, ImportResponse, RecordingResponse, TraceResponse
 from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.schedule import ScheduledResponse
-from labctl.answers.units import UnitResponse, UnitState
+from labctl.answers.units import TrendResponse, UnitResponse, UnitState
 from labctl.bundle import Bundle
 from labctl.calibration import Calibration, read_calibration
 from labctl.calibration.certification import warn
 from labctl.errors import CalibrationWithdrawn
+from labctl.figure_requests import FigureRequests
 from labctl.recording.files import recording_parts
-from labctl.service_connection import TIMEOUT_S, ServiceConnection, ServiceRefused, json_of, query_string, refusal
+from labctl.service_connection import (
+    TIMEOUT_S,
+    ServiceConnection,
+    ServiceRefused,
+    json_of,
+    part_of_path,
+    query_string,
+    refusal,
+)
 from labctl.withdrawal import HEADER, Withdrawn, read_withdrawn
 
 __all__ = [
+    "AllanResponse",
     "Bundle",
     "CalibrationFile",
     "CalibrationRow",
@@ -64,6 +73,7 @@ __all__ = [
     "DiagnosisRequest",
     "DiagnosisResponse",
     "EventResponse",
+    "FigurePointResponse",
     "FitRequest",
     "FitResponse",
     "FixedCoefficients",
@@ -74,6 +84,8 @@ __all__ = [
     "ResumeRequest",
     "ScheduledResponse",
     "ServiceRefused",
+    "TraceResponse",
+    "TrendResponse",
     "UnitResponse",
     "Withdrawn",
 ]
@@ -105,7 +117,7 @@ class CalibrationFile:
         return read_calibration(self.content)
 
 
-class Client:
+class Client(FigureRequests):
     """A connection to one service, to be closed or used in a `with` statement.
 
     `url` is the address of the service. `api_key` defaults to the environment variable `LABCTL_KEY`; a service on
@@ -155,11 +167,11 @@ class Client:
 
     def unit(self, serial: str) -> UnitResponse:
         """Return one unit: its recordings, its calibration versions, and which version is certified."""
-        return self._connection.get(f"/api/units/{_part(serial)}", UnitResponse)
+        return self._connection.get(f"/api/units/{part_of_path(serial)}", UnitResponse)
 
     def calibrations(self, serial: str) -> list[CalibrationRow]:
         """Return every calibration version of a unit, newest first, with its errors in deg/s."""
-        return self._connection.get_list(f"/api/units/{_part(serial)}/calibrations", CalibrationRow)
+        return self._connection.get_list(f"/api/units/{part_of_path(serial)}/calibrations", CalibrationRow)
 
     def calibration(
         self, serial: str, version: int | None = None, *, file_format: str = "json",
@@ -176,7 +188,7 @@ class Client:
         """
         query = {"format": file_format} | ({} if version is None else {"version": str(version)})
         headers = {} if held is None else {"If-None-Match": held.etag}
-        path = f"/api/units/{_part(serial)}/calibration"
+        path = f"/api/units/{part_of_path(serial)}/calibration"
         response = self._connection.request("GET", path, params=query, headers=headers)
         due, warning = response.headers.get("x-labctl-due"), _warning(response.headers.get("warning", ""))
         header = response.headers.get(HEADER)
@@ -201,7 +213,7 @@ class Client:
         Raises CalibrationWithdrawn when its version was revoked or its certificate was withdrawn, ServiceRefused with
         slug `not-found` for a hash that the unit does not have.
         """
-        path = f"/api/units/{_part(serial)}/calibration/state"
+        path = f"/api/units/{part_of_path(serial)}/calibration/state"
         answer = self._connection.get(path, CalibrationStateResponse, calibration_hash=calibration_hash)
         if (gone := answer.withdrawn) is not None:
             notice = Withdrawn(gone.at, gone.by, gone.reason, gone.certificate)
@@ -230,36 +242,8 @@ class Client:
 
     def fit(self, serial: str, request: FitRequest | None = None) -> FitResponse:
         """Fit a model to a recording of a unit; the result is the unit's next calibration version."""
-        path = f"/api/units/{_part(serial)}/calibrations"
+        path = f"/api/units/{part_of_path(serial)}/calibrations"
         return FitResponse.model_validate(json_of(self._post(path, request or FitRequest())))
-
-    def residuals(self, serial: str, version: int, *, recordings: Sequence[int]) -> ResidualsResponse:
-        """Return what the model of a version, fitted to recordings, leaves of each data set, deg/s."""
-        path = f"/api/units/{_part(serial)}/calibrations/{version}/residuals"
-        response = self._connection.request("GET", path, params={"recordings": list(recordings)})
-        return ResidualsResponse.model_validate(json_of(response))
-
-    def point(
-        self,
-        serial: str,
-        version: int,
-        *,
-        recording: int,
-        dataset: int,
-        axis: str,
-        figure: PointFigure = "residual",
-        recordings: Sequence[int] = (),
-    ) -> PointResponse:
-        """Return one data set of a figure, and its numbers computed again from the raw readings.
-
-        `figure` is "residual" (of the model fitted to `recordings`, default: to `recording`) or "comparison" (the
-        version without refitting).
-        """
-        path = f"/api/units/{_part(serial)}/calibrations/{version}/point"
-        query = {
-            "recording": recording, "dataset": dataset, "axis": axis, "figure": figure, "recordings": list(recordings),
-        }  # fmt: skip
-        return PointResponse.model_validate(json_of(self._connection.request("GET", path, params=query)))
 
     def start_campaign(self, request: CampaignRequest) -> CampaignResponse | ScheduledResponse:
         """Start a campaign now, or enter it into the schedule when the request has `at` or `cron`.
@@ -334,11 +318,11 @@ class Client:
 
     def start_diagnosis(self, serial: str, request: DiagnosisRequest | None = None) -> DiagnosisResponse:
         """Run experiments on the service's bench until one missing effect is left; returns at once."""
-        return self._diagnosis(f"/api/units/{_part(serial)}/diagnoses", request or DiagnosisRequest())
+        return self._diagnosis(f"/api/units/{part_of_path(serial)}/diagnoses", request or DiagnosisRequest())
 
     def diagnoses(self, serial: str) -> list[DiagnosisResponse]:
         """Return the diagnoses of a unit, newest first."""
-        return self._connection.get_list(f"/api/units/{_part(serial)}/diagnoses", DiagnosisResponse)
+        return self._connection.get_list(f"/api/units/{part_of_path(serial)}/diagnoses", DiagnosisResponse)
 
     def diagnosis(self, diagnosis: int) -> DiagnosisResponse:
         """Return a diagnosis with its rounds."""
@@ -388,8 +372,3 @@ def _warning(field: str) -> str:
 def _withdrawn(what: str, notice: Withdrawn, content: bytes | None = None) -> CalibrationWithdrawn:
     text = f"{what} must not be used: {notice.text}; fetch the version in force, or have the unit calibrated again"
     return CalibrationWithdrawn(text, notice, content)
-
-
-def _part(serial: str) -> str:
-    """Return a serial number as one part of a path."""
-    return quote(serial, safe="")

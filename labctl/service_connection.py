@@ -149,3 +149,8 @@ def query_string(**values: str | int | None) -> str:
     """Return a query string; values that are None or empty are left out."""
     given = {name: value for name, value in values.items() if value not in (None, "")}
     return f"?{urlencode(given)}" if given else ""
+
+
+def part_of_path(text: str) -> str:
+    """Return a text, such as a serial number, as one part of a path."""
+    return quote(text, safe="")

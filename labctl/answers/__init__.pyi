@@ -357,6 +357,8 @@ from labctl.answers.plans import (
     Visibility as Visibility,
 )
 from labctl.answers.points import (
+    FigureNumber as FigureNumber,
+    FigurePointResponse as FigurePointResponse,
     PointFigure as PointFigure,
     PointNumbers as PointNumbers,
     PointResponse as PointResponse,
