@@ -391,6 +391,7 @@ from labctl.answers.recordings import (
     RawChannelJson as RawChannelJson,
     RecordingAlone as RecordingAlone,
     RecordingFacts as RecordingFacts,
+    RecordingOrigin as RecordingOrigin,
     RecordingResponse as RecordingResponse,
     RecordingWithPoints as RecordingWithPoints,
     SamplesResponse as SamplesResponse,

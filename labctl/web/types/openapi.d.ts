@@ -13068,9 +13068,15 @@ export interface components {
             serial: string;
             /**
              * Campaign
-             * @description Campaign that made the recording; null: the recording was imported.
+             * @description Campaign that made the recording; null: no campaign, see `origin`.
              */
             campaign: number | null;
+            /**
+             * Origin
+             * @description What made the recording: a campaign, a simulation (`labctl simulate`, *Simulate*), or an import of files.
+             * @enum {string}
+             */
+            origin: "campaign" | "simulation" | "import";
             /**
              * Kind
              * @description Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table).
@@ -13126,9 +13132,15 @@ export interface components {
             kind: string;
             /**
              * Campaign
-             * @description The campaign that made the recording; null: the recording was imported.
+             * @description The campaign that made the recording; null: no campaign, see `origin`.
              */
             campaign: number | null;
+            /**
+             * Origin
+             * @description What made the recording: a campaign, a simulation (`labctl simulate`, *Simulate*), or an import of files.
+             * @enum {string}
+             */
+            origin: "campaign" | "simulation" | "import";
             /**
              * Datasets
              * @description Number of data sets.
@@ -13182,9 +13194,15 @@ export interface components {
             serial: string;
             /**
              * Campaign
-             * @description Campaign that made the recording; null: the recording was imported.
+             * @description Campaign that made the recording; null: no campaign, see `origin`.
              */
             campaign: number | null;
+            /**
+             * Origin
+             * @description What made the recording: a campaign, a simulation (`labctl simulate`, *Simulate*), or an import of files.
+             * @enum {string}
+             */
+            origin: "campaign" | "simulation" | "import";
             /**
              * Kind
              * @description Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table).

@@ -154,7 +154,7 @@ function nextSteps({ unit, calibration }, criticism) {
     h(
       "div",
       { class: "row" },
-      button("Certify", certify, { kind: isEnd ? "primary" : "" }),
+      button("Certify: put in force", certify, { kind: isEnd ? "primary" : "" }),
       h(
         "a",
         {

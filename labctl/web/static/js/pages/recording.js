@@ -116,7 +116,9 @@ function recordingHeader(about) {
     );
   const from = about.campaign
     ? h("a", { href: `/campaigns/${about.campaign}` }, `campaign ${about.campaign}`)
-    : "an import";
+    : about.origin === "simulation"
+      ? "a simulation"
+      : "an import";
   const made = [about.info.model, about.info.technology?.toUpperCase()].filter(Boolean);
   return pageHeader(
     `Recording ${about.id}`,

@@ -53,7 +53,7 @@ export function versionsCard(unit, rows, issued, explore) {
 const act = (unit, row) =>
   row.certified
     ? button("Revoke", () => askRevocation(unit.serial, row.version), { kind: "tiny" })
-    : button("Certify", () => askCertification(unit.serial, row.version), { kind: "tiny" });
+    : button("Certify: put in force", () => askCertification(unit.serial, row.version), { kind: "tiny" });
 
 /**
  * @param {Unit} unit
