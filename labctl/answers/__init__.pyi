@@ -480,6 +480,7 @@ from labctl.answers.units import (
     TrendPoint as TrendPoint,
     TrendResponse as TrendResponse,
     UnitResponse as UnitResponse,
+    VersionErrors as VersionErrors,
 )
 from labctl.answers.validity import (
     CheckGyroChart as CheckGyroChart,

@@ -16054,6 +16054,8 @@ export interface components {
              * @description Numbers of the unit's calibration versions.
              */
             calibrations: number[];
+            /** @description Errors of the newest versions over the noise floor. */
+            newest_errors: components["schemas"]["VersionErrors"];
             /**
              * Certified Version
              * @description Number of the version in force; null: none.
@@ -16269,6 +16271,22 @@ export interface components {
              * @description Whether the RMS error of each axis is at most the limit of the axis.
              */
             ok: boolean;
+        };
+        /**
+         * VersionErrors
+         * @description Errors of the newest versions of a unit over the noise floor, as lists of equal length.
+         */
+        VersionErrors: {
+            /**
+             * Version
+             * @description Numbers of the versions, rising; at most the newest 24.
+             */
+            version: number[];
+            /**
+             * Over Floor
+             * @description RMS error of each version on the data it was fitted to, over the noise floor of these data; null: one of both is not known, or the floor is 0.
+             */
+            over_floor: (number | null)[];
         };
         /**
          * VersionResponse
