@@ -40,7 +40,7 @@ def test_a_sparkline_draws_the_error_of_each_version_over_the_floor(
     row = page.get_by_role("row").filter(has_text=UNIT)
     drawn = row.locator(".sparkline")
     assert ratios_of(drawn) == pytest.approx([min(max(ratio, 0.5), 100.0) for ratio in expected], rel=0.01)
-    assert float(drawn.locator(".number").inner_text()) == pytest.approx(expected[2], rel=0.005)
+    assert float(drawn.locator(".sparkline-value").inner_text()) == pytest.approx(expected[2], rel=0.005)
     words = drawn.get_by_role("img").get_attribute("aria-label") or ""
     assert f"version 3: {expected[2]:#.3g}" in words
     assert page.get_by_role("row").filter(has_text="WITHOUT-A-VERSION").locator(".sparkline").count() == 0

@@ -5,7 +5,7 @@ import { number } from "./format.js";
 
 /** @import { Unit } from "../../../types/api.js" */
 
-const [WIDTH, HEIGHT, RIM] = [88, 24, 3];
+const [WIDTH, HEIGHT, RIM] = [72, 24, 3];
 /** What lies outside is drawn at the edge; the floor, 1, is a line. */
 export const LEAST_RATIO = 0.5;
 export const LARGEST_RATIO = 100;
@@ -27,9 +27,11 @@ export function heightOf(ratio) {
 export function errorSparkline({ version, over_floor }) {
   const known = version.flatMap((of, k) => (over_floor[k] === null ? [] : [{ of, ratio: Number(over_floor[k]) }]));
   const newest = known.at(-1);
-  if (!newest) return h("span", { class: "muted" }, "–");
+  if (!newest) return "–";
   const step = known.length > 1 ? (WIDTH - 2 * RIM) / (known.length - 1) : 0;
-  const points = known.map(({ ratio }, k) => `${(RIM + k * step).toFixed(1)},${heightOf(ratio).toFixed(2)}`);
+  const points = known.map(
+    ({ ratio }, k) => `${(WIDTH - RIM - (known.length - 1 - k) * step).toFixed(1)},${heightOf(ratio).toFixed(2)}`,
+  );
   const course = known.map(({ of, ratio }) => `version ${of}: ${number(ratio)}`).join(", ");
   const words = `Error over the noise floor, ${course}`;
   const [x, y] = points[points.length - 1].split(",");
@@ -43,6 +45,6 @@ export function errorSparkline({ version, over_floor }) {
       svg("polyline", { points: points.join(" ") }),
       svg("circle", { cx: x, cy: y, r: 2.4 }),
     ),
-    h("span", { class: "number" }, number(newest.ratio)),
+    h("span", { class: "sparkline-value" }, number(newest.ratio)),
   );
 }

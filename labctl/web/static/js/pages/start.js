@@ -124,7 +124,7 @@ function overview(units, found) {
     newsCard(found),
     h(
       "div",
-      { class: "columns", style: "--column-min: 17rem" },
+      { class: "columns", style: "--column-min: 20rem" },
       card(
         "Bench",
         benches.length
@@ -152,13 +152,13 @@ function overview(units, found) {
         "Units",
         h(
           "ul",
-          { class: "plain" },
+          { class: "plain unit-lines" },
           units.map((unit) =>
             h(
               "li",
-              { class: "row space-between" },
+              {},
               h("a", { class: "serial", href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
-              unit.calibrations.length ? errorSparkline(unit.newest_errors) : null,
+              unit.calibrations.length ? errorSparkline(unit.newest_errors) : h("span"),
               h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"),
             ),
           ),
