@@ -357,6 +357,8 @@ from labctl.answers.plans import (
     Visibility as Visibility,
 )
 from labctl.answers.points import (
+    FigureNumber as FigureNumber,
+    FigurePointResponse as FigurePointResponse,
     PointFigure as PointFigure,
     PointNumbers as PointNumbers,
     PointResponse as PointResponse,
@@ -389,6 +391,7 @@ from labctl.answers.recordings import (
     RawChannelJson as RawChannelJson,
     RecordingAlone as RecordingAlone,
     RecordingFacts as RecordingFacts,
+    RecordingOrigin as RecordingOrigin,
     RecordingResponse as RecordingResponse,
     RecordingWithPoints as RecordingWithPoints,
     SamplesResponse as SamplesResponse,
@@ -478,6 +481,7 @@ from labctl.answers.units import (
     TrendPoint as TrendPoint,
     TrendResponse as TrendResponse,
     UnitResponse as UnitResponse,
+    VersionErrors as VersionErrors,
 )
 from labctl.answers.validity import (
     CheckGyroChart as CheckGyroChart,

@@ -57,3 +57,40 @@ class PointResponse(ResponseModel):
     )
     formula: str = Field(description="The residual with its numbers.")
     summary: str = Field(description="The result of the computation from the readings, in one sentence.")
+
+
+#: Figures of a recording or of a unit over time whose points are computed again from raw readings.
+RecomputedFigure = Literal["allan", "trace", "mean", "trend"]
+#: What a point of the trend of a unit states.
+TrendQuantity = Literal["bias", "scale_factor", "error", "as_found", "as_left"]
+
+
+class FigureNumber(ResponseModel):
+    """One number of a point, and the same computed now from the raw readings."""
+
+    name: str = Field(description="What the number is.")
+    unit: str = Field(description="Its unit; empty: a number without a unit.")
+    shown: float | None = Field(description="The number of the figure, in `unit`; null: the figure does not state it.")
+    recomputed: float | None = Field(
+        description="The same computed now from the raw readings, in `unit`; null: there are no readings."
+    )
+    rounding: float = Field(description="Difference up to which both are equal, in `unit`.")
+
+
+class FigurePointResponse(ResponseModel):
+    """A point of an Allan deviation, of a trace, of the means of data sets or of a trend: what it is made of."""
+
+    figure: RecomputedFigure = Field(description="The figure whose point it is.")
+    title: str = Field(description="The point in words.")
+    recording: RecordingNumber
+    datasets: list[int] = Field(description="Numbers of the first and the last data set that its readings are of.")
+    numbers: list[FigureNumber] = Field(description="Its numbers; the first is the one that is drawn.")
+    formula: str = Field(description="How the drawn number follows from the readings, with its numbers.")
+    equal: bool | None = Field(
+        description="Whether all numbers agree within their rounding; null: there are no readings."
+    )
+    readings: int = Field(description="Number of readings that it is made of; 0: the recording has none.")
+    readings_sha256: str | None = Field(
+        description="SHA-256 of these readings, each as 8 bytes (little-endian double), in order; null: none."
+    )
+    summary: str = Field(description="The result of the computation from the readings, in one sentence.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import NotRequired
+from typing import Literal, NotRequired
 
 from pydantic import Field, JsonValue
 from typing_extensions import TypedDict
@@ -114,13 +114,19 @@ class SimulatedRecordingResponse(ImportResponse):
     )
 
 
+#: What made a recording of the database.
+RecordingOrigin = Literal["campaign", "simulation", "import"]
+ORIGIN = "What made the recording: a campaign, a simulation (`labctl simulate`, *Simulate*), or an import of files."
+
+
 class RecordingResponse(ResponseModel):
     """One line of the list of recordings."""
 
     id: RecordingNumber
     serial: Serial
     kind: str = Field(description=KIND)
-    campaign: int | None = Field(description="The campaign that made the recording; null: the recording was imported.")
+    campaign: int | None = Field(description="The campaign that made the recording; null: no campaign, see `origin`.")
+    origin: RecordingOrigin = Field(description=ORIGIN)
     datasets: DatasetCount
     readings: ReadingCount
     created_at: datetime = Field(description="Time at which the recording was stored.")
@@ -136,7 +142,8 @@ class RecordingFacts(ResponseModel):
 
     id: RecordingNumber
     serial: Serial
-    campaign: int | None = Field(description="Campaign that made the recording; null: the recording was imported.")
+    campaign: int | None = Field(description="Campaign that made the recording; null: no campaign, see `origin`.")
+    origin: RecordingOrigin = Field(description=ORIGIN)
     kind: str = Field(description=KIND)
     info: dict[str, JsonValue] = Field(
         description="Content of the file `recording.toml`: unit, axes, bench, data sheet, notes."

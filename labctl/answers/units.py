@@ -47,6 +47,16 @@ class RecalibrationResponse(ResponseModel):
 UnitState = Literal["in_force", "overdue", "none"]
 
 
+class VersionErrors(ResponseModel):
+    """Errors of the newest versions of a unit over the noise floor, as lists of equal length."""
+
+    version: list[int] = Field(description="Numbers of the versions, rising; at most the newest 24.")
+    over_floor: list[float | None] = Field(
+        description="RMS error of each version on the data it was fitted to, over the noise floor of these data; null: "
+        "one of both is not known, or the floor is 0."
+    )
+
+
 class UnitResponse(ResponseModel):
     """A unit, its recordings and its calibrations."""
 
@@ -57,6 +67,7 @@ class UnitResponse(ResponseModel):
     supplier: str = Field(default="", description="Supplier of the unit; empty: not stated.")
     recordings: list[int] = Field(description="Numbers of the unit's recordings.")
     calibrations: list[int] = Field(description="Numbers of the unit's calibration versions.")
+    newest_errors: VersionErrors = Field(description="Errors of the newest versions over the noise floor.")
     certified_version: int | None = Field(description="Number of the version in force; null: none.")
     certified_verdict: str | None = Field(
         default=None,

@@ -20,11 +20,11 @@ from labctl.answers.fleet import (
     FleetReportResponse,
     FleetUnitResponse,
 )
-from labctl.answers.points import PointResponse
-from labctl.answers.recordings import ImportResponse, RecordingResponse
+from labctl.answers.points import FigurePointResponse, PointResponse
+from labctl.answers.recordings import AllanResponse, ImportResponse, RecordingResponse, TraceResponse
 from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.schedule import ScheduledResponse
-from labctl.answers.units import UnitResponse
+from labctl.answers.units import TrendResponse, UnitResponse
 from labctl.bundle import Bundle
 from labctl.client.calibrations import CalibrationFile
 from labctl.client.client import Client
@@ -33,6 +33,7 @@ from labctl.service_connection import ServiceRefused
 from labctl.withdrawal import Withdrawn
 
 __all__ = [
+    "AllanResponse",
     "Bundle",
     "CalibrationFile",
     "CalibrationRow",
@@ -47,6 +48,7 @@ __all__ = [
     "DiagnosisRequest",
     "DiagnosisResponse",
     "EventResponse",
+    "FigurePointResponse",
     "FitRequest",
     "FitResponse",
     "FixedCoefficients",
@@ -62,6 +64,8 @@ __all__ = [
     "ResumeRequest",
     "ScheduledResponse",
     "ServiceRefused",
+    "TraceResponse",
+    "TrendResponse",
     "UnitResponse",
     "Withdrawn",
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -12,14 +11,12 @@ import httpx
 from labctl.answers.calibrations import CalibrationRow, FitRequest, FitResponse
 from labctl.answers.certification import CalibrationStateResponse
 from labctl.answers.common_fields import CriticismVerdict
-from labctl.answers.points import PointFigure, PointResponse
-from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.units import UnitResponse, UnitState
 from labctl.calibration import Calibration, read_calibration
 from labctl.calibration.certification import warn
 from labctl.client.connection import ClientPart, part
 from labctl.errors import CalibrationWithdrawn
-from labctl.service_connection import json_of, query_string
+from labctl.service_connection import query_string
 from labctl.withdrawal import HEADER, Withdrawn, read_withdrawn
 
 
@@ -120,34 +117,6 @@ class CalibrationMethods(ClientPart):
         """Fit a model to a recording of a unit; the result is the unit's next calibration version."""
         path = f"/api/units/{part(serial)}/calibrations"
         return self._ask(path, request or FitRequest(), FitResponse)
-
-    def residuals(self, serial: str, version: int, *, recordings: Sequence[int]) -> ResidualsResponse:
-        """Return what the model of a version, fitted to recordings, leaves of each data set, deg/s."""
-        path = f"/api/units/{part(serial)}/calibrations/{version}/residuals"
-        response = self._connection.request("GET", path, params={"recordings": list(recordings)})
-        return ResidualsResponse.model_validate(json_of(response))
-
-    def point(
-        self,
-        serial: str,
-        version: int,
-        *,
-        recording: int,
-        dataset: int,
-        axis: str,
-        figure: PointFigure = "residual",
-        recordings: Sequence[int] = (),
-    ) -> PointResponse:
-        """Return one data set of a figure, and its numbers computed again from the raw readings.
-
-        `figure` is "residual" (of the model fitted to `recordings`, default: to `recording`) or "comparison" (the
-        version without refitting).
-        """
-        path = f"/api/units/{part(serial)}/calibrations/{version}/point"
-        query = {
-            "recording": recording, "dataset": dataset, "axis": axis, "figure": figure, "recordings": list(recordings),
-        }  # fmt: skip
-        return PointResponse.model_validate(json_of(self._connection.request("GET", path, params=query)))
 
 
 def _warning(field: str) -> str:

@@ -7,6 +7,7 @@ import httpx
 from instruments.clock import Clock, SystemClock
 from labctl.client.calibrations import CalibrationMethods
 from labctl.client.campaigns import CampaignMethods
+from labctl.client.figures import FigureMethods
 from labctl.client.fleet import FleetMethods
 from labctl.client.recordings import RecordingMethods
 from labctl.closing import ClosedAtEnd
@@ -16,7 +17,7 @@ from labctl.service_connection import TIMEOUT_S, ServiceConnection
 DEFAULT_URL = "http://127.0.0.1:8420"
 
 
-class Client(CalibrationMethods, RecordingMethods, CampaignMethods, FleetMethods, ClosedAtEnd):
+class Client(CalibrationMethods, FigureMethods, RecordingMethods, CampaignMethods, FleetMethods, ClosedAtEnd):
     """A connection to one service, to be closed or used in a `with` statement.
 
     `url` is the address of the service. `api_key` defaults to the environment variable `LABCTL_KEY`; a service on

@@ -15,6 +15,7 @@ from labctl.answers.units import (
     RecalibrationResponse,
     UnitResponse,
     UnitState,
+    VersionErrors,
 )
 from labctl.errors import BadInput
 from labctl.exports import export_formats
@@ -25,8 +26,11 @@ from labctl.services.standards.usage import Notices
 from labctl.store import CertificationRow, Store, Unit
 from labctl.store.paging import Page, PageRequest
 from labctl.store.records import UnitHoldings
+from labctl.store.repositories.calibrations import FitError
 from labctl.store.repositories.units import UnitFilter
 
+#: Versions of a unit whose errors its answer has.
+MAX_ERRORS = 24
 #: Every unit, in one part.
 ANY_UNIT: PageRequest[str] = PageRequest()
 
@@ -108,18 +112,31 @@ def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]
 def _answers(store: Store, now: datetime, units: Sequence[Unit]) -> list[UnitResponse]:
     serials = [unit.serial for unit in units]
     held, notices = store.units.holdings(serials), Notices.of(store)
+    errors = store.calibrations.newest_errors(serials, MAX_ERRORS)
     in_force, verdicts = store.certifications.in_force(serials), store.certifications.verdicts(serials)
     answers = []
     for unit in units:
         act = in_force.get(unit.serial)
-        answer = _answer(unit, held[unit.serial], act, now, _notices(store, notices, act))
+        newest_errors = _over_floor(errors.get(unit.serial, []))
+        answer = _answer(unit, held[unit.serial], newest_errors, act, now, _notices(store, notices, act))
         answers.append(answer.model_copy(update={"certified_verdict": verdicts.get(unit.serial)}))
     return answers
 
 
+def _over_floor(errors: Sequence[FitError]) -> VersionErrors:
+    return VersionErrors(
+        version=[each.version for each in errors],
+        over_floor=[
+            each.rms_dps / each.noise_floor_dps if each.rms_dps is not None and each.noise_floor_dps else None
+            for each in errors
+        ],
+    )
+
+
 def _answer(
-    found: Unit, held: UnitHoldings, act: CertificationRow | None, now: datetime, notices: list[str]
-) -> UnitResponse:
+    found: Unit, held: UnitHoldings, errors: VersionErrors, act: CertificationRow | None, now: datetime,
+    notices: list[str],
+) -> UnitResponse:  # fmt: skip
     return UnitResponse(
         serial=found.serial,
         model=found.model,
@@ -128,6 +145,7 @@ def _answer(
         supplier=found.supplier,
         recordings=held.recordings,
         calibrations=held.versions,
+        newest_errors=errors,
         certified_version=act.version if act else None,
         due=act.due_at if act else None,
         overdue=bool(act and act.due_at and act.due_at <= now),

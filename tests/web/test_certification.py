@@ -31,6 +31,8 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     certify.last.click()  # version 1
     expect(dialog).to_contain_text("Adequate: no effect is missing")
     expect(dialog.get_by_role("checkbox")).to_have_count(0)
+    expect(dialog).to_contain_text("Certify version 1: put it in force")  # and issuing a certificate is another act
+    expect(dialog).to_contain_text("It makes no document: a certificate for a customer is issued afterwards.")
     dialog.get_by_label("Who").fill("A. Person")
     dialog.get_by_label("Why").fill("fits")
     dialog.get_by_role("button", name="Certify").click()
@@ -49,6 +51,9 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     dialog.get_by_role("button", name="Certify").click()
     expect(in_force).to_contain_text("version 2")
     expect(in_force).to_contain_text("Certified despite objections")
+    page.get_by_role("button", name="Issue certificate").first.click()
+    expect(dialog).to_contain_text("a document for a customer; which version is in force does not change")
+    dialog.get_by_role("button", name="Cancel").click()
     acts = page.get_by_role("region", name="Certifications").first
     expect(acts).to_contain_text("overridden")
     expect(acts).to_contain_text("needed on the robot today")

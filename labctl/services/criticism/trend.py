@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -91,17 +92,11 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
     The limit is of the bias, deg/s; default: twice the error that the version states. Raises NotFound, BadInput.
     """
     compute(UNNAMED)
-    rows = sorted(store.calibrations.of_unit(store.units.get(serial).serial), key=lambda row: row.version)
-    reference = version_of(store, serial, version if version is not None or not rows else rows[0].version)
+    compared = compared_with(store, serial, version)
+    reference, measured, undated = compared.reference, compared.measured, compared.undated
     if limit_dps is not None and not (math.isfinite(limit_dps) and limit_dps > 0):
         raise BadInput(f"limit {limit_dps} deg/s: give a number above 0")
-    measured, undated = in_time(
-        row
-        for row in store.recordings.of_unit(serial)
-        if row.kind == "points" or (row.kind == "samples" and row.datasets)
-    )
-    dated = [row for row in rows if not {each.id for each in undated}.intersection(row.recordings)]
-    points = [_point(store, row, reference, dated, measured) for row in measured]
+    points = [compared.point(Measurements(store, (row,))) for row in measured]
     occasions = occasions_of(store, measured)
     lines = list(_lines(points)) if len(occasions) > 1 else []
     limit = limit_dps if limit_dps is not None else _stated(reference)
@@ -118,16 +113,49 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Compared:
+    """A version, and the recordings of its unit that it is compared with."""
+
+    store: Store
+    reference: CalibrationRecord
+    measured: Sequence[RecordingRow]  #: in order of time
+    undated: Sequence[RecordingRow]
+    dated: Sequence[CalibrationRecord]  #: versions, rising, that no recording without a date was fitted to
+
+    def point(self, data: Measurements) -> TrendPoint:
+        """Return what the versions leave of one recording, by its means."""
+        return _point(self.store, data, self.reference, self.dated, self.measured)
+
+    def errors(self, data: Measurements) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Return axis -> error of each data set of one recording, (m,) deg/s, and axis -> its true rate."""
+        return errors_left(data, self.reference, [v for v in self.dated if data.row.id in v.recordings])
+
+
+def compared_with(store: Store, serial: str, version: int | None) -> Compared:
+    """Return a version (default: the first) and what it is compared with. Raises NotFound, BadInput."""
+    rows = sorted(store.calibrations.of_unit(store.units.get(serial).serial), key=lambda row: row.version)
+    reference = version_of(store, serial, version if version is not None or not rows else rows[0].version)
+    measured, undated = in_time(
+        row
+        for row in store.recordings.of_unit(serial)
+        if row.kind == "points" or (row.kind == "samples" and row.datasets)
+    )
+    undated_ids = {each.id for each in undated}
+    dated = [row for row in rows if not undated_ids.intersection(row.recordings)]
+    return Compared(store, reference, measured, undated, dated)
+
+
 def _stated(row: CalibrationRecord) -> float | None:
     return LARGEST_RATIO * expected if (expected := expected_dps(row)) else None
 
 
 def _point(
-    store: Store, row: RecordingRow, reference: CalibrationRecord, versions: Sequence[CalibrationRecord],
+    store: Store, data: Measurements, reference: CalibrationRecord, versions: Sequence[CalibrationRecord],
     measured: Sequence[RecordingRow],
 ) -> TrendPoint:  # fmt: skip
     """Return what the versions leave of one recording."""
-    data = Measurements(store, (row,))
+    row = data.row
     at = {each.id: ordered_at(each.info) for each in measured}
     before = [v for v in versions if v.recordings and all(at[n] < at[row.id] for n in v.recordings if n in at)]
     fitted_versions = [v for v in versions if row.id in v.recordings]
@@ -136,14 +164,25 @@ def _point(
         as_left=_applied(store, fitted_versions[-1:], data), rms_dps=None, axes={},
     )  # fmt: skip
     try:
-        angles = mounting_angles_of(read_calibration(fitted_versions[-1].document)) if fitted_versions else None
-        errors, _ = applied_errors(read_calibration(reference.document), data.points, angles_rad=angles)
-        channels = fit_data_of(data.points)
+        errors, rates_dps = errors_left(data, reference, fitted_versions)
     except LabctlError as error:
         return point.model_copy(update={"why": str(error)})
-    axes = {axis: line_left(values, channels.true_rate_dps(axis)) for axis, values in errors.items()}
+    axes = {axis: line_left(values, rates_dps[axis]) for axis, values in errors.items()}
     pooled = np.concatenate(list(errors.values()))
     return point.model_copy(update={"rms_dps": float(np.sqrt(np.mean(pooled**2))), "axes": axes})
+
+
+def errors_left(
+    data: Measurements, reference: CalibrationRecord, fitted_versions: Sequence[CalibrationRecord]
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return axis -> what a version leaves of each data set of a recording, (m,) deg/s, and axis -> their true rates.
+
+    The mountings are those of the newest version that was fitted to the recording. Raises BadInput, NotEnoughData.
+    """
+    angles = mounting_angles_of(read_calibration(fitted_versions[-1].document)) if fitted_versions else None
+    errors, _ = applied_errors(read_calibration(reference.document), data.points, angles_rad=angles)
+    channels = fit_data_of(data.points)
+    return errors, {axis: channels.true_rate_dps(axis) for axis in errors}
 
 
 def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measurements) -> AppliedVersion | None:

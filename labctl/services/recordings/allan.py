@@ -8,7 +8,7 @@ import numpy as np
 
 from labctl.answers.recordings import AllanResponse
 from labctl.errors import BadInput, NotEnoughData
-from labctl.fitting.data.static_record import StaticRecord, static_record
+from labctl.fitting.data.static_record import StaticRecord, longest_stretch, static_record
 from labctl.fitting.numeric.allan import MIN_READINGS, allan
 from labctl.progress import report_stage
 from labctl.recording import Columns, Recording, RecordingInfo
@@ -46,8 +46,7 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanRespon
     def work() -> AllanResponse:
         if dataset is None:
             return _response(recording, _at_rest(store, recording, info), info)
-        columns = store.recordings.dataset(recording, dataset)
-        return _response(recording, _of_set(Recording(info, columns), dataset), info)
+        return _response(recording, _of_set(valid_part(store, recording, dataset), dataset), info)
 
     question = {"recording": recording, "readings": store.recordings.fingerprint(recording), "dataset": dataset}
     return cached(AllanResponse, question, work)
@@ -81,24 +80,47 @@ def _response(recording: int, record: StaticRecord, info: RecordingInfo) -> Alla
     return AllanResponse.model_validate(answer, extra="forbid")
 
 
+def rest_of(store: Store, recording: int) -> Recording:
+    """Return the readings of the longest section at rest that is fitted: what `allan_unit` takes without a data set.
+
+    Raises NotFound, NotEnoughData.
+    """
+    info = store.recordings.get(recording).recording_info
+    _, still = _still(store, recording)
+    parts = [_needed(info, store.recordings.dataset(recording, number)) for number in still]
+    together = Recording(info, _joined(parts)) if parts else None
+    rows = None if together is None else longest_stretch(together)
+    if together is None or rows is None:
+        raise NotEnoughData(f"recording {recording} has no section at rest; name a data set")
+    return Recording(info, {name: values[rows] for name, values in together.columns.items()})
+
+
+def valid_part(store: Store, recording: int, dataset: int) -> Recording:
+    """Return the valid readings of a data set; raises NotFound, NotEnoughData where they are too few."""
+    info = store.recordings.get(recording).recording_info
+    columns = store.recordings.dataset(recording, dataset)
+    if "valid" in columns:
+        valid = np.asarray(columns["valid"]) != 0
+        columns = {name: values[valid] for name, values in columns.items()}
+    if len(columns["t_s"]) < MIN_READINGS:
+        raise NotEnoughData(
+            f"data set {dataset} has {len(columns['t_s'])} valid readings; name a data set with {MIN_READINGS} or more"
+        )
+    return Recording(info, columns)
+
+
 def _of_set(recording: Recording, dataset: int) -> StaticRecord:
     columns = recording.columns
-    n = len(recording)
-    valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(n, dtype=bool)
-    t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]
-    if len(t_s) < MIN_READINGS:
-        raise NotEnoughData(
-            f"data set {dataset} has {len(t_s)} valid readings; name a data set with {MIN_READINGS} or more"
-        )
+    t_s = np.asarray(columns["t_s"], dtype=np.float64)
     period_s = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
-    deviations = {str(axis): allan(recording.gyro_dps(axis)[valid], period_s) for axis in recording.info.axes}
+    deviations = {str(axis): allan(recording.gyro_dps(axis), period_s) for axis in recording.info.axes}
     axes = {axis: noise for axis, noise in deviations.items() if noise is not None}
     if not axes:
         raise NotEnoughData(
             f"data set {dataset}: its readings are all equal, so their noise is unknown; name another data set"
         )
     temperature_c = temperature_of(columns)
-    mean_c = float(temperature_c[valid].mean()) if temperature_c is not None else np.nan
+    mean_c = float(temperature_c.mean()) if temperature_c is not None else np.nan
     return StaticRecord(dataset, dataset, mean_c, len(t_s) * period_s, axes)
 
 
@@ -137,8 +159,11 @@ def _needed(info: RecordingInfo, columns: Columns) -> Columns:
 
 
 def _together(info: RecordingInfo, parts: Sequence[Columns]) -> StaticRecord | None:
-    together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return static_record(Recording(info, together))
+    return static_record(Recording(info, _joined(parts)))
+
+
+def _joined(parts: Sequence[Columns]) -> Columns:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:

@@ -11,6 +11,7 @@ from labctl.answers.recordings import (
     ChannelColumns,
     DataSetsResponse,
     RecordingAlone,
+    RecordingOrigin,
     RecordingResponse,
     RecordingWithPoints,
     SamplesResponse,
@@ -28,7 +29,18 @@ def page_of_recordings(
     """Return recordings, newest first, as many as are asked for."""
     page = store.recordings.page(request, serial)
     simulated = _of_simulated_time(store, page.rows)
-    return Page([_line(row, row.campaign in simulated) for row in page.rows], page.total, page.next_after)
+    origins = _origins(store, page.rows)
+    lines = [_line(row, row.campaign in simulated, origins[row.id]) for row in page.rows]
+    return Page(lines, page.total, page.next_after)
+
+
+def _origins(store: Store, rows: Sequence[RecordingRow]) -> dict[int, RecordingOrigin]:
+    """Return what made each of some recordings, by its number."""
+    alone = [row.id for row in rows if row.campaign is None]
+    made = store.audit.simulated_recordings(alone) if alone else set()
+    return {
+        row.id: "campaign" if row.campaign is not None else "simulation" if row.id in made else "import" for row in rows
+    }
 
 
 def _of_simulated_time(store: Store, rows: Sequence[RecordingRow]) -> set[int | None]:
@@ -37,11 +49,11 @@ def _of_simulated_time(store: Store, rows: Sequence[RecordingRow]) -> set[int | 
     return {number for number, bench in store.campaigns.benches(campaigns).items() if has_simulated_time(bench)}
 
 
-def _line(row: RecordingRow, simulated_time: bool) -> RecordingResponse:
+def _line(row: RecordingRow, simulated_time: bool, origin: RecordingOrigin) -> RecordingResponse:
     return RecordingResponse(
         id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
         readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
-        motion=row.recording_info.motion, simulated_time=simulated_time,
+        motion=row.recording_info.motion, simulated_time=simulated_time, origin=origin,
     )  # fmt: skip
 
 
@@ -117,6 +129,7 @@ def describe_recording(store: Store, recording: int, *, points: bool = True) -> 
         id=row.id,
         serial=row.serial,
         campaign=row.campaign,
+        origin=_origins(store, [row])[row.id],
         kind=row.kind,
         info=dict(row.info),
         created_at=row.created_at.isoformat(),

@@ -52,13 +52,14 @@ def trace(
         trace_points = _readings(store, recording, channel, inside) if raw else envelope_of(store, recording, channel)
     binned = _binned(trace_points, low, high, points)
     return TraceResponse(
-        recording=recording, channel=channel, unit=_unit(info, channel), from_s=low, until_s=high, raw=raw,
+        recording=recording, channel=channel, unit=unit_of(info, channel), from_s=low, until_s=high, raw=raw,
         t_s=binned.t_s.tolist(), min=binned.low.tolist(), max=binned.high.tolist(), mean=binned.mean.tolist(),
         n=binned.n.astype(np.int64).tolist(), channels=sorted(courses),
     )  # fmt: skip
 
 
-def _unit(info: RecordingInfo, channel: str) -> str:
+def unit_of(info: RecordingInfo, channel: str) -> str:
+    """Return the unit of a channel of a recording; empty: it has none."""
     for axis in info.axes:
         if channel.startswith(f"gyro_{axis}"):
             output = info.output.get(axis)

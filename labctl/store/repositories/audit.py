@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
@@ -15,6 +16,7 @@ from labctl.answers.json_object import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests import chain
+from labctl.store.paging import parts_of
 from labctl.store.records import AuditRow
 from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
@@ -158,6 +160,17 @@ class Audit:
             query = query.where(a.at >= since)
         with self._database.reading() as connection:
             return records_of(AuditRow, connection.execute(query.order_by(a.id).limit(limit)))
+
+    def simulated_recordings(self, recordings: Sequence[int]) -> set[int]:
+        """Return which of some recordings were made by a simulation in this database, as its act says."""
+        a = tables.audit.c
+        subjects = {f"recording {number}": number for number in recordings}
+        found: set[int] = set()
+        with self._database.reading() as connection:
+            for some in parts_of(list(subjects)):
+                query = sa.select(a.subject).where(a.action == "simulate", a.subject.in_(some))
+                found |= {subjects[subject] for subject in connection.scalars(query)}
+        return found
 
     def head(self) -> Head | None:
         """Return how long the trail is and the hash of its last row; None when the head was removed."""

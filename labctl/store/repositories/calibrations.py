@@ -16,6 +16,7 @@ from labctl.errors import Conflict, NotCertified, NotFound, VersionTaken
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION
+from labctl.store.paging import parts_of
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement, Release, Withdrawal
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.drafts.marks import mark_fitted
@@ -24,6 +25,15 @@ from labctl.store.repositories.units import SEEN
 from labctl.store.repositories.withdrawals import withdraw_of_version
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
+
+
+@dataclass(frozen=True)
+class FitError:
+    """Error of a version on the data that it was fitted to, and their noise floor, deg/s; None: not known."""
+
+    version: int
+    rms_dps: float | None
+    noise_floor_dps: float | None
 
 
 def _document_query() -> sa.Select[bytes, str]:
@@ -200,6 +210,26 @@ class Calibrations:
     def of_unit(self, serial: str) -> list[CalibrationRecord]:
         """Return every version of a unit, newest first."""
         return self._rows(tables.calibrations.c.serial == serial)
+
+    def newest_errors(self, serials: Sequence[str], most: int) -> dict[str, list[FitError]]:
+        """Return, of each of some units, the errors of its newest versions on the data they were fitted to, rising."""
+        c = tables.calibrations.c
+        some_of = c.serial.in_(sa.bindparam("serials", expanding=True))
+        place = sa.func.row_number().over(partition_by=c.serial, order_by=c.version.desc()).label("place")
+        newest = sa.select(c.id, place).where(some_of).subquery()  # without the answers, which are long
+        error = c.answer["error"]
+        query = (
+            sa.select(c.serial, c.version, error["rms_dps"].as_float(), error["noise_floor_dps"].as_float())
+            .join(newest, newest.c.id == c.id)
+            .where(newest.c.place <= most)
+            .order_by(c.serial, c.version)
+        )
+        found: dict[str, list[FitError]] = {}
+        with self._database.reading() as connection:
+            for some in parts_of(serials):
+                for serial, version, rms_dps, floor_dps in connection.execute(query, {"serials": some}):
+                    found.setdefault(serial, []).append(FitError(version, rms_dps, floor_dps))
+        return found
 
     def _rows(self, *conditions: sa.ColumnElement[bool]) -> list[CalibrationRecord]:
         c = tables.calibrations.c

@@ -1946,6 +1946,86 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/trend/point": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A point of a trend, computed again from its readings
+         * @description What a version leaves of one recording, and the same computed now from every reading of the recording.
+         */
+        get: operations["point_of_trend_api_units__serial__trend_point_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{recording}/allan/point": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A point of an Allan deviation, computed again
+         * @description The deviation at one averaging time with its interval and clusters, and the same computed now from readings.
+         */
+        get: operations["point_of_allan_api_recordings__recording__allan_point_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{recording}/trace/point": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A bin of a trace, computed again from its readings
+         * @description Least, largest and mean reading of one bin of a trace, and the same computed now from its readings.
+         */
+        get: operations["point_of_trace_api_recordings__recording__trace_point_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{recording}/datasets/{dataset}/mean": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The mean of a data set, computed again
+         * @description The kept mean of a channel in one data set, and the same computed now from the readings.
+         */
+        get: operations["point_of_mean_api_recordings__recording__datasets__dataset__mean_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/units/{serial}/sensors": {
         parameters: {
             query?: never;
@@ -8102,6 +8182,94 @@ export interface components {
             definition: string;
         };
         /**
+         * FigureNumber
+         * @description One number of a point, and the same computed now from the raw readings.
+         */
+        FigureNumber: {
+            /**
+             * Name
+             * @description What the number is.
+             */
+            name: string;
+            /**
+             * Unit
+             * @description Its unit; empty: a number without a unit.
+             */
+            unit: string;
+            /**
+             * Shown
+             * @description The number of the figure, in `unit`; null: the figure does not state it.
+             */
+            shown: number | null;
+            /**
+             * Recomputed
+             * @description The same computed now from the raw readings, in `unit`; null: there are no readings.
+             */
+            recomputed: number | null;
+            /**
+             * Rounding
+             * @description Difference up to which both are equal, in `unit`.
+             */
+            rounding: number;
+        };
+        /**
+         * FigurePointResponse
+         * @description A point of an Allan deviation, of a trace, of the means of data sets or of a trend: what it is made of.
+         */
+        FigurePointResponse: {
+            /**
+             * Figure
+             * @description The figure whose point it is.
+             * @enum {string}
+             */
+            figure: "allan" | "trace" | "mean" | "trend";
+            /**
+             * Title
+             * @description The point in words.
+             */
+            title: string;
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
+            recording: number;
+            /**
+             * Datasets
+             * @description Numbers of the first and the last data set that its readings are of.
+             */
+            datasets: number[];
+            /**
+             * Numbers
+             * @description Its numbers; the first is the one that is drawn.
+             */
+            numbers: components["schemas"]["FigureNumber"][];
+            /**
+             * Formula
+             * @description How the drawn number follows from the readings, with its numbers.
+             */
+            formula: string;
+            /**
+             * Equal
+             * @description Whether all numbers agree within their rounding; null: there are no readings.
+             */
+            equal: boolean | null;
+            /**
+             * Readings
+             * @description Number of readings that it is made of; 0: the recording has none.
+             */
+            readings: number;
+            /**
+             * Readings Sha256
+             * @description SHA-256 of these readings, each as 8 bytes (little-endian double), in order; null: none.
+             */
+            readings_sha256: string | null;
+            /**
+             * Summary
+             * @description The result of the computation from the readings, in one sentence.
+             */
+            summary: string;
+        };
+        /**
          * FindingResponse
          * @description One thing that was found out about an instrument.
          */
@@ -12926,9 +13094,15 @@ export interface components {
             serial: string;
             /**
              * Campaign
-             * @description Campaign that made the recording; null: the recording was imported.
+             * @description Campaign that made the recording; null: no campaign, see `origin`.
              */
             campaign: number | null;
+            /**
+             * Origin
+             * @description What made the recording: a campaign, a simulation (`labctl simulate`, *Simulate*), or an import of files.
+             * @enum {string}
+             */
+            origin: "campaign" | "simulation" | "import";
             /**
              * Kind
              * @description Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table).
@@ -12984,9 +13158,15 @@ export interface components {
             kind: string;
             /**
              * Campaign
-             * @description The campaign that made the recording; null: the recording was imported.
+             * @description The campaign that made the recording; null: no campaign, see `origin`.
              */
             campaign: number | null;
+            /**
+             * Origin
+             * @description What made the recording: a campaign, a simulation (`labctl simulate`, *Simulate*), or an import of files.
+             * @enum {string}
+             */
+            origin: "campaign" | "simulation" | "import";
             /**
              * Datasets
              * @description Number of data sets.
@@ -13040,9 +13220,15 @@ export interface components {
             serial: string;
             /**
              * Campaign
-             * @description Campaign that made the recording; null: the recording was imported.
+             * @description Campaign that made the recording; null: no campaign, see `origin`.
              */
             campaign: number | null;
+            /**
+             * Origin
+             * @description What made the recording: a campaign, a simulation (`labctl simulate`, *Simulate*), or an import of files.
+             * @enum {string}
+             */
+            origin: "campaign" | "simulation" | "import";
             /**
              * Kind
              * @description Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table).
@@ -15915,6 +16101,8 @@ export interface components {
              * @description Numbers of the unit's calibration versions.
              */
             calibrations: number[];
+            /** @description Errors of the newest versions over the noise floor. */
+            newest_errors: components["schemas"]["VersionErrors"];
             /**
              * Certified Version
              * @description Number of the version in force; null: none.
@@ -16130,6 +16318,22 @@ export interface components {
              * @description Whether the RMS error of each axis is at most the limit of the axis.
              */
             ok: boolean;
+        };
+        /**
+         * VersionErrors
+         * @description Errors of the newest versions of a unit over the noise floor, as lists of equal length.
+         */
+        VersionErrors: {
+            /**
+             * Version
+             * @description Numbers of the versions, rising; at most the newest 24.
+             */
+            version: number[];
+            /**
+             * Over Floor
+             * @description RMS error of each version on the data it was fitted to, over the noise floor of these data; null: one of both is not known, or the floor is 0.
+             */
+            over_floor: (number | null)[];
         };
         /**
          * VersionResponse
@@ -19822,6 +20026,161 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["PointResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    point_of_trend_api_units__serial__trend_point_get: {
+        parameters: {
+            query: {
+                /** @description Number of the recording. */
+                recording: number;
+                /** @description What the point states. */
+                quantity: "bias" | "scale_factor" | "error" | "as_found" | "as_left";
+                /** @description Output axis: x, y or z; empty for an error over all axes. */
+                axis?: string;
+                /** @description Version that is compared with all recordings of the unit; default: the first. */
+                version?: number | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FigurePointResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    point_of_allan_api_recordings__recording__allan_point_get: {
+        parameters: {
+            query: {
+                /** @description Output axis: x, y or z. */
+                axis: string;
+                /** @description Averaging time, one of those of the figure, s. */
+                tau_s: number;
+                /** @description Number of the data set of the figure; default: the longest section at rest. */
+                dataset?: number | null;
+            };
+            header?: never;
+            path: {
+                recording: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FigurePointResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    point_of_trace_api_recordings__recording__trace_point_get: {
+        parameters: {
+            query: {
+                /** @description Name of the channel, such as gyro_x. */
+                channel: string;
+                /** @description Time of the bin, one of those of the figure, s. */
+                t_s: number;
+                /** @description Beginning of the window of the figure, s. */
+                from_s?: number | null;
+                /** @description End of the window of the figure, s. */
+                until_s?: number | null;
+                /** @description Largest number of bins of the figure. */
+                points?: number;
+            };
+            header?: never;
+            path: {
+                recording: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FigurePointResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    point_of_mean_api_recordings__recording__datasets__dataset__mean_get: {
+        parameters: {
+            query: {
+                /** @description Name of the channel, such as gyro_x. */
+                channel: string;
+            };
+            header?: never;
+            path: {
+                recording: number;
+                dataset: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FigurePointResponse"];
                 };
             };
             /** @description Validation Error */

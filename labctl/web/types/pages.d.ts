@@ -119,7 +119,7 @@ export interface Plot extends HTMLElement {
 }
 
 export interface PlotEvent {
-  points: { x: number; y: number; customdata?: any }[];
+  points: { x: number; y: number; customdata?: any; curveNumber?: number; pointNumber?: number }[];
   [range: `xaxis.${string}`]: unknown;
   [camera: `scene${string}.camera`]: unknown;
 }
@@ -138,6 +138,10 @@ export interface Figure extends HTMLElement {
 }
 
 export interface Plotly {
+  Fx: {
+    hover: (plot: HTMLElement, points: { curveNumber: number; pointNumber: number }[]) => unknown;
+    unhover: (plot: HTMLElement) => unknown;
+  };
   restyle: (plot: HTMLElement, changed: object, traces: number[]) => Promise<unknown>;
   react: (plot: HTMLElement, data: PlotTrace[], layout: PlotLayout, config: object) => Promise<unknown>;
   relayout: (plot: HTMLElement, changed: object) => Promise<unknown>;

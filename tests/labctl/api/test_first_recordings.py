@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,8 @@ def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClien
     assert (answer["serial"], answer["datasets"], answer["seed"], answer["recipe"]) == ("HIDDEN-7", 15, 7, "short")
     (row,) = client.get("/api/recordings").json()
     assert (row["serial"], row["readings"], row["campaign"]) == ("HIDDEN-7", answer["readings"], None)
+    assert row["notes"].startswith("simulated")
+    assert row["origin"] == client.get("/api/recordings/1").json()["origin"] == "simulation"
     assert "simulated: recipe short, seed 7" in row["notes"]
     store: Store = service_of(client).store
     (act,) = store.audit.rows()
@@ -139,3 +142,16 @@ def test_a_resumed_campaign_goes_on_with_the_same_units(tmp_path: Path) -> None:
     with TestClient(create_app(LabService(store, SystemClock(), BenchRunner(store, bench, VirtualClock)))) as again:
         assert "campaign done" in again.get("/api/campaigns/1/events").text
         assert asymmetry(again, 1) - asymmetry(again, run(again)) == pytest.approx(0.04, rel=0.1)
+
+
+def test_what_made_a_recording_is_no_matter_of_its_notes(client: TestClient) -> None:
+    made = make_recording(SimulateRequest(recipe="short")).recording
+    assert made.info.notes.startswith("simulated")
+    store = service_of(client).store
+    store.recordings.add_import(made, made.info.started_at)  # as from a folder that was written elsewhere
+    plain = replace(made, info=made.info.model_copy(update={"notes": ""}))
+    store.recordings.add_import(plain, made.info.started_at, {"recipe": "short"})
+    number = client.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
+    assert "campaign done" in client.get(f"/api/campaigns/{number}/events").text
+    origins = {row["id"]: row["origin"] for row in client.get("/api/recordings").json()}
+    assert origins == {1: "import", 2: "simulation", 3: "campaign"}

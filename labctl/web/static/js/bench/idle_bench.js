@@ -6,7 +6,7 @@ import { card, factList, notice } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
 import { adviceNotice } from "../campaigns/advice.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
-import { campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
+import { instantFact, durationTaken } from "../campaigns/campaign_time.js";
 import { stateKind } from "../campaigns/states.js";
 import { stateChip } from "../campaigns/state_chip.js";
 import { startTime } from "../campaigns/start_time.js";
@@ -101,7 +101,7 @@ export function idleBench(bench, last, next) {
           `Last: campaign ${last.id}`,
           h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),
           factList([
-            ["Ended", last.ended_at ? campaignInstant(last, last.ended_at) : "not", "", durationTaken(last)],
+            ["Ended", ...instantFact(last, last.ended_at), durationTaken(last)],
             ["Progress", percent(last.progress)],
           ]),
           adviceNotice(last) ?? (last.reason ? notice(stateKind(last), last.reason) : null),

@@ -14,6 +14,14 @@ export const SIMULATED = "simulated time";
 const marked = (campaign, text) => (campaign.simulated_time && text !== "–" ? `${text} (${SIMULATED})` : text);
 
 /**
+ * A time in a list of facts: the instant, and in smaller letters beside it that it is simulated.
+ * @param {OnItsClock} campaign
+ * @param {string | null | undefined} text
+ * @returns {[string, string]}
+ */
+export const instantFact = (campaign, text) => [instant(text), campaign.simulated_time && text ? `(${SIMULATED})` : ""];
+
+/**
  * @param {OnItsClock} campaign
  * @param {string | null | undefined} text
  */

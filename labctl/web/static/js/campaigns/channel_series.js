@@ -13,6 +13,7 @@ import { channelName, channelUnit } from "../recordings/channels.js";
  * @property {number[]} t_s of the campaign, ascending
  * @property {(number | null)[]} values
  * @property {"line" | "hold" | "points"} drawn as a line, as a value held until the next, or as points
+ * @property {{ serial: string, channel: string, dataset: number[] }} [means] of which data sets the points are means
  */
 /** @typedef {{ serial: string, sets: MeasuredSets }} Measured */
 
@@ -87,6 +88,7 @@ function datasetMeans({ serial, sets }, steps) {
     t_s: rows.map((row) => middle.get(sets.number[row])),
     values: rows.map((row) => mean[row]),
     drawn: "points",
+    means: { serial, channel, dataset: rows.map((row) => sets.number[row]) },
   }));
 }
 
@@ -147,7 +149,13 @@ export function inRange(series, from_s, until_s) {
       values.push(values[values.length - 1]);
     }
   }
-  return { ...series, t_s, values };
+  const { means } = series;
+  return {
+    ...series,
+    t_s,
+    values,
+    ...(means ? { means: { ...means, dataset: kept.map((k) => means.dataset[k]) } } : {}),
+  };
 }
 
 /**

@@ -135,16 +135,18 @@ export function table(columns, rows, { label, selected, onrow, first, dense } = 
           h(
             "tr",
             { "aria-selected": selected?.(row) ? "true" : null, onclick: onrow ? () => onrow(row) : null },
-            shown.map((c) =>
-              h(
+            shown.map((c) => {
+              const content = c.cell(row);
+              return h(
                 "td",
                 {
                   class: c.number ? "number" : c.prose ? "prose" : null,
                   "data-title": typeof c.title === "string" && c.title ? c.title : null,
+                  "data-blank": content === "–" ? "yes" : null, // on a card, a line that says nothing is left out
                 },
-                h("div", {}, c.cell(row)),
-              ),
-            ),
+                h("div", {}, content),
+              );
+            }),
           ),
         ),
       ),

@@ -27,7 +27,7 @@ const DECADE = 5;
 export function ladderFigure(ladder, motion) {
   const steps = ladder.steps;
   const fittedTo = recordingsText({ recording: ladder.recording ?? 0, recordings: ladder.recordings ?? [] });
-  const left = heldOutName(motion).replace("at left-out ", "");
+  const left = heldOutName(motion).replace("at ", "").replace(" left out", "");
   const sizes = steps.flatMap((step) => [step.rms_dps, step.heldout_rms_dps, ladder.noise_floor_dps]).filter(isNumber);
   const isNarrow = Math.max(...sizes) < DECADE * Math.min(...sizes.filter((size) => size > 0));
   const x = steps.map((step) => `v${step.version}`);

@@ -154,7 +154,7 @@ function nextSteps({ unit, calibration }, criticism) {
     h(
       "div",
       { class: "row" },
-      actButton("Certify", certify, { kind: isEnd ? "primary" : "" }),
+      actButton("Certify: put in force", certify, { kind: isEnd ? "primary" : "" }),
       h(
         "a",
         {

@@ -62,15 +62,18 @@ export function dueBars({ due }) {
  */
 export function typeCard(figures, linked) {
   const name = typeName(figures);
+  const [errors, verdicts] = [errorBars(figures), verdictBars(figures)];
+  const missing = [errors.length ? "" : "fitted", verdicts.length ? "" : "criticised"].filter(Boolean).join(" or ");
   return card(
     `${name}: ${count(figures.units)} ${figures.units === 1 ? "unit" : "units"}`,
     h(
       "div",
       { class: "columns multiples" },
-      bars("Error over noise floor", errorBars(figures), "No fleet job has fitted any unit."),
-      bars("Verdict", verdictBars(figures), "No fleet job has criticised any unit."),
+      errors.length ? bars("Error over noise floor", errors, "") : null,
+      verdicts.length ? bars("Verdict", verdicts, "") : null,
       bars("Due", dueBars(figures), "No unit."),
     ),
+    missing ? h("p", { class: "muted small" }, `No fleet job has ${missing} any of these units.`) : null,
     linked
       ? h("p", {}, h("a", { class: "button", href: `/fleet?type=${encodeURIComponent(figures.type)}` }, `Open ${name}`))
       : null,

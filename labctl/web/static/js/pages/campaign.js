@@ -16,7 +16,7 @@ import { uncertaintyCard } from "../campaigns/uncertainty.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { draftsCard } from "../campaigns/drafts.js";
 import { adviceNotice } from "../campaigns/advice.js";
-import { campaignDuration, campaignInstant, durationTaken, hindrances, planNote } from "../campaigns/campaign_time.js";
+import { campaignDuration, instantFact, durationTaken, hindrances, planNote } from "../campaigns/campaign_time.js";
 import { hasEnded, isRunning, stateKind } from "../campaigns/states.js";
 import { stateChip } from "../campaigns/state_chip.js";
 
@@ -215,15 +215,14 @@ function summary(now, plan) {
     factList([
       ["State", stateChip(now), "", percent(now.progress)],
       ["Data sets", `${count(done)} of ${count(states.length)}`, "", `step ${now.step ?? "–"} of ${now.steps}`],
-      ["Begun", campaignInstant(now, now.started_at)],
+      ["Begun", ...instantFact(now, now.started_at)],
       isRunning(now)
         ? [
             "Expected end",
-            campaignInstant(now, now.expected_end),
-            "",
+            ...instantFact(now, now.expected_end),
             `${campaignDuration(now, remainingSeconds(now, plan.expected_s))} left`,
           ]
-        : ["Ended", campaignInstant(now, now.ended_at), "", durationTaken(now)],
+        : ["Ended", ...instantFact(now, now.ended_at), durationTaken(now)],
       ["Planned", campaignDuration(now, plan.expected_s), "", planNote(now)],
     ]),
   );

@@ -6,16 +6,18 @@ import { colour, figure } from "../core/figure.js";
 import { cardWithHeader, pageHeader } from "../core/components.js";
 import { count } from "../core/format.js";
 import { option, selectField } from "../core/fields.js";
+import { pointPlace, selectPoints } from "../core/figure_point.js";
 import { updateQuery } from "../core/router.js";
 import { timeUnit } from "../core/time_unit.js";
 import { followCampaign } from "../bench/campaign_stream.js";
 import { linkButton } from "../bench/actions.js";
 import { stateChip } from "../campaigns/state_chip.js";
 import { isRunning } from "../campaigns/states.js";
+import { askedMean, channelPoint } from "../campaigns/channel_point.js";
 import { allSeries, appendLive, inRange, panels } from "../campaigns/channel_series.js";
 
 /** @import { Campaign } from "../../../types/api.js" */
-/** @import { PageContext, PlotTrace } from "../../../types/pages.js" */
+/** @import { Figure, PageContext, PlotTrace } from "../../../types/pages.js" */
 /** @import { Series } from "../campaigns/channel_series.js" */
 
 const POINTS = 4000;
@@ -53,9 +55,23 @@ export async function page({ params, query, signal }) {
   };
   /** @type {ReturnType<typeof picture> | null} */
   let drawn = null;
+  const points = pointPlace();
+  /**
+   * What a point is made of: a mean of the readings of its data set; other series are values as they were logged.
+   * @param {readonly Series[]} series
+   * @param {Figure} figure
+   * @param {number} drawnSeries
+   * @param {number} k
+   */
+  const pointAt = (series, figure, drawnSeries, k) => {
+    const name = figure.plot.data?.[drawnSeries].name;
+    const found = series.find((each) => each.name === name);
+    return found?.means ? channelPoint(now, found.means.serial, found.means.channel, found.means.dataset[k]) : null;
+  };
   function drawAnew() {
     const { series } = shown();
     drawn = series.length ? picture(shown, panels(series).length) : null;
+    if (drawn) selectPoints(drawn, points, (each, k) => (drawn ? pointAt(shown().series, drawn, each, k) : null));
     setChildren(place, drawn ?? h("p", { class: "muted" }, "No channel is chosen."));
   }
   function choose() {
@@ -79,6 +95,7 @@ export async function page({ params, query, signal }) {
   listChannels();
   drawAnew();
   if (isRunning(now)) follow();
+  points.open((key) => askedMean(now, all(), key));
 
   function follow() {
     let redrawn = 0;
@@ -128,6 +145,7 @@ export async function page({ params, query, signal }) {
       ),
       choices,
       place,
+      points.element,
     ),
   );
 }
@@ -242,7 +260,7 @@ function picture(shown, height) {
     };
   };
   const caption =
-    "Temperatures as they were logged, the rate of each step, means of the data sets (points); “now” is since this page was opened.";
+    "Temperatures as they were logged, the rate of each step, means of the data sets (points; click one to see its readings); “now” is since this page was opened.";
   return figure("Channels of the campaign", caption, draw, {
     height: `${Math.max(18, PANEL_REM * height)}rem`,
     csv: () => [

@@ -6,7 +6,9 @@ import { setChildren, h } from "../core/elements.js";
 import { figure } from "../core/figure.js";
 import { duration, number } from "../core/format.js";
 import { card, emptyState, loadInto, notice, pageHeader, table } from "../core/components.js";
+import { pointPlace, selectPoints } from "../core/figure_point.js";
 import { updateQuery } from "../core/router.js";
+import { allanPoint, askedAllan } from "../recordings/allan.js";
 
 /** @import { Allan, NoiseFigure, RecordingRow } from "../../../types/api.js" */
 /** @import { PageContext } from "../../../types/pages.js" */
@@ -110,14 +112,27 @@ function overlay(records) {
       noise.tau_s.map((tau, i) => [row.id, axis, tau, noise.deviation_dps[i], noise.low_dps[i], noise.high_dps[i]]),
     ),
   ];
+  const place = pointPlace();
+  const drawn = lines.length
+    ? figure(
+        "Allan deviations",
+        "Thin lines: figures of the data sheet, if known. Click a point to see what it is made of.",
+        draw,
+        { height: "26rem", csv },
+      )
+    : null;
+  if (drawn)
+    selectPoints(drawn, place, (series, k) => {
+      const line = lines[series];
+      return line ? allanPoint(line.row.id, line.axis, line.noise.tau_s[k]) : null;
+    });
+  place.open(
+    (key) => records.map(({ row, found }) => found && askedAllan(key, row.id, null, found)).find(Boolean) ?? null,
+  );
   return [
     ...records.filter(({ found }) => !found).map(({ row, why }) => notice("", `Recording ${row.id}: ${why}`)),
-    lines.length
-      ? figure("Allan deviations", "Thin lines: figures of the data sheet, if known.", draw, {
-          height: "26rem",
-          csv,
-        })
-      : null,
+    drawn,
+    place.element,
     lines.length
       ? table(
           [

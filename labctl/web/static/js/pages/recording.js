@@ -116,7 +116,9 @@ function recordingHeader(about) {
     );
   const from = about.campaign
     ? h("a", { href: `/campaigns/${about.campaign}` }, `campaign ${about.campaign}`)
-    : "an import";
+    : about.origin === "simulation"
+      ? "a simulation"
+      : "an import";
   const made = [about.info.model, about.info.technology?.toUpperCase()].filter(Boolean);
   return pageHeader(
     `Recording ${about.id}`,
@@ -163,7 +165,7 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
       rates
         ? [
             "Table rate",
-            `${plainNumber(rates[0])} to ${plainNumber(rates[1])}`,
+            rates[0] === rates[1] ? plainNumber(rates[0]) : `${plainNumber(rates[0])} to ${plainNumber(rates[1])}`,
             "deg/s",
             info.max_rate_dps ? `unit's limit ${plainNumber(info.max_rate_dps)} deg/s` : null,
           ]

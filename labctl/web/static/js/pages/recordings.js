@@ -66,7 +66,7 @@ function recordingTable(rows) {
         cell: (row) =>
           row.campaign
             ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`)
-            : h("span", { class: "muted" }, row.notes.startsWith("simulated:") ? "simulation" : "import"),
+            : h("span", { class: "muted" }, row.origin),
       },
       {
         title: "Since",

@@ -6,6 +6,7 @@ import { actButton, card, pageHeader } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
+import { errorSparkline } from "../core/sparkline.js";
 import { isRunning } from "../campaigns/states.js";
 import { NEWEST, newsCard } from "../start/news_card.js";
 import { realGyroPicture } from "../start/real_gyro.js";
@@ -123,7 +124,7 @@ function overview(units, found) {
     newsCard(found),
     h(
       "div",
-      { class: "columns", style: "--column-min: 17rem" },
+      { class: "columns", style: "--column-min: 20rem" },
       card(
         "Bench",
         benches.length
@@ -151,16 +152,20 @@ function overview(units, found) {
         "Units",
         h(
           "ul",
-          { class: "plain" },
+          { class: "plain unit-lines" },
           units.map((unit) =>
             h(
               "li",
-              { class: "row space-between" },
-              h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
+              {},
+              h("a", { class: "serial", href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
+              unit.calibrations.length ? errorSparkline(unit.newest_errors) : h("span"),
               h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"),
             ),
           ),
         ),
+        units.some((unit) => unit.calibrations.length)
+          ? h("p", { class: "muted small" }, "Lines: error of each version over the noise floor (dashed).")
+          : null,
         units.length === SHOWN ? h("a", { class: "small", href: "/units" }, "All units") : null,
       ),
       card(

@@ -5,6 +5,7 @@ import { h } from "../core/elements.js";
 import { count, day } from "../core/format.js";
 import { chip, emptyState, pageHeader, table } from "../core/components.js";
 import { longList } from "../core/long_list.js";
+import { errorSparkline } from "../core/sparkline.js";
 import { VERDICTS, verdictChip } from "../unit/certification.js";
 
 /** @import { Batch, Unit } from "../../../types/api.js" */
@@ -71,6 +72,7 @@ const unitTable = (units) =>
       { title: "Batch", cell: (unit) => unit.batch || "–" },
       { title: "Recordings", number: true, cell: (unit) => unit.recordings.length },
       { title: "Versions", number: true, cell: (unit) => unit.calibrations.length },
+      { title: "Error / noise floor", cell: (unit) => errorSparkline(unit.newest_errors) },
       {
         title: "In force",
         cell: (unit) =>

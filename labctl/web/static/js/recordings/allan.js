@@ -8,9 +8,14 @@ import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
 import { cardWithHeader, loadInto, notice, table } from "../core/components.js";
 import { toggleGroup } from "../core/fields.js";
+import { pointPlace, pythonValue, selectPoints } from "../core/figure_point.js";
 
 /** @import { Allan, AllanAxis, NoiseFigure } from "../../../types/api.js" */
 /** @import { RecordingState } from "../../../types/pages.js" */
+/** @import { Asked } from "../core/figure_point.js" */
+
+/** Of each axis are drawn: the interval, the fit, the deviation. */
+const TRACES_OF_AXIS = 3;
 
 /** @type {["N" | "B" | "K", string][]} */
 const NOISE_FIGURES = [
@@ -51,6 +56,7 @@ export function allan(state, signal) {
     loadInto(place, "Working out the Allan deviation", async () => {
       try {
         return allanFigure(
+          own ? state.dataset : null,
           await get("/api/recordings/{recording}/allan", { path: { recording: state.id }, query: { dataset }, signal }),
         );
       } catch (error) {
@@ -67,8 +73,11 @@ export function allan(state, signal) {
   return Object.assign(element, { redraw: show });
 }
 
-/** @param {Allan} found */
-function allanFigure(found) {
+/**
+ * @param {number | null} dataset whose deviation it is; null: of the longest section at rest
+ * @param {Allan} found
+ */
+function allanFigure(dataset, found) {
   const axes = Object.entries(found.axes);
   const [first, last] = [found.datasets[0], found.datasets.at(-1)];
   const where = `Data set${first === last ? ` ${first}` : `s ${first} to ${last}`}, ${duration(found.duration_s)}${found.temperature_c === null ? "" : ` at ${withUnit(found.temperature_c, "deg C")}`}.`;
@@ -126,17 +135,29 @@ function allanFigure(found) {
       ]),
     ),
   ];
+  const place = pointPlace();
+  const drawn = figure(
+    `Recording ${found.recording} Allan deviation`,
+    "Band: 95 % interval. Dotted: the fit that gives angle random walk N, bias instability B and rate random walk K. Click a point to see the clusters of readings it is made of.",
+    draw,
+    { height: "21rem", csv },
+  );
+  /** @param {number} series @param {number} k */
+  const asked = (series, k) => {
+    const [axis, noise] = axes[Math.floor(series / TRACES_OF_AXIS)];
+    return series % TRACES_OF_AXIS === TRACES_OF_AXIS - 1
+      ? allanPoint(Number(found.recording), axis, noise.tau_s[k], dataset)
+      : null;
+  };
+  selectPoints(drawn, place, asked);
+  place.open((key) => askedAllan(key, Number(found.recording), dataset, found));
   return [
     h("p", { class: "muted" }, where),
     ...axes.flatMap(([axis, noise]) =>
       remarks(noise).map((text) => h("p", { class: "muted small" }, `${axis}: ${text}`)),
     ),
-    figure(
-      `Recording ${found.recording} Allan deviation`,
-      "Band: 95 % interval. Dotted: the fit that gives angle random walk N, bias instability B and rate random walk K.",
-      draw,
-      { height: "21rem", csv },
-    ),
+    drawn,
+    place.element,
     table(
       [
         {
@@ -153,6 +174,42 @@ function allanFigure(found) {
       { label: "Figures of IEEE Std 952", first: "11rem" },
     ),
   ];
+}
+
+/**
+ * A point of an Allan deviation.
+ * @param {number} recording
+ * @param {string} axis
+ * @param {number | null} tau averaging time, s
+ * @param {number | null} dataset
+ * @returns {Asked | null}
+ */
+export function allanPoint(recording, axis, tau, dataset = null) {
+  if (tau === null) return null;
+  const asked = { axis, tau_s: tau, dataset: dataset ?? undefined };
+  const of = dataset === null ? "" : `, dataset=${dataset}`;
+  return {
+    key: ["allan", recording, axis, tau, ...(dataset === null ? [] : [dataset])].join("_"),
+    name: `Allan deviation of recording ${recording}, axis ${axis}, averaging time ${number(tau)} s`,
+    read: () => get("/api/recordings/{recording}/allan/point", { path: { recording }, query: asked }),
+    call: `client.allan_point(${recording}, axis=${pythonValue(axis)}, tau_s=${tau}${of})`,
+    links: ({ datasets: [first] }) =>
+      h("a", { class: "button tiny", href: `/recordings/${recording}?dataset=${first}` }, "Open its readings"),
+  };
+}
+
+/**
+ * The point of an Allan deviation that an address names; null where it names another one.
+ * @param {string} key
+ * @param {number} recording
+ * @param {number | null} dataset
+ * @param {Allan} found
+ */
+export function askedAllan(key, recording, dataset, found) {
+  const all = Object.entries(found.axes).flatMap(([axis, noise]) =>
+    noise.tau_s.map((tau) => allanPoint(recording, axis, tau, dataset)),
+  );
+  return all.find((each) => each?.key === key) ?? null;
 }
 
 /**

@@ -8,13 +8,15 @@ import { setChildren, h } from "../core/elements.js";
 import { faded } from "../core/colour_scales.js";
 import { colour, figure } from "../core/figure.js";
 import { count, duration, isNumber, number } from "../core/format.js";
-import { busyIndicator, cardWithHeader, notice } from "../core/components.js";
+import { busyIndicator, button, cardWithHeader, notice } from "../core/components.js";
+import { pointPlace, pythonValue, selectPoints } from "../core/figure_point.js";
 import { option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 import { channelName, channelTitle } from "./channels.js";
 
 /** @import { Trace } from "../../../types/api.js" */
 /** @import { Picture, RecordingState } from "../../../types/pages.js" */
+/** @import { Asked } from "../core/figure_point.js" */
 
 const COLUMNS = 1200;
 const SETTLE_MS = 200;
@@ -37,7 +39,7 @@ export function trace(state, signal) {
   const place = h("div", { style: "min-height: 24rem" }, busyIndicator("Reading"));
   const picture = figure(
     `Recording ${state.id} trace`,
-    "Band: from the smallest to the largest reading in each bin of time; line: the mean of the bin. Drag across the plot to zoom in; click a data set to open its readings.",
+    "Band: from the smallest to the largest reading in each bin of time; line: the mean of the bin. Drag across the plot to zoom in; click a point to see the readings it is made of.",
     draw,
     {
       height: "21rem",
@@ -45,6 +47,7 @@ export function trace(state, signal) {
     },
   );
   const channels = h("div", {});
+  const points = pointPlace();
 
   /** @param {Trace} answer */
   const windowOf = (answer) => [state.from ?? answer.from_s ?? 0, state.until ?? answer.until_s ?? 0];
@@ -145,6 +148,11 @@ export function trace(state, signal) {
       `${count(shown)} readings${found.raw ? "" : ", from envelopes of each data set"}; ${duration(until - from)} shown.`,
     );
     picture.redraw();
+    const answer = found;
+    points.open((key) => {
+      const k = answer.t_s.findIndex((t_s) => `trace_${t_s}` === key);
+      return k < 0 ? null : binPoint(answer, k);
+    });
   }
 
   /**
@@ -153,7 +161,9 @@ export function trace(state, signal) {
    */
   function show(change) {
     Object.assign(state, change);
-    updateQuery({ channel: state.channel, from: rounded(state.from), until: rounded(state.until) });
+    [state.from, state.until] = [rounded(state.from), rounded(state.until)]; // a link has the same bins
+    points.close();
+    updateQuery({ channel: state.channel, from: state.from, until: state.until });
     return load();
   }
 
@@ -177,14 +187,36 @@ export function trace(state, signal) {
       else if (isNumber(low) && isNumber(high))
         waiting = setTimeout(() => show({ from: low * seconds, until: high * seconds }), SETTLE_MS);
     });
-    plot.on("plotly_click", (event) => {
-      const t = event.points[0].x * seconds;
-      const k = state.sets.number.findIndex(
-        (_, each) => (state.sets.t_from_s[each] ?? Infinity) <= t && t <= (state.sets.t_until_s[each] ?? -Infinity),
-      );
-      if (k >= 0) state.pick(state.sets.number[k]);
-    });
   };
+  selectPoints(picture, points, (series, k) => {
+    const x = picture.plot.data?.[series].x?.[k]; // the drawn line has gaps, the bins have none
+    const bin = series === 1 && typeof x === "number" ? (found?.t_s.findIndex((t) => t / seconds === x) ?? -1) : -1;
+    return found && bin >= 0 ? binPoint(found, bin) : null;
+  });
+
+  /**
+   * The bin of the trace at a point of the drawn line.
+   * @param {Trace} answer
+   * @param {number} k
+   * @returns {Asked}
+   */
+  function binPoint(answer, k) {
+    const t_s = answer.t_s[k];
+    const window = { from_s: state.from, until_s: state.until, points: COLUMNS };
+    const words = Object.entries(window).map(([name, value]) => `${name}=${pythonValue(value)}`);
+    return {
+      key: `trace_${t_s}`,
+      name: `${channelName(answer.channel)} at ${number(t_s, 6)} s`,
+      read: () =>
+        get("/api/recordings/{recording}/trace/point", {
+          path: { recording: state.id },
+          query: { channel: answer.channel, t_s, ...window },
+        }),
+      call: `client.trace_point(${state.id}, ${pythonValue(answer.channel)}, t_s=${t_s}, ${words.join(", ")})`,
+      links: ({ datasets: [first] }) =>
+        first ? button(`Open data set ${first}`, () => state.pick(first), { kind: "tiny" }) : null,
+    };
+  }
   /**
    * @param {string} text
    * @param {string} label
@@ -206,6 +238,7 @@ export function trace(state, signal) {
     "Trace",
     h("div", { class: "row", style: "align-items: end" }, channels, tools),
     place,
+    points.element,
     readingCount,
   );
   return Object.assign(element, { show, redraw: () => picture.redraw() });

@@ -6,7 +6,9 @@ import { day, number, sizeText, withUncertainty } from "../core/format.js";
 import { cardWithHeader, chip, loadInto, table } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
+import { pointPlace } from "../core/figure_point.js";
 import { driftFigure, errorFigure } from "./figures.js";
+import { askedTrend } from "./point.js";
 
 /** @import { CalibrationRow, Drift, Trend } from "../../../types/api.js" */
 
@@ -30,7 +32,7 @@ export function trendCard(serial, rows, signal) {
     loadInto(place, "Applying the version to every recording", async () => {
       const found = await get("/api/units/{serial}/trend", { path: { serial }, query: asked, signal });
       if (asked.version === version && asked.limit_dps === limit) field.placeholder = number(found.limit_dps);
-      return shown(found);
+      return shown(serial, found);
     });
   };
   /** @type {HTMLInputElement} */
@@ -63,8 +65,13 @@ export function trendCard(serial, rows, signal) {
   return cardWithHeader("Over the years", choose, place);
 }
 
-/** @param {Trend} trend */
-function shown(trend) {
+/**
+ * @param {string} serial
+ * @param {Trend} trend
+ */
+function shown(serial, trend) {
+  const place = pointPlace();
+  place.open((key) => askedTrend(serial, trend, key));
   const turned = trend.drifts.some((drift) => drift.what === "scale_factor");
   return [
     trend.text.map((line) => h("p", {}, line)),
@@ -72,11 +79,12 @@ function shown(trend) {
       ? h(
           "div",
           { class: "columns", style: "--column-min: 19rem" },
-          driftFigure(trend, "bias"),
-          turned ? driftFigure(trend, "scale_factor") : null,
-          errorFigure(trend),
+          driftFigure(serial, trend, "bias", place),
+          turned ? driftFigure(serial, trend, "scale_factor", place) : null,
+          errorFigure(serial, trend, place),
         )
       : null,
+    place.element,
     drifts(trend),
     pointTable(trend),
   ];

@@ -2,9 +2,12 @@
 
 import { faded } from "../core/colour_scales.js";
 import { axisColour, colour, figure } from "../core/figure.js";
+import { pointPlace, selectPoints } from "../core/figure_point.js";
+import { trendPoint } from "./point.js";
 
 /** @import { Drift, Trend, TrendPoint } from "../../../types/api.js" */
 /** @import { Picture, PlotTrace } from "../../../types/pages.js" */
+/** @import { Quantity } from "./point.js" */
 
 const K = 2;
 
@@ -34,10 +37,12 @@ export function seriesOf(points, axis, what) {
 }
 
 /**
+ * @param {string} serial
  * @param {Trend} trend
  * @param {What} what
+ * @param {ReturnType<typeof pointPlace>} place where a selected point is shown
  */
-export function driftFigure(trend, what) {
+export function driftFigure(serial, trend, what, place) {
   const lines = trend.drifts.filter((drift) => drift.what === what);
   const axes = [...new Set(trend.points.flatMap((point) => Object.keys(point.axes)))].sort();
   const share = what === "scale_factor";
@@ -55,14 +60,20 @@ export function driftFigure(trend, what) {
       showlegend: true,
     },
   });
-  return figure(
+  const drawn = figure(
     share ? "Scale factor over the years" : "Bias over the years",
     `Error of the ${share ? "scale factor" : "bias"} that remains on each recording with version ${trend.version}, not refitted; bars are expanded uncertainties, k = 2. Line and band: drift with its 95 % interval, valid only if the unit continues to age as before.${
       share || trend.limit_dps === null ? "" : " Dashed: the limit."
-    }`,
+    } Click a point to see what it is made of.`,
     draw,
     { height: "19rem" },
   );
+  selectPoints(drawn, place, (series, k) => {
+    const axis = String(drawn.plot.data?.[series].name ?? "").replace(/^axis /, "");
+    const recording = axes.includes(axis) ? seriesOf(trend.points, axis, what).recording[k] : undefined;
+    return recording === undefined ? null : trendPoint(serial, trend.version, recording, what, axis);
+  });
+  return drawn;
 }
 
 /**
@@ -150,8 +161,15 @@ function limits({ limit_dps: limit, points }, lines) {
   }));
 }
 
-/** @param {Trend} trend */
-export function errorFigure(trend) {
+/** The series of the figure of errors, in the order in which they are drawn. @type {readonly Quantity[]} */
+const ERRORS = ["as_found", "as_left", "error"];
+
+/**
+ * @param {string} serial
+ * @param {Trend} trend
+ * @param {ReturnType<typeof pointPlace>} place where a selected point is shown
+ */
+export function errorFigure(serial, trend, place) {
   /**
    * @param {string} name
    * @param {(point: TrendPoint) => { version: number, rms_dps: number } | null} of
@@ -170,6 +188,7 @@ export function errorFigure(trend) {
       name,
       x: known.map(({ at }) => at),
       y: known.map(({ rms_dps }) => rms_dps),
+      customdata: known.map(({ recording }) => recording),
       text: known.map(({ recording, version }) => `version ${version} on recording ${recording}`),
       marker: { size: symbol.endsWith("open") ? 14 : 9, symbol, color: shade },
       hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>",
@@ -189,10 +208,15 @@ export function errorFigure(trend) {
     ],
     layout: { xaxis: { type: "date" }, yaxis: { type: "log", title: { text: "RMS error, deg/s" } }, showlegend: true },
   });
-  return figure(
+  const drawn = figure(
     "Error over the years",
     `As found: error on each recording of the newest version that was fitted only to recordings made before it. As left: error of the newest version that was fitted to the recording itself. Diamonds: error of version ${trend.version} on every recording.`,
     draw,
     { height: "19rem" },
   );
+  selectPoints(drawn, place, (series, k) => {
+    const recording = /** @type {number[] | undefined} */ (drawn.plot.data?.[series].customdata)?.[k];
+    return recording === undefined ? null : trendPoint(serial, trend.version, recording, ERRORS[series]);
+  });
+  return drawn;
 }

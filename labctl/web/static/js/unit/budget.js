@@ -9,6 +9,9 @@ import { contributionTraces } from "./contribution_lines.js";
 /** @import { BudgetLine, ContributionsOver, Uncertainty } from "../../../types/api.js" */
 /** @import { PlotTrace } from "../../../types/pages.js" */
 
+/** A phone; and there, the height of a line of a legend. */
+const [NARROW_PX, LEGEND_LINE_PX] = [760, 20];
+
 /**
  * The lines of each axis, and which standards are not in them.
  * @param {Uncertainty} answer
@@ -107,20 +110,25 @@ export function contributionFigures(contributions) {
  */
 function one(name, lines, along, at) {
   /** @returns {{ data: PlotTrace[], layout: object }} */
-  const draw = () => ({
-    data: contributionTraces(lines, colour("text")),
-    layout: {
-      xaxis: { title: { text: along } },
-      yaxis: { title: { text: "standard uncertainty, deg/s" }, rangemode: "tozero" },
-      showlegend: true,
-      legend: { orientation: "h", y: -0.25, yanchor: "top", x: 0 },
-      margin: { l: 58, r: 16, t: 12, b: 130 },
-    },
-  });
+  const draw = () => {
+    const data = contributionTraces(lines, colour("text"));
+    const isNarrow = innerWidth < NARROW_PX; // its legend has one name a line, and they need their own room
+    const below = isNarrow ? LEGEND_LINE_PX * data.length : 74;
+    return {
+      data,
+      layout: {
+        xaxis: { title: { text: along } },
+        yaxis: { title: { text: isNarrow ? "u, deg/s" : "standard uncertainty, deg/s" }, rangemode: "tozero" },
+        showlegend: true,
+        legend: { orientation: isNarrow ? "v" : "h", yref: "container", y: 0, yanchor: "bottom", x: 0 },
+        margin: { l: 58, r: 16, t: 12, b: 56 + below },
+      },
+    };
+  };
   return figure(
     name,
     `Standard uncertainties that the budget combines, at ${at}. Dashed: the expanded uncertainty U. Uncertainties that the bench does not state have no line.`,
     draw,
-    { height: "26rem" },
+    { height: innerWidth < NARROW_PX ? "36rem" : "26rem" },
   );
 }

@@ -98,10 +98,10 @@ async function askCertificate(serial, version, replaced) {
   let refusal = "";
   for (;;) {
     const fields = [...why, ...FIELDS].map((field) => ({ ...field, value: given[field.name] }));
-    const answers = await dialog(`Certificate of version ${version}`, fields, {
-      text: "Laboratory and reference standards come from the bench file of the campaign. The certificate is written to the audit trail.",
+    const answers = await dialog(`Issue a certificate of version ${version}`, fields, {
+      text: "A certificate is a document for a customer; which version is in force does not change. Laboratory and reference standards come from the bench file of the campaign. The certificate is written to the audit trail.",
       body: refusal ? notice("bad", h("p", {}, refusal)) : null,
-      confirm: "Issue",
+      confirm: "Issue certificate",
     });
     if (!answers) return;
     const body = { by: answers.by, order: orderOf(answers), ...(replaced ? { amend: answers.amend } : {}) };

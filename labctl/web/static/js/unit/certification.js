@@ -69,10 +69,10 @@ export async function askCertification(serial, version) {
     },
   ];
   if (needed) fields.push({ name: "override", label: "Certify this version despite the objections", type: "checkbox" });
-  const answers = await dialog(`Put version ${version} in force`, fields, {
-    text: "After this, every request for the calibration of this unit gets this version. The certification is written to the audit trail.",
+  const answers = await dialog(`Certify version ${version}: put it in force`, fields, {
+    text: "After this, every request for the calibration of this unit gets this version. The certification is written to the audit trail. It makes no document: a certificate for a customer is issued afterwards.",
     body: assessed(known),
-    confirm: "Certify",
+    confirm: "Certify: put in force",
     kind: needed ? "danger" : "primary",
   });
   if (!answers) return;

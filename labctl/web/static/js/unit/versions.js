@@ -53,7 +53,7 @@ export function versionsCard(unit, rows, issued, explore) {
 const act = (unit, row) =>
   row.certified
     ? actButton("Revoke", () => askRevocation(unit.serial, row.version), { kind: "tiny" })
-    : actButton("Certify", () => askCertification(unit.serial, row.version), { kind: "tiny" });
+    : actButton("Certify: put in force", () => askCertification(unit.serial, row.version), { kind: "tiny" });
 
 /**
  * @param {Unit} unit

@@ -54,7 +54,7 @@ export function fullTurn(comparison, state) {
   };
   return figure(
     "Error after a full turn",
-    `Error of the heading after one full turn about axis ${state.axis}, for rates of ${comparison.least_turn_rate_dps} deg/s or more. Left: only the static bias at rest is subtracted. Right: the calibration is applied, and the remaining static bias is subtracted. Both plots have the same scale. Blue is cold, red is hot.`,
+    `Error of the heading after one full turn about axis ${state.axis}, for rates of ${comparison.least_turn_rate_dps} deg/s or more. ${capitalised(sides()[0])}: only the static bias at rest is subtracted. ${capitalised(sides()[1])}: the calibration is applied, and the remaining static bias is subtracted. Both plots have the same scale. Blue is cold, red is hot.`,
     draw,
     { height: twoScenes() },
   );

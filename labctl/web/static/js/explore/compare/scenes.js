@@ -8,6 +8,8 @@ import { colour } from "../../core/figure.js";
 /** @typedef {Record<"x" | "y" | "z", SceneAxis>} Axes */
 
 const isNarrow = () => window.innerWidth < 760;
+/** Where the two scenes stand, in words. */
+export const sides = () => (isNarrow() ? ["above", "below"] : ["left", "right"]);
 export const twoScenes = () => (isNarrow() ? "46rem" : "30rem");
 
 /** Where the colour bar is: at the right, or below on a narrow screen, so that the scenes have its width. */

@@ -2,13 +2,13 @@
 
 import { colour, figure } from "../../core/figure.js";
 import { alongRate, linesOf, ownRows, positionsOf, rms, span } from "./rows.js";
-import { number } from "../../core/format.js";
+import { capitalised, number } from "../../core/format.js";
 import { get } from "../../core/http/api.js";
 import { h, setChildren } from "../../core/elements.js";
 import { loadInto } from "../../core/components.js";
 import { query, updateQuery } from "../../core/router.js";
 import { asked } from "../chosen_recordings.js";
-import { barPlace, linkCameras, sceneLayout, twoScenes } from "./scenes.js";
+import { barPlace, linkCameras, sceneLayout, sides, twoScenes } from "./scenes.js";
 
 /** @import { Comparison } from "../../../../types/api.js" */
 /** @import { Picture, PlotTrace } from "../../../../types/pages.js" */
@@ -102,7 +102,7 @@ function twoVersions(comparisons, versions, axis) {
   };
   const element = figure(
     "Residual surfaces of two versions",
-    `Axis ${axis} turned about itself: what version ${versions[0]} (left) and version ${versions[1]} (right) leave of the same data sets. One scale, one camera: drag either to rotate both.`,
+    `Axis ${axis} turned about itself: what version ${versions[0]} (${sides()[0]}) and version ${versions[1]} (${sides()[1]}) leave of the same data sets. One scale, one camera: drag either to rotate both.`,
     draw,
     { height: twoScenes() },
   );
@@ -159,7 +159,7 @@ function modelAndResidual(comparison, state) {
   };
   const element = figure(
     "Error surface",
-    `Axis ${state.axis} turned about itself. Left: the measured error (dots) and the model (surface). Right: the residual of the model. Both plots have the same scale and one camera; drag either to rotate both.`,
+    `Axis ${state.axis} turned about itself. ${capitalised(sides()[0])}: the measured error (dots) and the model (surface). ${capitalised(sides()[1])}: the residual of the model. Both plots have the same scale and one camera; drag either to rotate both.`,
     draw,
     { height: twoScenes() },
   );
