@@ -195,18 +195,20 @@ class Compensator:
                 f"rates of {raw.shape[1]} axes given; the calibration has axes {', '.join(self.axes)}; give one rate "
                 "for each"
             )
-        warm = self._fitting(self._known(temperature_c), known, len(raw))
+        temperatures_c = self._fitting(self._known(temperature_c), known, len(raw))
         beside = self._by_force(specific_force_g, len(raw))
         correct = self._correct if cross_rates_dps is None else self._correct_across(cross_rates_dps, len(raw))
         if self._memory is None or history is not None:
             if self._memory is not None and history is not None:
-                remembered = self._memory.of_history(history, {"temperature_c": _one_c(warm, len(raw)), **known})
+                remembered = self._memory.of_history(
+                    history, {"temperature_c": _one_c(temperatures_c, len(raw)), **known}
+                )
                 beside = remembered if beside is None else remembered.with_bias(beside.bias_dps)
-            compensated = self._beside(beside, raw, warm, known, correct)
+            compensated = self._beside(beside, raw, temperatures_c, known, correct)
         else:
             running = self._running if continued and self._running is not None else RunningMemory(self._memory)
             compensated = self._followed(
-                running, beside, raw, warm, known, correct, len(raw) if cross_rates_dps else BLOCK
+                running, beside, raw, temperatures_c, known, correct, len(raw) if cross_rates_dps else BLOCK
             )
         left_out = self._left_out_dps if specific_force_g is None else None
         return Compensated(compensated.rate_dps.reshape(raw_rows.shape), compensated.outside, left_out)
@@ -315,11 +317,11 @@ class Compensator:
 
     def _fitting(self, temperature_c: Array | float, channels: Mapping[str, Array], n: int) -> Array:
         """Return the temperatures of n samples; raises BadInput where their shape, or that of a channel, is another."""
-        warm, axes = np.asarray(temperature_c, dtype=np.float64), len(self.axes)
-        if warm.shape not in {(), (1,), (n,), (n, axes)}:
+        temperatures_c, axes = np.asarray(temperature_c, dtype=np.float64), len(self.axes)
+        if temperatures_c.shape not in {(), (1,), (n,), (n, axes)}:
             raise BadInput(
-                f"temperature_c has shape {warm.shape}; give one temperature, one for each of the {n} samples, or one "
-                f"for each sample and axis, ({n}, {axes}), deg C"
+                f"temperature_c has shape {temperatures_c.shape}; give one temperature, one for each of the {n} "
+                f"samples, or one for each sample and axis, ({n}, {axes}), deg C"
             )
         for name in self.needs:
             one_for_all = {(), (1,)} if name != "t_s" else set()
@@ -327,7 +329,7 @@ class Compensator:
                 raise BadInput(
                     f"channel {name!r} has shape {np.shape(channels[name])}; give one value for each of the {n} samples"
                 )
-        return warm.reshape(()) if warm.shape == (1,) else warm
+        return temperatures_c.reshape(()) if temperatures_c.shape == (1,) else temperatures_c
 
     def _judge(self, raw: Array, temperature_c: Array, first: int) -> NDArray[np.bool_]:
         """Return which samples are outside the range or no numbers, (n,); raises BadInput when that is refused."""

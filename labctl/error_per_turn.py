@@ -56,9 +56,9 @@ def bias_at_rest(
         in_position = position == up_axis
         from_ = rest & in_position if np.any(rest & in_position) else rest
         if np.any(from_):
-            warm, which = np.unique(temperature_c[from_], return_inverse=True)
+            temperatures_c, which = np.unique(temperature_c[from_], return_inverse=True)
             bias[in_position] = np.interp(
-                temperature_c[in_position], warm, np.bincount(which, error_dps[from_]) / np.bincount(which)
+                temperature_c[in_position], temperatures_c, np.bincount(which, error_dps[from_]) / np.bincount(which)
             )
     return bias
 

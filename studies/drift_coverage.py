@@ -68,7 +68,7 @@ class Population:
 
     def inside(self, predicted: DriftPrediction, rates: Array, last: Array, years: float) -> int:
         """Return how many corrected rates are within their promise at the due date."""
-        spread, mean = predicted.spread_dps * years, np.abs(predicted.mean_dps) * years
+        spread, mean = predicted.expanded_about_mean_dps * years, np.abs(predicted.mean_dps) * years
         half = [with_drift(2 * self.noise, *each) for each in zip(spread.tolist(), mean.tolist(), strict=True)]
         return int(np.sum(np.abs(last - rates * years) <= half))
 

@@ -41,13 +41,13 @@ class FixedCoefficient(Request):
 
     @model_validator(mode="after")
     def _as_long_as_its_temperatures(self) -> FixedCoefficient:
-        warm = self.temperature_c or []
-        lengths = [len(self.value) if isinstance(self.value, list) else 0, len(warm)]
+        temperatures_c = self.temperature_c or []
+        lengths = [len(self.value) if isinstance(self.value, list) else 0, len(temperatures_c)]
         if self.u is not None:
             lengths.append(len(self.u) if isinstance(self.u, list) else 0)
         if len(set(lengths)) != 1:
             raise ValueError("value, u and temperature_c must be three lists of the same length, or value a number")
-        if any(high <= low for low, high in itertools.pairwise(warm)):
+        if any(high <= low for low, high in itertools.pairwise(temperatures_c)):
             raise ValueError("temperature_c must rise")
         return self
 

@@ -239,9 +239,9 @@ def _results(parent: ET.Element, certificate: Certificate) -> None:
         table = child(element, "list")
         rates = [each.rate_dps for each in points]
         quantity(table, "True rate", rates, "deg/s", ref_type="basic_referenceValue")
-        warm = [each.temperature_c for each in points if each.temperature_c is not None]
-        if len(warm) == len(points):
-            quantity(table, "Temperature of the item", warm, "deg C")
+        temperatures_c = [each.temperature_c for each in points if each.temperature_c is not None]
+        if len(temperatures_c) == len(points):
+            quantity(table, "Temperature of the item", temperatures_c, "deg C")
         quantity(
             table, "Error of indication", [each.error_dps for each in points], "deg/s",
             expanded=[each.expanded_dps for each in points], k=[each.k for each in points], probability=probability,
@@ -314,8 +314,8 @@ def _any_axis(parent: ET.Element, certificate: Certificate) -> None:
 
 def _budget(parent: ET.Element, certificate: Certificate) -> None:
     uncertainty = certificate.uncertainty
-    warm = "" if uncertainty.temperature_c is None else f" and {uncertainty.temperature_c:g} °C"
-    place_text = f"Of axis {uncertainty.axis} at {uncertainty.rate_dps:g} °/s{warm}, where U is largest."
+    temperature_text = "" if uncertainty.temperature_c is None else f" and {uncertainty.temperature_c:g} °C"
+    place_text = f"Of axis {uncertainty.axis} at {uncertainty.rate_dps:g} °/s{temperature_text}, where U is largest."
     element = _result(parent, "Contributions to the standard uncertainty", place_text)
     for each in uncertainty.budget:
         quantity(element, f"{each.source}, type {each.type}", [each.contribution_dps], "deg/s")

@@ -192,7 +192,7 @@ class TypeOfItem(Part):
     over_years: tuple[float, float]  #: shortest and longest history of a unit
     mean_per_year_dps: float  #: size of their mean drift at the worst place; its sign is not the same at all places
     freedom: float  #: degrees of freedom of the standard uncertainty
-    spread_dps: float  #: half width about the mean until the date, with the coverage of U
+    expanded_about_mean_dps: float  #: half width about the mean until the date, with the coverage of U
 
 
 class StabilityResult(Part):

@@ -202,12 +202,12 @@ def _method(certificate: Certificate) -> list[list[str]]:
 def uncertainty_text(certificate: Certificate) -> str:
     """Return how the expanded uncertainties are to be read."""
     uncertainty = certificate.uncertainty
-    warm = "" if uncertainty.temperature_c is None else f" and {_number(uncertainty.temperature_c)} °C"
+    temperature_text = "" if uncertainty.temperature_c is None else f" and {_number(uncertainty.temperature_c)} °C"
     return (
         "The expanded uncertainty U is that of a corrected rate: the standard uncertainty times the coverage factor k "
         f"that is stated with each result, for a coverage of about {uncertainty.coverage_probability * 100:.0f} % "
         "(JCGM 100:2008). The standard uncertainty is made of the contributions below, here at the place where U is "
-        f"largest: axis {uncertainty.axis}, {_number(uncertainty.rate_dps)} °/s{warm}."
+        f"largest: axis {uncertainty.axis}, {_number(uncertainty.rate_dps)} °/s{temperature_text}."
     )
 
 
@@ -260,9 +260,9 @@ def _any_axis_text(certificate: Certificate) -> str:
 
 def _coefficient(coefficient: CoefficientResult) -> list[str]:
     value, u = rounded(coefficient.value, coefficient.u or 0.0)
-    warm = "" if coefficient.temperature_c is None else _number(coefficient.temperature_c)
+    temperature_text = "" if coefficient.temperature_c is None else _number(coefficient.temperature_c)
     of_fit = "" if coefficient.has_standards or u == "–" else FIT_ALONE
-    return [coefficient.axis, coefficient.name_text, warm, value, u + of_fit, readable(coefficient.unit)]
+    return [coefficient.axis, coefficient.name_text, temperature_text, value, u + of_fit, readable(coefficient.unit)]
 
 
 def _sensor(result: SensorResult) -> Mapping[str, object]:
@@ -325,6 +325,6 @@ def _outcome(passed: bool) -> str:
 
 def _verified(result: ConformityResult) -> list[str]:
     error, expanded = rounded(result.error_dps, result.expanded_dps)
-    warm = "–" if result.temperature_c is None else _number(result.temperature_c)
+    temperature_text = "–" if result.temperature_c is None else _number(result.temperature_c)
     rates = [_number(rate) for rate in result.rates_dps]
-    return [result.output, warm, *rates, error, expanded, percent(result.risk), _outcome(result.passed)]
+    return [result.output, temperature_text, *rates, error, expanded, percent(result.risk), _outcome(result.passed)]

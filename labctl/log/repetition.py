@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from instruments.clock import Clock, SystemClock
 
-PER_S = 600.0
+WINDOW_S = 600.0
 #: Of records of other libraries, from one line of their code.
 MAX_FOREIGN = 10
 
@@ -22,10 +22,10 @@ class _Counted:
 
 
 class RepetitionLimit:
-    """Admits `most` records with the same key in `per_s`."""
+    """Admits `most` records with the same key in `window_s`."""
 
-    def __init__(self, most: int, per_s: float = PER_S, clock: Clock | None = None) -> None:
-        self._most, self._per_s, self._clock = most, per_s, clock or SystemClock()
+    def __init__(self, most: int, window_s: float = WINDOW_S, clock: Clock | None = None) -> None:
+        self._most, self._window_s, self._clock = most, window_s, clock or SystemClock()
         self._counted: dict[Hashable, _Counted] = {}
         self._guard = threading.Lock()
         self.held_back = 0  #: in all
@@ -35,7 +35,7 @@ class RepetitionLimit:
         now_s = self._clock.now_s()
         with self._guard:
             counted = self._counted.setdefault(key, _Counted(now_s))
-            if now_s - counted.since_s >= self._per_s:
+            if now_s - counted.since_s >= self._window_s:
                 counted.since_s, counted.admitted = now_s, 0
             if counted.admitted < self._most:
                 counted.admitted += 1

@@ -42,22 +42,25 @@ def temperature_of(columns: Columns) -> NDArray[np.float64] | None:
 
     The one place that decides: the unit's own thermometer, and where it has none the chamber's stands in for it.
     """
-    warm = columns.get("temperature_c", columns.get("chamber_c"))
-    return None if warm is None else np.asarray(warm, dtype=np.float64)
+    temperatures_c = columns.get("temperature_c", columns.get("chamber_c"))
+    return None if temperatures_c is None else np.asarray(temperatures_c, dtype=np.float64)
 
 
 def pieces(columns: Columns, motion: Motion = "rates") -> NDArray[np.int64]:
     """Return labels (n,) of readings: they rise with the data set, and within one that is taken in pieces."""
-    dataset, warm = np.asarray(columns["dataset"], dtype=np.int64), temperature_of(columns)
+    dataset, temperatures_c = np.asarray(columns["dataset"], dtype=np.int64), temperature_of(columns)
     piece = np.zeros(len(dataset), dtype=np.int64)
-    if len(dataset) and "t_s" in columns and (warm is not None or motion == "rest"):
+    if len(dataset) and "t_s" in columns and (temperatures_c is not None or motion == "rest"):
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         starts = dataset_starts(dataset)
         is_turn = np.asarray(columns["turn_deg"]) != 0 if "turn_deg" in columns else np.zeros(len(dataset), dtype=bool)
         for begin, end in zip(starts, np.append(starts[1:], len(dataset)), strict=True):
             if is_turn[begin]:  # a part of a turn is no known angle
                 continue
-            since_s, warm_rows = t_s[begin:end] - t_s[begin], None if warm is None else warm[begin:end]
+            since_s, warm_rows = (
+                t_s[begin:end] - t_s[begin],
+                None if temperatures_c is None else temperatures_c[begin:end],
+            )
             if motion == "rest":
                 piece[begin:end] = _windows(since_s, warm_rows)
             elif warm_rows is not None:

@@ -48,8 +48,8 @@ class Source:
     def text(self) -> str:
         """What was read, in one line."""
         local = "" if self.latitude_deg is None else f", gravity at latitude {self.latitude_deg:g} deg"
-        warm = "" if self.temperature is None else f", temperature {self.temperature} in deg C"
-        return f"columns {', '.join(self.columns)} in {self.unit}{local}{warm}"
+        temperature_text = "" if self.temperature is None else f", temperature {self.temperature} in deg C"
+        return f"columns {', '.join(self.columns)} in {self.unit}{local}{temperature_text}"
 
 
 def accelerometer_of_files(
@@ -76,8 +76,10 @@ def accelerometer_of_files(
     rests = find_rests(readings)
     require_one(source.temperature, earlier)
     if source.temperature is not None:
-        warm = calibrate_over_temperature(readings, rests)
-        return _with_alignment(_over_temperature(warm, rests), readings, lambda: solve_even(readings, rests, warm))
+        over_temperature = calibrate_over_temperature(readings, rests)
+        return _with_alignment(
+            _over_temperature(over_temperature, rests), readings, lambda: solve_even(readings, rests, over_temperature)
+        )
     if earlier is None:
         found = calibrate_accelerometer(readings, rests)
         answer = _response(found, rests, adequacy_of(found, rests))
@@ -98,8 +100,13 @@ def _readings(path: Path, source: Source) -> PoseReadings:
     if not path.is_file():
         raise BadRecording(f"{path}: not found; name a CSV or Parquet file of readings, or the folder of a recording")
     table = read_table(path)
-    warm = [] if source.temperature is None else [source.temperature]
-    rows = numbers_of(path, table, [*source.columns, *warm], "time, x, y and z" + ", and temperature" * len(warm))
+    temperature_columns = [] if source.temperature is None else [source.temperature]
+    rows = numbers_of(
+        path,
+        table,
+        [*source.columns, *temperature_columns],
+        "time, x, y and z" + ", and temperature" * len(temperature_columns),
+    )
     if len(rows) < MIN_READINGS:
         raise BadRecording(f"{path}: {len(rows)} rows; rests in poses need at least {MIN_READINGS}; record longer")
     steps = np.diff(rows[:, 0])
@@ -114,7 +121,7 @@ def _readings(path: Path, source: Source) -> PoseReadings:
     # without a gyro nothing tells a turn about the vertical, which leaves the specific force as it is
     return PoseReadings(
         info, rows[:, 0], UNITS_G[source.unit] * rows[:, 1:4], np.zeros((len(rows), 3)),
-        rows[:, 4] if warm else None, breaks,
+        rows[:, 4] if temperature_columns else None, breaks,
     )  # fmt: skip
 
 

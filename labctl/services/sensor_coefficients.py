@@ -36,9 +36,9 @@ def _of_field(answer: MagnetometerResponse) -> Iterator[SensorCoefficientRespons
         yield _of("dip of the field", answer.alignment["dip"])
 
 
-def _over_temperature(warm: AccelerometerTemperature) -> Iterator[SensorCoefficientResponse]:
+def _over_temperature(law: AccelerometerTemperature) -> Iterator[SensorCoefficientResponse]:
     terms: Sequence[tuple[str, str, Mapping[str, Sequence[Estimate]]]] = (
-        ("bias", "g", warm.bias_g), ("scale factor", "1", warm.scale_factor)
+        ("bias", "g", law.bias_g), ("scale factor", "1", law.scale_factor)
     )  # fmt: skip
     for name, unit, by_axis in terms:
         for axis in sorted(by_axis):

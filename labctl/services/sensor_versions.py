@@ -153,10 +153,10 @@ def _estimates(result: AccelerometerResponse | MagnetometerResponse) -> list[Est
     ]  # fmt: skip
 
 
-def _over_temperature(result: AccelerometerResponse, warm: AccelerometerTemperature) -> list[Estimate | None]:
+def _over_temperature(result: AccelerometerResponse, law: AccelerometerTemperature) -> list[Estimate | None]:
     """Return the nine estimates and those of temperature, by power and axis, in the order of the covariance."""
     sensor_estimates = _estimates(result)
-    for terms in (warm.bias_g, warm.scale_factor):
+    for terms in (law.bias_g, law.scale_factor):
         powers = max((len(term) for term in terms.values()), default=0)
         sensor_estimates += [
             dict(enumerate(terms.get(axis, []))).get(power) for power in range(powers) for axis in AXES

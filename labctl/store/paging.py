@@ -63,4 +63,5 @@ def parts_of(keys: Sequence[KeyT]) -> Iterator[Sequence[KeyT]]:
 
 def padded(keys: Sequence[KeyT]) -> list[KeyT]:
     """Return keys with the last one repeated until their number is a power of two: so few statements are prepared."""
-    return [*keys, *keys[-1:] * ((1 << (len(keys) - 1).bit_length()) - len(keys))] if keys else []
+    repeats = (1 << (len(keys) - 1).bit_length()) - len(keys) if keys else 0
+    return list(keys) + list(keys[-1:]) * repeats

@@ -53,7 +53,9 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
 
     at_caltemp = polynomial(np.array([float(at_c)]))
     offsets = (cubic.coefficients[0] + at_caltemp[0]).astype(np.float32)
-    differences_seen = compared(cubic, lambda warm: polynomial(warm) - at_caltemp + offsets.astype(np.float64))
+    differences_seen = compared(
+        cubic, lambda temperatures_c: polynomial(temperatures_c) - at_caltemp + offsets.astype(np.float64)
+    )
     hold_tolerance(options, differences_seen, NAME)
     losses = cubic.losses(differences_seen, CONSUMER)
     thermal, offset, caltemp = parameter_names(imu)

@@ -61,9 +61,9 @@ class TemperatureParameters:
     def lost(self, gravity_g: float, *, bias: bool) -> str:
         """Return the line that says what a format without scale factors over temperature loses, and the `bias` too."""
         low, high = self.range_c
-        warm = self.grid()
-        scale = gravity_g * float(np.abs(self.scale_change(warm)).max())
-        of_bias = f"the bias by up to {float(np.abs(self.bias_change_g(warm)).max()):.2g} g and " * bias
+        temperatures_c = self.grid()
+        scale = gravity_g * float(np.abs(self.scale_change(temperatures_c)).max())
+        of_bias = f"the bias by up to {float(np.abs(self.bias_change_g(temperatures_c)).max()):.2g} g and " * bias
         return (
             f"LOST temperature: over {low:.1f} to {high:.1f} deg C {of_bias}the scale factors by up to {scale:.2g} g "
             f"of 1 g differ from those here, of {self.reference_c:g} deg C."

@@ -87,10 +87,11 @@ def _every_point(positions: Sequence[str], use: RangeOfUse) -> PlannedSets:
     n = len(grid)
     begin_s: Array = EACH_S * np.arange(n, dtype=np.float64)
     lasts_s = np.full(n, EACH_S - 2.0 * STEP_S)
-    warm: Array = np.array([t for _, _, t in grid])
+    temperatures_c: Array = np.array([t for _, _, t in grid])
     return PlannedSets(
         begin_s, lasts_s, np.array([rate for _, rate, _ in grid]), np.array([p for p, _, _ in grid]),
-        np.ones(n, dtype=np.int64), np.ones(n, dtype=np.int64), begin_s, HeatCourse.constant_in_steps(warm, EACH_S),
+        np.ones(n, dtype=np.int64), np.ones(n, dtype=np.int64), begin_s,
+        HeatCourse.constant_in_steps(temperatures_c, EACH_S),
     )  # fmt: skip
 
 

@@ -59,11 +59,11 @@ class PlannedSets:
 def planned_data(sets: PlannedSets, axes: Sequence[str], noise: NoiseFigures) -> FitData:
     """Return planned data sets as data of a fit: outputs without error, and the noise that their means will have."""
     rates = body_rates(sets.rate_dps, sets.position)
-    warm = sets.temperature_c
+    temperatures_c = sets.temperature_c
     columns: dict[str, NDArray[np.generic]] = {
         "dataset": np.arange(1, len(sets) + 1), "t_s": sets.middle_s, "run": sets.run, "mounting": sets.mounting,
-        "position": sets.position, "table_rate_dps": sets.rate_dps, "temperature_c": warm, "power_s": sets.on_s,
-        "duration_s": sets.duration_s, "n": np.full(len(sets), READINGS),
+        "position": sets.position, "table_rate_dps": sets.rate_dps, "temperature_c": temperatures_c,
+        "power_s": sets.on_s, "duration_s": sets.duration_s, "n": np.full(len(sets), READINGS),
     }  # fmt: skip
     for axis in axes:
         white = np.sqrt(noise.of(axis).white_var(sets.duration_s))

@@ -80,10 +80,10 @@ def predicted_uncertainty(
         coefficients += design.columns.shape[1]
     every = np.array(variances)
     row, place = divmod(int(np.argmax(every)), every.shape[1])
-    warm = np.asarray(points["temperature_c"], dtype=np.float64)
+    temperatures_c = np.asarray(points["temperature_c"], dtype=np.float64)
     return PredictedUncertainty(
         K * float(np.sqrt(np.mean(every @ weights))), K * float(np.sqrt(every.max())), axes[row],
-        float(warm[place]), K * float(np.sqrt(np.mean(np.array(of_heat) @ weights))), len(sets), coefficients,
+        float(temperatures_c[place]), K * float(np.sqrt(np.mean(np.array(of_heat) @ weights))), len(sets), coefficients,
     )  # fmt: skip
 
 

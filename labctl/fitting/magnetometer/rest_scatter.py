@@ -54,8 +54,8 @@ def scatter_of(jacobian: NDArray[np.float64], distance: Array, places: Places) -
 
     problem = _Problem.of(jacobian, distance, places)
     found = minimize(
-        lambda logs: problem.unlikely(np.exp(logs)), np.array(START), method="Powell", bounds=[LOG_RATIO] * 2,
-        options={"xtol": TOLERANCE, "ftol": 1e-8},
+        lambda logs: problem.negative_log_likelihood(np.exp(logs)), np.array(START), method="Powell",
+        bounds=[LOG_RATIO] * 2, options={"xtol": TOLERANCE, "ftol": 1e-8},
     )  # fmt: skip
     return problem.scatter(np.exp(found.x))
 
@@ -85,7 +85,7 @@ class _Problem:
         left = normal[-1, -1] - normal[-1, :-1] @ np.linalg.solve(normal[:-1, :-1], normal[:-1, -1])
         return float(left / (self.n - len(normal) + 1))
 
-    def unlikely(self, ratios: Array) -> float:
+    def negative_log_likelihood(self, ratios: Array) -> float:
         """Return minus the logarithm of the restricted likelihood, without its constant."""
         weights = Weights.of(self.places, ratios)
         normal = weights.product_of(self.whole, self.sums)

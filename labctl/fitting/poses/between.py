@@ -50,19 +50,21 @@ def components(
 
     unit = np.array([max(start, 1e-18), float(np.diag(covariance + start * by_first).mean())])
 
-    def unlikely(variances: Array) -> float:
+    def negative_log_likelihood(variances: Array) -> float:
         first, second = np.append(variances, 0.0)[:2] * unit
         total = covariance + first * by_first + second * np.eye(len(residual))
-        return restricted_likelihood(jacobian, residual, total) + information(first)
+        return negative_log_restricted_likelihood(jacobian, residual, total) + information(first)
 
-    alone = minimize(unlikely, np.ones(1), method="L-BFGS-B", bounds=[(0.0, None)])
-    both = minimize(unlikely, np.append(alone.x, 0.1), method="L-BFGS-B", bounds=[(0.0, None)] * 2)
+    alone = minimize(negative_log_likelihood, np.ones(1), method="L-BFGS-B", bounds=[(0.0, None)])
+    both = minimize(negative_log_likelihood, np.append(alone.x, 0.1), method="L-BFGS-B", bounds=[(0.0, None)] * 2)
     demanded = float(alone.fun - both.fun) > DEMANDED
     first, second = both.x if demanded else (alone.x[0], 0.0)
     return float(first * unit[0]), float(second * unit[1])
 
 
-def restricted_likelihood(jacobian: NDArray[np.float64], residual: Array, covariance: NDArray[np.float64]) -> float:
+def negative_log_restricted_likelihood(
+    jacobian: NDArray[np.float64], residual: Array, covariance: NDArray[np.float64]
+) -> float:
     """Return minus the logarithm of the restricted likelihood, without its constant."""
     factor = cho_factor(covariance)
     weighted = cho_solve(factor, jacobian)

@@ -29,7 +29,7 @@ class DriftPrediction:
     freedom: Array  #: (places,)
 
     @property
-    def spread_dps(self) -> Array:
+    def expanded_about_mean_dps(self) -> Array:
         """Half width about the mean that covers as often as U, (places,), by Student's t (GUM G.3)."""
         return np.asarray(stdtrit(np.clip(self.freedom, 1.0, MAX_FREEDOM), 0.5 * (1.0 + LEVEL)) * self.u_dps)
 
@@ -74,9 +74,9 @@ def of_type(rates_dps: Array, years: Array) -> DriftPrediction:
     return DriftPrediction(mean, np.sqrt(variance), effective)
 
 
-def with_drift(expanded_dps: float, spread_dps: float, mean_dps: float) -> float:
+def with_drift(expanded_dps: float, expanded_about_mean_dps: float, mean_dps: float) -> float:
     """Return the half width that covers a corrected rate with an expanded uncertainty after a drift, deg/s.
 
     The mean of a drift is a known error that is not corrected; its spread is independent of the calibration.
     """
-    return half_width(math.hypot(expanded_dps, spread_dps), mean_dps)
+    return half_width(math.hypot(expanded_dps, expanded_about_mean_dps), mean_dps)

@@ -59,7 +59,11 @@ class Range:
     @property
     def places(self) -> list[tuple[float, float]]:
         """The rates, deg/s, and temperatures, deg C, of the grid on which a document bounds U."""
-        return [(rate, warm) for warm in grid_temperatures(*self.temperature_c) for rate in grid_rates(*self.rates_dps)]
+        return [
+            (rate, temperature_c)
+            for temperature_c in grid_temperatures(*self.temperature_c)
+            for rate in grid_rates(*self.rates_dps)
+        ]
 
 
 @dataclass(frozen=True)
@@ -207,21 +211,21 @@ def unreachable_below(info: RecordingInfo, over: Range, powered_runs: int) -> La
         ]  # fmt: skip
     found = []
     for axis in info.axes:
-        for rate, warm in over.places:
+        for rate, temperature_c in over.places:
             lines = [source.lines[0] for source in standard_lines(bench, _of_ideal(rate))]
-            found.append(_placed(_of_known([*lines, *later]), axis, rate, warm))
+            found.append(_placed(_of_known([*lines, *later]), axis, rate, temperature_c))
     return max(found, key=lambda each: each.u_dps or 0.0)
 
 
-def not_near(rates_dps: Array, temperature_c: Array, over: Range) -> str:
+def not_near(rates_dps: Array, temperatures_c: Array, over: Range) -> str:
     """Return a place of a range near which none of the planned data sets is, (n,) each, so that U stays unknown there.
 
-    `rates_dps` are those about one axis, `temperature_c` set points. Empty where each place has data sets near it.
+    `rates_dps` are those about one axis, `temperatures_c` set points. Empty where each place has data sets near it.
     """
-    planned = LocalModelError(rates_dps, temperature_c, np.ones(len(rates_dps)), np.zeros(len(rates_dps)))
-    for rate_dps, warm in over.places:
-        if reason := planned.unknown_at(rate_dps, warm):
-            return f"at {rate_dps:g} deg/s and {warm:g} deg C {reason}"
+    planned = LocalModelError(rates_dps, temperatures_c, np.ones(len(rates_dps)), np.zeros(len(rates_dps)))
+    for rate_dps, temperature_c in over.places:
+        if reason := planned.unknown_at(rate_dps, temperature_c):
+            return f"at {rate_dps:g} deg/s and {temperature_c:g} deg C {reason}"
     return ""
 
 

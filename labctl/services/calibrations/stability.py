@@ -36,9 +36,9 @@ class Stability:
     intervals: int  #: between calibrations of the unit itself, at the place with the fewest
     of_type: TypeDrift | None = None  #: None: from the unit's own history
 
-    def spread_dps(self, years: float) -> float:
+    def expanded_about_mean_dps(self, years: float) -> float:
         """Return the half width about the mean at the worst place over some years (GUM G.3)."""
-        return float(np.max(self.predicted.spread_dps)) * years
+        return float(np.max(self.predicted.expanded_about_mean_dps)) * years
 
     def mean_dps(self, years: float) -> float:
         """Return the size of the expected drift at the worst place over some years; 0 by a unit's own history."""
@@ -46,7 +46,7 @@ class Stability:
 
     def expanded_dps(self, years: float) -> float:
         """Return the half width that covers the drift at the worst place over some years, as often as U."""
-        return with_drift(0.0, self.spread_dps(years), self.mean_dps(years))
+        return with_drift(0.0, self.expanded_about_mean_dps(years), self.mean_dps(years))
 
     @property
     def worst(self) -> tuple[float, float]:
@@ -54,7 +54,7 @@ class Stability:
 
         By a unit's own history they are the root mean square and the number of the intervals.
         """
-        place = int(np.argmax(self.predicted.spread_dps))
+        place = int(np.argmax(self.predicted.expanded_about_mean_dps))
         return float(self.predicted.u_dps[place]), float(self.predicted.freedom[place])
 
 
@@ -96,7 +96,7 @@ def _own(store: Store, versions: list[CertifiedVersion], grid: ErrorGrid) -> Sta
 
 def _is_typical(of_unit: Stability, of_type: DriftPrediction) -> bool:
     """Return whether the root mean square of a unit's own drift is within what its type predicts, at every place."""
-    within = np.abs(of_type.mean_dps) + of_type.spread_dps
+    within = np.abs(of_type.mean_dps) + of_type.expanded_about_mean_dps
     return bool(np.all(of_unit.predicted.u_dps <= within))
 
 

@@ -69,11 +69,11 @@ def uncertainty_of_unit(
     """
     calibration = read_calibration(version_of(store, serial, version).document)
     covered = Covered(calibration.rate_dps, calibration.temperature_c)
-    rates, warm = covered.rates(_Known.of(calibration).evidence), covered.temperatures()
+    rates, temperatures_c = covered.rates(_Known.of(calibration).evidence), covered.temperatures()
     return uncertainty_answer(
         calibration,
         [max(rates) / 2] if rate_dps is None else rate_dps,
-        warm[len(warm) // 2] if temperature_c is None else temperature_c,
+        temperatures_c[len(temperatures_c) // 2] if temperature_c is None else temperature_c,
         grid=grid,
     )
 
@@ -157,7 +157,7 @@ def uncertainty_grid(calibration: Calibration) -> UncertaintyGrid:
     """Return the uncertainty about each axis on a small grid over the validity. Raises BadInput, NotEnoughData."""
     covered, known = Covered(calibration.rate_dps, calibration.temperature_c), _Known.of(calibration)
     rates, temperatures = covered.rates(known.evidence), covered.temperatures()
-    found = [[known.at(rate, warm) for rate in rates] for warm in temperatures]
+    found = [[known.at(rate, at_c) for rate in rates] for at_c in temperatures]
     axes = {axis: [[_response(place[axis]) for place in row] for row in found] for axis in found[0][0]}
     over = contributions_over(rates, temperatures, known.at)
     return UncertaintyGrid(rate_dps=rates, temperature_c=temperatures, axes=axes, contributions=over)
@@ -182,7 +182,7 @@ def widening_of(calibration: Calibration, about: Literal["any axis", "own axis"]
     else:
         places = [{axis: rate} for axis in calibration.axes for rate in rates]
         seen = [list(place) for place in places]
-    every = [widening([known.at_vector(place, warm) for place in places], seen) for warm in temperatures]
+    every = [widening([known.at_vector(place, at_c) for place in places], seen) for at_c in temperatures]
     return float(np.max(every))  # NaN where one of them is
 
 
@@ -216,10 +216,10 @@ def is_inside(calibration: Calibration, rate_dps: Sequence[float], temperature_c
 
     A rate vector is where no rate about any axis is faster than the fastest that was calibrated.
     """
-    (cold, warm), (slow, fast) = calibration.temperature_c, calibration.rate_dps
+    (lowest_c, highest_c), (slow, fast) = calibration.temperature_c, calibration.rate_dps
     if len(rate_dps) == 1:
-        return cold <= temperature_c <= warm and slow <= rate_dps[0] <= fast
-    return cold <= temperature_c <= warm and math.hypot(*rate_dps) <= max(abs(slow), abs(fast))
+        return lowest_c <= temperature_c <= highest_c and slow <= rate_dps[0] <= fast
+    return lowest_c <= temperature_c <= highest_c and math.hypot(*rate_dps) <= max(abs(slow), abs(fast))
 
 
 @dataclass(frozen=True)

@@ -133,12 +133,12 @@ def accelerometer_result(
         quantity="local gravity", value=ordered.gravity_m_s2, u=ordered.gravity_u_m_s2, unit="m/s^2",
         traceability=ordered.traceability.strip(),
     )  # fmt: skip
-    warm = "" if result.temperature is None else (
+    temperature_text = "" if result.temperature is None else (
         f" from {result.temperature.range_c[0]:.1f} °C to {result.temperature.range_c[1]:.1f} °C, the coefficients "
         f"without a power those at {result.temperature.reference_c:g} °C,"
     )  # fmt: skip
     holds_for = (
-        f"Specific forces of the size of gravity in any direction,{warm} at the conditions of the "
+        f"Specific forces of the size of gravity in any direction,{temperature_text} at the conditions of the "
         f"{result.rests - result.left_out} rests in {result.poses} poses."
     )
     converted = (
@@ -162,12 +162,12 @@ def _aligned(what: str, axes: Mapping[str, AccelerometerCoefficient]) -> list[Se
     ]
 
 
-def _over_temperature(warm: AccelerometerTemperature, ratio: float, freedom: float) -> list[SensorCoefficient]:
+def _over_temperature(law: AccelerometerTemperature, ratio: float, freedom: float) -> list[SensorCoefficient]:
     """Return the coefficients of temperature; the uncertainty of gravity is too small a share of them to count."""
     found = []
-    u = iter(np.sqrt(np.diag(np.array(warm.covariance)))[ACCELEROMETER_PARAMETERS:].tolist())
+    u = iter(np.sqrt(np.diag(np.array(law.covariance)))[ACCELEROMETER_PARAMETERS:].tolist())
     for name, unit, terms, factor in (
-        ("bias", "m/s^2", warm.bias_g, STANDARD_GRAVITY), ("scale factor", "1", warm.scale_factor, ratio)
+        ("bias", "m/s^2", law.bias_g, STANDARD_GRAVITY), ("scale factor", "1", law.scale_factor, ratio)
     ):  # fmt: skip
         for power in range(1, len(terms[AXES[0]]) + 1):
             per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
@@ -230,8 +230,8 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
 def _freedom_of(result: AccelerometerResponse) -> float:
     """Return the degrees of freedom of a fit that states none: rests beyond what the parameters take."""
     known = KNOWN_BEFORE if result.earlier is not None else 0
-    warm = result.temperature
-    parameters = ACCELEROMETER_PARAMETERS if warm is None else len(warm.covariance)
+    law = result.temperature
+    parameters = ACCELEROMETER_PARAMETERS if law is None else len(law.covariance)
     return max(float(result.rests - result.left_out + known - parameters), 1.0)
 
 

@@ -59,7 +59,8 @@ def _type(known: Stability, years: float) -> TypeOfItem | None:
         return None
     return TypeOfItem(
         model=known.of_type.model, units=known.of_type.units, over_years=known.of_type.over_years,
-        mean_per_year_dps=known.mean_dps(1.0), freedom=known.worst[1], spread_dps=known.spread_dps(years),
+        mean_per_year_dps=known.mean_dps(1.0), freedom=known.worst[1],
+        expanded_about_mean_dps=known.expanded_about_mean_dps(years),
     )  # fmt: skip
 
 
@@ -73,7 +74,7 @@ def until_date(expanded_dps: float, stability: StabilityResult | None) -> float:
     if stability.type is None:
         return math.hypot(expanded_dps, stability.drift_dps)
     mean = stability.type.mean_per_year_dps * stability.years
-    return with_drift(expanded_dps, stability.type.spread_dps, mean)
+    return with_drift(expanded_dps, stability.type.expanded_about_mean_dps, mean)
 
 
 def until(stability: StabilityResult | None, results: Sequence[ResultPoint]) -> tuple[str, ...]:

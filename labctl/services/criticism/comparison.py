@@ -52,8 +52,8 @@ def lines_over(
     over_rate, over_temperature = [], []
     for up_axis in np.unique(position).tolist():
         for axis in (axis for axis in data.info.axes if axis in fitted.axes):
-            warm = channels.temperature_c(axis)
-            temperatures = np.unique(level_centres(warm, temperature_rows(warm, position, level)))
+            temperatures_c = channels.temperature_c(axis)
+            temperatures = np.unique(level_centres(temperatures_c, temperature_rows(temperatures_c, position, level)))
 
             def error(across: Array, down: Array, *, by_rate: bool, axis: str = axis, up_axis: str = up_axis) -> Any:
                 grid = np.meshgrid(across, down)
@@ -178,11 +178,15 @@ def _axis(
 ) -> dict[str, list[int] | list[str] | list[float] | list[float | None]]:
     """Return the rows of one output axis."""
     channels = data.channels
-    rate, own_rate_dps, warm = channels.table_rate_dps(), channels.rate_dps(axis), channels.temperature_c(axis)
+    rate, own_rate_dps, temperatures_c = (
+        channels.table_rate_dps(),
+        channels.rate_dps(axis),
+        channels.temperature_c(axis),
+    )
     measured = data.outputs[axis] - own_rate_dps
     own_turn = axis_in(position) == axis
     before, after = (
-        turn_errors(error - bias_at_rest(error, rate, warm, position), np.where(own_turn, rate, 0.0))
+        turn_errors(error - bias_at_rest(error, rate, temperatures_c, position), np.where(own_turn, rate, 0.0))
         for error in (measured, residual)
     )
     return {
@@ -190,8 +194,10 @@ def _axis(
         "position": position.tolist(),
         "table_rate_dps": rate.tolist(),
         "own_rate_dps": own_rate_dps.tolist(),
-        "temperature_c": warm.tolist(),
-        "temperature_level_c": level_centres(warm, temperature_rows(warm, position, level)).tolist(),
+        "temperature_c": temperatures_c.tolist(),
+        "temperature_level_c": level_centres(
+            temperatures_c, temperature_rows(temperatures_c, position, level)
+        ).tolist(),
         "rate_level_dps": rate_level.tolist(),
         "measured_error_dps": measured.tolist(),
         "modelled_error_dps": (measured - residual).tolist(),

@@ -101,7 +101,7 @@ def own_numbers(sets: Channels, recording: int) -> dict[str, list[int]]:
 
 
 def _axis(
-    axis: str, shared: Mapping[str, Any], true: Array, warm: Array, measured: Array, residual: Array,
+    axis: str, shared: Mapping[str, Any], true: Array, temperatures_c: Array, measured: Array, residual: Array,
     floor: Array | None,
 ) -> dict[str, list[Any]]:  # fmt: skip
     m = len(residual)
@@ -110,7 +110,7 @@ def _axis(
         **{name: values if values is not None else unknown for name, values in shared.items()},
         "axis": [axis] * m,
         "own_rate_dps": true.tolist(),
-        "temperature_c": warm.tolist(),
+        "temperature_c": temperatures_c.tolist(),
         "measured_error_dps": measured.tolist(),
         "modelled_error_dps": (measured - residual).tolist(),
         "residual_dps": residual.tolist(),

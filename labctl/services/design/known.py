@@ -146,19 +146,23 @@ def _duration_s(store: Store, row: CalibrationRecord) -> float:
 
 def _slopes(fitted: FittedModel, span: Span) -> tuple[float, float]:
     """Return the change of bias, deg/s per K, and of scale factor, 1/K: root mean square over outputs and range."""
-    warm = np.linspace(span.low_c, span.high_c, 10)
+    temperatures_c = np.linspace(span.low_c, span.high_c, 10)
     bias: list[float] = []
     scale: list[float] = []
     for axis in fitted.axes:
-        still, turning = (_error(fitted, axis, warm, rate) for rate in (0.0, span.rate_dps))
-        bias += (np.gradient(still, warm)).tolist()
-        scale += (np.gradient(turning - still, warm) / max(span.rate_dps, 1e-9)).tolist()
+        still, turning = (_error(fitted, axis, temperatures_c, rate) for rate in (0.0, span.rate_dps))
+        bias += (np.gradient(still, temperatures_c)).tolist()
+        scale += (np.gradient(turning - still, temperatures_c) / max(span.rate_dps, 1e-9)).tolist()
     return _rms(bias), _rms(scale)
 
 
-def _error(fitted: FittedModel, axis: str, warm: Array, rate_dps: float) -> Array:
-    rates = {each: np.full(len(warm), rate_dps if each == axis else 0.0) for each in BODY_AXES}
-    columns = {"temperature_c": warm, "table_rate_dps": rates[axis], "position": np.full(len(warm), axis)}
+def _error(fitted: FittedModel, axis: str, temperatures_c: Array, rate_dps: float) -> Array:
+    rates = {each: np.full(len(temperatures_c), rate_dps if each == axis else 0.0) for each in BODY_AXES}
+    columns = {
+        "temperature_c": temperatures_c,
+        "table_rate_dps": rates[axis],
+        "position": np.full(len(temperatures_c), axis),
+    }
     return np.asarray(fitted.error_dps(Channels(columns, rates), axis))
 
 

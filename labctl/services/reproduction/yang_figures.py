@@ -97,11 +97,11 @@ def _panels(data: FitData) -> list[tuple[str, str, NDArray[np.bool_]]]:
 
 
 def _surface(data: FitData, by_axis: Mapping[str, Array], number: str, title: str, caption: str) -> PaperFigure:
-    rate, warm = data.channels.table_rate_dps(), data.temperature_c
+    rate, temperatures_c = data.channels.table_rate_dps(), data.temperature_c
     panels: list[PaperPanel] = []
     for axis, out, rows in _panels(data):
         known = rows & np.isfinite(by_axis[out])
-        traces = [trace("data sets", rate[known], by_axis[out][known], colour=warm[known])]
+        traces = [trace("data sets", rate[known], by_axis[out][known], colour=temperatures_c[known])]
         panels.append(panel(f"turning {axis}, output {out}", RATE, ERROR, traces, "deg C"))
     return {
         "id": f"figure-{number}-{title.split(maxsplit=1)[0]}", "title": f"Figure {number}: error {title}",

@@ -102,9 +102,9 @@ class _Walk:
         times = np.arange(np.ceil(from_s / ENVIRONMENT_S), np.floor(until_s / ENVIRONMENT_S) + 1) * ENVIRONMENT_S
         times = times[(times > from_s) & (times <= until_s)]
         if len(times):
-            warm = self._world.heat.sensor_c(self._settings.name, times)
+            temperatures_c = self._world.heat.sensor_c(self._settings.name, times)
             air = self._world.heat.airs_c(times)
-            rows = zip(times.tolist(), warm.tolist(), air.tolist(), strict=True)
+            rows = zip(times.tolist(), temperatures_c.tolist(), air.tolist(), strict=True)
             self._environment += [(t, self._run, sensor, value_c, self._setpoint) for t, sensor, value_c in rows]
 
     def _acquire(self, step: Acquire) -> None:

@@ -17,7 +17,7 @@ def test_units_with_one_interval_predict_as_a_sample_does() -> None:
     assert found.mean_dps == pytest.approx(drifts.mean())
     assert found.u_dps == pytest.approx(drifts.std(ddof=1) * np.sqrt(1 + 1 / 4))
     assert found.freedom == pytest.approx(3)
-    assert found.spread_dps == pytest.approx(student(3).ppf(0.5 * (1 + LEVEL)) * found.u_dps)
+    assert found.expanded_about_mean_dps == pytest.approx(student(3).ppf(0.5 * (1 + LEVEL)) * found.u_dps)
 
 
 def test_equal_histories_are_an_analysis_of_variance() -> None:
@@ -53,7 +53,7 @@ def test_the_variances_are_not_biased_where_histories_differ() -> None:
 
 def test_units_that_all_drift_alike_leave_no_spread() -> None:
     found = of_type(np.full((3, 2, 1), 0.02), np.ones((3, 2)))
-    assert (found.mean_dps[0], found.spread_dps[0]) == pytest.approx((0.02, 0.0))
+    assert (found.mean_dps[0], found.expanded_about_mean_dps[0]) == pytest.approx((0.02, 0.0))
 
 
 def test_a_history_of_its_own_has_the_root_mean_square_of_its_intervals() -> None:

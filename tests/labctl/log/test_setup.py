@@ -21,7 +21,7 @@ from labctl.config import LOG_LEVEL_VARIABLE
 from labctl.errors import BadInput
 from labctl.log import get_logger
 from labctl.log.context import for_campaign, for_request
-from labctl.log.repetition import MAX_FOREIGN, PER_S, RepetitionLimit
+from labctl.log.repetition import MAX_FOREIGN, WINDOW_S, RepetitionLimit
 from labctl.log.settings import LEVELS, is_read_by_a_person, level_asked
 from labctl.log.setup import held_back, running_log
 from tests.helpers.log_records import logged
@@ -155,7 +155,7 @@ def test_a_bound_on_repetitions_begins_anew_after_its_time() -> None:
     assert [limit.admits("a") for _ in range(4)] == [True, True, False, False]
     assert limit.admits("b")
     assert (limit.take_count("a"), limit.take_count("a"), limit.take_count("c")) == (2, 0, 0)
-    clock.sleep(PER_S)
+    clock.sleep(WINDOW_S)
     assert limit.admits("a")
 
 

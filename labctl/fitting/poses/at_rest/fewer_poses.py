@@ -27,7 +27,7 @@ from labctl.fitting.poses.at_rest.accelerometer import (
 )
 from labctl.fitting.poses.at_rest.gravity import local_gravity_g
 from labctl.fitting.poses.at_rest.rests import Rests
-from labctl.fitting.poses.between import restricted_likelihood
+from labctl.fitting.poses.between import negative_log_restricted_likelihood
 from labctl.fitting.poses.readings import AXES, PoseReadings
 from labctl.fitting.poses.triad import corrected, unit
 
@@ -57,7 +57,7 @@ class Scatter:
         """Variance of a rest beyond the noise of its mean, g^2."""
         return max(self.variance_g2 - self.noise_g2, 0.0)
 
-    def unlikely(self, between_g2: float) -> float:
+    def negative_log_likelihood(self, between_g2: float) -> float:
         """Return minus the logarithm of the likelihood of a variance between rests, without its constant."""
         total = max(self.noise_g2 + between_g2, 1e-30)
         return self.freedom / 2 * (math.log(total) + self.variance_g2 / total)
@@ -215,11 +215,11 @@ def _between(theta: Array, accel_g: NDArray[np.float64], gravity: float, white: 
     if known.scatter is not None:
         scale = max(scale, math.sqrt(known.scatter.variance_g2))
 
-    def unlikely(root: float) -> float:
+    def negative_log_likelihood(root: float) -> float:
         between = (root * scale) ** 2
         total = np.concatenate([white + between, np.ones(len(residual) - len(white))])
-        of_earlier = 0.0 if known.scatter is None else known.scatter.unlikely(between)
-        return restricted_likelihood(jacobian, residual, np.diag(total)) + of_earlier
+        of_earlier = 0.0 if known.scatter is None else known.scatter.negative_log_likelihood(between)
+        return negative_log_restricted_likelihood(jacobian, residual, np.diag(total)) + of_earlier
 
-    found = minimize_scalar(unlikely, bounds=(1e-6, MAX_ROOT), method="bounded", options={"xatol": 1e-4})
+    found = minimize_scalar(negative_log_likelihood, bounds=(1e-6, MAX_ROOT), method="bounded", options={"xatol": 1e-4})
     return float((found.x * scale) ** 2)

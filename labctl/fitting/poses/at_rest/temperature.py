@@ -80,7 +80,7 @@ class TemperatureLaw:
     """Sizes of the forces behind the means of k rests, by nine parameters and powers of temperature."""
 
     accel_g: NDArray[np.float64]  #: (k, 3)
-    warm: Array  #: (k,) temperature from the reference, over half the span
+    scaled_temperature: Array  #: (k,) temperature from the reference, over half the span
     orders: tuple[int, int]  #: of the bias, of the scale factor
 
     @property
@@ -88,12 +88,12 @@ class TemperatureLaw:
         return PARAMETERS + 3 * sum(self.orders)
 
     def take(self, rows: NDArray[np.bool_]) -> TemperatureLaw:
-        return TemperatureLaw(self.accel_g[rows], self.warm[rows], self.orders)
+        return TemperatureLaw(self.accel_g[rows], self.scaled_temperature[rows], self.orders)
 
     def forces(self, theta: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the forces (k, 3), g, and the inverse matrices (k, 3, 3)."""
         errors, bias = matrices(theta[:PARAMETERS])
-        whole = np.eye(3) + errors + np.zeros((len(self.warm), 3, 3))
+        whole = np.eye(3) + errors + np.zeros((len(self.scaled_temperature), 3, 3))
         diagonal = np.arange(3)
         whole[:, diagonal, diagonal] += self._powers(1) @ self._terms(theta, 1)
         inverse = np.asarray(np.linalg.inv(whole), dtype=np.float64)
@@ -115,7 +115,7 @@ class TemperatureLaw:
         return np.hstack([nine, *warmer])
 
     def _powers(self, which: int) -> NDArray[np.float64]:
-        return powers_of(self.warm, self.orders[which])
+        return powers_of(self.scaled_temperature, self.orders[which])
 
     def _terms(self, theta: Array, which: int) -> NDArray[np.float64]:
         begin = PARAMETERS + 3 * sum(self.orders[:which])
@@ -132,23 +132,23 @@ def at_reference(readings: PoseReadings, rests: Rests, found: OverTemperature) -
 
     Raises NotEnoughData without a thermometer.
     """
-    warm = rest_temperatures(readings, rests)
+    temperatures_c = rest_temperatures(readings, rests)
     assert readings.temperature_c is not None  # refused by the line before
     return (
         replace(readings, accel_g=found.at_reference_g(readings.accel_g, readings.temperature_c)),
-        replace(rests, accel_g=found.at_reference_g(rests.accel_g, warm)),
+        replace(rests, accel_g=found.at_reference_g(rests.accel_g, temperatures_c)),
     )
 
 
 def rest_temperatures(readings: PoseReadings, rests: Rests) -> Array:
     """Return the mean temperature of each rest, (k,) deg C. Raises NotEnoughData without a thermometer."""
-    warm = readings.temperature_c
-    if warm is None:
+    temperatures_c = readings.temperature_c
+    if temperatures_c is None:
         raise NotEnoughData(
             f"{readings.info.serial}: no temperature was recorded, so its coefficients cannot be fitted; name the "
             "column of the temperature, or calibrate without one"
         )
-    sums = np.concatenate([[0.0], np.cumsum(warm)])
+    sums = np.concatenate([[0.0], np.cumsum(temperatures_c)])
     return np.asarray((sums[rests.end] - sums[rests.begin]) / rests.n)
 
 
@@ -160,12 +160,12 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
     """
     serial = readings.info.serial
     require_poses(serial, rests)
-    warm = rest_temperatures(readings, rests)
-    low, high, levels = float(warm.min()), float(warm.max()), different_temperatures(warm)
+    temperatures_c = rest_temperatures(readings, rests)
+    low, high, levels = float(temperatures_c.min()), float(temperatures_c.max()), different_temperatures(temperatures_c)
     _require_span(serial, low, high, levels)
     orders = (min(BIAS_ORDER, levels - 1), SCALE_ORDER)
     reference, half = round((low + high) / 2, 1), (high - low) / 2
-    law = TemperatureLaw(rests.accel_g, (warm - reference) / half, orders)
+    law = TemperatureLaw(rests.accel_g, (temperatures_c - reference) / half, orders)
     if len(rests) < law.parameters + MIN_FREEDOM:
         raise NotEnoughData(
             f"{serial}: {len(rests)} rests at {levels} temperatures; {law.parameters} coefficients need at least "
@@ -210,10 +210,10 @@ def _require_span(serial: str, low: float, high: float, levels: int) -> None:
         )
 
 
-def different_temperatures(warm: Array) -> int:
+def different_temperatures(temperatures_c: Array) -> int:
     """Return how many temperatures (k,) are further than SAME_TEMPERATURE_K from the next lower one that counts."""
     count, last = 0, -np.inf
-    for each in np.sort(warm):
+    for each in np.sort(temperatures_c):
         if each - last > SAME_TEMPERATURE_K:
             count, last = count + 1, each
     return count

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 from labctl.fitting.magnetometer.places import MAX_PLACES, Places, Weights
 from labctl.fitting.magnetometer.rest_scatter import scatter_of
 from labctl.fitting.numeric.freedom import information_of
-from labctl.fitting.poses.between import gls, restricted_likelihood
+from labctl.fitting.poses.between import gls, negative_log_restricted_likelihood
 
 #: A way to the first rest, two rests with a way between, and a way after the last.
 REST = np.array([0] * 2 + [1] * 3 + [0] * 4 + [2] * 3 + [0] * 2)
@@ -89,10 +89,12 @@ def test_the_scatter_is_what_the_dense_likelihood_says() -> None:
     assert found.covariance(np.eye(3)) == pytest.approx(gls(jacobian, drawn, total)[1], rel=1e-6)
     assert np.all(found.freedom(np.eye(3)) < len(rest) - 3)
 
-    def unlikely(logs: NDArray[np.float64]) -> float:
-        return restricted_likelihood(jacobian, drawn, np.tensordot(np.exp(logs), parts, 1))
+    def negative_log_likelihood(logs: NDArray[np.float64]) -> float:
+        return negative_log_restricted_likelihood(jacobian, drawn, np.tensordot(np.exp(logs), parts, 1))
 
-    best = minimize(unlikely, np.log([1.0, 4.0, 6.0]), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-10})
+    best = minimize(
+        negative_log_likelihood, np.log([1.0, 4.0, 6.0]), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-10}
+    )
     assert found.variances == pytest.approx(np.exp(best.x), rel=0.01)
 
 

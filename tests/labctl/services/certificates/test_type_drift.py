@@ -141,12 +141,12 @@ def test_the_certificate_says_which_units_the_drift_is_of(store: Store) -> None:
     assert stated.drift_dps is not None
     assert stated.intervals == 0
     mean = stated.type.mean_per_year_dps * stated.years
-    assert stated.drift_dps == pytest.approx(half_width(stated.type.spread_dps, mean))
+    assert stated.drift_dps == pytest.approx(half_width(stated.type.expanded_about_mean_dps, mean))
     assert "The drift of this item is not known from calibrations of its own." in said
     assert f"the drift of 4 other units of model {MODEL} over 0.8 to 3.2 years" in said
     assert f"by {stated.type.mean_per_year_dps:.3g} °/s per year on average" in said
     largest = max(point.expanded_dps for point in found.results)
-    whole = half_width(float(np.hypot(largest, stated.type.spread_dps)), mean)
+    whole = half_width(float(np.hypot(largest, stated.type.expanded_about_mean_dps)), mean)
     assert conformity.expanded_dps == pytest.approx(whole)
     assert f"the largest U of the results is {whole:.3g} °/s" in said
     assert (
