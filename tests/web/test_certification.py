@@ -59,6 +59,7 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     expect(acts).to_contain_text("needed on the robot today")
 
 
+@pytest.mark.slow
 def test_a_change_that_predicts_no_better_is_shown_as_such(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

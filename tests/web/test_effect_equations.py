@@ -71,6 +71,7 @@ def test_the_page_of_an_effect_has_its_equation_and_the_meaning_of_its_shape(
     assert not findings(page)
 
 
+@pytest.mark.slow
 def test_a_suspect_and_an_effect_of_the_model_open_their_equation(service: Service, visit: Callable[..., Page]) -> None:
     made = service.post("/api/recordings/example", {"name": "osu-fog"})
     fit = {"recording": made["recording"], "model": "bias_scale"}

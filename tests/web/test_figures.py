@@ -50,6 +50,7 @@ def redness(colour: str) -> float:
     return red - blue
 
 
+@pytest.mark.slow
 def test_the_pictures_of_a_tri_axial_recording_are_true(
     service: Service, visit: Callable[..., Page], unit: str
 ) -> None:

@@ -111,6 +111,7 @@ def test_before_a_turn_only_the_static_bias_is_taken_off(three: tuple[TestClient
     assert all(row["turn_before_deg"] is None for row in rows if row["axis"] != row["position"])
 
 
+@pytest.mark.slow
 def test_another_recording_is_compared_with_the_version_as_it_is(
     client: TestClient, triaxial: Callable[[int], Any]
 ) -> None:
@@ -145,6 +146,7 @@ def test_a_version_that_is_not_there_is_said_so(three: tuple[TestClient, Recordi
     assert three[0].get(f"{PATH}/2/comparison").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_coefficient_has_one_value_in_criticism_preview_and_version(client: TestClient) -> None:
     recording = single_axis(5, saturation=-0.01)
     add_recording(client, recording)

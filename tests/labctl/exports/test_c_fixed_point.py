@@ -53,6 +53,7 @@ def test_the_tables_are_nearer_with_more_temperatures(mems: Calibration) -> None
     assert sizes[1] < 0.1 * sizes[0]
 
 
+@pytest.mark.slow
 def test_axes_whose_errors_do_not_add_up_are_refused(open_loops: Calibration) -> None:
     """A sum over the outputs would be wrong by 0.6 deg/s while three axes turn, and right while one does."""
     with pytest.raises(BadInput, match=r"while several axes turn model .* differs from this sum by up to 0\.6"):

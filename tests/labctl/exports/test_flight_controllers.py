@@ -57,6 +57,7 @@ def ardupilot_formula(text: str) -> Formula:
 FORMULAS = {"px4": px4_formula, "ardupilot": ardupilot_formula}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMULAS)
 @pytest.mark.parametrize("which", ["mems", "open_loops"])
 def test_the_controllers_formula_is_within_the_stated_bounds(

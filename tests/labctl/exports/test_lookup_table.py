@@ -31,6 +31,7 @@ def looked_up(text: str, axes: tuple[str, ...], raw: np.ndarray, warm: np.ndarra
     return rate
 
 
+@pytest.mark.slow
 def test_the_interpolation_error_is_within_the_stated_one(any_calibration: Calibration) -> None:
     text, _ = exported(any_calibration, "table-csv", outputs="15", temperatures="9")
     raw, warm = whole_range(any_calibration, temperatures=37)

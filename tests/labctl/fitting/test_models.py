@@ -72,6 +72,7 @@ def test_only_turning_about_y_moves_only_the_y_inputs(triaxial: Callable[[int], 
             assert rows[6][name] == pytest.approx(k[out, turning], abs=2e-6), name
 
 
+@pytest.mark.slow
 def test_coverage_of_k_and_b(triaxial: Callable[[int], object]) -> None:
     scores = []
     for seed in range(8):

@@ -198,6 +198,7 @@ def test_what_is_no_rate_vector_is_refused(rates: dict[str, float]) -> None:
         rate_vector_uncertainty(result.fitted, rates, 20.0, evidence=evidence, name="unit", bench=bench)
 
 
+@pytest.mark.slow
 def test_units_that_turn_about_any_axis_are_inside_u() -> None:
     """One unit of each plan; `python -m studies rate_vector_coverage` has 400."""
     found = [scores(number) for number in (0, 8, 5)]

@@ -56,6 +56,7 @@ def test_without_them_the_scale_factor_is_off_and_says_so_by_its_uncertainty(swe
     assert result.error.rms_dps > 100 * 0.02
 
 
+@pytest.mark.slow
 def test_windows_of_several_readings_give_the_same(swept: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
     one = fit(swept, None, [*PLAIN, "time_delay", "bandwidth"])
     monkeypatch.setattr("labctl.recording.motions.windows.MAX_WINDOWS", 3000)

@@ -53,6 +53,7 @@ def test_the_constant_is_found_exactly(k: float) -> None:
     assert set(result.fitted.axes["z"].names) == {"bias", "scale_factor", "k_squared"}
 
 
+@pytest.mark.slow
 def test_its_uncertainty_covers_the_truth() -> None:
     score = []
     for seed in range(20):

@@ -102,6 +102,7 @@ def test_imucal_finds_the_same_of_simulated_turns() -> None:
     assert np.all(np.abs(value / WORDS - imucal_matrix(taken, 100.0)) < u / WORDS)
 
 
+@pytest.mark.slow
 def test_coverage_of_two_standard_uncertainties() -> None:
     """Of 40 sets here; `python -m studies hand_turns` has 200 of each case."""
     found = [deviations(900 + k, 1.0, 1, 360.0) for k in range(40)]

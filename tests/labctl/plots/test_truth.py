@@ -157,6 +157,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, dict[
         return to_points(recording), client.get(f"{path}/1/comparison").json()
 
 
+@pytest.mark.slow
 def test_nine_panels_have_measured_dots_and_model_lines_redder_with_temperature(
     compared: tuple[Recording, dict[str, Any]],
 ) -> None:

@@ -55,6 +55,7 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
     assert dumps[0] != dumps[2]
 
 
+@pytest.mark.slow
 def test_a_triaxial_campaign_finds_the_unit_as_it_was_made(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     with open_store(location, write=True) as store:

@@ -136,6 +136,7 @@ def test_a_place_that_an_earlier_version_does_not_cover_is_not_known(store: Stor
     assert str(stability_of(store, SERIAL, add(store, later(1.0, 0.02)))).startswith(NOT_COMPARABLE)
 
 
+@pytest.mark.slow
 def test_about_any_axis_the_drift_of_a_misalignment_counts(tmp_path: Path) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         for years, angle in ((0.0, 0.0), (1.0, 1e-3)):

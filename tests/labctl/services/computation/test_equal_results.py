@@ -48,6 +48,7 @@ def kept(location: str) -> list[object]:
         return [*files, list_certifications(store, UNIT), trail]
 
 
+@pytest.mark.slow
 def test_answers_and_the_database_are_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_recording(RECORDING, tmp_path / "taken in", "parquet")
     here, there = str(tmp_path / "threads.sqlite"), str(tmp_path / "workers.sqlite")

@@ -29,6 +29,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
         yield opened
 
 
+@pytest.mark.slow
 def test_an_unexplained_residual_has_a_law_that_the_model_can_take(store: Store) -> None:
     (unit,) = store.units.all()
     found = criticise_unit(store, unit.serial, 1, None)

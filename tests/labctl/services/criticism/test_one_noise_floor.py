@@ -15,6 +15,7 @@ from tests.helpers.simulated_recordings import single_axis
 FOG = "FOG-0001"
 
 
+@pytest.mark.slow
 def test_every_place_shows_the_same_floor(tmp_path: Path) -> None:
     lab = Lab(tmp_path)
     write_recording(single_axis(1, scale_factor_odd=1e-6), tmp_path / "day", "parquet")

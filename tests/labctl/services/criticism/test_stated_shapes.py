@@ -37,6 +37,7 @@ def shape(answer: PreviewResponse) -> dict[str, float]:
     return answer.model.terms[-1]["parameters"]
 
 
+@pytest.mark.slow
 def test_the_best_shape_leaves_less_than_any_other_and_stated_again_leaves_the_same(store: Store) -> None:
     best = preview(store, "saturation")
     found = shape(best)["knee_dps"]

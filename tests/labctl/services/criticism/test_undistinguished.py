@@ -30,6 +30,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
         yield opened
 
 
+@pytest.mark.slow
 def test_an_adequate_version_names_what_would_explain_its_data_as_well(store: Store) -> None:
     before, after = criticise_unit(store, GYRO, 1, None), criticise_unit(store, GYRO, 2, None)
     assert (before.verdict, before.undistinguished) == ("ambiguous", [])
@@ -40,6 +41,7 @@ def test_an_adequate_version_names_what_would_explain_its_data_as_well(store: St
     assert after.text[1].startswith("These data do not show that the cause is sine_response")
 
 
+@pytest.mark.slow
 def test_a_version_with_both_is_not_asked_which_it_is(store: Store) -> None:
     improve_unit(store, GYRO, ImproveRequest(add=["scale_factor_odd", "sine_response"], version=1), AT)
     assert criticise_unit(store, GYRO, 3, None).undistinguished == []

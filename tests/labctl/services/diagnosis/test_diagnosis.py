@@ -158,6 +158,7 @@ def killed_after(number: int, location: str) -> bool:
     return os.waitstatus_to_exitcode(status) == 9
 
 
+@pytest.mark.slow
 def test_a_kill_after_any_write_leads_to_the_same_end(fitted: Path, tmp_path: Path) -> None:
     expected = _comparable(run(copied(fitted, tmp_path / "whole"), one_after_one))
     number = 0

@@ -45,6 +45,7 @@ def report(store: Store) -> FleetReportResponse:
     return fleet_report(store, FleetReportRequest(type="FOG-A"), NOW)
 
 
+@pytest.mark.slow
 def test_an_effect_that_hardly_a_unit_shows_is_named_for_the_type(store: Store, report: FleetReportResponse) -> None:
     (found,) = report.missing
     assert "scale_factor_odd" in found.effects

@@ -75,6 +75,7 @@ def test_the_second_campaign_on_a_bench_is_expected_to_take_what_the_first_took(
         assert (known.home_s, known.heating, known.cooling) == (earlier.home_s, None, None)  # another chamber now
 
 
+@pytest.mark.slow
 def test_a_plan_says_what_it_takes_from_earlier_campaigns_and_what_it_guesses(tmp_path: Path) -> None:
     path, recipe = tmp_path / "bench.toml", tmp_path / "recipe.toml"
     bench = slow_bench()

@@ -111,6 +111,7 @@ def test_what_one_axis_cannot_give_is_named_with_what_to_record(fog: Recording) 
     assert "table1-x-table2" in missing.record
 
 
+@pytest.mark.slow
 def test_the_model_of_yang_2018_stalls_and_criticism_names_the_nonlinearity() -> None:
     campaign = simulated_readings("yang-23-rates", "yang-paper-sim", sample_rate_hz=1.0)
     result = fit(to_points(campaign), "yang2018")

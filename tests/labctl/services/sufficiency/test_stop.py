@@ -160,6 +160,7 @@ def test_a_process_that_cannot_be_started_ends_no_campaign(store: Store, monkeyp
     monitor.close()
 
 
+@pytest.mark.slow
 def test_a_model_that_is_wrong_does_not_end_a_campaign_however_much_is_measured(tmp_path: Path) -> None:
     answer = run_once(tmp_path / "lab.sqlite", recipe(0.03, "weiss1995"))
     assert answer.state is CampaignState.DONE
