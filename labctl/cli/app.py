@@ -39,7 +39,7 @@ from labctl.cli.commands import (
     server,
     signing_key,
     standards,
-    trend,
+    units,
     wire_logs,
 )
 from labctl.cli.commands.documents import certificate, certificate_list, datasheet, reproduction, uncertainty
@@ -96,10 +96,10 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "diagnose": diagnosis.diagnose,
     "improve": criticism.improve,
     "ladder": criticism.ladder,
-    "trend": trend.trend,
+    "trend": units.trend,
     "reproduce": reproduction.reproduce,
     "datasheet": datasheet.datasheet,
-    "units": trend.units,
+    "units": units.units,
     "certify": calibrations.certify,
     "release": calibrations.release,
     "revoke": calibrations.revoke,

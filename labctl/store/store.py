@@ -23,10 +23,10 @@ from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.fetches import Fetches
 from labctl.store.repositories.fleet_jobs import FleetJobs
 from labctl.store.repositories.fleet_reports import FleetReports
+from labctl.store.repositories.imports import Imports
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import Leases
 from labctl.store.repositories.manifests import Manifests
-from labctl.store.repositories.recording_writer import Imports
 from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.releases import ReleaseRequests
 from labctl.store.repositories.replication import Replication

@@ -21,7 +21,7 @@ from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
 from labctl.store.repositories.drafts.marks import make_due
-from labctl.store.repositories.recording_writer import new_recording
+from labctl.store.repositories.imports import new_recording
 from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import changing, of_campaign, prepared_recordings

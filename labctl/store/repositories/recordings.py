@@ -22,7 +22,7 @@ from labctl.store.connection.database import Database
 from labctl.store.import_parts import WHOLE_TABLE, import_parts
 from labctl.store.paging import Page, PageRequest, rows_to_read
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
-from labctl.store.repositories.recording_writer import Imports
+from labctl.store.repositories.imports import Imports
 from labctl.store.repositories.records_by_name import records_of
 from labctl.store.repositories.sample_blocks import (
     blocks_of,

@@ -183,7 +183,8 @@ def sent_by_client(act: CampaignAct[Any]) -> str:
     if method is None:
         return f"Client has no method {act.name}"
     given = {name: SAMPLES.get(name, f"the {name}") for name in act.body.model_fields}
-    parameters = {"request": act.body.model_validate(given)} if act is RESUME else given
+    takes_request = "request" in signature(method).parameters
+    parameters = {"request": act.body.model_validate(given)} if takes_request else given
     if set(signature(method).parameters) != {"self", "campaign", *parameters}:
         return f"Client.{act.name} takes {', '.join(signature(method).parameters)}; its request has {', '.join(given)}"
     sent: list[httpx.Request] = []

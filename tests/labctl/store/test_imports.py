@@ -211,7 +211,7 @@ def test_a_kill_between_parts_leaves_nothing_that_is_seen(
 def test_what_is_left_is_discarded_in_short_transactions(location: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_store(location, write=True) as store:
         killed_import(store, monkeypatch, 12)
-        monkeypatch.setattr("labctl.store.repositories.recording_writer.MAX_ROWS", 100)
+        monkeypatch.setattr("labctl.store.repositories.imports.MAX_ROWS", 100)
         seen = Transactions(monkeypatch, store)
         assert store.imports.discard_unfinished() == 1
         assert store.imports.discard_unfinished() == 0
