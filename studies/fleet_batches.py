@@ -3,8 +3,8 @@
 The fleets are drawn with numpy alone: units that scatter by one spread in each of six coefficients, each calibrated
 with an uncertainty of 0.3 spreads, in batches of equal size on three benches. The first batch is shifted in one
 coefficient. The optimum is the power of Student's t for a batch that is known beforehand to be the only one that may
-differ, at the level that the number of groups and coefficients requires: noncentral t with the root of the
-noncentrality s^2 n (1 - n/N) / (1 + 0.3^2). `LABCTL_STUDY_FLEETS` is how many fleets each figure is of,
+differ, at the level that the number of groups and coefficients requires: noncentral F with the noncentrality
+s^2 n (1 - n/N) / (1 + 0.3^2). `LABCTL_STUDY_FLEETS` is how many fleets each figure is of,
 `LABCTL_STUDY_SEED` the seed.
 """
 
@@ -14,7 +14,7 @@ import os
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import chi2, nct, ncx2, t
+from scipy.stats import chi2, f, ncf, ncx2
 
 from labctl.fitting.fleet.group_effects import ALARM
 from labctl.fitting.fleet.population import Population, population_of
@@ -61,9 +61,8 @@ def others_named(found: Population) -> bool:
 def optimum(units: int, size: int, shift: float) -> float:
     """Return the power of the best test of one batch at the level of the whole type."""
     freedom = units - 2
-    limit = float(t.isf(_level(units, size) / 2.0, freedom))
-    root = shift * np.sqrt(size * (1.0 - size / units) / (1.0 + U**2))
-    return float(nct.sf(limit, freedom, root) + nct.cdf(-limit, freedom, root))
+    limit = float(f.isf(_level(units, size), 1, freedom))
+    return float(ncf.sf(limit, 1, freedom, shift**2 * size * (1.0 - size / units) / (1.0 + U**2)))
 
 
 def _level(units: int, size: int) -> float:
