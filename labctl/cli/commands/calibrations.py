@@ -45,6 +45,13 @@ def fit(
             "axis) or a calibration file.",
         ),
     ] = None,
+    type_prior: Annotated[
+        bool,
+        typer.Option(
+            "--type-prior",
+            help="Add what the other calibrated units of the unit's type say of its coefficients; the version says so.",
+        ),
+    ] = False,
     accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
     database: Database = None,
@@ -58,8 +65,9 @@ def fit(
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
     with one_clear_line():
         request = FitRequest(
-            recordings=recording_numbers(recording), model=model, effects=names, accept_warnings=accept_warnings
-        )
+            recordings=recording_numbers(recording), model=model, effects=names, type_prior=type_prior,
+            accept_warnings=accept_warnings,
+        )  # fmt: skip
         if fixed is not None:
             from labctl.services.fixed_coefficients import read_fixed
 
