@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ import pytest
 from labctl.answers.calibrations import FitRequest
 from labctl.answers.design import DesignRequest
 from labctl.calibration import read_calibration
+from labctl.cli.printing.calibrations import print_fit
+from labctl.cli.printing.design import print_design
 from labctl.errors import BadInput, NotEnoughData
 from labctl.services.calibrations.fitting import fit_unit, fitted_unit, one_version
 from labctl.services.design.design import design_campaign
@@ -26,7 +29,7 @@ NEW, OTHER = 50, 51
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
-    """Return a store with a calibrated type, and two units of it that are not fitted yet: a usual one and a wild one."""
+    """Return a store with a calibrated type, and two units of it that are not fitted: a usual one and a wild one."""
     with open_store(str(tmp_path_factory.mktemp("prior") / "lab.sqlite"), write=True) as opened:
         for number in range(MIN_UNITS):
             opened.recordings.add_import(unit_points(number), AT)
@@ -42,7 +45,9 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
         yield opened
 
 
-def test_a_fit_with_the_prior_of_its_type_is_more_certain_and_says_where_it_is_from(store: Store) -> None:
+def test_a_fit_with_the_prior_of_its_type_is_more_certain_and_says_where_it_is_from(
+    store: Store, capsys: pytest.CaptureFixture[str]
+) -> None:
     alone = fitted_unit(store, f"U{NEW:05d}", ALONE, AT).result.fitted.axes["x"]
     answer = fit_unit(store, f"U{NEW:05d}", WITH, AT)
     stated = answer.type_prior
@@ -61,6 +66,8 @@ def test_a_fit_with_the_prior_of_its_type_is_more_certain_and_says_where_it_is_f
     again = prior_of_type(store, "FOG-A", "bias_scale", [])
     assert again.prior.units == MIN_UNITS  # a version that was fitted with a prior is no evidence for the next one
     assert again.versions_hash == stated["versions_hash"]
+    print_fit(answer)
+    assert f"prior              {MIN_UNITS} other units of type FOG-A by bias_scale" in capsys.readouterr().out
 
 
 def test_a_unit_that_is_not_like_its_type_is_fitted_alone_and_says_so(store: Store) -> None:
@@ -81,7 +88,9 @@ def test_a_type_with_too_few_units_or_without_the_model_gives_no_prior(store: St
         prior_of_type(store, "", "bias_scale", [])
 
 
-def test_a_design_with_the_prior_takes_no_longer_and_its_recipe_is_fitted_with_it(store: Store) -> None:
+def test_a_design_with_the_prior_takes_no_longer_and_its_recipe_is_fitted_with_it(
+    store: Store, capsys: pytest.CaptureFixture[str]
+) -> None:
     asked = {"like": "ojeda2000", "model": "bias_scale", "u_dps": 0.01, "type_prior": "FOG-A"}
     answer = design_campaign(store, DesignRequest.model_validate(asked), load_bench("single-axis-sim"))
     prior = answer.type_prior
@@ -92,3 +101,7 @@ def test_a_design_with_the_prior_takes_no_longer_and_its_recipe_is_fitted_with_i
     rules = parse_recipe(answer.recipe_toml).fit
     assert rules is not None
     assert rules.type_prior
+    print_design(answer, Path("mine.toml"))
+    printed = " ".join(capsys.readouterr().out.split())
+    assert f"with the prior of {MIN_UNITS} units of type FOG-A by bias_scale: {answer.chosen.hours:.1f} h" in printed
+    assert f"without it {prior.without.hours:.1f} h" in printed
