@@ -179,7 +179,8 @@ class Levels:
 
 def _sums(at: NDArray[np.int64], total: int, weight: Array, columns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the weighted sums of columns (m, c) over each of `total` levels, (total, c)."""
-    return np.asarray(np.column_stack([np.bincount(at, weight * column, minlength=total) for column in columns.T]), dtype=np.float64)
+    sums = [np.bincount(at, weight * column, minlength=total) for column in columns.T]
+    return np.asarray(np.column_stack(sums), dtype=np.float64)
 
 
 def _far_centres(at: NDArray[np.int64], z: Array, total: int) -> Array:
