@@ -19,6 +19,22 @@ Override = Annotated[
     bool,
     typer.Option("--override", help="Certify although there are objections; the reason must then be a sentence."),
 ]
+FixedFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--fixed",
+        metavar="FILE",
+        help="Hold the coefficients in FILE at their values and fit the others; FILE is TOML (a table for each "
+        "axis) or a calibration file.",
+    ),
+]
+TypePrior = Annotated[
+    bool,
+    typer.Option(
+        "--type-prior",
+        help="Add what the other calibrated units of the unit's type say of its coefficients; the version says so.",
+    ),
+]
 
 
 def fit(
@@ -36,22 +52,8 @@ def fit(
             "polynomial order to 2.",
         ),
     ] = None,
-    fixed: Annotated[
-        Path | None,
-        typer.Option(
-            "--fixed",
-            metavar="FILE",
-            help="Hold the coefficients in FILE at their values and fit the others; FILE is TOML (a table for each "
-            "axis) or a calibration file.",
-        ),
-    ] = None,
-    type_prior: Annotated[
-        bool,
-        typer.Option(
-            "--type-prior",
-            help="Add what the other calibrated units of the unit's type say of its coefficients; the version says so.",
-        ),
-    ] = False,
+    fixed: FixedFile = None,
+    type_prior: TypePrior = False,
     accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
     database: Database = None,
