@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,6 +18,8 @@ from labctl.cli.printing.calibrations import print_fit
 from labctl.cli.printing.design import print_design
 from labctl.errors import BadInput, NotEnoughData
 from labctl.services.calibrations.fitting import fit_unit, fitted_unit, one_version
+from labctl.services.certificates.assembly import statements
+from labctl.services.certificates.facts import Facts
 from labctl.services.design.design import design_campaign
 from labctl.services.design.type_prior import MIN_UNITS, prior_of_type
 from labctl.services.planning.loading import load_bench
@@ -66,6 +70,9 @@ def test_a_fit_with_the_prior_of_its_type_is_more_certain_and_says_where_it_is_f
     again = prior_of_type(store, "FOG-A", "bias_scale", [])
     assert again.prior.units == MIN_UNITS  # a version that was fitted with a prior is no evidence for the next one
     assert again.versions_hash == stated["versions_hash"]
+    facts = SimpleNamespace(simulated=False, calibration=SimpleNamespace(document=document))
+    (said,) = [text for text in statements(cast(Facts, facts)) if "of type FOG-A" in text]
+    assert f"together with the calibrations of {MIN_UNITS} other units" in said
     print_fit(answer)
     assert f"prior              {MIN_UNITS} other units of type FOG-A by bias_scale" in capsys.readouterr().out
 
