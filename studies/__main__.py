@@ -10,6 +10,7 @@ STUDIES = (
     "use_coverage",
     "enough",
     "fleets",
+    "fleet_batches",
     "budget_coverage",
     "rate_vector_coverage",
     "indexing",

@@ -11,7 +11,7 @@ covariance; sizes are in spreads of the units.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
 import numpy as np
@@ -22,7 +22,8 @@ from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.design.predicted_uncertainty import K, derivative_at_points, predicted_uncertainty
 from labctl.fitting.estimation.axis_solutions import solve_axes
 from labctl.fitting.estimation.prior import CoefficientPrior
-from labctl.fitting.fleet.population import Population, population_of
+from labctl.fitting.fleet.directions import kind_of_coefficient
+from labctl.fitting.fleet.population import population_of
 from labctl.fitting.fleet.prior import fit_with_prior, prior_of
 from labctl.fitting.fleet.type_evidence import TypeCriticism, judged
 from labctl.fitting.fleet.type_sums import TypeSums
@@ -140,9 +141,9 @@ def _priors(fleets: int, seed: int) -> Iterator[str]:
     """Yield how many data sets a new unit needs with a prior, for the U of a campaign without one."""
     yield (
         f"| prior from {PRIOR_UNITS} units | data sets alone | U, mdeg/s | covered, % | data sets with it | ratio "
-        "| U, mdeg/s | covered, % | prior refused, % |"
+        "| U, mdeg/s | covered, % | covered by the exact prior, % | prior refused, % |"
     )
-    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     kinds = {
         "alike in all but the bias": ALIKE_BUT_BIAS, "alike in temperature": ALIKE_IN_TEMPERATURE,
         "different in all": DIFFERENT,
@@ -155,12 +156,15 @@ def _priors(fleets: int, seed: int) -> Iterator[str]:
             for i in range(fleets)
         ]
         campaign, u = smallest(prior_of(populations[0]), alone, full)
-        inside, places, refused = covered(populations, kind, campaign, seed)
-        inside_alone, _, _ = covered(populations, kind, full, seed, with_prior=False)
+        inside, places, refused = covered([prior_of(each) for each in populations], kind, campaign, seed)
+        exact = [exact_prior(kind, full.names)] * fleets
+        inside_exact, _, _ = covered(exact, kind, campaign, seed)
+        inside_alone, _, _ = covered([None] * fleets, kind, full, seed)
         n, few = len(full.sets), len(campaign.sets)
         yield (
             f"| {title} | {n} | {1e3 * alone:.3g} | {share(inside_alone, places)} | {few} | {few / n:.2f} "
-            f"| {1e3 * u:.3g} | {share(inside, places)} | {share(refused, fleets * NEW_UNITS)} |"
+            f"| {1e3 * u:.3g} | {share(inside, places)} | {share(inside_exact, places)} "
+            f"| {share(refused, fleets * NEW_UNITS)} |"
         )
 
 
@@ -174,25 +178,25 @@ def smallest(prior: CoefficientPrior, u_dps: float, full: Campaign) -> tuple[Cam
     return full, u_dps
 
 
+def exact_prior(kind: Mapping[str, tuple[float, float]], names: Sequence[str]) -> CoefficientPrior:
+    """Return the prior of a type whose mean and spread are known exactly."""
+    mean, spread = np.array([kind[kind_of_coefficient(name)] for name in names]).T
+    return CoefficientPrior(tuple(names), mean, np.diag(spread**2), PRIOR_UNITS, 25.0)
+
+
 def covered(
-    populations: list[Population],
-    kind: Mapping[str, tuple[float, float]],
-    campaign: Campaign,
-    seed: int,
-    *,
-    with_prior: bool = True,
+    priors: Sequence[CoefficientPrior | None], kind: Mapping[str, tuple[float, float]], campaign: Campaign, seed: int
 ) -> tuple[int, int, int]:
     """Return how many corrected rates of new units are within their U, of how many, and how many priors were refused.
 
     One place of the range of use is drawn for each axis of each unit.
     """
     inside = places = refused = 0
-    for i, population in enumerate(populations):
+    for i, prior in enumerate(priors):
         rng = np.random.default_rng([seed, 5, i])
-        prior = prior_of(population)
         for truth in truths(rng, kind, campaign.names, NEW_UNITS):
             data = campaign.measured(rng, truth)
-            if with_prior:
+            if prior is not None:
                 found = fit_with_prior(data, PRESET, prior)
                 fits, refused = found.fitted.axes, refused + (not found.is_used)
             else:

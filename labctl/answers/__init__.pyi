@@ -185,6 +185,7 @@ from labctl.answers.datasheet import (
 from labctl.answers.course import CourseResponse as CourseResponse
 from labctl.answers.design import (
     DesignBound as DesignBound,
+    DesignPrior as DesignPrior,
     DesignRequest as DesignRequest,
     DesignResponse as DesignResponse,
     DesignedCampaign as DesignedCampaign,
@@ -247,6 +248,7 @@ from labctl.answers.fitted_model import (
     TermJson as TermJson,
     ThermalFamilyJson as ThermalFamilyJson,
     ThermalHintJson as ThermalHintJson,
+    TypePriorJson as TypePriorJson,
     UsualRange as UsualRange,
     ValidityJson as ValidityJson,
 )

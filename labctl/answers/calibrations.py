@@ -36,6 +36,7 @@ from labctl.answers.fitted_model import (
     TemperatureBasisJson,
     TermJson,
     ThermalHintJson,
+    TypePriorJson,
     UsualRange,
 )
 from labctl.answers.fixed_coefficients import FixedCoefficients
@@ -76,6 +77,11 @@ class FitRequest(Request):
         default=None,
         description="Published or measured coefficients that are held at their values; the other coefficients of the "
         "model are fitted. Default: all are fitted.",
+    )
+    type_prior: bool = Field(
+        default=False,
+        description="Add what the other calibrated units of the unit's type say of its coefficients; the version "
+        "states it. At least 10 units of the type with this model are needed.",
     )
     accept_warnings: bool = Field(default=False, description=ACCEPT)
 
@@ -218,6 +224,11 @@ class FitResponse(FittedResponse):
     )
     bench: str | None = Field(
         default=None, description="Name of the bench of that campaign; null: the recording was imported."
+    )
+    type_prior: TypePriorJson | None = Field(
+        default=None,
+        description="What other calibrated units of the type contributed to the coefficients; null: nothing, the unit "
+        "was fitted alone.",
     )
     hash: CalibrationHash
 

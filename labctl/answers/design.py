@@ -48,6 +48,12 @@ class DesignRequest(Request):
         description="Serial numbers whose newest calibrations state the noise: of this unit, or of its type.",
     )  # fmt: skip
 
+    type_prior: str | None = Field(
+        default=None, min_length=1, max_length=200,
+        description="Type of units whose calibrations by the same model say what is expected of the coefficients: the "
+        "design counts with it, and the recipe is fitted with it. Null: without.",
+    )  # fmt: skip
+
     @model_validator(mode="after")
     def _asks_for_something(self) -> DesignRequest:
         if self.u_dps is None and self.hours is None:
@@ -80,6 +86,17 @@ class DesignedCampaign(ResponseModel):
     is_reaching: bool = Field(description="Whether it reaches the goal: U everywhere in the range, and the hours.")
 
 
+class DesignPrior(ResponseModel):
+    """What a design counts with of the type of a unit, and what it saves."""
+
+    type: str = Field(description="Type of the units: the model that their manufacturer gives them.")
+    model: str = Field(description="Error model of their calibrations.")
+    units: int = Field(description="Number of units that the prior is from.")
+    without: DesignedCampaign | None = Field(
+        description="The recipe that would be chosen for the same goal without the prior; null: none was found."
+    )
+
+
 class DesignBound(ResponseModel):
     """The least hours in which any recipe could reach the same U: by noise and by heat."""
 
@@ -106,6 +123,9 @@ class DesignResponse(ResponseModel):
     chosen: DesignedCampaign = Field(description="The chosen recipe.")
     recipe_toml: str = Field(description="The chosen recipe as a recipe file, TOML.")
     schedule_hash: str = Field(description="Hash of the steps of its plan on this bench.")
+    type_prior: DesignPrior | None = Field(
+        default=None, description="The prior of a type that U counts with; null: none was asked for."
+    )
     decisions: list[str] = Field(description="Each choice of the recipe with its reason, a sentence each.")
     others: list[DesignedCampaign] = Field(description="The next best recipes, shortest first.")
     reference: DesignedCampaign | None = Field(

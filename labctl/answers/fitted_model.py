@@ -267,6 +267,25 @@ class FitEnvironment(TypedDict):
     """Amplitude expected from the horizontal part of the Earth's rate, deg/s; absent: none was fitted."""
 
 
+class TypePriorJson(TypedDict):
+    """What other calibrated units of the type contributed to a fit."""
+
+    type: str
+    """Type of the units: the model that their manufacturer gives them."""
+    model: str
+    """Error model of their calibrations."""
+    units: int
+    """Number of units that the prior is from."""
+    left_out: int
+    """Units of the type that could not be compared."""
+    is_used: bool
+    """Whether the prior is in the coefficients; false: the unit contradicts its type and was fitted alone."""
+    p_value: float
+    """Probability of a larger difference between the unit and its type by chance."""
+    versions_hash: str
+    """SHA-256 over the sorted hashes of the calibrations that the prior is from."""
+
+
 class FitResultJson(TypedDict):
     """What a fit reports of its model."""
 

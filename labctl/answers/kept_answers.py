@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from typing import NotRequired
+
 from typing_extensions import TypedDict
 
-from labctl.answers.fitted_model import ErrorFiguresJson, FitResultJson, LeftOutEffect, ThermalHintJson, UsualRange
+from labctl.answers.fitted_model import (
+    ErrorFiguresJson,
+    FitResultJson,
+    LeftOutEffect,
+    ThermalHintJson,
+    TypePriorJson,
+    UsualRange,
+)
 from labctl.answers.json_object import JsonObject
 
 
@@ -52,6 +61,8 @@ class KeptFit(FitFigures, KeptVersion):
     """Name of the recipe of the campaign; null: no campaign."""
     bench: str | None
     """Name of the bench of the campaign; null: no campaign."""
+    type_prior: NotRequired[TypePriorJson]
+    """What other units of the type contributed; absent: the unit was fitted alone."""
 
 
 class KeptChange(ChangeFigures, KeptVersion):

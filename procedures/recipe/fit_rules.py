@@ -27,6 +27,7 @@ class FitRules(Table):
 
     model: ModelName | None = None  #: absent: the effects alone
     effects: tuple[ModelName, ...] = Field(default=(), max_length=50)  #: beside the model
+    type_prior: Yes = False  #: whether what other calibrated units of the unit's type say is added to the fit
     compare: tuple[ModelName, ...] = Field(default=(), max_length=MAX_COMPARED)  #: further models, fitted, not kept
     criticise: Yes = True  #: whether a verdict is made
     against: Yes = True  #: whether the version in force is applied without refitting, and its drift computed

@@ -19,6 +19,22 @@ Override = Annotated[
     bool,
     typer.Option("--override", help="Certify although there are objections; the reason must then be a sentence."),
 ]
+FixedFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--fixed",
+        metavar="FILE",
+        help="Hold the coefficients in FILE at their values and fit the others; FILE is TOML (a table for each "
+        "axis) or a calibration file.",
+    ),
+]
+TypePrior = Annotated[
+    bool,
+    typer.Option(
+        "--type-prior",
+        help="Add what the other calibrated units of the unit's type say of its coefficients; the version says so.",
+    ),
+]
 
 
 def fit(
@@ -36,15 +52,8 @@ def fit(
             "polynomial order to 2.",
         ),
     ] = None,
-    fixed: Annotated[
-        Path | None,
-        typer.Option(
-            "--fixed",
-            metavar="FILE",
-            help="Hold the coefficients in FILE at their values and fit the others; FILE is TOML (a table for each "
-            "axis) or a calibration file.",
-        ),
-    ] = None,
+    fixed: FixedFile = None,
+    type_prior: TypePrior = False,
     accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
     database: Database = None,
@@ -58,8 +67,9 @@ def fit(
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
     with one_clear_line():
         request = FitRequest(
-            recordings=recording_numbers(recording), model=model, effects=names, accept_warnings=accept_warnings
-        )
+            recordings=recording_numbers(recording), model=model, effects=names, type_prior=type_prior,
+            accept_warnings=accept_warnings,
+        )  # fmt: skip
         if fixed is not None:
             from labctl.services.fixed_coefficients import read_fixed
 

@@ -184,6 +184,16 @@ Prior = Annotated[
 ]
 
 
+TypePrior = Annotated[
+    str | None,
+    typer.Option(
+        "--type-prior",
+        metavar="TYPE",
+        help="Count with what the calibrated units of this type say of the coefficients; the recipe's fit does so too.",
+    ),
+]
+
+
 @app.command("design")
 def design(
     out: Annotated[Path, typer.Option("--out", metavar="RECIPE.toml", help="File for the recipe.")],
@@ -195,6 +205,7 @@ def design(
     rates: Rates = None,
     temperatures: Temperatures = None,
     prior: Prior = None,
+    type_prior: TypePrior = None,
     bench: BenchName = None,
     as_json: Json = False,
     database: Database = None,
@@ -212,6 +223,7 @@ def design(
 
     with one_clear_line():
         given: dict[str, Any] = {"model": model, "u_dps": u_dps, "hours": hours, "prior": prior or []}
+        given |= {"type_prior": type_prior}
         given |= {"like": None if like is None else own_text(like), "effects": names_in(effects)}
         given |= {"rates_dps": pair("--rates", rates), "temperatures_c": pair("--temperatures", temperatures)}
         request = DesignRequest.model_validate(given)

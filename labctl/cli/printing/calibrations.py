@@ -12,7 +12,7 @@ from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
 if TYPE_CHECKING:
     from labctl.answers.calibrations import FitResponse
-    from labctl.answers.fitted_model import Coefficients, Entry, HeldJson
+    from labctl.answers.fitted_model import Coefficients, Entry, HeldJson, TypePriorJson
     from labctl.answers.poses import PosesJson
 
 
@@ -34,6 +34,8 @@ def print_fit(answer: FitResponse) -> None:
     console.print(f"  valid              {warm}, {rates}")
     if answer.model.held is not None:
         _print_held(answer.model.held)
+    if answer.type_prior is not None:
+        _print_type_prior(answer.type_prior)
     print_joint(answer.joint)
     for axis, content in answer.axes.items():
         coefficients = content["coefficients"]
@@ -55,6 +57,17 @@ def print_fit(answer: FitResponse) -> None:
         console.print(rows)
     if answer.poses is not None:
         print_poses(answer.poses)
+
+
+def _print_type_prior(prior: TypePriorJson) -> None:
+    units = f"{prior['units']} other units of type {prior['type']} by {prior['model']}"
+    if prior["is_used"]:
+        console.print(f"  prior              {units} (p = {prior['p_value']:.2g})", soft_wrap=True)
+    else:
+        console.print(
+            f"  prior              not used: the unit is unlike {units} (p = {prior['p_value']:.1g})", style="yellow",
+            soft_wrap=True,
+        )  # fmt: skip
 
 
 def _print_held(held: HeldJson) -> None:

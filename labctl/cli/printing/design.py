@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from labctl.cli.output import console, format_number, print_heading, table
 
 if TYPE_CHECKING:
-    from labctl.answers.design import DesignBound, DesignedCampaign, DesignResponse
+    from labctl.answers.design import DesignBound, DesignedCampaign, DesignPrior, DesignResponse
 
 
 def print_design(answer: DesignResponse, out: Path) -> None:
@@ -22,6 +22,8 @@ def print_design(answer: DesignResponse, out: Path) -> None:
         "\nrecipes, U (k = 2) in deg/s", "", "recipe", "hours", "largest U", "rms U", "by heat", "data sets", numbers=5
     )
     listed = [("chosen", answer.chosen), *(("", each) for each in answer.others)]
+    if answer.type_prior is not None and answer.type_prior.without is not None:
+        listed.append(("without the prior", answer.type_prior.without))
     if answer.reference is not None:
         listed.append((answer.reference_name, answer.reference))
     for name, each in listed:
@@ -29,6 +31,8 @@ def print_design(answer: DesignResponse, out: Path) -> None:
     console.print(rows)
     if answer.reference_refused:
         console.print(f"  {answer.reference_name}: {answer.reference_refused}", style="yellow", soft_wrap=True)
+    if answer.type_prior is not None:
+        _print_type_prior(answer.type_prior, answer.chosen)
     if answer.bound is not None:
         _print_bound(answer.bound)
     if answer.standards_u_dps is not None:
@@ -39,6 +43,20 @@ def print_design(answer: DesignResponse, out: Path) -> None:
         )
     for assumption in answer.assumptions:
         console.print(f"  counted with: {assumption}", soft_wrap=True)
+
+
+def _print_type_prior(prior: DesignPrior, choice: DesignedCampaign) -> None:
+    without = prior.without
+    beside = "no recipe was found without it"
+    if without is not None:
+        reach = "" if without.is_reaching else ", which does not reach the goal"
+        beside = f"without it {without.hours:.1f} h for U = {format_number(without.u_worst_dps, 2)} deg/s{reach}"
+    console.print(
+        f"  with the prior of {prior.units} units of type {prior.type} by {prior.model}: {choice.hours:.1f} h for "
+        f"U = {format_number(choice.u_worst_dps, 2)} deg/s; {beside}. The recipe's fit uses the prior; `labctl fit "
+        "--type-prior` does the same",
+        soft_wrap=True,
+    )
 
 
 def _row(name: str, each: DesignedCampaign) -> tuple[str, ...]:

@@ -21,11 +21,12 @@ from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_design import TOLD_APART
-from labctl.fitting.estimation.axis_solutions import leaning, residuals, solve_axes
+from labctl.fitting.estimation.axis_solutions import AxisSolutions, leaning, residuals, solve_axes
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held import Fixed, refuse_fixed, with_held
 from labctl.fitting.estimation.joint import joint_findings
 from labctl.fitting.estimation.of_poses import of_poses
+from labctl.fitting.estimation.prior import CoefficientPrior
 from labctl.fitting.estimation.published.common import full_range_dps
 from labctl.fitting.estimation.published.tables import from_coefficients
 from labctl.fitting.estimation.requirements import require_enough_data
@@ -52,10 +53,12 @@ MIN_SETS, MAX_LEGS = 4, 12
 BEYOND_K = 1.0
 
 
-def errors_by_leg(data: FitData, preset: Preset, solutions: Mapping[str, Solution]) -> list[LegErrorJson]:
+def errors_by_leg(
+    data: FitData, preset: Preset, solutions: Mapping[str, Solution], prior: CoefficientPrior | None = None
+) -> list[LegErrorJson]:
     """Return the error of legs by fits to others; none where the temperature goes one way only.
 
-    The drift of each axis stays that of `solutions`, the fit to all data sets.
+    The drift of each axis stays that of `solutions`, the fit to all data sets; `prior` is in each fit.
     """
     if not data.channels.history.thermometer or "t_s" not in data.channels:
         return []
@@ -65,18 +68,18 @@ def errors_by_leg(data: FitData, preset: Preset, solutions: Mapping[str, Solutio
     if min(int(up.sum()), int(down.sum())) < MIN_SETS:
         return []
     leg_errors = [
-        _tested(data, preset, solutions, [(up, down)], ("heating", "cooling")),
-        _tested(data, preset, solutions, [(down, up)], ("cooling", "heating")),
+        _tested(data, preset, solutions, prior, [(up, down)], ("heating", "cooling")),
+        _tested(data, preset, solutions, prior, [(down, up)], ("cooling", "heating")),
     ]
     numbers, counts = np.unique(legs[legs != 0], return_counts=True)
     if 2 < len(numbers) <= MAX_LEGS and counts.min() >= MIN_SETS:
         pairs = [((legs != 0) & (legs != number), legs == number) for number in numbers]
-        leg_errors.append(_tested(data, preset, solutions, pairs, ("all legs but one", "each leg in turn")))
+        leg_errors.append(_tested(data, preset, solutions, prior, pairs, ("all legs but one", "each leg in turn")))
     return leg_errors
 
 
 def _tested(
-    data: FitData, preset: Preset, solutions: Mapping[str, Solution],
+    data: FitData, preset: Preset, solutions: Mapping[str, Solution], prior: CoefficientPrior | None,
     pairs: list[tuple[NDArray[np.bool_], NDArray[np.bool_]]], names: tuple[str, str],
 ) -> LegErrorJson:  # fmt: skip
     """Return the error of each second part of the data sets by a fit to the first, pooled."""
@@ -94,8 +97,7 @@ def _tested(
         try:
             model, rows = preset.build(data_used)
             training = data_used.take(rows)
-            require_enough_data(training, model)
-            solved = solve_axes(training, model, solutions)
+            solved = _solved(training, model, solutions, prior)
             residuals_dps = residuals(FittedModel(model, solved.fits), data_tested, solved.nuisance)
         except LabctlError as error:
             return _answer(names, None, 0, f"the {names[0]} alone does not determine the model: {error}")
@@ -161,10 +163,13 @@ def _at_rate(channels: Channels, rate_dps: float) -> Channels:
     return replace(channels, columns=columns, rates=dict.fromkeys(BODY_AXES, rate))
 
 
-def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solution]) -> dict[str, Array]:
+def held_out_errors(
+    data: FitData, preset: Preset, solutions: Mapping[str, Solution], prior: CoefficientPrior | None = None
+) -> dict[str, Array]:
     """Return axis -> (m,) deg/s, corrected minus true rate of each part left out in turn (`held_out_pairs`).
 
-    The drift of each axis stays that of `solutions`, the fit to all data sets. Empty where a fold leaves too little.
+    The drift of each axis stays that of `solutions`, the fit to all data sets; `prior` is in each fit. Empty where a
+    fold leaves too little.
     """
     pairs = data.held_out_pairs
     if preset.inner_only:
@@ -175,8 +180,7 @@ def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solut
             return {}
         try:
             model, rows = preset.build(data_used)
-            require_enough_data(data_used.take(rows), model)
-            solved = solve_axes(data_used.take(rows), model, solutions)
+            solved = _solved(data_used.take(rows), model, solutions, prior)
         except NotEnoughData:
             return {}
         try:
@@ -190,6 +194,15 @@ def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solut
         for axis, values in residuals_dps.items():
             errors[axis].append(values)
     return {axis: np.concatenate(parts) for axis, parts in errors.items() if parts}
+
+
+def _solved(
+    data: FitData, model: ErrorModel, solutions: Mapping[str, Solution] | None, prior: CoefficientPrior | None
+) -> AxisSolutions:
+    """Fit a model to data sets, which have to determine it where there is no prior. Raises NotEnoughData."""
+    if prior is None:
+        require_enough_data(data, model)
+    return solve_axes(data, model, solutions, prior)
 
 
 def fit(
@@ -213,22 +226,23 @@ def fit(
 
 
 @single_threaded
-def fit_preset(data: FitData, preset: Preset) -> FitResult:
+def fit_preset(data: FitData, preset: Preset, prior: CoefficientPrior | None = None) -> FitResult:
     """Fit a preset to data sets; its errors include those on temperatures left out of the fit.
+
+    `prior` is what is known of the coefficients beside the data, at the reference temperature of the preset.
 
     Raises NotEnoughData where the data sets do not determine the model, NotConverged where it cannot be inverted.
     """
     model, rows = preset.build(data)
     training = data.take(rows)
-    require_enough_data(training, model)
-    solved = solve_axes(training, model)
+    solved = _solved(training, model, None, prior)
     fitted = FittedModel(_with_shapes(model, solved.fits, data.channels.history), solved.fits)
     residual = residuals(fitted, data, solved.nuisance)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
     floor, leaned = data.noise_floor, leaning(data, solved.nuisance)
     error = ErrorFigures(
-        rms(raw), rms(residual), rms(held_out_errors(leaned, preset, solved.solutions)), floor.rms_dps, floor.source,
-        tuple(errors_by_leg(leaned, preset, solved.solutions)),
+        rms(raw), rms(residual), rms(held_out_errors(leaned, preset, solved.solutions, prior)), floor.rms_dps,
+        floor.source, tuple(errors_by_leg(leaned, preset, solved.solutions, prior)),
     )  # fmt: skip
     return FitResult(
         fitted,

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Reference
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.presets import Preset, Rows
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
@@ -65,6 +67,16 @@ class CoefficientPrior:
         chosen = spread[[list(names).index(name) for name in own.names]]
         rows = solve_triangular(factor, np.column_stack([chosen, own.mean]) / size[:, None], lower=True)
         return rows[:, :-1], rows[:, -1]
+
+
+def with_reference(preset: Preset, prior: CoefficientPrior) -> Preset:
+    """Return a preset whose models have the reference temperature that a prior holds for."""
+
+    def build(data: FitData) -> tuple[ErrorModel, Rows]:
+        model, rows = preset.build(data)
+        return prior.referred(model), rows
+
+    return replace(preset, build=build)
 
 
 def coefficient_names(model: ErrorModel, axis: str, owners: Sequence[str], names: Sequence[str]) -> list[str]:

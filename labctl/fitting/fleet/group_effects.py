@@ -3,7 +3,9 @@
 The levels of all factors compete as columns of one linear model; the one that explains most is added, and the others
 are judged beside it, until none is left that chance would not give. So a batch is not named for the bench that it was
 measured on, as long as other batches were measured there. The spread of the units is estimated without what a level
-explains, and a single unit counts no more than `CLIP` standard deviations.
+explains. A unit counts no more than `CLIP` standard deviations about the type, so that one unit that is far out makes
+no group; where nearly all units of a level lie together, far from the type, they count in full: that is a group, and
+not as many outliers.
 """
 
 from __future__ import annotations
@@ -22,14 +24,21 @@ from labctl.fitting.numeric.arrays import Array
 #: Probability that any group is named of a type without groups, over all coefficients and levels (Bonferroni): half of
 #: the 1 % that is stated, since few units may not be normally distributed.
 ALARM = 0.005
-#: Units of a level, and beside it, without which nothing is said of the level.
-MIN_UNITS = 3
+#: Units of a level without which nothing is said of it, and the same beside it; degrees of freedom of its test.
+MIN_UNITS, MIN_BESIDE, MIN_FREEDOM = 2, 3, 3
 #: Standard deviations that a unit counts for at most in a group (Huber 1964).
 CLIP = 3.0
+#: Share of the units of a level that are farther out than `CLIP` on one side, and share within `NEAR` of the way to
+#: their median (or `CLIP`) of it, from which on the level is out as a whole.
+OUT, TOGETHER, NEAR = 0.75, 0.65, 0.25
+#: Units of a level from which on it may be a group although its units are far from each other too.
+MIN_SCATTERED = 5
 #: Levels that explain a shift so nearly as well, in chi2, are not distinguished from the best one.
 NEAR_CHI2 = 9.0
 #: Levels named of one coefficient at most, and iterations of the robust fit.
 MAX_LEVELS, ITERATIONS = 12, 12
+#: Rounds in which the starting medians of the type and of its groups are found beside each other (Tukey 1977).
+POLISH = 4
 #: A column of which less than this share is left beside those that were found is one of them.
 DEPENDENT = 1e-6
 DATE = "date"
@@ -75,7 +84,7 @@ class _Tried:
 
     levels: tuple[Level, ...]
     gain: Array  #: chi2 that each explains
-    norm: Array  #: squared length of each column beside those that were found
+    left: Array  #: chi2 that is left beside it
 
 
 class Levels:
@@ -89,14 +98,14 @@ class Levels:
     @property
     def _has_dates(self) -> bool:
         years = self._table.years[np.isfinite(self._table.years)]
-        return len(np.unique(years)) > MIN_UNITS
+        return len(np.unique(years)) > MIN_FREEDOM
 
     def _enough(self) -> dict[str, tuple[NDArray[np.int64], int]]:
         """Return factor -> the levels with enough units in and beside them, and the number of all levels."""
         found = {}
         for factor, level in self._table.level.items():
             count = np.bincount(level[level >= 0], minlength=len(self._table.levels[factor]))
-            found[factor] = (np.flatnonzero((count >= MIN_UNITS) & (count.sum() - count >= MIN_UNITS)), len(count))
+            found[factor] = (np.flatnonzero((count >= MIN_UNITS) & (count.sum() - count >= MIN_BESIDE)), len(count))
         return found
 
     def column(self, level: Level) -> Array:
@@ -106,38 +115,103 @@ class Levels:
         number = self._table.levels[level.factor].index(level.level)
         return (self._table.level[level.factor] == number).astype(np.float64)
 
-    def tried(self, root: Array, left: Array, basis: NDArray[np.float64]) -> _Tried:
-        """Return what each level explains of a weighted residual `left` (n,) beside an orthonormal `basis` (n, q)."""
-        levels: list[Level] = []
-        gain: list[Array] = []
-        norm: list[Array] = []
-        whole = np.column_stack([left - basis @ (basis.T @ left), basis])
-        for factor, (numbers, total) in self._enough().items():
+    def tried(self, root: Array, counted: Array, basis: NDArray[np.float64], z: Array | None = None) -> _Tried:
+        """Return what each level explains of standardised residuals beside an orthonormal `basis` (n, q).
+
+        `counted` (n,) are the residuals as they count beside a level; with `z` (n,), as they are, the units of a level
+        that is far out as a whole count in full for it.
+        """
+        tried: list[Level] = []
+        gain, left = [np.zeros(0)], [np.zeros(0)]
+        for factor, (numbers, _) in self._enough().items():
             if not len(numbers):
                 continue
-            known = self._table.level[factor] >= 0
-            at, weight = self._table.level[factor][known], root[known]
-            size = np.bincount(at, weight**2, minlength=total)
-            share = size / size.sum()
-            inner = np.column_stack([np.bincount(at, weight * column, minlength=total) for column in whole[known].T])
-            inner = (inner - share[:, None] * inner.sum(axis=0))[numbers]
-            length = (size - size * share)[numbers]
-            levels += [Level(factor, self._table.levels[factor][number]) for number in numbers.tolist()]
-            _append(gain, norm, inner, length)
+            explained, rest = self._of_factor(factor, root, counted, basis, z)
+            tried += [Level(factor, self._table.levels[factor][number]) for number in numbers.tolist()]
+            gain.append(explained[numbers])
+            left.append(rest[numbers])
         if self._has_dates:
             known = np.isfinite(self._table.years)
             centred = np.where(known, self.dates - np.average(self.dates[known], weights=root[known] ** 2), 0.0) * root
-            levels.append(Level(DATE, ""))
-            _append(gain, norm, (centred @ whole)[None], np.array([centred @ centred]))
-        none = np.zeros(0)
-        return _Tried(tuple(levels), np.concatenate([none, *gain]), np.concatenate([none, *norm]))
+            beside = counted - basis @ (basis.T @ counted)
+            explained = _explained((centred @ np.column_stack([beside, basis]))[None], np.array([centred @ centred]))
+            tried.append(Level(DATE, ""))
+            gain.append(explained)
+            left.append(beside @ beside - explained)
+        return _Tried(tuple(tried), np.concatenate(gain), np.concatenate(left))
+
+    def _of_factor(
+        self, factor: str, root: Array, counted: Array, basis: NDArray[np.float64], z: Array | None
+    ) -> tuple[Array, Array]:
+        """Return the chi2 that each level of a factor explains, and what is left beside it."""
+        known, total = self._table.level[factor] >= 0, len(self._table.levels[factor])
+        at, weight, of_basis, own = self._table.level[factor][known], root[known], basis[known], counted[known]
+        along = basis.T @ counted
+        size = np.bincount(at, weight**2, minlength=total)
+        share = size / size.sum()
+        inner = _sums(at, total, weight, np.column_stack([own - of_basis @ along, of_basis]))
+        inner -= share[:, None] * inner.sum(axis=0)
+        squares, within = np.full(total, counted @ counted), np.full(total, np.inf)
+        added = np.zeros(inner.shape)
+        is_group = np.ones(total, dtype=bool)
+        if z is not None and np.any(centre := _far_centres(at, z[known], total)):
+            is_group = np.isfinite(centre)
+            centre = np.where(is_group, centre, 0.0)
+            more = _in_full(z[known], centre[at]) - own
+            added = _sums(at, total, more, np.column_stack([weight, of_basis]))
+            inner[:, 0] += (1.0 - share) * added[:, 0] - np.sum(inner[:, 1:] * added[:, 1:], axis=1)
+            squares = squares + np.bincount(at, more * (more + 2.0 * own), minlength=total)
+            beside = np.clip(z[known] - centre[at], -CLIP, CLIP) ** 2 - own**2
+            within = np.where(centre != 0.0, counted @ counted + np.bincount(at, beside, minlength=total), np.inf)
+        explained = np.where(is_group, _explained(inner, size * (1.0 - share)), 0.0)
+        return explained, np.minimum(squares - np.sum((along + added[:, 1:]) ** 2, axis=1) - explained, within)
+
+    def in_full(self, z: Array, level: Level) -> Array:
+        """Return z (n,) as it counts where a level is judged: clipped, but for the level if it is far out as one."""
+        clipped = np.clip(z, -CLIP, CLIP)
+        if level.factor == DATE:
+            return clipped
+        own = self.column(level) > 0
+        centre = _far_centres(np.zeros(int(own.sum()), dtype=np.int64), z[own], 1)
+        clipped[own] = _in_full(z[own], centre[0])
+        return clipped
 
 
-def _append(gain: list[Array], norm: list[Array], inner: NDArray[np.float64], length: Array) -> None:
+def _sums(at: NDArray[np.int64], total: int, weight: Array, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the weighted sums of columns (m, c) over each of `total` levels, (total, c)."""
+    sums = [np.bincount(at, weight * column, minlength=total) for column in columns.T]
+    return np.asarray(np.column_stack(sums), dtype=np.float64)
+
+
+def _far_centres(at: NDArray[np.int64], z: Array, total: int) -> Array:
+    """Return the median of each level of which nearly all units lie together farther out than `CLIP`, (total,); else 0.
+
+    A few of its units may be far from the others: that they are outliers is found beside the shift of the level. NaN
+    where all of its few units are far out and far from each other: they are outliers, and no group.
+    """
+    centre = np.zeros(total)
+    count = np.bincount(at, minlength=total)
+    out = np.maximum(np.bincount(at, z > CLIP, minlength=total), np.bincount(at, z < -CLIP, minlength=total))
+    for number in np.flatnonzero((out >= OUT * count) & (count >= MIN_UNITS)).tolist():
+        own = z[at == number]
+        middle = float(np.median(own))
+        if np.mean(np.abs(own - middle) <= max(CLIP, NEAR * abs(middle))) >= TOGETHER:
+            centre[number] = middle
+        elif len(own) < MIN_SCATTERED:
+            centre[number] = np.nan
+    return centre
+
+
+def _in_full(z: Array, centre: Array | float) -> Array:
+    """Return z clipped to what lies between the type and a centre, and `CLIP` beyond both."""
+    return np.asarray(np.clip(z, np.minimum(centre, 0.0) - CLIP, np.maximum(centre, 0.0) + CLIP))
+
+
+def _explained(inner: NDArray[np.float64], length: Array) -> Array:
+    """Return the chi2 that columns explain, (c,), by their products (c, 1 + q) with the residual and with the basis."""
     left = length - np.sum(inner[:, 1:] ** 2, axis=1)
     is_new = left > DEPENDENT * np.maximum(length, 1e-300)
-    norm.append(np.where(is_new, left, 0.0))
-    gain.append(np.where(is_new, inner[:, 0] ** 2 / np.where(is_new, left, 1.0), 0.0))
+    return np.where(is_new, inner[:, 0] ** 2 / np.where(is_new, left, 1.0), 0.0)
 
 
 def select_shifts(y: Array, variance: Array, levels: Levels, tests: int, offset: Mapping[Level, Array]) -> RobustFit:
@@ -164,7 +238,7 @@ def robust_fit(y: Array, variance: Array, columns: NDArray[np.float64]) -> tuple
 
     A unit counts at most `CLIP` deviations, and beyond `GONE` nothing at all (Hampel 1974).
     """
-    fitted = np.full(len(y), np.median(y))
+    fitted = _medians(y, columns)
     tau = _robust_spread(y - fitted, variance)
     for _ in range(ITERATIONS):
         size = np.sqrt(variance + tau**2)
@@ -177,6 +251,21 @@ def robust_fit(y: Array, variance: Array, columns: NDArray[np.float64]) -> tuple
         if is_close:
             break
     return fitted, tau
+
+
+def _medians(y: Array, columns: NDArray[np.float64]) -> Array:
+    """Return the median of the type, and of each group beside it, for each value of y (n,): where a fit starts.
+
+    From the median of all units a group that is far out would be given no weight, and its shift would stay 0.
+    """
+    groups = [column > 0 for column in columns.T[1:] if np.all((column == 0.0) | (column == 1.0))]
+    none = ~np.any(groups, axis=0) if groups else np.ones(len(y), dtype=bool)
+    base = none if np.any(none) else np.ones(len(y), dtype=bool)
+    fitted = np.full(len(y), np.median(y[base]))
+    for _ in range(POLISH if groups else 0):
+        for group in groups:
+            fitted[group] += np.median((y - fitted)[group])
+    return fitted
 
 
 def _robust_spread(residual: Array, variance: Array) -> float:
@@ -197,21 +286,21 @@ def _strongest(
 ) -> Shift | None:
     """Return the level that explains most of a residual (n,); None where chance would explain as much."""
     root = 1.0 / np.sqrt(variance + tau**2)
-    left = np.clip(residual * root, -CLIP, CLIP)
+    z = residual * root
     basis, _ = np.linalg.qr(columns * root[:, None])
-    tried = levels.tried(root, left, basis)
+    tried = levels.tried(root, np.clip(z, -CLIP, CLIP), basis, z)
     freedom = len(residual) - columns.shape[1] - 1
-    if not len(tried.gain) or freedom < MIN_UNITS:
+    if not len(tried.gain) or freedom < MIN_FREEDOM:
         return None
     best = int(np.argmax(tried.gain))
-    chi2 = float(left @ left - np.sum((basis.T @ left) ** 2))
     known = float(np.mean(variance * root**2))  # the part that the units' own uncertainties explain is not estimated
-    scale = max((chi2 - float(tried.gain[best])) / freedom, known, 1e-12)
+    scale = max(float(tried.left[best]) / freedom, known, 1e-12)
     t = float(np.sqrt(tried.gain[best] / scale))
     p_value = min(1.0, tests * 2.0 * float(stdtr(freedom, -t)))
     if p_value > ALARM:
         return None
-    near = np.flatnonzero(tried.gain > tried.gain[best] - NEAR_CHI2 * scale)
+    beside = levels.tried(root, levels.in_full(z, tried.levels[best]), basis)
+    near = np.flatnonzero(beside.gain > tried.gain[best] - NEAR_CHI2 * scale)
     same_as = tuple(tried.levels[i] for i in near.tolist() if i != best)
     return Shift(tried.levels[best], t, p_value, same_as)
 

@@ -10,18 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from labctl.errors import BadInput
+from labctl.fitting.data.channels import Argument
+from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth import turning_size_dps
-from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.shifts import KINDS
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.axis_solutions import prior_rows, solve_axes
-from labctl.fitting.estimation.prior import CoefficientPrior
+from labctl.fitting.estimation.fit import fit_preset
+from labctl.fitting.estimation.prior import CoefficientPrior, with_reference
+from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.fleet.population import Population
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import FittedModel
-from labctl.fitting.models.presets import Preset
+from labctl.fitting.models.presets import POSES, Preset, preset_for
 from labctl.fitting.numeric.arrays import Array, block_diagonal
 from labctl.fitting.numeric.least_squares import solve
+from labctl.fitting.uncertainty.use import AxisEvidence, use_evidence
+from labctl.recording import Recording
 
 #: A prior that contradicts the data at this level, over all axes, is not used: the unit is not like its type.
 CONFLICT_LEVEL = 1e-3
@@ -41,6 +49,16 @@ class FitWithPrior:
     units: int  #: of the type that the prior is from
 
 
+@dataclass(frozen=True)
+class ResultWithPrior:
+    """The whole result of a fit to a recording and a prior."""
+
+    result: FitResult
+    evidence: Mapping[str, AxisEvidence]  #: axis -> what the recording shows of the errors in use
+    is_used: bool  #: whether the prior is in it
+    p_value: float  #: of a larger contradiction between prior and data by chance, over all axes
+
+
 def prior_of(
     population: Population, groups: Mapping[str, str | None] | None = None, on: datetime | None = None
 ) -> CoefficientPrior:
@@ -53,8 +71,9 @@ def prior_of(
     covariance = population.estimate.correlation * np.outer(stretch, stretch) + np.diag(u_mean**2)
     units = min((each.units for each in population.coefficients), default=0)
     return CoefficientPrior(
-        population.names, population.expected(groups or {}, on, with_bench=False), covariance, units
-    )
+        population.names, population.expected(groups or {}, on, with_bench=False), covariance, units,
+        population.table.reference_temperature_c,
+    )  # fmt: skip
 
 
 def fit_with_prior(data: FitData, preset: Preset, prior: CoefficientPrior) -> FitWithPrior:
@@ -71,6 +90,40 @@ def fit_with_prior(data: FitData, preset: Preset, prior: CoefficientPrior) -> Fi
     is_used = p_value >= CONFLICT_LEVEL
     solved = solve_axes(used, model, prior=prior if is_used else None)
     return FitWithPrior(FittedModel(model, solved.fits), is_used, p_value, prior.units)
+
+
+def fit_recording_with_prior(
+    recording: Recording, model: str | None, effects: list[str], prior: CoefficientPrior, argument: Argument,
+    *, covered: Covered | None = None,
+) -> ResultWithPrior:  # fmt: skip
+    """Fit a preset, or effects, to a recording and a prior; without the prior where the data contradict it.
+
+    `argument` is what the law is of whose coefficients the prior is of. Raises what `fit` raises, and BadInput for a
+    recording or a model that the prior does not fit.
+    """
+    preset = preset_for(model, effects)
+    if recording.info.motion == "poses" or recording.info.kind == "coefficients" or preset.name == POSES:
+        raise BadInput(
+            f"{recording.info.serial}: a prior of the type is for data sets at rates; leave the prior out for poses "
+            "and for a table of coefficients"
+        )
+    data = fit_data_of(recording, covered)
+    preset = with_shapes(data, preset)
+    of_prior = with_reference(preset, prior)
+    error_model, kept = of_prior.build(data)
+    if error_model.argument != argument or not any(prior.known(axis) for axis in data.outputs):
+        raise BadInput(
+            f"{recording.info.serial}: the calibrated units of the type state no coefficient of model "
+            f"{error_model.name} of the {error_model.argument}; calibrate units of the type with this model, or leave "
+            "the prior out"
+        )
+    used = data.take(kept)
+    levels = [contradiction(used, error_model, axis, prior) for axis in used.outputs]
+    p_value = min(1.0, len(levels) * min(levels))
+    is_used = p_value >= CONFLICT_LEVEL
+    result = fit_preset(data, of_prior, prior) if is_used else fit_preset(data, preset)
+    evidence = use_evidence(data, of_prior, prior=prior) if is_used else use_evidence(data, preset)
+    return ResultWithPrior(result, evidence, is_used, p_value)
 
 
 def contradiction(data: FitData, model: ErrorModel, axis: str, prior: CoefficientPrior) -> float:

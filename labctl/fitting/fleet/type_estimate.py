@@ -11,7 +11,7 @@ from scipy.special import chdtrc, stdtr, stdtrit
 
 from labctl.fitting.fleet.directions import Direction, directions_of
 from labctl.fitting.fleet.findings import CoefficientPopulation, GroupEffect, GroupSpread, OutlierUnit
-from labctl.fitting.fleet.group_effects import DATE, Levels, RobustFit, Shift, heterogeneity, select_shifts
+from labctl.fitting.fleet.group_effects import DATE, Levels, RobustFit, Shift, heterogeneity, robust_fit, select_shifts
 from labctl.fitting.fleet.spread import Spread, reml, weighted_fit
 from labctl.fitting.fleet.unit_coefficients import UnitTable
 from labctl.fitting.numeric.arrays import Array
@@ -102,10 +102,10 @@ def _are_alike(table: UnitTable, direction: Direction, column: Array) -> bool:
     columns = np.column_stack([np.ones(len(column)), column])
     values, variance = [], []
     for k in direction.places:
-        centred = table.values[:, k] - np.median(table.values[:, k])
-        tau = 1.4826 * float(np.median(np.abs(centred)))
-        size = np.sqrt(table.variance[:, k] + max(tau, 1e-300) ** 2)
-        fit, covariance, _ = weighted_fit(np.clip(centred, -6.0 * size, 6.0 * size), size**2, columns)
+        fitted, tau = robust_fit(table.values[:, k], table.variance[:, k], columns)
+        size = np.sqrt(table.variance[:, k] + tau**2)
+        clipped = fitted + np.clip(table.values[:, k] - fitted, -6.0 * size, 6.0 * size)
+        fit, covariance, _ = weighted_fit(clipped, size**2, columns)
         values.append(fit[1])
         variance.append(covariance[1, 1])
     weight = 1.0 / np.array(variance)

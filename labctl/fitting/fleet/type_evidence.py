@@ -1,9 +1,11 @@
 """Which effects a type is missing: the evidence of all of its units together, where no single unit shows any.
 
 Each shape of each effect may have a size that all units share, sizes that differ about 0 (the sign is each unit's own),
-or both; a Bayes factor with unit-information priors weighs them against nothing. Effects are compared as in the
-criticism of one unit: over shapes and axes, then those that cannot be distinguished are one group. What the leader and
-all of its shapes explain is taken off before the next effect is looked for.
+or both; a Bayes factor with unit-information priors weighs them against nothing. The likelihood is that of all
+estimates of all units, with the sizes integrated out: what the sizes of a shape differ by adds to the scatter in the
+directions of this shape alone, while noise that is larger than stated adds to it in all directions. Effects are
+compared as in the criticism of one unit: over shapes and axes, then those that cannot be distinguished are one group.
+What the leader and all of its shapes explain is taken off before the next effect is looked for.
 """
 
 from __future__ import annotations
@@ -16,6 +18,14 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from labctl.fitting.criticism import CandidateEstimates
+from labctl.fitting.fleet.shape_evidence import (
+    MIN_REMAINING,
+    ShapeEvidence,
+    common_evidence,
+    common_size,
+    evidence_of,
+    noise_scale,
+)
 from labctl.fitting.fleet.type_sums import AxisSums, TypeSums
 from labctl.fitting.numeric.arrays import Array
 
@@ -30,8 +40,6 @@ INDISTINGUISHABLE_CHI2, ALIKE = 7.0, 0.95
 MIN_NEXT_SHARE = 0.1
 #: Effects named at most, and units without which nothing is.
 MAX_EFFECTS, MIN_UNITS = 4, 5
-#: A direction that is left with less than this share beside what was found is taken as found.
-MIN_REMAINING = 1e-4
 #: An effect is a bench's where the others show none of it, and it differs from theirs, at this level.
 BENCH_LEVEL = 1e-3
 
@@ -105,20 +113,6 @@ class TypeCriticism:
 
 
 @dataclass(frozen=True)
-class _Evidence:
-    """Log Bayes factors of the shapes of one axis, nats, (S,) each."""
-
-    common: Array
-    varied: Array
-    gain: Array  #: chi2 that a common size takes off
-
-    @property
-    def log_bf(self) -> Array:
-        """Averaged over both."""
-        return np.asarray(np.logaddexp(self.common, self.varied) - np.log(2.0))
-
-
-@dataclass(frozen=True)
 class _Candidate:
     """An effect over all axes."""
 
@@ -148,8 +142,9 @@ def judged(sums: TypeSums) -> TypeCriticism:
             sums.units, (), (), 1.0, f"{sums.units} units are too few; criticise at least {MIN_UNITS} units of the type"
         )
     axes = sums.total()
-    ratio = _noise_ratio(axes)
-    first = candidates = _candidates(axes, ratio, common_only=False)
+    evidence = {axis: evidence_of(each) for axis, each in axes.items()}
+    first = candidates = _candidates(axes, evidence)
+    noise = {axis: float(noise_scale(each.whole, each.all_directions)) ** 0.5 for axis, each in axes.items()}
     named: list[TypeEffect] = []
     lead_gain = 0.0
     left = axes
@@ -158,13 +153,17 @@ def judged(sums: TypeSums) -> TypeCriticism:
         enough = ENOUGH if not named else ENOUGH_NEXT
         if leader.log_bf < enough or leader.gain < MIN_NEXT_SHARE * lead_gain:
             break
+        if not named:
+            noise |= {axis: float(evidence[axis].noise[shape]) for axis, shape in leader.best.items()}
         lead_gain = lead_gain or leader.gain
-        named.append(_type_effect(sums, left, candidates, ratio))
+        named.append(_type_effect(sums, left, evidence, candidates, noise))
         left = {axis: _without(each, named[-1].group) for axis, each in left.items()}
-        candidates = _candidates(left, ratio, common_only=True)
+        evidence = {axis: common_evidence(each, noise[axis]) for axis, each in left.items()}
+        candidates = _candidates(left, evidence)
     return TypeCriticism(
         sums.units, tuple(named),
-        tuple(CandidateEvidence(c.effect, c.log_bf, _units_of(axes, c)) for c in first), ratio,
+        tuple(CandidateEvidence(c.effect, c.log_bf, _units_of(axes, c)) for c in first),
+        max(noise.values(), default=1.0),
     )  # fmt: skip
 
 
@@ -172,59 +171,8 @@ def _units_of(axes: Mapping[str, AxisSums], candidate: _Candidate) -> int:
     return int(max(axes[axis].units[shape] for axis, shape in candidate.best.items()))
 
 
-def _noise_ratio(axes: Mapping[str, AxisSums]) -> float:
-    """Return by how much estimates scatter more than they should: the median over all shapes, at least 1."""
-    ratios = [
-        (sums.squares - _gains(sums)) / np.maximum((sums.units - 1) * sums.directions, 1.0) for sums in axes.values()
-    ]
-    every = np.concatenate([np.ones(0), *ratios])
-    return float(np.sqrt(max(float(np.median(every)), 1.0))) if len(every) else 1.0
-
-
-def _gains(sums: AxisSums) -> Array:
-    """Return the chi2 that a common size of each shape takes off, (S,)."""
-    return np.array([_solved(sums, shape)[1] for shape in range(len(sums.shapes))])
-
-
-def _solved(sums: AxisSums, shape: int) -> tuple[Array, float, int]:
-    """Return the common size of a shape (k,), the chi2 that it takes off, and its directions."""
-    own = sums.slice_of(shape)
-    block, product = sums.information[own, own], sums.products[own]
-    size = np.sqrt(np.maximum(np.diag(block), 1e-300))
-    values, vectors = np.linalg.eigh(block / np.outer(size, size))
-    kept = values > MIN_REMAINING
-    inner = vectors[:, kept].T @ (product / size)
-    return vectors[:, kept] @ (inner / values[kept]) / size, float(np.sum(inner**2 / values[kept])), int(kept.sum())
-
-
-def _evidence(sums: AxisSums, ratio: float, *, common_only: bool) -> _Evidence:
-    """Return the evidence for each shape of one axis."""
-    solved = [_solved(sums, shape) for shape in range(len(sums.shapes))]
-    gain = np.array([each[1] for each in solved]) / ratio**2
-    k = np.array([each[2] for each in solved], dtype=np.float64)
-    n = np.maximum(sums.units, 1.0)
-    penalty = 0.5 * np.log1p(n)
-    common = np.where(k > 0, 0.5 * gain * n / (1 + n) - k * penalty, -np.inf)
-    if common_only:
-        return _Evidence(common, np.full(len(k), -np.inf), gain)
-    squares, many = sums.squares / ratio**2, n * np.maximum(sums.directions, 1.0)
-    about_zero = _of_spread(squares, many) - penalty
-    about_mean = _of_spread(squares - gain, np.maximum(many - k, 1.0)) - penalty
-    scale = np.maximum((squares - gain) / np.maximum(many - k, 1.0), 1.0)
-    with_mean = about_mean + 0.5 * gain / scale * n / (1 + n) - k * penalty
-    varied = np.where(k > 0, np.logaddexp(about_zero, with_mean) - np.log(2.0), -np.inf)
-    return _Evidence(common, varied, gain)
-
-
-def _of_spread(squares: Array, freedom: Array) -> Array:
-    """Return the largest log likelihood ratio, nats, of estimates that scatter more than their uncertainties."""
-    ratio = np.maximum(squares / freedom, 1.0)
-    return np.asarray(0.5 * freedom * (ratio - 1.0 - np.log(ratio)))
-
-
-def _candidates(axes: Mapping[str, AxisSums], ratio: float, *, common_only: bool) -> list[_Candidate]:
+def _candidates(axes: Mapping[str, AxisSums], evidence: Mapping[str, ShapeEvidence]) -> list[_Candidate]:
     """Return every effect over its shapes and axes, the likeliest first: on all of its axes, or on one of them."""
-    evidence = {axis: _evidence(sums, ratio, common_only=common_only) for axis, sums in axes.items()}
     effects = dict.fromkeys(shape.effect for sums in axes.values() for shape in sums.shapes)
     found = []
     for effect in effects:
@@ -251,26 +199,23 @@ def _over_axes(per_axis: Sequence[float]) -> float:
 
 
 def _type_effect(
-    sums: TypeSums, axes: Mapping[str, AxisSums], candidates: Sequence[_Candidate], ratio: float
+    sums: TypeSums,
+    axes: Mapping[str, AxisSums],
+    evidence: Mapping[str, ShapeEvidence],
+    candidates: Sequence[_Candidate],
+    noise: Mapping[str, float],
 ) -> TypeEffect:
     """Return the leader with all that cannot be distinguished from it, and its sizes."""
     leader = candidates[0]
     group = (leader.effect, *(r.effect for r in candidates[1:] if _is_alike(axes, leader, r)))
-    evidence = {axis: _evidence(each, ratio, common_only=False) for axis, each in axes.items()}
     shown = tuple(a for a, i in leader.best.items() if evidence[a].log_bf[i] >= LEAD) or tuple(leader.best)
     strongest = max(shown, key=lambda a: evidence[a].log_bf[leader.best[a]])
     place = leader.best[strongest]
-    sizes = tuple(size for axis in shown for size in _sizes(axes[axis], axis, leader.best[axis], ratio))
-    common = sum(evidence[a].common[leader.best[a]] for a in shown)
-    about = sum(
-        float(_of_spread(
-            axes[a].squares[[leader.best[a]]] / ratio**2,
-            axes[a].units[[leader.best[a]]] * np.maximum(axes[a].directions[[leader.best[a]]], 1.0),
-        )[0])
-        for a in shown
-    )  # fmt: skip
+    sizes = tuple(size for axis in shown for size in _sizes(axes[axis], axis, leader.best[axis], noise[axis]))
+    common = sum(float(evidence[a].common[leader.best[a]]) for a in shown)
+    about = sum(float(evidence[a].about_zero[leader.best[a]]) for a in shown)
     n = axes[strongest].units[place] * max(axes[strongest].directions[place], 1.0)
-    benches, of_bench = _by_bench(sums, strongest, axes[strongest].shapes[place].key, ratio)
+    benches, of_bench = _by_bench(sums, strongest, axes[strongest].shapes[place].key, noise[strongest])
     return TypeEffect(
         group, axes[strongest].shapes[place].shape, leader.log_bf, sizes,
         bool(common >= about or max(abs(size.z) for size in sizes) > LEAD), shown,
@@ -281,7 +226,7 @@ def _type_effect(
 def _sizes(sums: AxisSums, axis: str, shape: int, ratio: float) -> list[MeanSize]:
     """Return mean and spread of the coefficients of a shape (DerSimonian and Laird 1986)."""
     own = sums.slice_of(shape)
-    values, gain, directions = _solved(sums, shape)
+    values, gain, directions = common_size(sums, shape)
     weight = np.maximum(np.diag(sums.information)[own], 1e-300)
     squared = sums.squared_weights[own]
     freedom = max(sums.units[shape] * max(sums.directions[shape], 1.0) - directions, 1.0)
@@ -308,7 +253,7 @@ def _is_alike(axes: Mapping[str, AxisSums], leader: _Candidate, rival: _Candidat
         return False
     part = whole = 0.0
     for axis, shape in leader.best.items():
-        values, gain, _ = _solved(axes[axis], shape)
+        values, gain, _ = common_size(axes[axis], shape)
         whole += gain
         if axis in rival.best:
             part += _reproduced(axes[axis], shape, values, rival.best[axis])
@@ -364,7 +309,7 @@ def _taken(sums: AxisSums, keep: Sequence[int], information: NDArray[np.float64]
     return AxisSums(
         shapes, {shape.key: i for i, shape in enumerate(shapes)}, starts, sums.units[list(keep)],
         sums.squares[list(keep)], sums.directions[list(keep)], information[np.ix_(at, at)], products[at],
-        sums.squared_weights[at],
+        sums.squared_weights[at], sums.whole, sums.all_directions,
     )  # fmt: skip
 
 

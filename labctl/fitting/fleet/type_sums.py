@@ -1,7 +1,8 @@
 """Sums over units of what each says of every candidate: all that the criticism of a type needs, and quickly added.
 
 For one coefficient that all units share the sums are sufficient: those of the inner products of the regressors beside
-the model, and of their products with the data. The sums of squares say beside that how much units differ.
+the model, and of their products with the data. The sums of squares say beside that how much units differ: those of
+each shape, and those of all shapes together, which show by how much the noise itself is larger than stated.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism import CandidateEstimates, EstimatedShape
 from labctl.fitting.numeric.arrays import Array
 
-#: Directions of a shape with less than this share of its largest one are left out.
-MIN_DIRECTION = 1e-6
+#: Directions of a shape with less than this share of its largest one are left out; and those of all shapes together,
+#: whose correlations are kept as 32-bit floats.
+MIN_DIRECTION, MIN_OF_ALL = 1e-6, 1e-4
 
 
 @dataclass
@@ -32,6 +34,8 @@ class AxisSums:
     information: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))  #: (K, K)
     products: Array = field(default_factory=lambda: np.zeros(0))  #: (K,) information times estimate
     squared_weights: Array = field(default_factory=lambda: np.zeros(0))  #: (K,) sum of 1 / u^4
+    whole: float = 0.0  #: sum of the chi2 that all shapes together take off each unit
+    all_directions: float = 0.0  #: of all shapes together, sum over the units
 
     def slice_of(self, shape: int) -> slice:
         """Return the place of the coefficients of a shape."""
@@ -59,6 +63,11 @@ class AxisSums:
             self.directions[number] = max(self.directions[number], float(kept.sum()))
             self.units[number] += len(z)
             begin = own.stop
+        if shapes:
+            values, vectors = np.linalg.eigh(overlap)
+            kept = values > MIN_OF_ALL * values[-1]
+            self.whole += float((((z @ vectors[:, kept]) ** 2) / values[kept]).sum())
+            self.all_directions += float(kept.sum()) * len(z)
 
     def merge(self, other: AxisSums) -> None:
         """Add the sums over other units."""
@@ -71,6 +80,8 @@ class AxisSums:
         self.units[numbers] += other.units
         self.squares[numbers] += other.squares
         self.directions[numbers] = np.maximum(self.directions[numbers], other.directions)
+        self.whole += other.whole
+        self.all_directions += other.all_directions
 
     def _columns(self, number: int) -> NDArray[np.int64]:
         own = self.slice_of(number)
@@ -101,6 +112,11 @@ class TypeSums:
 
     benches: dict[str, dict[str, AxisSums]] = field(default_factory=dict)
     units: int = 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether the totals of all shapes together are known of every unit."""
+        return all(np.isfinite(sums.whole) for axes in self.benches.values() for sums in axes.values())
 
     def add(self, axes: Mapping[str, CandidateEstimates], bench: str | None = None) -> None:
         """Add one unit, measured on a bench."""

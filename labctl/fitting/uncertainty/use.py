@@ -15,6 +15,7 @@ from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.estimation.axis_solutions import leaning, residuals, solve_axes
 from labctl.fitting.estimation.held import Fixed, with_held
+from labctl.fitting.estimation.prior import CoefficientPrior
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.fitted_model import FittedModel
@@ -38,19 +39,22 @@ from labctl.recording import Recording
 RATE_FOLDS = 11
 
 
-def left_variance(data: FitData, preset: Preset) -> dict[str, Array]:
+def left_variance(data: FitData, preset: Preset, prior: CoefficientPrior | None = None) -> dict[str, Array]:
     """Return axis -> (m,) (deg/s)^2, the variance left at each data set; NaN where it could not be left out.
+
+    `prior` is what is known of the coefficients beside the data, in each fit.
 
     Raises NotEnoughData where the data sets do not determine the model.
     """
     model, rows = preset.build(data)
-    axis_solutions = solve_axes(data.take(rows), model)
+    axis_solutions = solve_axes(data.take(rows), model, prior=prior)
     inside = residuals(FittedModel(model, axis_solutions.fits), data, axis_solutions.nuisance)
     data = leaning(data, axis_solutions.nuisance)
     by_temperature = data.folds
     if preset.inner_only:
         by_temperature = by_temperature[1:-1]
-    outside = [_left_out(data, preset, masks, axis_solutions.solutions) for masks in (by_temperature, rate_folds(data))]
+    solutions = axis_solutions.solutions
+    outside = [_left_out(data, preset, masks, solutions, prior) for masks in (by_temperature, rate_folds(data))]
     residual_var = {}
     for axis, values in inside.items():
         within = within_runs(data, values)
@@ -85,8 +89,9 @@ def rate_folds(data: FitData) -> list[NDArray[np.bool_]]:
 
 
 def _left_out(
-    data: FitData, preset: Preset, masks: list[NDArray[np.bool_]], solutions: Mapping[str, Solution]
-) -> dict[str, Array]:
+    data: FitData, preset: Preset, masks: list[NDArray[np.bool_]], solutions: Mapping[str, Solution],
+    prior: CoefficientPrior | None,
+) -> dict[str, Array]:  # fmt: skip
     """Return axis -> (m,) residuals of each data set by the fit without its fold, NaN where there is none."""
     residual_dps = {axis: np.full(len(data), np.nan) for axis in data.outputs}
     for mask in masks:
@@ -95,8 +100,9 @@ def _left_out(
             continue
         try:
             model, rows = preset.build(data_used)
-            require_enough_data(data_used.take(rows), model)
-            solved = solve_axes(data_used.take(rows), model, solutions)
+            if prior is None:
+                require_enough_data(data_used.take(rows), model)
+            solved = solve_axes(data_used.take(rows), model, solutions, prior)
             without = residuals(FittedModel(model, solved.fits), data.take(mask), solved.nuisance)
         except LabctlError:  # too little is left, or a law that cannot be inverted: this fold says nothing
             continue
@@ -162,16 +168,17 @@ class AxisEvidence:
 
 @single_threaded
 def use_evidence(
-    data: FitData, preset: Preset, instability_dps: Mapping[str, float | None] | None = None
-) -> dict[str, AxisEvidence]:
+    data: FitData, preset: Preset, instability_dps: Mapping[str, float | None] | None = None,
+    prior: CoefficientPrior | None = None,
+) -> dict[str, AxisEvidence]:  # fmt: skip
     """Return axis -> what a recording shows of a model's errors in use.
 
-    `instability_dps` is each axis' bias instability by a static record. Raises NotEnoughData where the data sets do not
-    determine the model.
+    `instability_dps` is each axis' bias instability by a static record, `prior` what is known of the coefficients.
+    Raises NotEnoughData where the data sets do not determine the model.
     """
     model, rows = preset.build(data)
-    solutions = solve_axes(data.take(rows), model)
-    residual_var = left_variance(data, preset)
+    solutions = solve_axes(data.take(rows), model, prior=prior)
+    residual_var = left_variance(data, preset, prior)
     inside = residuals(FittedModel(model, solutions.fits), data, solutions.nuisance)
     repeatability = repeatability_of(data, inside, instability_dps or {})
     correlation = _correlation({axis: within_runs(data, values) for axis, values in inside.items()})

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
+from typing import NotRequired
+
+from typing_extensions import TypedDict
 
 from labctl.answers.calibrations import (
     CalibrationRow,
@@ -14,17 +17,19 @@ from labctl.answers.calibrations import (
     ImprovedVersionResponse,
     VersionResponse,
 )
+from labctl.answers.fitted_model import TypePriorJson
 from labctl.answers.kept_answers import KeptFit
 from labctl.calibration import Calibration, build_calibration, read_calibration
+from labctl.errors import BadInput
 from labctl.fitting import FitResult, fit
 from labctl.fitting.effects.response import IDS
 from labctl.fitting.models.memory import split_memory
-from labctl.fitting.uncertainty import evidence_of
-from labctl.recording.info import REFERENCES
+from labctl.fitting.uncertainty import AxisEvidence, evidence_of
+from labctl.recording.info import REFERENCES, measured_at
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
-from labctl.services.criticism.measurements import measurements_of
+from labctl.services.criticism.measurements import Measurements, measurements_of
 from labctl.services.fixed_coefficients import fixed_of
 from labctl.services.recordings.inspection import refuse_wrong
 from labctl.services.recordings.warnings import as_json, warning_of
@@ -76,17 +81,15 @@ def fitted_unit(store: Store, serial: str, request: FitRequest, at: datetime, *,
     job_title = f"fit of {measured.named} of {serial}"
     refuse_wrong(measured.warnings, job_title, accepted=request.accept_warnings)
     source = measured.source
-    fixed = fixed_of(request.fixed)
-    result = fit(source, request.model, request.effects, covered=measured.covered, fixed=fixed)
+    result, evidence, of_type = _results(store, serial, request, measured)
     late = source.info.motion == "profile" and IDS.isdisjoint(result.fitted.model.effect_ids)
     warnings = [*measured.warnings, *map(warning_of, worse_than_raw(result.error, late=late))]
     refuse_wrong(warnings, job_title, accepted=request.accept_warnings)
-    evidence = evidence_of(source, request.model, request.effects, fixed)
     run = store.campaigns.get(campaign) if campaign is not None else None
     recipe, bench = (run.recipe_name, run.bench_name) if run is not None else (None, None)
     provenance = {
         "recording": recording, "campaign": campaign, "recipe": recipe, "bench": bench, **several(recordings),
-        **reference_of(measured.rows),
+        **reference_of(measured.rows), **of_type,
     }  # fmt: skip
 
     def build(version: int) -> NewCalibration:
@@ -97,7 +100,7 @@ def fitted_unit(store: Store, serial: str, request: FitRequest, at: datetime, *,
         answer: KeptFit = {
             "serial": serial, "version": version, **result.to_json(), "recording": recording,
             "recordings": list(recordings), "campaign": campaign, "recipe": recipe, "bench": bench,
-            "hash": calibration.hash, "warnings": [as_json(warning) for warning in warnings],
+            "hash": calibration.hash, "warnings": [as_json(warning) for warning in warnings], **of_type,
         }  # fmt: skip
         return NewCalibration(
             None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer, recordings,
@@ -105,6 +108,39 @@ def fitted_unit(store: Store, serial: str, request: FitRequest, at: datetime, *,
         )  # fmt: skip
 
     return FittedUnit(build, result, measured.rows, bench)
+
+
+class OfType(TypedDict):
+    """What a version states of the other units of the type in its coefficients; empty: it was fitted alone."""
+
+    type_prior: NotRequired[TypePriorJson]
+
+
+def _results(
+    store: Store, serial: str, request: FitRequest, measured: Measurements
+) -> tuple[FitResult, Mapping[str, AxisEvidence], OfType]:
+    """Fit a model to measurements, alone or with the prior of the unit's type."""
+    source, fixed = measured.source, fixed_of(request.fixed)
+    if not request.type_prior:
+        result = fit(source, request.model, request.effects, covered=measured.covered, fixed=fixed)
+        return result, evidence_of(source, request.model, request.effects, fixed), {}
+    from labctl.fitting.fleet.prior import fit_recording_with_prior  # noqa: PLC0415  slow to load, and seldom needed
+    from labctl.services.design.type_prior import prior_of_type  # noqa: PLC0415  as above
+
+    if fixed is not None:
+        raise BadInput(
+            f"{serial}: coefficients are held at known values and a prior of the type is asked for; choose one"
+        )
+    unit = store.units.get(serial)
+    known = prior_of_type(
+        store, unit.model, request.model, request.effects, without=serial,
+        groups={"batch": unit.batch, "supplier": unit.supplier}, on=measured_at(measured.rows[-1].info),
+    )  # fmt: skip
+    found = fit_recording_with_prior(
+        source, request.model, request.effects, known.prior, known.argument, covered=measured.covered
+    )
+    stated = known.to_json(is_used=found.is_used, p_value=found.p_value)
+    return found.result, found.evidence, {"type_prior": stated}
 
 
 def several(recordings: tuple[int, ...]) -> dict[str, list[int]]:

@@ -50,7 +50,7 @@ SIMULATED = (
 
 def statements(facts: Facts) -> tuple[str, ...]:
     """Return the statements in order; of a simulated bench that it is simulated first, and none on traceability."""
-    statement_texts = [ITEM_ONLY, TRACEABLE, NOISE, BY_CUSTOMER, WHOLE]
+    statement_texts = [ITEM_ONLY, TRACEABLE, NOISE, BY_CUSTOMER, WHOLE, *_of_type(facts)]
     return (SIMULATED, *statement_texts[:1], *statement_texts[2:]) if facts.simulated else tuple(statement_texts)
 
 
@@ -140,6 +140,16 @@ def _item(facts: Facts) -> Item:
         model=facts.calibration.document["unit"]["model"], identification=item.identification,
         axes=facts.calibration.axes, condition=item.condition, received=item.received,
     )  # fmt: skip
+
+
+def _of_type(facts: Facts) -> Iterator[str]:
+    """Yield what other units contributed to the coefficients: evidence that is not from this item."""
+    prior = facts.calibration.document["provenance"].get("type_prior")
+    if isinstance(prior, dict) and prior.get("is_used"):
+        yield (
+            f"The coefficients were estimated from the measurements of this item together with the calibrations of "
+            f"{prior['units']} other units of type {prior['type']}; the measured errors are of this item alone."
+        )
 
 
 def _method(facts: Facts) -> Method:

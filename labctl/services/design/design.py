@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import tomli_w
 
 from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile
 from instruments.positions import Position
-from labctl.answers.design import DesignBound, DesignedCampaign, DesignRequest, DesignResponse, Range
+from labctl.answers.design import DesignBound, DesignedCampaign, DesignPrior, DesignRequest, DesignResponse, Range
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.design.bound import least_heat_h, u_of_one_hour_dps
@@ -34,6 +34,7 @@ from procedures.recipe.recipe import Recipe, recipe_document
 from procedures.recipe.schemes import Span, scheme_text
 
 if TYPE_CHECKING:
+    from labctl.services.design.type_prior import TypePrior
     from labctl.store import Store
 
 #: The recipe that a design without another one is compared with, and the model of a design without one.
@@ -69,13 +70,22 @@ def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFil
     used = tuple(each for each in BODY_AXES if each in {Position.of(position).axis for position in base.positions})
     use = RangeOfUse(used, span.rate_dps, (span.low_c, span.high_c))
     name = f"{base.name}-designed"
-    problem = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name)
-    goal = Goal(request.u_dps, request.hours)
-    tried = search(problem, goal, ramps=model not in TABLES and base.order == "position-major")
+    alone = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name)
+    of_type = _prior(store, request, model, effects)
+    problem = alone if of_type is None else replace(alone, prior=of_type.prior, evaluated={})
+    goal, ramps = Goal(request.u_dps, request.hours), model not in TABLES and base.order == "position-major"
+    tried = search(problem, goal, ramps=ramps)
     choice = chosen(tried, goal)
     if choice is None:
         raise _nothing(problem, goal, tried)
-    return _answer(_Found(problem, goal, tried, choice), on, known, like)
+    answer = _answer(_Found(problem, goal, tried, choice), on, known, like)
+    if of_type is None:
+        return answer
+    without = chosen(search(alone, goal, ramps=ramps), goal)
+    return answer.model_copy(update={"type_prior": DesignPrior(
+        type=of_type.type, model=of_type.model, units=of_type.prior.units,
+        without=None if without is None else _designed(without, goal),
+    )})  # fmt: skip
 
 
 def designed(store: Store, request: DesignRequest, bench: BenchFile | None) -> DesignResponse:
@@ -90,6 +100,21 @@ class _Found:
     goal: Goal
     tried: list[Candidate]
     choice: Candidate
+
+
+def _prior(
+    store: Store | None, request: DesignRequest, model: str | None, effects: tuple[str, ...]
+) -> TypePrior | None:
+    """Return what the type of a unit says of the model, if it is asked for. Raises BadInput, NotEnoughData."""
+    if request.type_prior is None:
+        return None
+    from labctl.services.design.type_prior import prior_of_type  # noqa: PLC0415  slow to load, seldom needed
+
+    if store is None:
+        raise BadInput(
+            f"type {request.type_prior!r}: there is no database with calibrated units; name one with --database"
+        )
+    return prior_of_type(store, request.type_prior, model, effects)
 
 
 def _model(request: DesignRequest, like: Recipe | None) -> tuple[str | None, tuple[str, ...]]:

@@ -9,6 +9,7 @@ from labctl.fitting.design.heat_course import HeatFlow
 from labctl.fitting.design.noise_figures import NoiseFigures
 from labctl.fitting.design.predicted_uncertainty import PredictedUncertainty, predicted_uncertainty
 from labctl.fitting.design.range_of_use import RangeOfUse
+from labctl.fitting.estimation.prior import CoefficientPrior
 from labctl.fitting.models.presets import preset_for
 from labctl.services.design.foreseen_sets import foreseen_sets
 from procedures.contracts.errors import ProcedureError
@@ -77,6 +78,7 @@ class Problem:
     noise: NoiseFigures
     use: RangeOfUse
     name: str
+    prior: CoefficientPrior | None = None  #: what the type says of the coefficients; the recipe is fitted with it
     evaluated: dict[Scheme, Candidate | None] = field(default_factory=dict)  #: those that cannot be run are None
 
     def effects_of(self, scheme: Scheme) -> tuple[str, ...]:
@@ -97,7 +99,8 @@ class Problem:
     def _evaluate(self, scheme: Scheme) -> Candidate:
         effects = self.effects_of(scheme)
         recipe = recipe_of(
-            scheme, self.base, self.span, name=self.name, fit=FitRules(model=self.model, effects=effects),
+            scheme, self.base, self.span, name=self.name,
+            fit=FitRules(model=self.model, effects=effects, type_prior=self.prior is not None),
             ramp_c_per_min=self.limits.ramp_c_per_min,
         )  # fmt: skip
         return self.of_recipe(recipe, scheme, effects)
@@ -107,7 +110,7 @@ class Problem:
         plan = make_plan(recipe, self.limits)
         sets = foreseen_sets(plan, self.flow, self.limits.max_acceleration_dps2)
         preset = preset_for(self.model, list(effects))
-        predicted = predicted_uncertainty(sets, self.axes, preset, self.noise, self.use)
+        predicted = predicted_uncertainty(sets, self.axes, preset, self.noise, self.use, self.prior)
         low_c, high_c = float(sets.temperature_c.min()), float(sets.temperature_c.max())
         missed_k = max(low_c - self.span.low_c, self.span.high_c - high_c, 0.0)
         return Candidate(scheme, plan, predicted, (low_c, high_c), missed_k)

@@ -49,7 +49,9 @@ def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
     version = draft.version  # of a draft that was kept, and not yet reported on
     if version is None:
         report_stage(f"fitting {draft.serial}")
-        request = FitRequest(recording=draft.recording, model=rules.model, effects=list(rules.effects))
+        request = FitRequest(
+            recording=draft.recording, model=rules.model, effects=list(rules.effects), type_prior=rules.type_prior
+        )
         try:
             version = fit_unit(store, draft.serial, request, at, is_draft=True).version
         except REFUSALS as error:

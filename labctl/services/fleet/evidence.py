@@ -21,6 +21,7 @@ from labctl.store import FleetEvidence
 #: Units of a part: a criticism made anew makes its part count no more, and a process that is killed loses one part.
 UNITS_OF_A_PART = 50
 SUMS = ("units", "squares", "directions", "information", "products", "squared_weights")
+TOTALS = ("whole", "all_directions")
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def content_of(sums: TypeSums) -> bytes:
             number = len(head)
             shapes = [[s.effect, s.shape, list(s.names), list(s.units), s.is_exact] for s in each.shapes]
             head.append({"bench": bench, "axis": axis, "shapes": shapes, "starts": each.starts})
-            arrays |= {f"{number}.{name}": getattr(each, name) for name in SUMS}
+            arrays |= {f"{number}.{name}": np.asarray(getattr(each, name)) for name in SUMS + TOTALS}
     text = json.dumps({"units": sums.units, "axes": head}, sort_keys=True).encode()
     file = io.BytesIO()
     np.savez_compressed(file, head=np.frombuffer(text, dtype=np.uint8), **arrays)  # type: ignore[arg-type]
@@ -105,7 +106,7 @@ def content_of(sums: TypeSums) -> bytes:
 
 
 def sums_in(content: bytes) -> TypeSums:
-    """Return the sums in bytes that `content_of` made."""
+    """Return the sums in bytes that `content_of` made; those of an older program are not `complete`."""
     sums = TypeSums()
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
         head = json.loads(arrays["head"].tobytes())
@@ -118,5 +119,7 @@ def sums_in(content: bytes) -> TypeSums:
             axis = AxisSums(shapes, {s.key: i for i, s in enumerate(shapes)}, list(each["starts"]))
             for name in SUMS:
                 setattr(axis, name, arrays[f"{number}.{name}"])
+            for name in TOTALS:
+                setattr(axis, name, float(arrays.get(f"{number}.{name}", np.nan)))
             sums.benches.setdefault(each["bench"], {})[each["axis"]] = axis
     return sums

@@ -125,15 +125,18 @@ def evidence_in(store: Store, type_: str, model: str, *, whole: bool) -> Evidenc
     contents, not_current = store.fleet_reports.evidence(type_, model)
     sums = TypeSums()
     for content in contents:
-        sums.merge(sums_in(content))
+        if (part := sums_in(content)).complete:
+            sums.merge(part)
+        else:
+            not_current += part.units
     found = judged(sums)
     said = [f"What the model of the type is missing was judged by the criticisms of {sums.units} units."]
     if found.reason:
         said = [f"What the model is missing: {found.reason}; `labctl fleet criticise` does it."]
     if not_current:
         said.append(
-            f"The criticisms of {not_current} units do not count, as others that were added to them were made again; "
-            "`labctl fleet criticise --again` makes all again."
+            f"The criticisms of {not_current} units do not count, as others that were added to them were made again, "
+            "or an older program made them; `labctl fleet criticise --again` makes all again."
         )
     missing = [_missing(each) for each in found.named]
     said += [each.text for each in missing]

@@ -6882,6 +6882,29 @@ export interface components {
             ratio: number;
         };
         /**
+         * DesignPrior
+         * @description What a design counts with of the type of a unit, and what it saves.
+         */
+        DesignPrior: {
+            /**
+             * Type
+             * @description Type of the units: the model that their manufacturer gives them.
+             */
+            type: string;
+            /**
+             * Model
+             * @description Error model of their calibrations.
+             */
+            model: string;
+            /**
+             * Units
+             * @description Number of units that the prior is from.
+             */
+            units: number;
+            /** @description The recipe that would be chosen for the same goal without the prior; null: none was found. */
+            without: components["schemas"]["DesignedCampaign"] | null;
+        };
+        /**
          * DesignRequest
          * @description What a campaign has to reach, for which model and over which range.
          */
@@ -6932,6 +6955,11 @@ export interface components {
              * @description Serial numbers whose newest calibrations state the noise: of this unit, or of its type.
              */
             prior?: string[];
+            /**
+             * Type Prior
+             * @description Type of units whose calibrations by the same model say what is expected of the coefficients: the design counts with it, and the recipe is fitted with it. Null: without.
+             */
+            type_prior?: string | null;
         };
         /**
          * DesignResponse
@@ -6986,6 +7014,8 @@ export interface components {
              * @description Hash of the steps of its plan on this bench.
              */
             schedule_hash: string;
+            /** @description The prior of a type that U counts with; null: none was asked for. */
+            type_prior: components["schemas"]["DesignPrior"] | null;
             /**
              * Decisions
              * @description Each choice of the recipe with its reason, a sentence each.
@@ -8367,6 +8397,12 @@ export interface components {
             /** @description Published or measured coefficients that are held at their values; the other coefficients of the model are fitted. Default: all are fitted. */
             fixed?: components["schemas"]["FixedCoefficients"] | null;
             /**
+             * Type Prior
+             * @description Add what the other calibrated units of the unit's type say of its coefficients; the version states it. At least 10 units of the type with this model are needed.
+             * @default false
+             */
+            type_prior?: boolean;
+            /**
              * Accept Warnings
              * @description Fit the data although labctl found errors in them, and keep the fit even if it is worse than no correction; the response still lists the warnings.
              * @default false
@@ -8458,6 +8494,8 @@ export interface components {
              * @description Name of the bench of that campaign; null: the recording was imported.
              */
             bench: string | null;
+            /** @description What other calibrated units of the type contributed to the coefficients; null: nothing, the unit was fitted alone. */
+            type_prior: components["schemas"]["TypePriorJson"] | null;
             /**
              * Hash
              * @description SHA-256 of the calibration as it was stored.
@@ -15874,6 +15912,47 @@ export interface components {
             refused: string;
         };
         /**
+         * TypePriorJson
+         * @description What other calibrated units of the type contributed to a fit.
+         */
+        TypePriorJson: {
+            /**
+             * Type
+             * @description Type of the units: the model that their manufacturer gives them.
+             */
+            type: string;
+            /**
+             * Model
+             * @description Error model of their calibrations.
+             */
+            model: string;
+            /**
+             * Units
+             * @description Number of units that the prior is from.
+             */
+            units: number;
+            /**
+             * Left Out
+             * @description Units of the type that could not be compared.
+             */
+            left_out: number;
+            /**
+             * Is Used
+             * @description Whether the prior is in the coefficients; false: the unit contradicts its type and was fitted alone.
+             */
+            is_used: boolean;
+            /**
+             * P Value
+             * @description Probability of a larger difference between the unit and its type by chance.
+             */
+            p_value: number;
+            /**
+             * Versions Hash
+             * @description SHA-256 over the sorted hashes of the calibrations that the prior is from.
+             */
+            versions_hash: string;
+        };
+        /**
          * UncertaintyCourse
          * @description U of one unit while the campaign ran, as lists of equal length.
          */
@@ -16419,6 +16498,8 @@ export interface components {
              * @description Name of the bench of that campaign; null: the recording was imported.
              */
             bench: string | null;
+            /** @description What other calibrated units of the type contributed to the coefficients; null: nothing, the unit was fitted alone. */
+            type_prior: components["schemas"]["TypePriorJson"] | null;
             /**
              * Hash
              * @description SHA-256 of the calibration as it was stored.

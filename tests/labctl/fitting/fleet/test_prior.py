@@ -114,8 +114,12 @@ def test_the_prior_of_a_population_covers_a_unit_to_come() -> None:
     rng, inside, every = np.random.default_rng(6), 0, 0
     for _ in range(25):
         values = 1.0 + 0.3 * rng.normal(size=(12, 2)) + 0.2 * rng.normal(size=(12, 2))
-        units = [UnitCoefficients(f"U{i}", ("x.a", "x.b"), v, 0.04 * np.eye(2)) for i, v in enumerate(values)]
+        units = [
+            UnitCoefficients(f"U{i}", ("x.a", "x.b"), v, 0.04 * np.eye(2), reference_temperature_c=20.0)
+            for i, v in enumerate(values)
+        ]
         prior = prior_of(population_of(units))
+        assert prior.reference_temperature_c == 20.0
         new = 1.0 + 0.3 * rng.normal(size=(40, 2))
         inside += int(np.sum(np.abs(new - prior.mean) <= 1.96 * np.sqrt(np.diag(prior.covariance))))
         every += new.size

@@ -6,8 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from labctl.fitting.criticism import CandidateEstimates, EstimatedShape
+from labctl.fitting.fleet.shape_evidence import evidence_of
 from labctl.fitting.fleet.type_evidence import UnitEvidence, judged, sums_of, type_evidence
 from labctl.fitting.fleet.type_sums import TypeSums
 
@@ -30,14 +32,19 @@ def overlap() -> np.ndarray:
 
 
 def units(
-    hidden: Mapping[int, float], seed: int = 1, n: int = UNITS, *, signed: bool = False, bench: str = ""
-) -> list[UnitEvidence]:
-    """Return units with an effect of some z in the shape `hidden`; those of one bench only, or all."""
+    hidden: Mapping[int, float], seed: int = 1, n: int = UNITS, *, signed: bool = False, bench: str = "",
+    spread: float = 0.0,
+) -> list[UnitEvidence]:  # fmt: skip
+    """Return units with an effect of some z in the shape `hidden`; those of one bench only, or all.
+
+    With a `spread` the size of each unit is drawn: normal about 1 with this standard deviation.
+    """
     rng, same, found = np.random.default_rng(seed), overlap(), []
     root = np.linalg.cholesky(same + 1e-9 * np.eye(8))
     for i in range(n):
         of_bench = f"bench {i % 3}"
         sign = rng.choice([-1.0, 1.0]) if signed else 1.0
+        sign += spread * rng.normal() if spread else 0.0
         z = root @ rng.normal(size=8)
         if bench in ("", of_bench):
             z = z + sum(sign * size * same[:, shape] for shape, size in hidden.items())
@@ -65,6 +72,33 @@ def test_sizes_whose_sign_is_each_units_own_are_named_by_their_spread() -> None:
     assert effect.group == ("alone",)
     assert not effect.is_common
     assert effect.sizes[0].spread == pytest.approx(Z * U, rel=0.3)
+
+
+def test_the_evidence_for_sizes_of_each_unit_does_not_fall_with_their_spread() -> None:
+    found = [type_evidence(units({0: 0.02}, spread=50.0 * z)) for z in (2.0, 6.0, 20.0, 60.0, 200.0)]
+    assert [each.named[0].group for each in found] == [("alone",)] * 5
+    evidence = [each.named[0].log_bayes_factor for each in found]
+    assert evidence == sorted(evidence)
+    assert evidence[0] > 50.0
+    assert all(each.noise_ratio < 1.1 and not each.named[0].is_common for each in found)
+    spreads = [each.named[0].sizes[0].spread / U for each in found]
+    assert spreads == pytest.approx([2.0, 6.0, 20.0, 60.0, 200.0], rel=0.2)
+
+
+def test_the_evidence_is_the_marginal_likelihood_of_all_estimates() -> None:
+    """Against scipy: the density of all estimates, at the noise and the variance of sizes that make it largest."""
+    every = units({6: 3.0}, signed=True, n=60)
+    values = np.array([each.axes["x"].z for each in every])
+    same, column = overlap(), overlap()[:, 6]
+
+    def log_density(noise: float, size: float) -> float:
+        covariance = noise * same + size * np.outer(column, column)
+        return float(multivariate_normal(np.zeros(8), covariance).logpdf(values).sum())
+
+    nothing = max(log_density(noise, 0.0) for noise in np.linspace(1.0, 4.0, 301))
+    varied = max(log_density(noise, size) for noise in (1.0, 1.02, 1.05, 1.1) for size in np.linspace(5.0, 15.0, 101))
+    found = evidence_of(sums_of(every).total()["x"]).about_zero[6]
+    assert found == pytest.approx(varied - nothing - 0.5 * np.log1p(60), abs=0.3)
 
 
 def test_shapes_that_are_alike_are_one_group_however_many_units_there_are() -> None:
