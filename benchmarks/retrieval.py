@@ -2,7 +2,8 @@
 
 The load is that of `benchmarks.open_load`, in a process of its own. Generator, both processes of the service and the
 server share the cores of this machine, so the processor time of each request in the service stands beside the times.
-Smaller by LABCTL_BENCH_UNITS; a database that was filled before is taken from LABCTL_BENCH_DATABASE.
+Smaller by LABCTL_BENCH_UNITS and LABCTL_BENCH_SECONDS; a database that was filled before is taken from
+LABCTL_BENCH_DATABASE.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from labctl.store.repositories.units import UnitFilter
 from studies import postgresql_cluster
 
 UNITS = int(os.environ.get("LABCTL_BENCH_UNITS", "1000000"))
-RATES, SECONDS, PROCESSES = (200, 500, 1000, 2000), 10, 2
+RATES, SECONDS, PROCESSES = (200, 500, 1000, 2000), float(os.environ.get("LABCTL_BENCH_SECONDS", "10")), 2
 #: Searches for units: a part of a serial number that one has, a type, a batch, and what no unit has.
 SEARCHES = ("G-0012345", "FOG-07", "B-123", "absent")
 
@@ -47,7 +48,7 @@ def database() -> Iterator[str]:
 
 def run() -> dict[str, float | str]:
     """Return percentiles of the times by rate, processor time per request, and the times of lists of many units."""
-    figures: dict[str, float | str] = {"units": float(UNITS)}
+    figures: dict[str, float | str] = {"units": float(UNITS), "load_of_the_machine": os.getloadavg()[0]}
     with database() as url, serve(url, "--read-only", "--processes", str(PROCESSES)) as service:
         with Client(service.url) as client:  # a copied row is what labctl writes: its hashes fit
             serial = many_units.serial_of(UNITS // 3)
@@ -58,7 +59,7 @@ def run() -> dict[str, float | str]:
             found = _load(service.port, rate)
             spent_s = _processor_s(service.web) - before_s
             figures |= {f"at_{rate}_per_s_{name}": value for name, value in found.items()}
-            figures[f"at_{rate}_per_s_processor_ms"] = 1e3 * spent_s / (rate * SECONDS)
+            figures[f"at_{rate}_per_s_processor_ms"] = 1e3 * spent_s / found["answered"]
         with open_store(url, write=False, read_only=True) as store:
             figures |= _lists(store)
     return {**describe("fastapi", "uvicorn", "uvloop", "psycopg", "sqlalchemy"), **figures}

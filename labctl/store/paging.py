@@ -61,6 +61,7 @@ def parts_of(keys: Sequence[KeyT]) -> Iterator[Sequence[KeyT]]:
         yield keys[first : first + MAX_PARAMETERS]
 
 
-def padded(keys: Sequence[KeyT]) -> list[KeyT]:
+def padded(keys: Sequence[str]) -> list[str]:
     """Return keys with the last one repeated until their number is a power of two: so few statements are prepared."""
-    return [*keys, *keys[-1:] * ((1 << (len(keys) - 1).bit_length()) - len(keys))] if keys else []
+    most = 1 << max(len(keys) - 1, 0).bit_length()
+    return [*keys, *(keys[-1] for _ in range(most - len(keys)))] if keys else []

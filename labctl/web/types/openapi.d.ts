@@ -19,8 +19,7 @@ export interface paths {
          *     or not-certified, `X-Labctl-Due` the date until which it is valid; `Warning` says that it is overdue or revoked.
          *     `X-Labctl-Withdrawn` says when, by whom and why the version was revoked or its certificate withdrawn. Who fetches is
          *     recorded, by the name of the key.
-         *     What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each. JSON is a
-         *     point read of tens of microseconds: it runs in the event loop, without a switch to a thread; others compute.
+         *     What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each.
          */
         get: operations["calibration_api_units__serial__calibration_get"];
         put?: never;
