@@ -33,10 +33,14 @@ class TypeFigures:
     named: dict[str, int] = field(default_factory=dict)  #: ids of effects with commas -> units that name them
     due: dict[str, int] = field(default_factory=dict)  #: overdue, 30_days, 90_days, later, no_date -> units
 
-    @property
-    def of_results(self) -> tuple[dict[Any, int], ...]:
-        """The counts of results of fleet jobs, in the order of the query for them."""
-        return self.ratios, self.verdicts, self.named
+    def add_results(self, class_: int | None, verdict: str | None, named: str | None, units: int) -> None:
+        """Count units whose newest results by fleet jobs are these; None: there is none."""
+        if class_ is not None:
+            self.ratios[class_] = self.ratios.get(class_, 0) + units
+        if verdict is not None:
+            self.verdicts[verdict] = self.verdicts.get(verdict, 0) + units
+        if named is not None:
+            self.named[named] = self.named.get(named, 0) + units
 
 
 @dataclass(frozen=True)
@@ -79,10 +83,8 @@ class FleetReports:
             for unseen in UNSEEN:
                 for model, n in connection.execute(counted.where(unseen)):
                     figures[model].units -= n
-            for model, *keys, n in connection.execute(_results(wanted)):
-                for counts, key in zip(figures[model].of_results, keys, strict=True):
-                    if key is not None:
-                        counts[key] = counts.get(key, 0) + n
+            for model, class_, verdict, named, n in connection.execute(_results(wanted)):
+                figures[model].add_results(class_, verdict, named, n)
             for model, key, n in connection.execute(_due(wanted, now)):
                 figures[model].due[key] = n
         return [each for each in figures.values() if each.units]
