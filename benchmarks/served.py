@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,6 +21,7 @@ class Served:
 
     url: str
     process: int
+    web: tuple[int, ...]  #: processes that answer over HTTP
 
     @property
     def port(self) -> int:
@@ -32,15 +35,19 @@ class Served:
 
 
 @contextmanager
-def serve(database: Path, *options: str) -> Iterator[Served]:
-    """Serve a database until the block ends; its cache is beside the database, so it is empty at the start."""
+def serve(database: Path | str, *options: str) -> Iterator[Served]:
+    """Serve a database until the block ends; its cache is in a folder of its own, so it is empty at the start."""
     words = ["serve", "--port", "0", "--json", "--database", str(database), *options]
-    kept = {**os.environ, "XDG_CACHE_HOME": str(database.parent / "cache")}
     command = [sys.executable, "-m", "labctl", *words]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=kept) as service:
+    with (
+        tempfile.TemporaryDirectory() as cache,
+        subprocess.Popen(
+            command, stdout=subprocess.PIPE, text=True, env={**os.environ, "XDG_CACHE_HOME": cache}
+        ) as service,
+    ):
         assert service.stdout is not None
         try:
-            url = next(line for line in service.stdout if '"url"' in line).split('"')[3]
-            yield Served(url, service.pid)
+            ready = json.loads(next(line for line in service.stdout if '"url"' in line))
+            yield Served(ready["url"], service.pid, tuple(ready["web_pids"]))
         finally:
             service.terminate()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from typing import Any, Generic, TypeVar
 
@@ -26,6 +27,11 @@ class JointReads(Generic[KeyT, ValueT]):
         self._read = read
         self._waiting: dict[KeyT, asyncio.Future[ValueT | None]] = {}
         self._reading: asyncio.Task[None] | None = None
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="joint reads")
+
+    def close(self) -> None:
+        """End the thread; a statement that is under way is not waited for."""
+        self._thread.shutdown(wait=False, cancel_futures=True)
 
     async def get(self, key: KeyT) -> ValueT | None:
         """Return what is read of a key from now on, None where there is nothing. Raises what `read` raises."""
@@ -54,7 +60,7 @@ class JointReads(Generic[KeyT, ValueT]):
 
     async def _answer(self, joined: Mapping[KeyT, asyncio.Future[ValueT | None]]) -> None:
         try:
-            found = await asyncio.get_running_loop().run_in_executor(None, self._read, list(joined))
+            found = await asyncio.get_running_loop().run_in_executor(self._thread, self._read, list(joined))
         except Exception as error:  # noqa: BLE001  it is raised in the requests
             for waiting in joined.values():
                 if not waiting.done():

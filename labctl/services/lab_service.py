@@ -166,6 +166,8 @@ class LabService:
             for background in self._backgrounds:
                 background.close()
             self.fetches.write()
+            self.in_force.close()
+            self.keys.close()
             self.store.close()
 
     def execute(self, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:

@@ -37,6 +37,11 @@ class FleetFilter:
     @property
     def condition(self) -> sa.ColumnElement[bool]:
         """The condition on rows of the table of units."""
+        return sa.and_(SEEN, self.of_measured)
+
+    @property
+    def of_measured(self) -> sa.ColumnElement[bool]:
+        """The same for units that are known to be measured, as those with a version or a result are."""
         c = tables.units.c
         stated = [
             column == value
@@ -44,7 +49,7 @@ class FleetFilter:
             if value
         ]
         found = PageRequest[str](self.search).matching((c.serial, c.model, c.technology, c.batch, c.supplier))
-        return sa.and_(SEEN, found, *stated)
+        return sa.and_(found, *stated)
 
 
 @dataclass(frozen=True)

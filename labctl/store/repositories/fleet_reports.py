@@ -12,6 +12,7 @@ import sqlalchemy as sa
 from labctl.answers.json_object import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.repositories.fleet_jobs import FleetFilter, newest_has_model
+from labctl.store.repositories.units import UNSEEN
 from labctl.store.schema import tables
 from labctl.store.schema.types import EPOCH
 
@@ -31,6 +32,15 @@ class TypeFigures:
     verdicts: dict[str, int] = field(default_factory=dict)
     named: dict[str, int] = field(default_factory=dict)  #: ids of effects with commas -> units that name them
     due: dict[str, int] = field(default_factory=dict)  #: overdue, 30_days, 90_days, later, no_date -> units
+
+    def add_results(self, class_: int | None, verdict: str | None, named: str | None, units: int) -> None:
+        """Count units whose newest results by fleet jobs are these; None: there is none."""
+        if class_ is not None:
+            self.ratios[class_] = self.ratios.get(class_, 0) + units
+        if verdict is not None:
+            self.verdicts[verdict] = self.verdicts.get(verdict, 0) + units
+        if named is not None:
+            self.named[named] = self.named.get(named, 0) + units
 
 
 @dataclass(frozen=True)
@@ -66,16 +76,18 @@ class FleetReports:
 
     def types(self, wanted: FleetFilter, now: datetime) -> list[TypeFigures]:
         """Return the figures of every type, by name."""
-        figures: dict[str, TypeFigures] = {}
         with self._database.reading() as connection:
             u = tables.units.c
-            counted = sa.select(u.model, sa.func.count()).where(wanted.condition).group_by(u.model).order_by(u.model)
-            for model, n in connection.execute(counted):
-                figures[model] = TypeFigures(model, n)
-            for name, query in _by_type(wanted, now).items():
-                for model, key, n in connection.execute(query):
-                    getattr(figures[model], name)[key] = n
-        return list(figures.values())
+            counted = sa.select(u.model, sa.func.count()).where(wanted.of_measured).group_by(u.model).order_by(u.model)
+            figures = {model: TypeFigures(model, n) for model, n in connection.execute(counted)}
+            for unseen in UNSEEN:
+                for model, n in connection.execute(counted.where(unseen)):
+                    figures[model].units -= n
+            for model, class_, verdict, named, n in connection.execute(_results(wanted)):
+                figures[model].add_results(class_, verdict, named, n)
+            for model, key, n in connection.execute(_due(wanted, now)):
+                figures[model].due[key] = n
+        return [each for each in figures.values() if each.units]
 
     def state(self, wanted: FleetFilter, model: str) -> str:
         """Return a text that changes with every version and criticism that a report would be computed from."""
@@ -160,15 +172,31 @@ def _condition(wanted: FleetFilter, model: str) -> sa.ColumnElement[bool]:
     return wanted.condition if not model else sa.and_(wanted.condition, newest_has_model(model))
 
 
-def _by_type(wanted: FleetFilter, now: datetime) -> dict[str, sa.Select[*tuple[Any, ...]]]:
-    """Return field of `TypeFigures` -> query of (type, key, units)."""
-    u, x, a = tables.units.c, tables.fleet_units.c, tables.certifications.c
-    results = sa.join(tables.units, tables.fleet_units, sa.and_(x.serial == u.serial, x.newest))
-    ratio = x.rms_dps / x.noise_floor_dps
-    class_ = sa.case(*((ratio < edge, i) for i, edge in enumerate(RATIO_EDGES)), else_=len(RATIO_EDGES))
-    named = sa.cast(x.named, sa.Text)
-    act_ids = sa.select(sa.func.max(a.id)).group_by(a.serial)
-    acts = sa.join(tables.units, tables.certifications, a.serial == u.serial)
+def _results(wanted: FleetFilter) -> sa.Select[*tuple[Any, ...]]:
+    """Return the query of (type, class of error over floor, verdict, effects named, units): one pass over all results.
+
+    A fit has no verdict, a criticism no class.
+    """
+    u, x = tables.units.c, tables.fleet_units.c
+    is_fit = sa.and_(x.kind == "fit", x.rms_dps.is_not(None), x.noise_floor_dps > 0.0)
+    ratio = sa.case((is_fit, x.rms_dps / x.noise_floor_dps))
+    above = sa.case(*((ratio < edge, i) for i, edge in enumerate(RATIO_EDGES)), else_=len(RATIO_EDGES))
+    class_ = sa.case((is_fit, above))
+    verdict = sa.case((x.kind == "criticise", x.verdict))
+    named = sa.case(
+        (sa.and_(x.kind == "criticise", x.verdict.in_(("missing", "ambiguous"))), sa.cast(x.named, sa.Text))
+    )
+    joined = sa.join(tables.units, tables.fleet_units, x.serial == u.serial)
+    query = sa.select(u.model, class_.label("class_"), verdict.label("verdict"), named.label("named"), sa.func.count())
+    grouped = query.select_from(joined).where(x.newest, wanted.of_measured)
+    return grouped.group_by(u.model, sa.literal_column("2"), sa.literal_column("3"), sa.literal_column("4"))
+
+
+def _due(wanted: FleetFilter, now: datetime) -> sa.Select[*tuple[Any, ...]]:
+    """Return the query of (type, due, units) of units with a version in force: the newest act of each certifies."""
+    u, a = tables.units.c, tables.certifications.c
+    later = tables.certifications.alias()
+    is_newest = ~sa.exists().where(later.c.serial == a.serial, later.c.id > a.id)
 
     def until(days: int) -> sa.ColumnElement[bool]:
         return a.due_at <= now + timedelta(days=days)
@@ -177,19 +205,9 @@ def _by_type(wanted: FleetFilter, now: datetime) -> dict[str, sa.Select[*tuple[A
         (a.due_at.is_(None), "no_date"), (until(0), "overdue"), (until(30), "30_days"), (until(90), "90_days"),
         else_="later",
     )  # fmt: skip
-
-    def grouped(
-        key: sa.ColumnElement[Any], joined: sa.Join, *conditions: sa.ColumnElement[bool]
-    ) -> sa.Select[*tuple[Any, ...]]:
-        query = sa.select(u.model, key, sa.func.count()).select_from(joined)
-        return query.where(wanted.condition, *conditions).group_by(u.model, key)
-
-    return {
-        "ratios": grouped(class_, results, x.kind == "fit", x.rms_dps.is_not(None), x.noise_floor_dps > 0.0),
-        "verdicts": grouped(x.verdict, results, x.kind == "criticise", x.verdict.is_not(None)),
-        "named": grouped(named, results, x.kind == "criticise", x.verdict.in_(("missing", "ambiguous"))),
-        "due": grouped(due, acts, a.id.in_(act_ids), a.act == "certify"),
-    }
+    joined = sa.join(tables.units, tables.certifications, a.serial == u.serial)
+    query = sa.select(u.model, due, sa.func.count()).select_from(joined)
+    return query.where(a.act == "certify", is_newest, wanted.of_measured).group_by(u.model, due)
 
 
 def _chart_query(

@@ -38,6 +38,18 @@ SIMILARITY = 0.85
 SEEN = _measured()
 
 
+def _unmeasured() -> tuple[sa.ColumnElement[bool], sa.ColumnElement[bool]]:
+    u, r, s = tables.units.c, tables.recordings.c, tables.sensor_versions.c
+    has_none = ~sa.exists().where(r.serial == u.serial)
+    importing = u.serial.in_(sa.select(r.serial).where(r.importing.is_not(None)))
+    return sa.and_(has_none, ~sa.exists().where(s.serial == u.serial)), sa.and_(importing, ~SEEN)
+
+
+#: Units that are not SEEN: those without a recording, and those with imports under way alone. They are counted in place
+#: of the others: few units are so, and they are found by indexes, without each recording of each unit.
+UNSEEN = _unmeasured()
+
+
 def add_missing_unit(connection: sa.Connection, serial: str, model: str, technology: str | None, at: datetime) -> bool:
     """Keep a unit that is seen for the first time; returns whether it was."""
     known_serial = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial))
@@ -95,6 +107,13 @@ class BatchRow:
     units: int
 
 
+def _count(connection: sa.Connection, condition: sa.ColumnElement[bool]) -> int:
+    """Return how many measured units meet a condition: all that do without those that are not measured."""
+    counted = sa.select(sa.func.count()).select_from(tables.units).where(condition)
+    whole = connection.scalar(counted) or 0
+    return whole - sum(connection.scalar(counted.where(unseen)) or 0 for unseen in UNSEEN)
+
+
 class Units:
     """Gyros by serial number."""
 
@@ -133,7 +152,7 @@ class Units:
     def count(self) -> int:
         """Return how many units there are."""
         with self._database.reading() as connection:
-            return int(connection.scalar(sa.select(sa.func.count()).select_from(tables.units).where(SEEN)) or 0)
+            return _count(connection, sa.true())
 
     def all(self) -> list[Unit]:
         """Return every unit, by serial number."""
@@ -145,13 +164,14 @@ class Units:
         """Return units by serial number; searched are serial number, model, technology, batch and supplier."""
         c = tables.units.c
         filtered = sa.true() if wanted is None else wanted.condition
-        matching = sa.and_(SEEN, request.matching((c.serial, c.model, c.technology, c.batch, c.supplier)), filtered)
-        query = sa.select(tables.units).where(matching).order_by(c.serial).limit(rows_to_read(request))
+        found = request.matching((c.serial, c.model, c.technology, c.batch, c.supplier))
+        query = sa.select(tables.units).where(found, filtered, SEEN).order_by(c.serial).limit(rows_to_read(request))
         if request.after is not None:
             query = query.where(c.serial > request.after)
         with self._database.reading() as connection:
-            total = connection.scalar(sa.select(sa.func.count()).select_from(tables.units).where(matching)) or 0
             units = records_of(Unit, connection.execute(query))
+            is_whole = request.after is None and (request.limit is None or len(units) <= request.limit)
+            total = len(units) if is_whole else _count(connection, sa.and_(found, filtered))
         return Page.of(units, lambda unit: unit.serial, request, total)
 
     def batches(self) -> list[BatchRow]:

@@ -149,4 +149,4 @@ def test_the_number_of_statements_does_not_grow_with_the_units(client: TestClien
         client.get(f"/api/units?limit={limit}")
         sa.event.remove(sa.Engine, "before_cursor_execute", note)
         counts.append(len(statements))
-    assert counts[0] == counts[1] > 0
+    assert 0 < counts[1] <= counts[0]  # a list that is whole is not counted

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing
 
 import pytest
 
 from labctl.errors import StoreError
 from labctl.services.joint_reads import MAX_JOINED, JointReads
 
+Open = Callable[[Callable[[Sequence[str]], dict[str, int]]], JointReads[str, int]]
+
 
 class Source:
-    """What is read; the first statement waits until it is let go."""
+    """What is read; a statement ends once `go` is set."""
 
     def __init__(self) -> None:
         self.values = {f"k{n}": n for n in range(200)}
@@ -33,13 +36,20 @@ def source() -> Source:
     return Source()
 
 
+@pytest.fixture
+def open_reads() -> Iterator[Open]:
+    """Return what makes joint reads, which are closed at the end of the test."""
+    with ExitStack() as opened:
+        yield lambda read: opened.enter_context(closing(JointReads(read)))
+
+
 async def begun(source: Source) -> None:
     await asyncio.to_thread(source.begun.wait, 30)
 
 
-def test_requests_during_a_statement_share_the_next_one(source: Source) -> None:
+def test_requests_during_a_statement_share_the_next_one(source: Source, open_reads: Open) -> None:
     async def ask() -> list[int | None]:
-        reads = JointReads(source.read)
+        reads = open_reads(source.read)
         first = asyncio.create_task(reads.get("k0"))
         await begun(source)
         others = [asyncio.create_task(reads.get(key)) for key in ("k1", "k2", "k1", "absent")]
@@ -51,9 +61,9 @@ def test_requests_during_a_statement_share_the_next_one(source: Source) -> None:
     assert source.asked == [["k0"], ["k1", "k2", "absent"]]
 
 
-def test_a_request_gets_what_is_true_after_it_asked(source: Source) -> None:
+def test_a_request_gets_what_is_true_after_it_asked(source: Source, open_reads: Open) -> None:
     async def ask() -> tuple[int | None, int | None]:
-        reads = JointReads(source.read)
+        reads = open_reads(source.read)
         before = asyncio.create_task(reads.get("k5"))
         await begun(source)
         source.values["k5"] = -1  # as a revocation that is committed while the statement for `before` is under way
@@ -65,7 +75,7 @@ def test_a_request_gets_what_is_true_after_it_asked(source: Source) -> None:
     assert asyncio.run(ask()) == (5, -1)
 
 
-def test_an_error_reaches_every_request_and_the_next_statement_is_tried(source: Source) -> None:
+def test_an_error_reaches_every_request_and_the_next_statement_is_tried(source: Source, open_reads: Open) -> None:
     source.go.set()
     fails = [True]
 
@@ -75,7 +85,7 @@ def test_an_error_reaches_every_request_and_the_next_statement_is_tried(source: 
         return source.read(keys)
 
     async def ask() -> list[object]:
-        reads = JointReads(read)
+        reads = open_reads(read)
         refused = await asyncio.gather(reads.get("k1"), reads.get("k2"), return_exceptions=True)
         fails[0] = False
         return [*refused, await reads.get("k1")]
@@ -84,9 +94,9 @@ def test_an_error_reaches_every_request_and_the_next_statement_is_tried(source: 
     assert (str(one), str(two), value) == ("away; try again", "away; try again", 1)
 
 
-def test_a_client_that_leaves_takes_nothing_from_the_others(source: Source) -> None:
+def test_a_client_that_leaves_takes_nothing_from_the_others(source: Source, open_reads: Open) -> None:
     async def ask() -> int | None:
-        reads = JointReads(source.read)
+        reads = open_reads(source.read)
         leaves, stays = asyncio.create_task(reads.get("k3")), asyncio.create_task(reads.get("k3"))
         await begun(source)
         leaves.cancel()
@@ -97,11 +107,11 @@ def test_a_client_that_leaves_takes_nothing_from_the_others(source: Source) -> N
     assert source.asked == [["k3"]]
 
 
-def test_one_statement_takes_no_more_than_its_limit(source: Source) -> None:
+def test_one_statement_takes_no_more_than_its_limit(source: Source, open_reads: Open) -> None:
     source.go.set()
 
     async def ask() -> list[int | None]:
-        reads = JointReads(source.read)
+        reads = open_reads(source.read)
         return list(await asyncio.gather(*(reads.get(f"k{n}") for n in range(150))))
 
     assert asyncio.run(ask()) == list(range(150))
