@@ -8,7 +8,9 @@ import { movedLevel, stepOf } from "./point_numbers.js";
 /** @typedef {{ rates: number[], temperatures: number[] }} Levels */
 /** @typedef {{ rates: [number, number], temperatures: [number, number] }} Ranges */
 
-const [WIDTH, HEIGHT, LEFT, BOTTOM, RIM] = [640, 320, 64, 44, 16];
+const [WIDE, NARROW, HEIGHT, LEFT, BOTTOM, RIM] = [640, 350, 320, 64, 44, 16];
+/** A page that is narrower is a phone: the plan has fewer units, so that its words keep their size, px. */
+const PHONE_PX = 760;
 /** Steps of Page Up and Page Down, and of an arrow with Shift. */
 const LARGE = 10;
 const NAMES = { rates: "Rate", temperatures: "Temperature" };
@@ -31,14 +33,15 @@ const KEYS = {
  * @param {() => unknown} moved
  */
 export function pointPlan(levels, shown, use, moved) {
+  const width = innerWidth < PHONE_PX ? NARROW : WIDE;
   const drawing = svg("svg", {
     class: "point-plan",
-    viewBox: `0 0 ${WIDTH} ${HEIGHT}`,
+    viewBox: `0 0 ${width} ${HEIGHT}`,
     role: "group",
     "aria-label": "Points of the recipe: rates and temperatures",
   });
   /** @param {number} rate */
-  const x = (rate) => LEFT + share(rate, shown.rates) * (WIDTH - LEFT - RIM);
+  const x = (rate) => LEFT + share(rate, shown.rates) * (width - LEFT - RIM);
   /** @param {number} warm */
   const y = (warm) => HEIGHT - BOTTOM - share(warm, shown.temperatures) * (HEIGHT - BOTTOM - RIM);
 
@@ -84,10 +87,10 @@ export function pointPlan(levels, shown, use, moved) {
       if (!element.hasPointerCapture(event.pointerId)) return;
       const box = drawing.getBoundingClientRect();
       const [px, py] = [
-        ((event.clientX - box.left) / box.width) * WIDTH,
+        ((event.clientX - box.left) / box.width) * width,
         ((event.clientY - box.top) / box.height) * HEIGHT,
       ];
-      if (which.rates !== undefined) move("rates", which.rates, at((px - LEFT) / (WIDTH - LEFT - RIM), shown.rates));
+      if (which.rates !== undefined) move("rates", which.rates, at((px - LEFT) / (width - LEFT - RIM), shown.rates));
       if (which.temperatures !== undefined)
         move(
           "temperatures",
@@ -147,10 +150,10 @@ export function pointPlan(levels, shown, use, moved) {
       width: x(use.rates[1]) - x(use.rates[0]),
       height: y(use.temperatures[0]) - y(use.temperatures[1]),
     }),
-    svg("path", { class: "point-axes", d: `M${LEFT} ${RIM}V${HEIGHT - BOTTOM}H${WIDTH - RIM}` }),
+    svg("path", { class: "point-axes", d: `M${LEFT} ${RIM}V${HEIGHT - BOTTOM}H${width - RIM}` }),
     ...ends("rates").flatMap((value) => label(value, x(value), HEIGHT - 6, "middle")),
     ...ends("temperatures").flatMap((value) => label(value, LEFT - 28, y(value) + 4, "end")),
-    word("rate, deg/s", (LEFT + WIDTH - RIM) / 2, HEIGHT - 6, "middle"),
+    word("rate, deg/s", (LEFT + width - RIM) / 2, HEIGHT - 6, "middle"),
     word("deg C", LEFT - 28, RIM + 2, "end"),
     points,
     levels.rates.map((_, k) => handle("rates", k)),
