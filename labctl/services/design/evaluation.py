@@ -87,4 +87,6 @@ def _moved(recipe: Recipe, rates: tuple[float, ...], temperatures: tuple[float, 
         return Recipe.model_validate(document)
     except ValidationError as error:
         what = "; ".join(str(each["msg"]).removeprefix("Value error, ") for each in error.errors())
-        raise BadInput(f"recipe {recipe.name} with these rates and temperatures: {what}") from None
+        raise BadInput(
+            f"recipe {recipe.name} with these rates and temperatures: {what}; give other rates_dps or temperatures_c"
+        ) from None
