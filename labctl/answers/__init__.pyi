@@ -189,6 +189,8 @@ from labctl.answers.design import (
     DesignRequest as DesignRequest,
     DesignResponse as DesignResponse,
     DesignedCampaign as DesignedCampaign,
+    EvaluateRequest as EvaluateRequest,
+    EvaluateResponse as EvaluateResponse,
 )
 from labctl.answers.diagnosis import (
     ChosenExperiment as ChosenExperiment,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from labctl.answers.base import Request, ResponseModel
+from labctl.answers.base import Request, ResponseModel, SeveralLines
 from labctl.answers.common_fields import BenchName
 from labctl.answers.plans import RecipeSource
 
@@ -19,7 +19,7 @@ Effect = Annotated[str, Field(min_length=1, max_length=200)]
 class DesignRequest(Request):
     """What a campaign has to reach, for which model and over which range."""
 
-    like: RecipeSource | None = Field(
+    like: Annotated[RecipeSource | None, SeveralLines()] = Field(
         default=None,
         description="Recipe whose rates, temperatures, positions and model count where the request gives none; "
         "null: the ranges are those of the bench and its units.",
@@ -142,3 +142,42 @@ class DesignResponse(ResponseModel):
     )
     assumptions: list[str] = Field(description="Figures that the prediction counts with, and where they are from.")
     tried: int = Field(description="Number of recipes that were planned and compared.")
+
+
+class EvaluateRequest(Request):
+    """A recipe of fixed rates and temperatures, and the points at which they are moved."""
+
+    recipe: RecipeSource = Field(
+        description="Recipe whose points are moved; U is of the range of its own rates and temperatures."
+    )
+    rates_dps: list[float] | None = Field(
+        default=None, min_length=1, max_length=500, description="Rates in place of its own, deg/s; null: its own."
+    )
+    temperatures_c: list[float] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=500,
+        description="Temperatures in place of its own, deg C; null: its own.",
+    )
+    model: str | None = Field(
+        default=None, max_length=100, description="Model to fit; null: that of the recipe, else bias_scale."
+    )
+    u_dps: float | None = Field(default=None, gt=0, description="U (k = 2) to reach in the range, deg/s; null: none.")
+
+
+class EvaluateResponse(ResponseModel):
+    """What a recipe costs and gives on the bench with its points where they are asked for."""
+
+    bench: BenchName
+    model: str | None = Field(description="Model that is fitted; null: effects alone.")
+    rates_dps: list[float] = Field(description="Rates of the recipe, in its order, deg/s.")
+    temperatures_c: list[float] = Field(description="Temperatures of the recipe, in its order, deg C.")
+    allowed_rates_dps: Range = Field(description="Lowest and highest rate of the bench and its units, deg/s.")
+    allowed_temperatures_c: Range = Field(description="Lowest and highest temperature of these, deg C.")
+    use_rates_dps: Range = Field(description="Range of rates that U is of, deg/s.")
+    use_temperatures_c: Range = Field(description="Range of temperatures that U is of, deg C.")
+    evaluated: DesignedCampaign | None = Field(
+        description="Hours and U of the recipe; null: the bench cannot run it, or it does not fit the model."
+    )
+    why: str = Field(default="", description="Why `evaluated` is null; empty: it is not.")
+    recipe_toml: str = Field(description="The recipe with these points, TOML.")

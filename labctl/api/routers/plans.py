@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request
 
-from labctl.answers.design import DesignRequest, DesignResponse
+from labctl.answers.design import DesignRequest, DesignResponse, EvaluateRequest, EvaluateResponse
 from labctl.answers.plans import PlannedResponse, PlanRequest, RecipeResponse
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.services.design.design import designed
+from labctl.services.design.evaluation import evaluated
 from labctl.services.planning import planner as services
 from labctl.services.schedule.planned_start import planned_start
 from labctl.services.simulation.visibility import planned
@@ -42,3 +43,12 @@ async def design(http: Request, request: DesignRequest, service: ServiceDep) -> 
     Some seconds of computation; nothing moves, nothing is stored. `recipe_toml` can be sent to `POST /api/campaigns`.
     """
     return await while_connected(http, service, designed, request, service.bench)
+
+
+@router.post("/designs/evaluation", summary="Evaluate a recipe at other points")
+async def evaluation(http: Request, request: EvaluateRequest, service: ServiceDep) -> EvaluateResponse:
+    """Hours and U of a recipe of fixed rates and temperatures on this service's bench, with its points moved.
+
+    Nothing moves, nothing is stored. `recipe_toml` can be sent to `POST /api/campaigns` or `POST /api/plans`.
+    """
+    return await while_connected(http, service, evaluated, request, service.bench)

@@ -57,6 +57,36 @@ def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFil
 
     Without a bench it is the simulated one that fits best. Raises RecipeError, BadBench, BadInput, PlanRefused.
     """
+    posed = pose(store, request, bench)
+    problem, goal = posed.problem, Goal(request.u_dps, request.hours)
+    ramps = problem.model not in TABLES and problem.base.order == "position-major"
+    tried = search(problem, goal, ramps=ramps)
+    choice = chosen(tried, goal)
+    if choice is None:
+        raise _nothing(problem, goal, tried)
+    answer = _answer(_Found(problem, goal, tried, choice), posed.bench, posed.known, posed.like)
+    if posed.of_type is None:
+        return answer
+    without = chosen(search(replace(problem, prior=None, evaluated={}), goal, ramps=ramps), goal)
+    return answer.model_copy(update={"type_prior": DesignPrior(
+        type=posed.of_type.type, model=posed.of_type.model, units=posed.of_type.prior.units,
+        without=None if without is None else _designed(without, goal),
+    )})  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A problem, the bench that it is of, what is known of the noise there and of the type, and the recipe it is like."""
+
+    problem: Problem
+    bench: BenchFile
+    known: Known
+    like: Recipe | None
+    of_type: TypePrior | None  #: what the type of a unit says of the coefficients
+
+
+def pose(store: Store | None, request: DesignRequest, bench: BenchFile | None) -> Posed:
+    """Return what decides what a recipe costs and gives. Raises RecipeError, BadBench, BadInput, PlanRefused."""
     like = None if request.like is None else load_recipe(request.like)
     if like is not None:
         check_fit(like)
@@ -70,22 +100,10 @@ def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFil
     used = tuple(each for each in BODY_AXES if each in {Position.of(position).axis for position in base.positions})
     use = RangeOfUse(used, span.rate_dps, (span.low_c, span.high_c))
     name = f"{base.name}-designed"
-    alone = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name)
+    problem = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name)
     of_type = _prior(store, request, model, effects)
-    problem = alone if of_type is None else replace(alone, prior=of_type.prior, evaluated={})
-    goal, ramps = Goal(request.u_dps, request.hours), model not in TABLES and base.order == "position-major"
-    tried = search(problem, goal, ramps=ramps)
-    choice = chosen(tried, goal)
-    if choice is None:
-        raise _nothing(problem, goal, tried)
-    answer = _answer(_Found(problem, goal, tried, choice), on, known, like)
-    if of_type is None:
-        return answer
-    without = chosen(search(alone, goal, ramps=ramps), goal)
-    return answer.model_copy(update={"type_prior": DesignPrior(
-        type=of_type.type, model=of_type.model, units=of_type.prior.units,
-        without=None if without is None else _designed(without, goal),
-    )})  # fmt: skip
+    problem = problem if of_type is None else replace(problem, prior=of_type.prior)
+    return Posed(problem, on, known, like, of_type)
 
 
 def designed(store: Store, request: DesignRequest, bench: BenchFile | None) -> DesignResponse:
@@ -142,7 +160,7 @@ def _base_and_span(
         rates = rates or (min(like.rates_dps), max(like.rates_dps))
         temperatures = temperatures or (min(like.temperatures_c), max(like.temperatures_c))
     else:
-        rates, temperatures = rates or _rates(limits), temperatures or _temperatures(limits)
+        rates, temperatures = rates or allowed_rates(limits), temperatures or allowed_temperatures(limits)
         usual = load_recipe(REFERENCE).model_dump() | {"fit": None}
         base = Recipe.model_validate({**usual, "name": request.model or "effects", "positions": outputs})
     if missing := missing_instruments(base, limits):
@@ -166,7 +184,8 @@ def _refuse_beyond(base: Recipe, span: Span, limits: BenchLimits) -> None:
         raise PlanRefused(base.name, beyond, "Give --rates LOW,HIGH or --temperatures LOW,HIGH within the limits.")
 
 
-def _rates(limits: BenchLimits) -> Range:
+def allowed_rates(limits: BenchLimits) -> Range:
+    """Return the lowest and the highest rate of a bench and its units, deg/s."""
     rates: list[float] = [gyro.max_rate_dps for gyro in limits.gyros.values()]
     if limits.table is not None:
         rates.append(limits.table.max_rate_dps)
@@ -174,7 +193,8 @@ def _rates(limits: BenchLimits) -> Range:
     return -largest, largest
 
 
-def _temperatures(limits: BenchLimits) -> Range:
+def allowed_temperatures(limits: BenchLimits) -> Range:
+    """Return the lowest and the highest temperature of a bench and its units, deg C."""
     ends = [(gyro.min_c, gyro.max_c) for gyro in limits.gyros.values()]
     ends += [] if limits.chamber is None else [(limits.chamber.min_c, limits.chamber.max_c)]
     return max(low for low, _ in ends), min(high for _, high in ends)
@@ -219,12 +239,12 @@ def _answer(found: _Found, bench: BenchFile, known: Known, like: Recipe | None) 
         rates_dps=(-problem.span.rate_dps, problem.span.rate_dps),
         temperatures_c=(problem.span.low_c, problem.span.high_c),
         is_reached=goal.reached_by(choice),
-        chosen=_designed(choice, goal),
+        chosen=designed_campaign(choice, goal),
         recipe_toml=tomli_w.dumps(recipe_document(recipe)),
         schedule_hash=choice.plan.schedule_hash,
         decisions=list(decisions(problem, found.tried, choice, goal)),
-        others=[_designed(each, goal) for each in next_best(found.tried, choice, goal, COMPARED)],
-        reference=None if reference is None else _designed(reference, goal),
+        others=[designed_campaign(each, goal) for each in next_best(found.tried, choice, goal, COMPARED)],
+        reference=None if reference is None else designed_campaign(reference, goal),
         reference_name=REFERENCE if like is None else like.name,
         reference_refused=refused,
         bound=_bound(found),
@@ -234,7 +254,8 @@ def _answer(found: _Found, bench: BenchFile, known: Known, like: Recipe | None) 
     )
 
 
-def _designed(candidate: Candidate, goal: Goal) -> DesignedCampaign:
+def designed_campaign(candidate: Candidate, goal: Goal) -> DesignedCampaign:
+    """Return what a recipe costs and gives, as an answer states it."""
     predicted = candidate.predicted
     return DesignedCampaign(
         text=candidate.recipe.description if candidate.scheme is None else scheme_text(candidate.scheme),

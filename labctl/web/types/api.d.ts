@@ -106,6 +106,7 @@ export type Effect = Schema<"CataloguedEffect">;
 export type Fetch = Schema<"FetchResponse">;
 export type Heartbeat = Schema<"HeartbeatResponse">;
 export type NoiseFigure = Schema<"NoiseFigure">;
+export type EvaluatedRecipe = Schema<"EvaluateResponse">;
 export type FigurePoint = Schema<"FigurePointResponse">;
 export type Point = Schema<"PointResponse">;
 export type Preview = Schema<"PreviewResponse">;

@@ -935,6 +935,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/designs/evaluation": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Evaluate a recipe at other points
+         * @description Hours and U of a recipe of fixed rates and temperatures on this service's bench, with its points moved.
+         *
+         *     Nothing moves, nothing is stored. `recipe_toml` can be sent to `POST /api/campaigns` or `POST /api/plans`.
+         */
+        post: operations["evaluation_api_designs_evaluation_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/campaigns": {
         parameters: {
             query?: never;
@@ -7933,6 +7955,108 @@ export interface components {
              * @description Degrees of freedom nu of `u`: U = t(95.45 %, nu) u, t of Student; null: not stated, U = 2 u.
              */
             degrees_of_freedom: number | null;
+        };
+        /**
+         * EvaluateRequest
+         * @description A recipe of fixed rates and temperatures, and the points at which they are moved.
+         */
+        EvaluateRequest: {
+            /**
+             * Recipe
+             * @description Recipe whose points are moved; U is of the range of its own rates and temperatures.
+             */
+            recipe: string;
+            /**
+             * Rates Dps
+             * @description Rates in place of its own, deg/s; null: its own.
+             */
+            rates_dps?: number[] | null;
+            /**
+             * Temperatures C
+             * @description Temperatures in place of its own, deg C; null: its own.
+             */
+            temperatures_c?: number[] | null;
+            /**
+             * Model
+             * @description Model to fit; null: that of the recipe, else bias_scale.
+             */
+            model?: string | null;
+            /**
+             * U Dps
+             * @description U (k = 2) to reach in the range, deg/s; null: none.
+             */
+            u_dps?: number | null;
+        };
+        /**
+         * EvaluateResponse
+         * @description What a recipe costs and gives on the bench with its points where they are asked for.
+         */
+        EvaluateResponse: {
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
+            bench: string;
+            /**
+             * Model
+             * @description Model that is fitted; null: effects alone.
+             */
+            model: string | null;
+            /**
+             * Rates Dps
+             * @description Rates of the recipe, in its order, deg/s.
+             */
+            rates_dps: number[];
+            /**
+             * Temperatures C
+             * @description Temperatures of the recipe, in its order, deg C.
+             */
+            temperatures_c: number[];
+            /**
+             * Allowed Rates Dps
+             * @description Lowest and highest rate of the bench and its units, deg/s.
+             */
+            allowed_rates_dps: [
+                number,
+                number
+            ];
+            /**
+             * Allowed Temperatures C
+             * @description Lowest and highest temperature of these, deg C.
+             */
+            allowed_temperatures_c: [
+                number,
+                number
+            ];
+            /**
+             * Use Rates Dps
+             * @description Range of rates that U is of, deg/s.
+             */
+            use_rates_dps: [
+                number,
+                number
+            ];
+            /**
+             * Use Temperatures C
+             * @description Range of temperatures that U is of, deg C.
+             */
+            use_temperatures_c: [
+                number,
+                number
+            ];
+            /** @description Hours and U of the recipe; null: the bench cannot run it, or it does not fit the model. */
+            evaluated: components["schemas"]["DesignedCampaign"] | null;
+            /**
+             * Why
+             * @description Why `evaluated` is null; empty: it is not.
+             * @default
+             */
+            why: string;
+            /**
+             * Recipe Toml
+             * @description The recipe with these points, TOML.
+             */
+            recipe_toml: string;
         };
         /**
          * EventResponse
@@ -18309,6 +18433,39 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["DesignResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    evaluation_api_designs_evaluation_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["EvaluateRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EvaluateResponse"];
                 };
             };
             /** @description Validation Error */

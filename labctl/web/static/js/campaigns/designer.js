@@ -9,6 +9,7 @@ import { busyIndicator, button, chip, notice, table } from "../core/components.j
 import { labelledField, option, selectField } from "../core/fields.js";
 import { firstModels } from "../explore/first_models.js";
 import { designBody } from "./designer_request.js";
+import { movedPoints } from "./moved_points.js";
 
 /** @import { Design, DesignedCampaign, Recipe } from "../../../types/api.js" */
 
@@ -21,12 +22,14 @@ const MODELS = firstModels("rates");
  */
 
 /**
- * The card, closed at first. `taken(text)` is called with the recipe that a person takes.
+ * The card, closed at first. `source()` gives the recipe of the page; `taken(text)` is called with the one that a person
+ * takes.
  * @param {readonly Recipe[]} all
+ * @param {() => string} source
  * @param {(text: string) => unknown} taken
  * @param {AbortSignal} signal of the page
  */
-export function designerCard(all, taken, signal) {
+export function designerCard(all, source, taken, signal) {
   const place = h("div", { class: "stack" });
   const details = h(
     "details",
@@ -35,7 +38,7 @@ export function designerCard(all, taken, signal) {
       /** @param {Event} event */
       ontoggle: (event) => {
         if (!(/** @type {HTMLDetailsElement} */ (event.target).open) || place.childElementCount) return;
-        setChildren(place, form(all, taken, signal));
+        setChildren(place, form(all, taken, signal), movedPoints(source, taken, signal));
       },
     },
     h("summary", {}, h("strong", {}, "Design a campaign for an uncertainty")),

@@ -136,7 +136,7 @@ export async function page({ query, signal }) {
       h(
         "div",
         { class: "page" },
-        designerCard(all, (text) => navigate(`/campaigns/new?toml=${encodeURIComponent(text)}`), signal),
+        designerCard(all, source, (text) => navigate(`/campaigns/new?toml=${encodeURIComponent(text)}`), signal),
         planned,
         card("Effects that the plan can detect", found),
         hider

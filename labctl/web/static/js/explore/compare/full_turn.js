@@ -4,9 +4,9 @@
 import { temperatureColours } from "../../core/colour_scales.js";
 import { h } from "../../core/elements.js";
 import { figure } from "../../core/figure.js";
-import { number, plainNumber } from "../../core/format.js";
+import { capitalised, number, plainNumber } from "../../core/format.js";
 import { ownRows, pickRows, rms, span } from "./rows.js";
-import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
+import { barPlace, sceneLayout, sides, twoScenes } from "./scenes.js";
 
 /** @import { Comparison } from "../../../../types/api.js" */
 /** @import { PlotTrace } from "../../../../types/pages.js" */
