@@ -9,7 +9,14 @@ import tomli_w
 
 from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile
 from instruments.positions import Position
-from labctl.answers.design import DesignBound, DesignedCampaign, DesignRequest, DesignResponse, Range
+from labctl.answers.design import (
+    DesignBound,
+    DesignedCampaign,
+    DesignRequest,
+    DesignResponse,
+    Range,
+    TiltedDesign,
+)
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.design.bound import least_heat_h, u_of_one_hour_dps
@@ -21,6 +28,7 @@ from labctl.services.design.known import Known, known_noise
 from labctl.services.design.problem import Candidate, Goal, Problem
 from labctl.services.design.search import chosen, next_best, search
 from labctl.services.design.sentences import decisions
+from labctl.services.design.tilted_fixture import TiltedChoice, is_useful, tilted_choice
 from labctl.services.planning.earlier_campaigns import times_on_bench
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
@@ -69,13 +77,16 @@ def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFil
     used = tuple(each for each in BODY_AXES if each in {Position.of(position).axis for position in base.positions})
     use = RangeOfUse(used, span.rate_dps, (span.low_c, span.high_c))
     name = f"{base.name}-designed"
-    problem = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name)
+    useful = tuple(each for each in on.tilted_positions if is_useful(base.positions, axes, each))
+    problem = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name, useful)
     goal = Goal(request.u_dps, request.hours)
-    tried = search(problem, goal, ramps=model not in TABLES and base.order == "position-major")
+    ramps = model not in TABLES and base.order == "position-major"
+    tried = search(problem, goal, ramps=ramps)
     choice = chosen(tried, goal)
     if choice is None:
         raise _nothing(problem, goal, tried)
-    return _answer(_Found(problem, goal, tried, choice), on, known, like)
+    tilted = tilted_choice(problem, goal, tried) if ramps else None
+    return _answer(_Found(problem, goal, tried, choice, tilted, on.units_at_once), on, known, like)
 
 
 def designed(store: Store, request: DesignRequest, bench: BenchFile | None) -> DesignResponse:
@@ -90,6 +101,12 @@ class _Found:
     goal: Goal
     tried: list[Candidate]
     choice: Candidate
+    tilted: TiltedChoice | None
+    units: int  #: measured at once
+
+    def designed(self, candidate: Candidate) -> DesignedCampaign:
+        """Return a recipe with its figures."""
+        return _designed(candidate, self.goal, self.units)
 
 
 def _model(request: DesignRequest, like: Recipe | None) -> tuple[str | None, tuple[str, ...]]:
@@ -194,27 +211,41 @@ def _answer(found: _Found, bench: BenchFile, known: Known, like: Recipe | None) 
         rates_dps=(-problem.span.rate_dps, problem.span.rate_dps),
         temperatures_c=(problem.span.low_c, problem.span.high_c),
         is_reached=goal.reached_by(choice),
-        chosen=_designed(choice, goal),
+        chosen=found.designed(choice),
         recipe_toml=tomli_w.dumps(recipe_document(recipe)),
         schedule_hash=choice.plan.schedule_hash,
         decisions=list(decisions(problem, found.tried, choice, goal)),
-        others=[_designed(each, goal) for each in next_best(found.tried, choice, goal, COMPARED)],
-        reference=None if reference is None else _designed(reference, goal),
+        others=[found.designed(each) for each in next_best(found.tried, choice, goal, COMPARED)],
+        reference=None if reference is None else found.designed(reference),
         reference_name=REFERENCE if like is None else like.name,
         reference_refused=refused,
-        bound=_bound(found),
+        bound=_bound(problem, goal, choice),
+        tilted=None if found.tilted is None else _tilted(found, found.tilted),
+        units_at_once=found.units,
         standards_u_dps=None if outlook is None else outlook.expanded * problem.span.rate_dps,
-        assumptions=[*known.sources, _heat_text(problem.flow, bench)],
+        assumptions=[*known.sources, _heat_text(problem.flow, bench), _units_text(bench)],
         tried=len(found.tried),
     )
 
 
-def _designed(candidate: Candidate, goal: Goal) -> DesignedCampaign:
+def _tilted(found: _Found, tilted: TiltedChoice) -> TiltedDesign:
+    return TiltedDesign(
+        position=tilted.position,
+        is_on_bench=tilted.is_on_bench,
+        best=found.designed(tilted.best),
+        recipe_toml=tomli_w.dumps(recipe_document(tilted.best.recipe)),
+        without=None if tilted.without is None else found.designed(tilted.without),
+        bound=_bound(tilted.problem, found.goal, tilted.best),
+    )
+
+
+def _designed(candidate: Candidate, goal: Goal, units: int) -> DesignedCampaign:
     predicted = candidate.predicted
     return DesignedCampaign(
         text=candidate.recipe.description if candidate.scheme is None else scheme_text(candidate.scheme),
-        hours=candidate.hours, u_worst_dps=predicted.worst_dps, u_rms_dps=predicted.rms_dps,
-        u_heat_dps=predicted.heat_rms_dps, worst_axis=predicted.worst_axis,
+        hours=candidate.hours, hours_per_unit=candidate.hours / units,
+        u_worst_dps=predicted.worst_dps, u_rms_dps=predicted.rms_dps, u_heat_dps=predicted.heat_rms_dps,
+        worst_axis=predicted.worst_axis,
         worst_temperature_c=predicted.worst_temperature_c, datasets=candidate.plan.datasets,
         coefficients=predicted.coefficients, mountings=_mountings(candidate), covered_c=candidate.covered_c,
         is_reaching=goal.reached_by(candidate),
@@ -235,22 +266,32 @@ def _reference(problem: Problem, like: Recipe | None) -> tuple[Candidate | None,
         return None, str(error)
 
 
-def _bound(found: _Found) -> DesignBound | None:
-    """Return the least hours for the goal, or for what the chosen recipe gives where it does not reach one."""
-    problem, choice = found.problem, found.choice
-    wanted = max(found.goal.u_dps or 0.0, choice.predicted.worst_dps)
+def _bound(problem: Problem, goal: Goal, choice: Candidate) -> DesignBound | None:
+    """Return the least hours for the goal, or for what the chosen recipe gives where it does not reach one.
+
+    With a tilted fixture the temperature goes through the range in one mounting.
+    """
+    wanted = max(goal.u_dps or 0.0, choice.predicted.worst_dps)
+    positions = (*problem.base.positions, *problem.tilted)
     try:
         preset = preset_for(problem.model, list(problem.effects))
-        hour = u_of_one_hour_dps(problem.base.positions, problem.axes, preset, problem.noise, problem.use)
+        hour = u_of_one_hour_dps(positions, problem.axes, preset, problem.noise, problem.use)
     except LabctlError:
         return None
     noise_h = (hour / wanted) ** 2
+    heated = 1 if problem.tilted else len(problem.base.positions)
     handling_c = problem.base.mounting.handling_c
-    mountings = len(problem.base.positions)
-    heat_h = least_heat_h(mountings, problem.use.temperature_c, handling_c, problem.limits.ramp_c_per_min)
-    heat_h += mountings * MOUNTING_S / 3600.0 if problem.limits.needs_person else 0.0
+    heat_h = least_heat_h(heated, problem.use.temperature_c, handling_c, problem.limits.ramp_c_per_min)
+    heat_h += len(positions) * MOUNTING_S / 3600.0 if problem.limits.needs_person else 0.0
     bound_h = max(noise_h, heat_h)
     return DesignBound(noise_h=noise_h, heat_h=heat_h, bound_h=bound_h, ratio=choice.hours / bound_h)
+
+
+def _units_text(bench: BenchFile) -> str:
+    stated = bench.table is not None and bench.table.places is not None
+    source = "table.places of the bench file" if stated else "those in the bench file, which states no table.places"
+    at_once = "1 unit" if bench.units_at_once == 1 else f"{bench.units_at_once} units"
+    return f"{at_once} at once ({source}); a person mounts all of them in {MOUNTING_S / 60:g} min (assumed)"
 
 
 def _heat_text(flow: HeatFlow, bench: BenchFile) -> str:

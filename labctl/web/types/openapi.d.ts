@@ -6932,6 +6932,13 @@ export interface components {
             reference_refused: string;
             /** @description The least hours; null: the model has no law over the range. */
             bound: components["schemas"]["DesignBound"] | null;
+            /** @description What a tilted fixture is worth; null: the unit has fewer than three outputs, or the data sets are at fixed temperatures. */
+            tilted: components["schemas"]["TiltedDesign"] | null;
+            /**
+             * Units At Once
+             * @description Units that one campaign measures: table.places of the bench file, else the units in it.
+             */
+            units_at_once: number;
             /**
              * Standards U Dps
              * @description U (k = 2) that fixture and table leave at the largest rate, whatever the noise, deg/s: beside the U of the recipe, and only by further mountings made smaller; null: not stated, or no output across the axis.
@@ -6963,6 +6970,11 @@ export interface components {
              * @description Expected duration by the plan on the bench, h.
              */
             hours: number;
+            /**
+             * Hours Per Unit
+             * @description The same over the units that are measured at once, h.
+             */
+            hours_per_unit: number;
             /**
              * U Worst Dps
              * @description Largest U (k = 2) of a component of the corrected rate vector in the range, deg/s, by what the campaign decides: noise, drift and unsettled heat.
@@ -15281,6 +15293,33 @@ export interface components {
              * @description The hint in a sentence.
              */
             text: string;
+        };
+        /**
+         * TiltedDesign
+         * @description What a tilted fixture is worth, which brings a direction of the units between their axes up.
+         */
+        TiltedDesign: {
+            /**
+             * Position
+             * @description The direction that points up, such as x+y+z.
+             */
+            position: string;
+            /**
+             * Is On Bench
+             * @description Whether the bench file states such a fixture; false: these are the hours of a bench that has one.
+             */
+            is_on_bench: boolean;
+            /** @description The best recipe with it: the temperature moves in this mounting alone. */
+            best: components["schemas"]["DesignedCampaign"];
+            /**
+             * Recipe Toml
+             * @description That recipe as a recipe file, TOML.
+             */
+            recipe_toml: string;
+            /** @description The best recipe without it; null: there is none. */
+            without: components["schemas"]["DesignedCampaign"] | null;
+            /** @description The least hours with it; null: the model has no law over the range. */
+            bound: components["schemas"]["DesignBound"] | null;
         };
         /**
          * TimeLine

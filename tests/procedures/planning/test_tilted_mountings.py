@@ -34,6 +34,13 @@ def test_a_tilted_mounting_needs_a_fixture_that_brings_its_direction_up(limits: 
         make_plan(recipe(inverted={"temperatures_c": [20], "rates_dps": [5]}), has)
 
 
+def test_a_tilted_unit_is_not_turned_about_the_table_axis(limits: BenchLimits) -> None:
+    has = replace(limits, tilted_positions=("x+y+z",))
+    turned = {"unit_deg": [180], "temperatures_c": [20], "rates_dps": [5]}
+    plan = make_plan(recipe(indexing=turned), has)
+    assert [step.position for step in plan.steps if isinstance(step, Mount)] == ["x", "x@180", "x+y+z"]
+
+
 def moving(plan: Plan) -> set[str]:
     """Return the positions in which data are taken after a move that is not waited for."""
     found, moves = set(), False
