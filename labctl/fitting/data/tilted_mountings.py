@@ -64,18 +64,14 @@ def leaning_mountings(shares: Mapping[str, float]) -> list[LeaningMounting]:
 
 
 def undetermined(positions: Iterable[str]) -> str:
-    """Return why mountings, some of them tilted, do not determine the nine elements of a matrix; empty: they do."""
+    """Return which mountings, some of them tilted, do not determine the nine elements of a matrix; empty: they do."""
     every = [Position.of(name) for name in positions]
     if not any(position.is_tilted for position in every):
         return ""
     directions = np.array([position.up for position in every])
     if np.linalg.matrix_rank(directions, tol=DIRECTIONS_TOLERANCE) == len(BODY_AXES):
         return ""
-    ends = ", ".join(dict.fromkeys(position.end for position in every))
-    return (
-        f"positions {ends}: the nine elements of scale factors and misalignments need three directions along the table "
-        "axis that are not in one plane; measure further mountings too, such as x, y and z"
-    )
+    return ", ".join(dict.fromkeys(position.end for position in every))
 
 
 def element_gain(shares: Mapping[str, float], output: str, about: str, *, tilted: bool | None = None) -> float:

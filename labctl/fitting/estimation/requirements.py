@@ -112,5 +112,9 @@ def _require_directions(data: FitData, model: ErrorModel) -> None:
     estimated = {term.effect for term in _estimated(data, model, list(data.outputs))}
     if not estimated & ALIGNMENT:
         return
-    if text := undetermined(turned_positions(data.channels)):
-        raise NotEnoughData(f"{data.info.serial}: {text}, or leave {' and '.join(sorted(estimated & ALIGNMENT))} out")
+    if ends := undetermined(turned_positions(data.channels)):
+        raise NotEnoughData(
+            f"{data.info.serial}: positions {ends}: the nine elements of scale factors and misalignments need three "
+            "directions along the table axis that are not in one plane; measure further mountings too, such as x, y "
+            f"and z, or leave out {' and '.join(sorted(estimated & ALIGNMENT))}"
+        )
