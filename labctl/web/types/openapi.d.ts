@@ -7121,6 +7121,16 @@ export interface components {
              * @description Recordings that the version is judged by at first; default: those that it was fitted to, and those of earlier diagnoses of the unit.
              */
             recordings?: number[];
+            /**
+             * At
+             * @description Time before which no experiment is begun, ISO 8601; a time without an offset is in `time_zone`. The recordings so far are judged at once. Default: as soon as the bench is free.
+             */
+            at?: string | null;
+            /**
+             * Time Zone
+             * @description Time zone of `at`, such as Europe/Berlin; default: that of the service's computer.
+             */
+            time_zone?: string | null;
         };
         /**
          * DiagnosisResponse
@@ -7168,6 +7178,11 @@ export interface components {
              * @description Time at which it was asked for.
              */
             created_at: string;
+            /**
+             * Begins At
+             * @description Time before which it begins no experiment; null: it begins at once.
+             */
+            begins_at: string | null;
             /**
              * State
              * @description criticising: the recordings so far are judged; awaiting_confirmation: a person has to confirm the experiment; measuring: the campaign of the experiment runs; done: see `outcome`; stopped: a person stopped it, and it can be resumed; failed: it could not go on, see `why`, and it can be resumed.
