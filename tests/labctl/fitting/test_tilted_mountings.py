@@ -18,6 +18,7 @@ from labctl.fitting.uncertainty import (
     evidence_of,
     rate_vector_uncertainty,
 )
+from labctl.fitting.uncertainty.local_model_error import LocalModelError
 from labctl.recording import Recording, RecordingInfo, Standard
 
 AXES = "xyz"
@@ -156,3 +157,20 @@ def test_too_few_directions_are_refused_with_what_to_add(positions: tuple[str, .
     with pytest.raises(NotEnoughData, match=r"need three directions along the table axis.*such as x, y and z"):
         fit(measured(positions), effects=EFFECTS)
     assert undetermined(STRAIGHT) == undetermined(tuple(DIAGONALS)[:3]) == undetermined(("x",)) == ""
+
+
+def test_data_of_a_tilted_unit_say_what_the_model_leaves_at_a_rate_about_another_axis() -> None:
+    turned = np.repeat([-230.0, -115.0, 0.0, 115.0, 230.0], 4)
+    rest, n = 0.0 * turned, len(turned)
+    warm = np.repeat([-30.0, 25.0], n)
+    left, white = np.full(2 * n, 4e-6), np.full(2 * n, 1e-6)
+    about_y = np.concatenate([rest, turned])  # at 25 deg C alone
+    straight = LocalModelError(np.concatenate([turned, rest]), warm, left, white, {"y": about_y})
+    assert straight.at(0.0, 25.0, {"y": 230.0}) is not None
+    assert straight.at(0.0, -30.0, {"y": 230.0}) is None
+    both = np.concatenate([turned, turned])
+    tilted = LocalModelError(np.concatenate([turned, rest]), warm, left, white, {"y": both})
+    found = tilted.at(0.0, -30.0, {"y": 230.0})
+    assert found is not None
+    assert found >= np.sqrt(3e-6)  # all that is left counts, whichever axis it is of
+    assert "about y, no data set was measured near there" in str(tilted.unknown_at(0.0, -30.0, {"y": 500.0}))
