@@ -159,11 +159,7 @@ function shown(found, taken) {
       : null,
     found.tilted ? tiltedText(found.tilted, taken) : null,
     found.units_at_once > 1
-      ? h(
-          "p",
-          { class: "small" },
-          `${found.units_at_once} units at once: ${number(chosen.hours_per_unit)} h per unit.`,
-        )
+      ? h("p", { class: "small" }, `${found.units_at_once} units at once: ${number(chosen.hours_per_unit)} h per unit.`)
       : null,
     found.standards_u_dps === null
       ? null
