@@ -187,6 +187,7 @@ from labctl.answers.design import (
     DesignBound as DesignBound,
     DesignRequest as DesignRequest,
     DesignResponse as DesignResponse,
+    TiltedDesign as TiltedDesign,
     DesignedCampaign as DesignedCampaign,
 )
 from labctl.answers.diagnosis import (
