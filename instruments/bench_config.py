@@ -14,12 +14,13 @@ import math
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
 
 from instruments.datasheet import Convention, undeclared
 from instruments.laboratory import Laboratory
+from instruments.positions import Position
 from instruments.standards import Standard
 from instruments.toml_documents import MAX_BYTES, read_toml
 
@@ -61,6 +62,7 @@ class TableSettings(DeviceSettings):
     steps_per_turn: int = Field(default=1600, gt=0)  #: half steps of the table, after the reduction
     max_rate_dps: float = Field(gt=0)
     acceleration_dps2: float = Field(gt=0)
+    places: int | None = Field(default=None, ge=1, le=1000)  #: units that fit on it at once; absent: those in the file
 
 
 #: Time constant with which the air of a chamber follows a ramp where a bench file states none, s: a guess.
@@ -135,6 +137,17 @@ class ReferenceSettings(DeviceSettings):
     corrections: dict[str, float] = Field(default_factory=dict)
 
 
+def _tilted(text: str) -> str:
+    """Return a direction of a tilted fixture in its normal form; raises ValueError for another position."""
+    position = Position.of(text)
+    if not position.is_tilted or position.turned_deg:
+        raise ValueError(
+            f"{text!r} is no direction of a tilted fixture; give the sum of body axes that points up, such as x+y+z"
+        )
+    return position.end
+
+
+TiltedPosition = Annotated[str, AfterValidator(_tilted)]
 SettingsT = TypeVar("SettingsT", bound=BaseModel)
 
 
@@ -186,6 +199,8 @@ class BenchFile(Strict):
     references: tuple[SerializeAsAny[ReferenceSettings], ...] = ()
     laboratory: Laboratory | None = None  #: as certificates name it
     standards: tuple[Standard, ...] = ()  #: reference standards, at most one of each quantity and name
+    #: Directions of the body that a tilted fixture of the bench brings up, such as "x+y+z"; absent: it has none.
+    tilted_positions: tuple[TiltedPosition, ...] = ()
     simulation: SimulationSettings | None = None
     #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
     #: here is not used.
@@ -201,6 +216,17 @@ class BenchFile(Strict):
             values = [value for unit in self.gyros if (value := getattr(unit, key)) is not None]
             if twice := next((value for value in values if values.count(value) > 1), None):
                 raise ValueError(f"two gyros have the {key} {twice!r}; give each gyro a different one")
+        return self
+
+    @model_validator(mode="after")
+    def _units_fit(self) -> BenchFile:
+        """Reject more units than the table has places."""
+        places = None if self.table is None else self.table.places
+        if places is not None and len(self.gyros) > places:
+            raise ValueError(
+                f"table.places = {places}, but the file has {len(self.gyros)} units in [[gyros]]; correct places, or "
+                "remove units"
+            )
         return self
 
     @model_validator(mode="after")
@@ -239,6 +265,11 @@ class BenchFile(Strict):
             return stated
         simulated = self.simulation.chamber.get("air_tau_s", USUAL_AIR_TAU_S)
         return float(simulated) if isinstance(simulated, int | float) else None  # another is refused when it is opened
+
+    @property
+    def units_at_once(self) -> int:
+        """How many units one campaign measures: as many as fit on the table where the file says it."""
+        return len(self.gyros) if self.table is None or self.table.places is None else self.table.places
 
     @property
     def is_simulated(self) -> bool:

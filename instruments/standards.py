@@ -15,11 +15,12 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 #: clock: the time base that rates follow from. table_rate: the table's rate beside its time base. thermometer: the
 #: temperature that units are fitted by. chamber_gradient: the unit's temperature against that thermometer.
 #: fixture_angle: the unit's axis against its mounting, of each face. tilt: the mounting plate against the axis of
-#: rotation. mounting_repeatability: the unit in one mounting against the same mounting another time. level: the axis of
-#: rotation against the vertical. turn_angle: of a turn by hand.
+#: rotation. mounting_repeatability: the unit in one mounting against the same mounting another time.
+#: tilted_fixture_angle: the unit's direction in a tilted mounting against the one that is stated, in each of two
+#: directions. level: the axis of rotation against the vertical. turn_angle: of a turn by hand.
 Quantity = Literal[
     "clock", "table_rate", "thermometer", "chamber_gradient", "fixture_angle", "tilt", "mounting_repeatability",
-    "level", "supply", "turn_angle",
+    "tilted_fixture_angle", "level", "supply", "turn_angle",
 ]  # fmt: skip
 Unit = Literal["ppm", "deg/s", "deg C", "deg", "V"]
 Distribution = Literal["normal", "rectangular", "triangular", "u-shaped"]
@@ -33,6 +34,7 @@ UNITS: dict[Quantity, tuple[Unit, ...]] = {
     "fixture_angle": ("deg",),
     "tilt": ("deg",),
     "mounting_repeatability": ("deg",),
+    "tilted_fixture_angle": ("deg",),
     "level": ("deg",),
     "supply": ("V",),
     "turn_angle": ("deg",),

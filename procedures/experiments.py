@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from instruments.plugins import PluginGroup
+from instruments.positions import AXES, Position
 from procedures.recipe.recipe import Recipe
 
 #: Changes of a recipe, by key; None where the recipe does not lend itself to the experiment.
@@ -67,6 +68,8 @@ LOOP_C, SEVERAL_C = 7, 4
 SLOW_C_PER_MIN, MIN_RAMP_K = 0.25, 5.0
 #: Rates near rest, over the largest.
 NEAR_REST = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+#: What a tilted fixture brings up in an experiment: all three axes turn at 1/sqrt(3) of the table's rate.
+DIAGONAL = "x+y+z"
 #: Shares of the largest rate that are close to each other in its top third.
 TOP = (0.3, 0.5, *np.arange(0.66, 1.001, 0.04).tolist())
 
@@ -156,6 +159,14 @@ def _turned(recipe: Recipe) -> Changes:
     rates = few_rates(recipe)
     indexing = {"unit_deg": [180], "fixture_deg": [180], "temperatures_c": [at_hand_c(recipe)], "rates_dps": rates}
     return _at_one(recipe, rates, indexing=indexing, **_one_session(recipe))
+
+
+def _tilted(recipe: Recipe) -> Changes:
+    mounted = [Position.of(each) for each in recipe.positions]
+    straight = [str(each) for each in mounted if not each.is_tilted]
+    if not _turns(recipe) or {Position.of(each).axis for each in straight} < set(AXES):
+        return None
+    return _at_one(recipe, few_rates(recipe), positions=[*straight, DIAGONAL], repeats=2, **_one_session(recipe))
 
 
 def _one_powered_run(recipe: Recipe) -> Changes:
@@ -270,6 +281,10 @@ BLOCKS: tuple[Block, ...] = (
         _inverted_at_several,
     ),
     Block("turned_180", "each position also turned by 180 deg on its fixture and on the table", _turned),
+    Block(
+        "tilted", "each position, and tilted with x+y+z up: three axes turn at once, in one powered run", _tilted,
+        needs=("a tilted fixture that brings x+y+z up (tilted_positions of the bench file)",),
+    ),
     Block("one_powered_run", "all positions twice in one powered run, at one temperature", _one_powered_run),
     Block("power_cycles", "three power cycles at constant temperature", _power_cycles),
     Block("from_switching_on", "a few rates again and again for an hour from switching on", _from_switching_on),

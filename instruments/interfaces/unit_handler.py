@@ -9,7 +9,7 @@ class UnitHandler(Protocol):
     """A person or a device that turns the units and switches their power. Every failure is an InstrumentError."""
 
     def mount(self, position: str) -> None:
-        """Turn the units so that body axis `position` (x, -x, y ...) points up along the table axis."""
+        """Turn the units so that body axis `position` (x, -x, y ..., tilted x+y+z) points up along the table axis."""
         ...
 
     def turn(self, position: str, turn_deg: float) -> None:

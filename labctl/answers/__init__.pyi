@@ -188,6 +188,7 @@ from labctl.answers.design import (
     DesignPrior as DesignPrior,
     DesignRequest as DesignRequest,
     DesignResponse as DesignResponse,
+    TiltedDesign as TiltedDesign,
     DesignedCampaign as DesignedCampaign,
     EvaluateRequest as EvaluateRequest,
     EvaluateResponse as EvaluateResponse,

@@ -71,6 +71,7 @@ class DesignedCampaign(ResponseModel):
 
     text: str = Field(description="What the recipe does, in words.")
     hours: float = Field(description="Expected duration by the plan on the bench, h.")
+    hours_per_unit: float = Field(description="The same over the units that are measured at once, h.")
     u_worst_dps: float = Field(
         description="Largest U (k = 2) of a component of the corrected rate vector in the range, deg/s, by what the "
         "campaign decides: noise, drift and unsettled heat."
@@ -111,6 +112,19 @@ class DesignBound(ResponseModel):
     ratio: float = Field(description="Hours of the chosen recipe over `bound_h`.")
 
 
+class TiltedDesign(ResponseModel):
+    """What a tilted fixture is worth, which brings a direction of the units between their axes up."""
+
+    position: str = Field(description="The direction that points up, such as x+y+z.")
+    is_on_bench: bool = Field(
+        description="Whether the bench file states such a fixture; false: these are the hours of a bench that has one."
+    )
+    best: DesignedCampaign = Field(description="The best recipe with it: the temperature moves in this mounting alone.")
+    recipe_toml: str = Field(description="That recipe as a recipe file, TOML.")
+    without: DesignedCampaign | None = Field(description="The best recipe without it; null: there is none.")
+    bound: DesignBound | None = Field(description="The least hours with it; null: the model has no law over the range.")
+
+
 class DesignResponse(ResponseModel):
     """The recipe that was chosen, why, and what it was compared with."""
 
@@ -136,6 +150,13 @@ class DesignResponse(ResponseModel):
         default="", description="Why that recipe cannot be run on the bench, or does not fit the model; empty: it can."
     )
     bound: DesignBound | None = Field(description="The least hours; null: the model has no law over the range.")
+    tilted: TiltedDesign | None = Field(
+        description="What a tilted fixture is worth; null: the unit has fewer than three outputs, or the data sets are "
+        "at fixed temperatures."
+    )
+    units_at_once: int = Field(
+        description="Units that one campaign measures: table.places of the bench file, else the units in it."
+    )
     standards_u_dps: float | None = Field(
         description="U (k = 2) that fixture and table leave at the largest rate, whatever the noise, deg/s: beside the "
         "U of the recipe, and only by further mountings made smaller; null: not stated, or no output across the axis."

@@ -51,6 +51,17 @@ class DiagnosisRequest(Request):
         description="Recordings that the version is judged by at first; default: those that it was fitted to, and "
         "those of earlier diagnoses of the unit.",
     )
+    at: str | None = Field(
+        default=None,
+        max_length=64,
+        description="Time before which no experiment is begun, ISO 8601; a time without an offset is in `time_zone`. "
+        "The recordings so far are judged at once. Default: as soon as the bench is free.",
+    )
+    time_zone: str | None = Field(
+        default=None,
+        max_length=100,
+        description="Time zone of `at`, such as Europe/Berlin; default: that of the service's computer.",
+    )
 
 
 class ConfirmExperimentRequest(Request):
@@ -133,6 +144,9 @@ class DiagnosisResponse(ResponseModel):
     spent_hours: float = Field(description="Time that its campaigns have taken on the bench so far, h.")
     by: str = Field(description="Who asked for it.")
     created_at: datetime = Field(description="Time at which it was asked for.")
+    begins_at: datetime | None = Field(
+        default=None, description="Time before which it begins no experiment; null: it begins at once."
+    )
     state: DiagnosisState = Field(
         description="criticising: the recordings so far are judged; awaiting_confirmation: a person has to confirm the "
         "experiment; measuring: the campaign of the experiment runs; done: see `outcome`; stopped: a person stopped "

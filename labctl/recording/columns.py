@@ -49,7 +49,7 @@ COLUMNS = (
     Column("t_s", "number", "s", "time since started_at", frozenset({"samples"})),
     Column(DEVICE_S, "number", "s", "time by the unit's own clock, from its own zero"),
     Column(ARRIVAL_S, "number", "s", "time since started_at at which the reading had arrived"),
-    Column("position", "text", "", "body axis along the table axis, with its sign"),
+    Column("position", "text", "", "body axis along the table axis, with its sign; tilted a sum of axes, x+y+z"),
     Column("run", "integer", "", "powered session"),
     Column("mounting", "integer", "", "number of the mounting: increases each time the unit is mounted again"),
     Column("verification", "integer", "", "1: measured to verify a calibration, and never fitted"),

@@ -62,7 +62,7 @@ class Mount(StepBase):
     """A person turns the unit so that body axis `position` points along the table axis, up."""
 
     kind: Literal["mount"] = "mount"
-    position: str  #: "x", "-x", "y", ...
+    position: str  #: "x", "-x", "y", ...; tilted "x+y+z"
     mounting: int
     run: int
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro
-from instruments.positions import Position
+from instruments.positions import AXES, Position
 from procedures.contracts.errors import GuardTripped, SoakFailed, StepFailed
 from procedures.contracts.journal import Event
 from procedures.contracts.operator import Prompt
@@ -112,6 +113,13 @@ def mounting_text(position: str) -> str:
     """Return what a person is asked for to mount the units in a position."""
     axis_position = Position.of(position)
     text = f"turn the units so that body axis {axis_position.end} points up along the table axis"
+    if axis_position.is_tilted:
+        angles = zip(AXES, axis_position.up, strict=True)
+        from_text = ", ".join(f"{math.degrees(math.acos(share)):.2f} deg from {axis}" for axis, share in angles)
+        text = (
+            f"mount the units on the tilted fixture so that body direction {axis_position.end}, {from_text}, points up "
+            "along the table axis"
+        )
     if axis_position.unit_deg:
         text += (
             f", and each unit on the same face of its fixture by {axis_position.unit_deg} deg from where it was first"

@@ -10,13 +10,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from instruments.interfaces.gyro import Readings
-from instruments.positions import Position
+from instruments.positions import AXES, Position
 from procedures.monitoring.turn_course import Nominal
 
 #: Rates that differ by less say nothing, deg/s: drift is no answer.
 MIN_CHANGE_DPS = 5.0
 #: Limits of the change of the output over that of the rate.
 MIN_SHARE, LARGEST_SHARE = 0.5, 2.0
+#: Of a tilted mounting an axis is compared that turns at so much of the table's rate at least.
+MIN_ALONG = 0.3
 #: A rate that comes to less was not measured as a rate.
 NOTHING_SHARE = 0.2
 
@@ -73,31 +75,39 @@ class UnitResponse:
     def complaint(self, name: str, rate_dps: float, position: Position, max_rate_dps: float) -> str:
         """Return what is wrong with the answer of a unit to the table's rate, deg/s; empty where nothing is."""
         now = self._sums.get(name, _Sums()).mean_dps()
-        if position.axis not in now or abs(rate_dps) > max_rate_dps:
+        up = {axis: share for axis, share in zip(AXES, position.up, strict=True) if abs(share) >= MIN_ALONG}
+        if not up.keys() & now.keys() or abs(rate_dps) > max_rate_dps:
             return ""
         earlier = self._earlier.setdefault(name, [])
         before = max(earlier, key=lambda each: abs(each[0] - rate_dps), default=None)
         earlier.append((rate_dps, now))
-        if before is None or abs(rate_dps - before[0]) < MIN_CHANGE_DPS:
+        if before is None or abs(rate_dps - before[0]) * min(map(abs, up.values())) < MIN_CHANGE_DPS:
             return ""
-        change_dps = position.sign * (rate_dps - before[0])
-        shares = {axis: (mean - before[1][axis]) / change_dps for axis, mean in now.items()}
-        share = shares[position.axis]
-        if MIN_SHARE <= share <= LARGEST_SHARE:
-            self._confirmed.add(name)
-            self._unconfirmed.pop(name, None)
-            return ""
-        return (
-            f"from {before[0]:g} to {rate_dps:.5g} deg/s of the table its output about {position.axis} changed by "
-            f"{share * change_dps:+.3g} deg/s, {100 * share:.3g} % of that, limits {100 * MIN_SHARE:g} and "
-            f"{100 * LARGEST_SHARE:g} %; {_advice(shares, position)}"
-        )
+        change_dps = rate_dps - before[0]
+        changes = {axis: mean - before[1][axis] for axis, mean in now.items()}
+        for axis, along in up.items():
+            share = changes[axis] / (along * change_dps) if axis in changes else 1.0
+            if not MIN_SHARE <= share <= LARGEST_SHARE:
+                shares = {other: change / (along * change_dps) for other, change in changes.items()}
+                return (
+                    f"from {before[0]:g} to {rate_dps:.5g} deg/s of the table its output about {axis} changed by "
+                    f"{changes[axis]:+.3g} deg/s, {100 * share:.3g} % of {_that(along)}, limits "
+                    f"{100 * MIN_SHARE:g} and {100 * LARGEST_SHARE:g} %; {_advice(shares, axis, position)}"
+                )
+        self._confirmed.add(name)
+        self._unconfirmed.pop(name, None)
+        return ""
 
 
-def _advice(shares: Mapping[str, float], position: Position) -> str:
-    share = shares[position.axis]
-    other = max(shares, key=lambda axis: abs(shares[axis]))
-    if other != position.axis and abs(shares[other]) >= MIN_SHARE:
+def _that(along: float) -> str:
+    return "that" if abs(along) == 1.0 else f"the {100 * abs(along):.3g} % of that which turn about this axis"
+
+
+def _advice(shares: Mapping[str, float], axis: str, position: Position) -> str:
+    """Return what to do about an output that does not follow; `shares` are of the rate about its own axis."""
+    share = shares[axis]
+    other = max(shares, key=lambda each: abs(shares[each]))
+    if other not in position.axes and abs(shares[other]) >= MIN_SHARE:
         return f"its output about {other} shows the rate: mount the unit with {position.end} up"
     if -LARGEST_SHARE <= share <= -MIN_SHARE:
         return f"its sign is reversed: mount the unit with {position.end} up, or correct the sign of its scale"

@@ -11,6 +11,7 @@ from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
 from instruments.interfaces.rate_course import RateCourse, course_complaint
 from instruments.interfaces.table import TableLimits
+from instruments.positions import Position
 from procedures.contracts.bench import Bench
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.earlier_times import EarlierTimes
@@ -39,20 +40,21 @@ class BenchLimits:
     is_driven: bool = True
     air_tau_s: float | None = None  #: time constant of the chamber's air, for the forecast; None: a guess is used
     earlier: EarlierTimes | None = None  #: what earlier campaigns of the bench took, for the forecast
+    tilted_positions: tuple[str, ...] = ()  #: directions of the body that a tilted fixture brings up
 
     @classmethod
     def of(
         cls, bench: Bench, *, needs_person: bool = True, air_tau_s: float | None = None,
-        earlier: EarlierTimes | None = None,
+        earlier: EarlierTimes | None = None, tilted_positions: tuple[str, ...] = (),
     ) -> BenchLimits:  # fmt: skip
-        """Return the limits of an opened bench; `needs_person` and `air_tau_s` as its file says (`BenchFile`)."""
+        """Return the limits of an opened bench, the others as its file says (`BenchFile`)."""
         units = {name: gyro.limits for name, gyro in bench.gyros.items()}
         chamber = None if bench.chamber is None else bench.chamber.limits
         if bench.table is None:
-            return cls(None, chamber, units, needs_person=needs_person, air_tau_s=air_tau_s, earlier=earlier)
+            return cls(None, chamber, units, None, needs_person, True, air_tau_s, earlier, tilted_positions)
         achievable_dps = bench.table.achievable_dps
         limits = bench.table.limits
-        return cls(limits, chamber, units, achievable_dps, needs_person, air_tau_s=air_tau_s, earlier=earlier)
+        return cls(limits, chamber, units, achievable_dps, needs_person, True, air_tau_s, earlier, tilted_positions)
 
     @property
     def max_acceleration_dps2(self) -> float:
@@ -161,7 +163,7 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
     courses = [limits.course_complaint(profile.course) for profile in recipe.profiles]
     beyond += _courses_beyond(recipe, courses)
     values["profiles"] = tuple(each for each, text in zip(values["profiles"], courses, strict=True) if not text)
-    empty += _ramp_complaints(recipe, limits)
+    empty += _ramp_complaints(recipe, limits) + _fixture_complaints(recipe, limits)
     handling = recipe.mounting.handling_c
     if handling is not None and (text := limits.temperature_complaint(handling)):
         empty.append(f"mounting.handling_c {handling:g}: {text}")
@@ -186,6 +188,19 @@ def _ramp_complaints(recipe: Recipe, limits: BenchLimits) -> list[str]:
             f"ramp.c_per_min {ramp.c_per_min:g}: faster than the {limits.ramp_c_per_min:g} K/min of the chamber"
         )
     return complaints
+
+
+def _fixture_complaints(recipe: Recipe, limits: BenchLimits) -> list[str]:
+    """Return which tilted mountings no fixture of the bench brings up; one upside down is another direction."""
+    mounted = [Position.of(each) for each in recipe.positions]
+    mounted += [each.upside_down for each in mounted] if recipe.inverted is not None else []
+    tilted = dict.fromkeys(each.end for each in mounted if each.is_tilted)
+    return [
+        f"positions {end}: the bench states no tilted fixture that brings this direction of a unit up; where it has "
+        f'one, add tilted_positions = ["{end}"] at the beginning of the bench file'
+        for end in tilted
+        if end not in limits.tilted_positions
+    ]
 
 
 def _courses_beyond(recipe: Recipe, complaints: list[str | None]) -> list[str]:

@@ -96,10 +96,13 @@ def _blocks(recipe: Recipe) -> list[MountingBlock]:
 
 
 def _turned(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[MountingBlock]:
-    """Return the mountings that follow a mounting in its powered session: turned about the table axis, upside down."""
+    """Return the mountings that follow a mounting in its powered session: turned about the table axis, upside down.
+
+    A tilted unit is not turned about the table axis: the straight mountings separate the angle of its fixture.
+    """
     straight = Position.of(position)
     tables: list[tuple[Inverted | Indexing, list[Position]]] = []
-    if (rules := recipe.indexing) is not None:
+    if (rules := recipe.indexing) is not None and not straight.is_tilted:
         of_unit = [replace(straight, unit_deg=angle) for angle in rules.unit_deg]
         tables.append((rules, [*of_unit, *(replace(straight, fixture_deg=angle) for angle in rules.fixture_deg)]))
     if recipe.inverted is not None:

@@ -56,6 +56,7 @@ class _StepWriter:
         self.mounting = 0
         self.run = 0
         self.datasets = 0
+        self.has_ramped = False
         self.timed_runs = 0
         self.timed_at = 0
         self.not_counted_s = 0.0  #: by which moves of the chamber count as longer than they are expected to take
@@ -91,14 +92,18 @@ class _StepWriter:
             self.acquire(level, verification=block.verification)
             self.check_home(level)
             self.measure_clock_again()
-        if self.recipe.ramp is not None and not block.verification and block.position in self.recipe.positions:
-            self.ramp(self.recipe.ramp)
+        ramp = self.recipe.ramp
+        if ramp is None or block.verification or block.position not in self.recipe.positions:
+            return
+        if ramp.moves_in(block.position):
+            self.ramp(ramp)
 
     def ramp(self, rules: Ramp) -> None:
         """Soak at one temperature, and run rates while the chamber goes to others, one after the other."""
         self.move_chamber(rules.from_c)
         self.soak(rules.from_c)
-        is_first = self.mounting == 1 and rules.first_dwell_s is not None
+        is_first = not self.has_ramped and rules.first_dwell_s is not None
+        self.has_ramped = True
         dwell_s = rules.first_dwell_s if is_first else rules.dwell_s
         for leg, to_c in enumerate(rules.ends_c, start=1):
             from_c, way_c = self.air_c, to_c - self.air_c

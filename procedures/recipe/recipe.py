@@ -11,6 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field, JsonValue, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from instruments.positions import Position as BodyPosition
 from instruments.toml_documents import listed, parse_toml, read_toml_text, shown
 from procedures.contracts.errors import RecipeError
 from procedures.recipe.fit_rules import FitRules
@@ -59,7 +60,7 @@ class Recipe(Table):
     turns: TurnRules | None = None  #: instead of temperatures and rates
     temperatures_c: tuple[Number, ...]
     rates_dps: tuple[Number, ...]
-    positions: tuple[Position, ...] = Field(min_length=1)  #: body axis along the table axis, up
+    positions: tuple[Position, ...] = Field(min_length=1)  #: body axis along the table axis, up; tilted x+y+z
     order: Literal["position-major", "temperature-major"] = "position-major"
     #: "up_down": every second temperature on the way up, the others on the way down
     temperature_order: Literal["as_listed", "up", "down", "up_down"] = "as_listed"
@@ -117,6 +118,21 @@ class Recipe(Table):
         beyond = outside("rates_dps", self.stop.rates_dps, self.rates_dps, "deg/s")
         if beyond := beyond or outside("temperature_c", self.stop.temperature_c, self.temperatures_c, "deg C"):
             raise ValueError(beyond)
+        return self
+
+    @model_validator(mode="after")
+    def _mountings_of_it(self) -> Recipe:
+        """Refuse a ramp in a mounting that the recipe does not have, and a tilted unit that a hand is to turn."""
+        if self.ramp is not None and (others := [each for each in self.ramp.positions if each not in self.positions]):
+            raise ValueError(
+                f"ramp.positions: {others[0]} is none of the positions of the recipe ({', '.join(self.positions)}); "
+                "add it there, or leave it out"
+            )
+        tilted = [each for each in self.positions if BodyPosition.of(each).is_tilted]
+        if self.turns is not None and tilted:
+            raise ValueError(
+                f"positions: {tilted[0]} is tilted, and a hand turns units about a body axis; give x, y or z"
+            )
         return self
 
     @field_validator(*_OF_RATES)

@@ -6,13 +6,25 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
+
+from instruments import positions
 
 Number = Annotated[float, Strict()]  #: a number written as a number: "20" in quotes is refused
 Whole = Annotated[int, Strict()]
 Yes = Annotated[bool, Strict()]
 Turned = Annotated[int, Strict(), Field(ge=1, le=359)]  #: deg, counter-clockwise seen from above
-Position = Literal["x", "-x", "y", "-y", "z", "-z"]
+
+
+def _position(text: str) -> str:
+    """Return the text of a position whose turns about the table axis are those of [indexing]."""
+    position = positions.Position.of(text)
+    if position.turned_deg:
+        raise ValueError("a recipe states turns about the table axis in its table [indexing]; write the position alone")
+    return str(position)
+
+
+Position = Annotated[str, Strict(), AfterValidator(_position)]  #: what points up: an end of a body axis, or x+y+z
 Action = Literal["warn", "take_back", "suspend", "fail"]
 GuardKind = Literal[
     "chamber_limits",  # air against the chamber's limits
@@ -115,6 +127,11 @@ class Ramp(Table):
     rates_dps: tuple[Number, ...] = Field(min_length=1)
     c_per_min: Number | None = Field(default=None, gt=0)  #: absent: as fast as the chamber can
     back: Yes = False  #: and back to `from_c` in the same way
+    positions: tuple[Position, ...] = ()  #: mountings in which the temperature moves; absent: all of the recipe
+
+    def moves_in(self, position: str) -> bool:
+        """Return whether the temperature moves in a mounting of the recipe."""
+        return not self.positions or position in self.positions
 
     @property
     def ends_c(self) -> tuple[float, ...]:

@@ -74,7 +74,9 @@ class Cycle:
     """The temperature goes through the whole range and back while data are taken, without a soak.
 
     It begins and ends where the units are mounted, so that each temperature is passed while warming and while cooling
-    (Niu et al., Sensors 13(9), 2013, 12192).
+    (Niu et al., Sensors 13(9), 2013, 12192). With a tilted fixture it does so in the tilted mounting alone: the others,
+    at the temperature where units are mounted, determine scale factors and misalignments there, and the tilted one how
+    the scale factors of all axes change with temperature.
     """
 
     rates: int
@@ -83,6 +85,8 @@ class Cycle:
     first_dwell_s: float  #: and so much longer in the first mounting
     ramp_share: float = 1.0  #: of the chamber's fastest ramp
     cycles: int = 1
+    tilted: str = ""  #: direction that the tilted fixture brings up; empty: each mounting has its cycle
+    repeats: int = 1  #: of the rates at the temperature where units are mounted
 
     def changes(self, base: Recipe, span: Span, ramp_c_per_min: float) -> dict[str, object]:
         """Return the keys of the recipe that differ from those of `base`."""
@@ -96,9 +100,14 @@ class Cycle:
             ramp["first_dwell_s"] = self.dwell_s + self.first_dwell_s
         if self.ramp_share < 1.0 and math.isfinite(ramp_c_per_min):
             ramp["c_per_min"] = round(self.ramp_share * ramp_c_per_min, 3)
+        positions = list(base.positions)
+        if self.tilted:
+            positions.append(self.tilted)
+            ramp["positions"] = [self.tilted]
         return {
             "temperatures_c": [begin_c], "rates_dps": rates, "ramp": ramp, "soak": NO_SOAK.table(base),
-            "acquire": _acquire(base, self.duration_s), "order": "position-major",
+            "acquire": _acquire(base, self.duration_s), "order": "position-major", "positions": positions,
+            "repeats": self.repeats,
         }  # fmt: skip
 
 
@@ -113,8 +122,9 @@ def scheme_text(scheme: Scheme) -> str:
             ends += f", in the first mounting {(scheme.dwell_s + scheme.first_dwell_s) / 60:g} min"
         slow = f" at {100 * scheme.ramp_share:.0f} % of the fastest ramp" if scheme.ramp_share < 1 else ""
         times = f"{scheme.cycles} cycles" if scheme.cycles > 1 else "one cycle"
+        where = f"with {scheme.tilted} up alone" if scheme.tilted else "in each mounting"
         return (
-            f"{times} of the temperature in each mounting{slow}, without a soak{ends}; {scheme.rates} rates of "
+            f"{times} of the temperature {where}{slow}, without a soak{ends}; {scheme.rates} rates of "
             f"{scheme.duration_s:g} s"
         )
     order = ", up and down" if scheme.order == "up_down" else ""

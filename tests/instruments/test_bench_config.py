@@ -163,3 +163,21 @@ def test_a_simulated_gyro_whose_driver_has_no_profile_is_told_to_name_one(monkey
     opened = open_bench(BenchFile.model_validate(record), VirtualClock())
     assert list(opened.gyros) == ["fog"]
     opened.close()
+
+
+def test_a_table_holds_as_many_units_as_it_has_places() -> None:
+    bench = two_units()
+    table = bench["table"]
+    assert BenchFile.model_validate(bench).units_at_once == 2
+    assert BenchFile.model_validate({**bench, "table": {**table, "places": 3}}).units_at_once == 3
+    with pytest.raises(ValidationError, match=r"table.places = 1, but the file has 2 units in \[\[gyros\]\]; correct"):
+        BenchFile.model_validate({**bench, "table": {**table, "places": 1}})
+
+
+def test_a_tilted_fixture_is_stated_by_its_directions() -> None:
+    bench = read_bench("single-axis-sim").model_dump(exclude_none=True)
+    stated = BenchFile.model_validate({**bench, "tilted_positions": ["z+x", "-x-y-z"]})
+    assert stated.tilted_positions == ("x+z", "-x-y-z")
+    for wrong in ("x", "x+y@90", "up"):
+        with pytest.raises(ValidationError, match=r"is no direction of a tilted fixture|is not a position"):
+            BenchFile.model_validate({**bench, "tilted_positions": [wrong]})

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from instruments.plugins import PluginError
+from labctl.services.criticism.next_experiment import plans_of
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
+from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Acquire, MoveChamber
 from procedures.experiments import BLOCKS, NOT_TAKEN, Block, _checked, all_blocks
 from procedures.planning.limits import BenchLimits
@@ -23,9 +27,9 @@ def test_labctls_own_blocks_are_found_by_their_entry_point() -> None:
 )
 def test_each_block_makes_a_plan_within_the_limits_that_differs_from_the_recipe(recipe: str, bench: str | None) -> None:
     whole = load_recipe(recipe)
-    limits = limits_of(load_bench(bench or "triaxial-sim"))
+    limits = replace(limits_of(load_bench(bench or "triaxial-sim")), tilted_positions=("x+y+z",))
     made = {block.id: block.changed(whole) for block in BLOCKS}
-    assert sum(changed is None for changed in made.values()) <= 1
+    assert sum(changed is None for changed in made.values()) <= 2
     for name, changed in made.items():
         if changed is None:
             continue
@@ -34,6 +38,20 @@ def test_each_block_makes_a_plan_within_the_limits_that_differs_from_the_recipe(
         assert changed != whole, name
         assert changed.fit is None, name
         assert Recipe.model_validate(recipe_document(changed)) == changed, name
+
+
+def test_a_tilted_unit_is_asked_for_where_the_bench_has_the_fixture_and_the_unit_three_axes() -> None:
+    block = next(block for block in BLOCKS if block.id == "tilted")
+    assert block.changed(load_recipe("ojeda2000")) is None
+    changed = block.changed(load_recipe("quick-triaxial"))
+    assert changed is not None
+    assert changed.positions == ("x", "y", "z", "x+y+z")
+    bench = load_bench("triaxial-sim")
+    with pytest.raises(PlanRefused, match="states no tilted fixture"):
+        make_plan(changed, limits_of(bench))
+    fixture = bench.model_copy(update={"tilted_positions": ("x+y+z",)})
+    offered = [{each.block.id for each in plans_of(load_recipe("quick-triaxial"), on)} for on in (bench, fixture)]
+    assert offered[1] - offered[0] == {"tilted"}
 
 
 def test_a_recipe_at_rest_is_not_turned_and_one_of_turns_by_hand_not_changed() -> None:

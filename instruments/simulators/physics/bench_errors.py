@@ -35,6 +35,7 @@ class BenchErrors:
     fixture_rad: Mapping[str, Lean] = field(default_factory=dict)  #: the end that points up -> of its face
     table_rad: Lean = UPRIGHT
     remounted: tuple[Standard, ...] = ()  #: what each mounting is drawn from
+    tilted: tuple[Standard, ...] = ()  #: what the tilted fixture is drawn from, of each direction of its own
     seed: tuple[int, ...] = field(default=(), compare=False)
 
     @staticmethod
@@ -56,17 +57,25 @@ class BenchErrors:
             {end: _lean(two) for end, two in zip(ends, faces.reshape(6, 2), strict=True)} if np.any(faces) else {},
             _lean(np.radians(of["tilt"][:2])),
             tuple(standard for standard in standards if standard.quantity == "mounting_repeatability"),
+            tuple(standard for standard in standards if standard.quantity == "tilted_fixture_angle"),
             tuple(seed),
         )
 
     def lean_rad(self, position: Position, mounting: int) -> Lean:
         """Return by how much the axis of rotation leans in the frame of a unit in its mounting of a number, rad."""
-        faces = _turned(self.fixture_rad.get(position.end, UPRIGHT), position.unit_deg, position.sign)
+        faces = _turned(self._of_face(position), position.unit_deg, position.sign)
         top = self.table_rad[0], position.sign * self.table_rad[1]  # upside down, the second axis lies the other way
         table = _turned(top, position.turned_deg, position.sign)
         rng = np.random.default_rng([*self.seed, zlib.crc32(b"mountings"), mounting])
         mounted = np.radians(_summed(self.remounted, "mounting_repeatability", rng))
         return faces[0] + table[0] + float(mounted[0]), faces[1] + table[1] + float(mounted[1])
+
+    def _of_face(self, position: Position) -> Lean:
+        """Return by how much the face of the fixture below a unit leans, rad."""
+        if not position.is_tilted:
+            return self.fixture_rad.get(position.end, UPRIGHT)
+        rng = np.random.default_rng([*self.seed, zlib.crc32(b"tilted fixture"), zlib.crc32(position.end.encode())])
+        return _lean(np.radians(_summed(self.tilted, "tilted_fixture_angle", rng)[:2]))
 
 
 def felt(rates: Array, frame: BodyFrame, lean_rad: Lean) -> Array:

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.positions import Position
+from instruments.positions import Position, Vector
 
 Array = NDArray[np.float64]
 #: One sidereal turn, deg/s.
@@ -17,18 +17,25 @@ EARTH_DPS = 360.0 / 86164.0905
 
 @dataclass(frozen=True)
 class BodyFrame:
-    """Orientation of the units: body axis along the table axis, the two level axes in cyclic order, and the sign."""
+    """Orientation of the units: body axis along the table axis, the two level axes in cyclic order, and the sign.
+
+    In a tilted mounting `rows` are the body's components of three directions of the bench that stand for these axes:
+    `first`, `second` and `up`.
+    """
 
     up: int
     first: int
     second: int
     sign: float
     turned_deg: float = 0.0  #: of the units against the table, counter-clockwise seen from above
+    rows: tuple[Vector, ...] = ()  #: empty where a body axis lies along the table axis
 
     @classmethod
     @cache
     def of(cls, position: Position) -> BodyFrame:
         """Return the frame of a mounting position."""
+        if position.is_tilted:
+            return cls(2, 0, 1, 1.0, float(position.turned_deg), _level_and_up(np.array(position.up)))
         up = "xyz".index(position.axis)
         return cls(up, (up + 1) % 3, (up + 2) % 3, position.sign, float(position.turned_deg))
 
@@ -36,7 +43,21 @@ class BodyFrame:
         """Return the specific force in body axes, (n, 3) g: one g up."""
         g = np.zeros((n, 3))
         g[:, self.up] = self.sign
-        return g
+        return self.in_body(g)
+
+    def in_body(self, vectors: Array) -> Array:
+        """Return vectors (n, 3) along `first`, `second` and `up` of a tilted mounting in body axes; others as given."""
+        return vectors @ np.array(self.rows) if self.rows else vectors
+
+
+def _level_and_up(up: Array) -> tuple[Vector, ...]:
+    """Return two level directions and the direction up in body axes; right-handed, the first nearest to a body axis."""
+    nearest = np.zeros(3)
+    nearest[int(np.argmin(np.abs(up)))] = 1.0
+    first = nearest - (nearest @ up) * up
+    first /= np.linalg.norm(first)
+    x, y, z = (tuple(each.tolist()) for each in (first, np.cross(up, first), up))
+    return x, y, z
 
 
 @dataclass(frozen=True)
@@ -56,7 +77,7 @@ class EarthRotation:
         return np.array([level * np.cos(heading), level * np.sin(heading), EARTH_DPS * np.sin(latitude)])
 
     def body_rates(self, frame: BodyFrame, table_dps: Array, angle_deg: Array) -> Array:
-        """Return the inertial rate in body axes, (n, 3) deg/s, at table rates and table angles (n,)."""
+        """Return the inertial rate along the axes of a frame, (n, 3) deg/s, at table rates and table angles (n,)."""
         rates = np.zeros((len(table_dps), 3))
         rates[:, frame.up] = frame.sign * table_dps
         if self.latitude_deg is not None:

@@ -221,7 +221,7 @@ class World:
         """Return the inertial rate in body axes, (n, 3) deg/s: table and Earth, at table angles (n,)."""
         frame = BodyFrame.of(self.position)
         rates = self._earth.body_rates(frame, table_dps / (1.0 + self.errors.rate), angle_deg)
-        return felt(rates, frame, self._lean_rad)
+        return frame.in_body(felt(rates, frame, self._lean_rad))
 
     def gravity(self, t_s: Array) -> Array:
         """Return the specific force in body axes at times (n,), (n, 3) g: one g up."""

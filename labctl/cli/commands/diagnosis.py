@@ -11,7 +11,7 @@ from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, Database, Json, Serial, recording_numbers
 from labctl.cli.output import print_json, stderr
 from labctl.cli.printing.diagnosis import DiagnosisPrinter, print_diagnosis_end
-from labctl.errors import Conflict, NotFound
+from labctl.errors import BadInput, Conflict, NotFound
 
 if TYPE_CHECKING:
     from labctl.answers.diagnosis import (
@@ -40,6 +40,19 @@ RecordingOption = Annotated[
         "earlier diagnoses.",
     ),
 ]
+AtOption = Annotated[
+    str | None,
+    typer.Option(
+        "--at",
+        metavar="TIME",
+        help="Begin no experiment before this time, in a running service: 2026-03-28T22:00. The recordings so far are "
+        "judged at once.",
+    ),
+]
+ZoneOption = Annotated[
+    str | None,
+    typer.Option("--time-zone", metavar="NAME", help="Time zone of --at; default: the time zone of this computer."),
+]
 EndOption = Annotated[
     bool, typer.Option("--end", help="End the diagnosis of the unit that has not ended, for good; run nothing.")
 ]
@@ -51,6 +64,8 @@ def diagnose(
     hours: Hours = None,
     version: VersionOption = None,
     recording: RecordingOption = None,
+    at: AtOption = None,
+    time_zone: ZoneOption = None,
     end: EndOption = False,
     as_json: Json = False,
     database: Database = None,
@@ -58,6 +73,7 @@ def diagnose(
     """Run experiments one after the other until one missing effect is left, or no experiment can distinguish more.
 
     A diagnosis that was stopped is continued. On a bench that is not simulated each experiment has to be confirmed.
+    With --at the first experiment is chosen now, and the service begins it at that time.
     """
     from labctl.answers.diagnosis import DiagnosisRequest
     from labctl.config import default_database
@@ -65,7 +81,7 @@ def diagnose(
     from labctl.store.connection.location import is_url
 
     with one_clear_line():
-        given = {"version": version, "recordings": recording_numbers(recording)}
+        given = {"version": version, "recordings": recording_numbers(recording), "at": at, "time_zone": time_zone}
         request = DiagnosisRequest.model_validate(given if hours is None else {**given, "hours": hours})
         printer = DiagnosisPrinter(quiet=as_json)
         url = diagnosis_service_url(database, serial, bench)
@@ -74,13 +90,19 @@ def diagnose(
         elif url is not None:
             is_shared = is_url(database or default_database())  # there the service was found by its bench
             answer = _follow(url, serial, request, None if is_shared else bench, printer)
+        elif at is not None:
+            raise BadInput(
+                f"--at {at}: no service uses this database, and without one nothing begins a diagnosis later; start "
+                "`labctl serve`, or leave the option out"
+            )
         else:
             answer = _run(database, serial, request, bench, printer)
     if as_json:
         print_json(answer)
     else:
         print_diagnosis_end(answer)
-    if not answer.ended or answer.outcome == "insufficient_data":
+    is_set = at is not None and answer.begins_at is not None and answer.state == "measuring"
+    if (not answer.ended and not is_set) or answer.outcome == "insufficient_data":
         raise typer.Exit(1)
 
 
@@ -117,12 +139,19 @@ def _follow(
     clock = SystemClock()
     with Client(url) as client:
         answer = next((each for each in client.diagnoses(serial) if not each.ended), None)
+        if answer is not None and request.at is not None:
+            raise Conflict(
+                f"--at {request.at}: diagnosis {answer.id} of {serial} has not ended, and goes on as it was begun; "
+                f"leave the option out, or end it with `labctl diagnose {serial} --end`"
+            )
         if answer is None:
             answer = client.start_diagnosis(serial, request)
         elif answer.state in {"stopped", "failed"}:
             answer = client.act_on_diagnosis(answer.id, "resume", "continued on the command line", by=os_user())
         while not answer.ended and answer.state not in {"stopped", "failed"}:
             printer.update(answer)
+            if request.at is not None and answer.state == "measuring":
+                return answer  # the service begins at that time
             if answer.state == "awaiting_confirmation":
                 if (reply := ask_experiment(answer, answer.rounds[-1])) is None:
                     return answer

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from labctl.cli.output import console, format_number, print_heading, table
 
 if TYPE_CHECKING:
-    from labctl.answers.design import DesignBound, DesignedCampaign, DesignPrior, DesignResponse
+    from labctl.answers.design import DesignBound, DesignedCampaign, DesignPrior, DesignResponse, TiltedDesign
 
 
 def print_design(answer: DesignResponse, out: Path) -> None:
@@ -21,12 +21,7 @@ def print_design(answer: DesignResponse, out: Path) -> None:
     rows = table(
         "\nrecipes, U (k = 2) in deg/s", "", "recipe", "hours", "largest U", "rms U", "by heat", "data sets", numbers=5
     )
-    listed = [("chosen", answer.chosen), *(("", each) for each in answer.others)]
-    if answer.type_prior is not None and answer.type_prior.without is not None:
-        listed.append(("without the prior", answer.type_prior.without))
-    if answer.reference is not None:
-        listed.append((answer.reference_name, answer.reference))
-    for name, each in listed:
+    for name, each in _listed(answer):
         rows.add_row(*_row(name, each))
     console.print(rows)
     if answer.reference_refused:
@@ -35,6 +30,12 @@ def print_design(answer: DesignResponse, out: Path) -> None:
         _print_type_prior(answer.type_prior, answer.chosen)
     if answer.bound is not None:
         _print_bound(answer.bound)
+    if answer.tilted is not None:
+        _print_tilted(answer.tilted)
+    if answer.units_at_once > 1:
+        console.print(
+            f"  {answer.units_at_once} units at once: {answer.chosen.hours_per_unit:.2g} h per unit", soft_wrap=True
+        )
     if answer.standards_u_dps is not None:
         console.print(
             f"  beside it fixture and table leave {answer.standards_u_dps:.2g} deg/s at {most_dps:g} deg/s, whatever "
@@ -43,6 +44,16 @@ def print_design(answer: DesignResponse, out: Path) -> None:
         )
     for assumption in answer.assumptions:
         console.print(f"  counted with: {assumption}", soft_wrap=True)
+
+
+def _listed(answer: DesignResponse) -> list[tuple[str, DesignedCampaign]]:
+    """Return the recipes of an answer, each with what it is."""
+    listed = [("chosen", answer.chosen), *(("", each) for each in answer.others)]
+    if answer.type_prior is not None and answer.type_prior.without is not None:
+        listed.append(("without the prior", answer.type_prior.without))
+    if answer.reference is not None:
+        listed.append((answer.reference_name, answer.reference))
+    return listed
 
 
 def _print_type_prior(prior: DesignPrior, choice: DesignedCampaign) -> None:
@@ -62,6 +73,18 @@ def _print_type_prior(prior: DesignPrior, choice: DesignedCampaign) -> None:
 def _row(name: str, each: DesignedCampaign) -> tuple[str, ...]:
     figures = (each.u_worst_dps, each.u_rms_dps, each.u_heat_dps)
     return name, each.text, f"{each.hours:.1f}", *(format_number(value, 2) for value in figures), str(each.datasets)
+
+
+def _print_tilted(tilted: TiltedDesign) -> None:
+    have = "the tilted fixture" if tilted.is_on_bench else "a tilted fixture, which the bench file does not state,"
+    best, without = tilted.best, tilted.without
+    others = f"; without it {without.hours:.1f} h for U = {without.u_worst_dps:.2g} deg/s" if without else ""
+    bound = f" (at best {tilted.bound.bound_h:.2g} h)" if tilted.bound else ""
+    console.print(
+        f"  with {have} that brings {tilted.position} up: {best.hours:.1f} h for U = {best.u_worst_dps:.2g} deg/s"
+        f"{bound}{others}",
+        soft_wrap=True,
+    )
 
 
 def _print_bound(bound: DesignBound) -> None:

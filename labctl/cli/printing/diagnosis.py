@@ -45,9 +45,10 @@ class DiagnosisPrinter:
 
 def _began(answer: DiagnosisResponse) -> str:
     of = ", ".join(map(str, answer.recordings))
+    begins = f", no experiment before {answer.begins_at:%Y-%m-%d %H:%M %Z}" if answer.begins_at else ""
     return (
         f"diagnosis {answer.id} of {answer.serial} version {answer.version} on bench {answer.bench}: recording {of}, "
-        f"at most {answer.hours:g} h"
+        f"at most {answer.hours:g} h{begins}"
     )
 
 

@@ -86,7 +86,7 @@ class Channels:
         return np.asarray(self.columns["table_rate_dps"], dtype=np.float64)
 
     def up(self, axis: str) -> Array:
-        """Return how much of a body axis points up along the table axis, (n,): 1, -1 or 0."""
+        """Return how much of a body axis points up along the table axis, (n,): 1, -1, 0, or tilted between them."""
         return up_in(np.asarray(self.columns["position"]), axis)
 
     def positions(self) -> list[tuple[str, NDArray[np.bool_]]]:

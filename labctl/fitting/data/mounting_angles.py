@@ -12,6 +12,11 @@ mounting nothing of this is separated, and m has the angles in full. The two end
 half the difference stays in m. A unit turned by 180 deg on its face separates all of them. What is different in each
 mounting, because a unit is never placed alike, is a random effect of the size that the bench states.
 
+A tilted mounting, with a direction d of the body along the table axis, shows an output o the rate (K d)_o + a_o, where
+a is what its own axis of rotation leans by. Where the straight mountings have each body axis up, they determine the
+matrix K, and each output takes a_o of every tilted mounting beside it: no error of the tilted fixture is then in a
+coefficient. Else the angles are part of what is fitted (`labctl.fitting.data.tilted_mountings`).
+
 Several recordings may be of several benches, whose angles are not the same: nothing is separated there, and the shifts
 between mountings (`shifts`) have the angles.
 """
@@ -54,10 +59,14 @@ class AngleGains:
     fixture: float = 1.0  #: of an angle of each face
     table: float = 1.0  #: of the table top
     mounting: float = 1.0  #: of each single mounting
+    tilted: float = 0.0  #: of the tilted fixture
 
     def of(self, quantity: str) -> float:
         """Return the gain for a quantity of the bench's standards."""
-        return {"fixture_angle": self.fixture, "tilt": self.table, "mounting_repeatability": self.mounting}[quantity]
+        return {
+            "fixture_angle": self.fixture, "tilt": self.table, "mounting_repeatability": self.mounting,
+            "tilted_fixture_angle": self.tilted,
+        }[quantity]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -122,6 +131,11 @@ def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> Ang
         blocks.append(block_diagonal([scheme.separated, np.eye(len(placed)) * placed_rad / PLACED_SIZE]))
         values.append(regressors @ blocks[-1])
         sizes += [np.full(scheme.separated.shape[1], WIDE_RAD), np.full(len(placed), PLACED_SIZE)]
+    for position in tilted_beside(turned_positions(channels)):
+        names.append(_tilt_of(position))
+        blocks.append(np.eye(1))
+        values.append(angle_regressor(channels, names[-1])[:, None])
+        sizes.append(np.full(1, WIDE_RAD))
     combined = block_diagonal(blocks)
     return AngleColumns(tuple(names), combined, np.concatenate(values, axis=1), np.concatenate(sizes))
 
@@ -154,7 +168,7 @@ def angle_regressor(channels: Channels, name: str) -> Array:
     regressor = np.zeros(len(channels))
     for text, rows in channels.positions():
         position = Position.of(text)
-        if name == f"{position}{PLACED}":
+        if name in {f"{position}{PLACED}", _tilt_of(position)}:
             regressor[rows] = 1.0
         elif name in _names(position):
             regressor[rows] = _shown(position, (name,))[0]
@@ -227,6 +241,18 @@ def _scheme(positions: tuple[str, ...], axis: str) -> _Scheme | None:
     sign = np.array([position.sign for position in about])
     angles = np.array([_shown(position, names) for position in about])
     return _Scheme(about, names, sign, angles, _separated(sign, angles))
+
+
+def tilted_beside(positions: Iterable[str]) -> list[Position]:
+    """Return the tilted mountings beside straight ones that have each body axis up; none where one has not."""
+    every = [Position.of(position) for position in positions]
+    straight = {position.axis for position in every if not position.is_tilted}
+    return [position for position in every if position.is_tilted] if straight >= set(BODY_AXES) else []
+
+
+def _tilt_of(position: Position) -> str:
+    """Return the name of what the axis of rotation of a tilted mounting leans by, towards the axis of an output."""
+    return f"{position} tilt"
 
 
 def _names(position: Position) -> tuple[str, ...]:

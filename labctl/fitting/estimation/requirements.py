@@ -6,12 +6,16 @@ import numpy as np
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.mounting_angles import turned_positions
+from labctl.fitting.data.tilted_mountings import undetermined
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.linearity import is_linear_in_rate
 
 #: A polynomial of order q in temperature needs at least q times this span.
 SPAN_PER_ORDER_C = 1.0
+#: Effects that have the elements of the matrix beside the scale factors.
+ALIGNMENT = frozenset({"misalignment", "non_orthogonality"})
 
 
 def require_enough_data(data: FitData, model: ErrorModel) -> None:
@@ -21,6 +25,7 @@ def require_enough_data(data: FitData, model: ErrorModel) -> None:
     _require_mean_rates(data, model)
     _require_rates(data, model)
     _require_temperatures(data, model)
+    _require_directions(data, model)
 
 
 def require_channels(data: FitData, model: ErrorModel) -> None:
@@ -100,3 +105,16 @@ def _require_temperatures(data: FitData, model: ErrorModel) -> None:
                 f"{term.effect}; measure over a span of at least {SPAN_PER_ORDER_C * (least - 1):.0f} deg C, or "
                 f"fit a lower order (`{term.effect}:N`)"
             )
+
+
+def _require_directions(data: FitData, model: ErrorModel) -> None:
+    """Refuse tilted mountings that do not separate scale factors and misalignments, where both are estimated."""
+    estimated = {term.effect for term in _estimated(data, model, list(data.outputs))}
+    if not estimated & ALIGNMENT:
+        return
+    if ends := undetermined(turned_positions(data.channels)):
+        raise NotEnoughData(
+            f"{data.info.serial}: positions {ends}: the nine elements of scale factors and misalignments need three "
+            "directions along the table axis that are not in one plane; measure further mountings too, such as x, y "
+            f"and z, or leave out {' and '.join(sorted(estimated & ALIGNMENT))}"
+        )

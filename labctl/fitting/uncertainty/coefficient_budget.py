@@ -53,7 +53,7 @@ def _of_axis(
         else:
             across = None if name == "scale_factor" else name.removeprefix("misalignment_")
             lines.append(slope_line(fitted, evidence, temperature_c, across))
-        sensitivities = _sensitivities(name, values, law.temperature_slope(fitted, temperature_c), bench)
+        sensitivities = _sensitivities(axis, name, values, law.temperature_slope(fitted, temperature_c), bench)
         sources = [*time_lines(fitted, [law], temperature_c, bench), *standard_lines(bench, sensitivities)]
         lines += [source.lines[0] for source in sources]
         budgets[name] = budget_of(name, unit, lines, values[name])
@@ -81,22 +81,25 @@ def response_budgets(
 
 
 def _sensitivities(
-    name: str, values: Mapping[str, float], temperature: float, bench: BenchConditions | None
+    axis: str, name: str, values: Mapping[str, float], temperature: float, bench: BenchConditions | None
 ) -> Sensitivities:
     """Return how a coefficient follows errors of the bench.
 
     One error of the time base is the same at all rates, so it is in the scale factor in full; a tilt of a mounting is a
-    misalignment, and in a scale factor by the misalignments of the unit and by its cosine.
+    misalignment, and in a scale factor by the misalignments of the unit and by its cosine. That of a tilted mounting is
+    in both.
     """
     if name == "bias":
         return Sensitivities.of_one(temperature=temperature, level=1.0)
     gain = 1.0 + values.get("scale_factor", 0.0)
+    about = axis if name == "scale_factor" else name.removeprefix("misalignment_")
+    tilted = bench.element_gains(axis, about) if bench is not None and bench.has_tilted else None
     if name != "scale_factor":
-        gains = bench.angle_gains(name.removeprefix("misalignment_")) if bench is not None else None
+        gains = tilted or (bench.angle_gains(about) if bench is not None else None)
         return Sensitivities.of_one(relative_rate=values[name], temperature=temperature, angle=gain, gains=gains)
     across = math.hypot(*(value for other, value in values.items() if other.startswith("misalignment")))
     fastest = bench.max_rate_dps if bench is not None else None
     return Sensitivities.of_one(
-        relative_rate=gain, rate_dps=1.0 / fastest if fastest else 0.0, temperature=temperature, angle=across,
-        angle_squared=gain / 2,
+        relative_rate=gain, rate_dps=1.0 / fastest if fastest else 0.0, temperature=temperature,
+        angle=across if tilted is None else gain, gains=tilted, angle_squared=gain / 2,
     )  # fmt: skip

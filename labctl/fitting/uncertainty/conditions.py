@@ -10,6 +10,7 @@ from typing import Literal
 from labctl.answers.budget import BenchConditionsJson
 from labctl.answers.fitted_model import FitEnvironment
 from labctl.fitting.data.mounting_angles import AngleGains, angle_gains, placed_rad, separates_any
+from labctl.fitting.data.tilted_mountings import element_gain, has_tilted
 from labctl.recording import RecordingInfo, Standard
 
 Thermometer = Literal["unit", "chamber", "reference"]
@@ -47,6 +48,17 @@ class BenchConditions:
         """Return whether the fit took into account how a unit is placed in each mounting with an axis up."""
         stated = self.separates and placed_rad(self.standards) > 0
         return stated and separates_any(self.mountings, axis)
+
+    @property
+    def has_tilted(self) -> bool:
+        """Return whether the coefficients have the angles of tilted mountings in them."""
+        return has_tilted(self.mountings)
+
+    def element_gains(self, output: str, about: str) -> AngleGains:
+        """Return how an element of the matrix follows the angles of mountings, some of them tilted."""
+        every = element_gain(self.mountings, output, about)
+        fixture, tilted = (element_gain(self.mountings, output, about, tilted=each) for each in (False, True))
+        return AngleGains(fixture, every, every, tilted)
 
     def to_json(self) -> BenchConditionsJson:
         """Return this as JSON."""

@@ -20,6 +20,8 @@ MIN_NEAR = 3.0
 WIDENED = (1.0, 1.5, 2.0, 3.0)
 #: Farther than this many widths from every data set nothing is known.
 FARTHEST = 2.0
+#: A unit is tilted that turns about a second body axis at more than this share of its largest rate.
+TILTED_SHARE = 0.1
 #: The least variance that is stated, as a share of the standard uncertainty of the estimate itself: a smaller one could
 #: not be seen.
 MIN_SHARE = 0.25
@@ -139,10 +141,21 @@ class LocalModelError:
         return self._distance([_scaled(self.rate_dps, rate_dps)], temperature_c)
 
     def _away_across(self, axis: str, rate_dps: float, temperature_c: float) -> Array:
-        """Return the same for a rate about another body axis alone."""
+        """Return the same for a rate about another body axis alone.
+
+        Of a tilted unit, which turns about several at once, the part about this axis counts: what its output is off by
+        then is no less than what this axis adds, unless errors of several axes cancel.
+        """
         across = self.across_dps or {}
-        along = [_scaled(rates, rate_dps if name == axis else 0.0) for name, rates in across.items()]
-        return self._distance([_scaled(self.rate_dps, 0.0), *along], temperature_c)
+        others = [_scaled(rates, 0.0) for name, rates in (("", self.rate_dps), *across.items()) if name != axis]
+        beside = [np.where(self._is_tilted, 0.0, each) for each in others]
+        return self._distance([_scaled(across[axis], rate_dps), *beside], temperature_c)
+
+    @property
+    def _is_tilted(self) -> NDArray[np.bool_]:
+        """Whether the unit turned about more than one body axis in a data set, (m,)."""
+        sizes = np.sort(np.abs([self.rate_dps, *(self.across_dps or {}).values()]), axis=0)
+        return np.asarray(sizes[-2] > TILTED_SHARE * sizes[-1])
 
     def warmth_away(self, temperature_c: float) -> Array:
         """Return how far a temperature is from that of each data set, (m,) widths of the neighbourhood."""

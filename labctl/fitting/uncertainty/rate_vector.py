@@ -17,6 +17,7 @@ import numpy as np
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, AngleGains
+from labctl.fitting.data.tilted_mountings import TILTED, leaning_mountings
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
@@ -215,6 +216,8 @@ class _Place:
         `aligned` is without what a rotation of the frame takes off: of two outputs the mean of both parts is left, and
         of the part about an axis without output nothing. What the mountings with one axis up separate is not in it.
         """
+        if bench is not None and bench.has_tilted:
+            return self._tilted_angles(bench, aligned=aligned)
         columns_by_quantity: dict[str, list[Array]] = {quantity: [] for quantity in ANGLE_QUANTITIES}
         gains = {axis: AngleGains() if bench is None else bench.angle_gains(axis) for axis in BODY_AXES}
         for up, towards in permutations(BODY_AXES, 2):
@@ -228,7 +231,35 @@ class _Place:
                 each[self.outputs.index(up)] = self.rates_dps[towards] / 2
             for quantity, columns in columns_by_quantity.items():
                 columns.append(each * gains[up].of(quantity))
+        columns_by_quantity[TILTED] = [np.zeros(len(self.outputs))]
         return {quantity: np.column_stack(columns) for quantity, columns in columns_by_quantity.items()}
+
+    def _tilted_angles(self, bench: BenchConditions, *, aligned: bool) -> dict[str, Array]:
+        """Return the same for mountings of which some are tilted: two angles of each, which change the whole matrix.
+
+        An antisymmetric change is a rotation of the frame, which `aligned` takes off where all three axes have outputs.
+        """
+        rates = np.array([self.rates_dps[axis] for axis in BODY_AXES])
+        columns: dict[str, list[Array]] = {quantity: [] for quantity in (*ANGLE_QUANTITIES, TILTED)}
+        for mounting in leaning_mountings(bench.mountings):
+            for change in mounting.matrices:
+                matrix = (change + change.T) / 2 if aligned and len(self.outputs) == len(BODY_AXES) else change
+                added = matrix @ rates  # to the rate about each body axis
+                each = sum(
+                    (added[row] * self._shown_by(axis) for row, axis in enumerate(BODY_AXES)),
+                    np.zeros(len(self.outputs)),
+                )
+                of_fixture = TILTED if mounting.is_tilted else "fixture_angle"
+                for quantity in (of_fixture, "tilt", "mounting_repeatability"):
+                    columns[quantity].append(each)
+        none = np.zeros(len(self.outputs))
+        return {quantity: np.column_stack(found or [none]) for quantity, found in columns.items()}
+
+    def _shown_by(self, axis: str) -> Array:
+        """Return how a rate about a body axis that nothing knows shows in the corrected rates, (n,)."""
+        if axis not in self.outputs:
+            return self.response[:, BODY_AXES.index(axis)]
+        return np.array([float(axis == output) for output in self.outputs])
 
 
 def _budget(sources: Sequence[SourceLines], row: int) -> Budget:

@@ -11,6 +11,7 @@ import numpy as np
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.earth import EARTH_RATE_DPS
 from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, AngleGains, separates_any
+from labctl.fitting.data.tilted_mountings import TILTED
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.budget import BudgetLine
 from labctl.fitting.uncertainty.conditions import BenchConditions
@@ -29,6 +30,7 @@ NO_TIME_BASE = (
 )
 NO_LATITUDE = "not known: latitude_deg is not stated, so the Earth's rate is part of the bias"
 SECOND = "with the second order (GUM 5.1.2, note)"
+BESIDE_STRAIGHT = "separated from the coefficients by the mountings with each body axis up"
 PLACED_IN_COEFFICIENTS = "in the coefficients, about the axes whose mountings separate angles"
 IN_COEFFICIENTS = "in the coefficients: the fit takes turn_common_u of the recipe"
 NO_SENSITIVITY = "its sensitivity is not known: the model has no supply_sensitivity"
@@ -61,7 +63,8 @@ class Sensitivities:
     ) -> Sensitivities:
         """Return those of a single result, 0 where not named; `gains` is how `angle` follows each kind of angle."""
         arrays = [np.full((1, 1), each) for each in (relative_rate, rate_dps, temperature, level)]
-        angles = {name: np.full((1, 1), angle * (gains.of(name) if gains else 1.0)) for name in ANGLE_QUANTITIES}
+        gains = gains or AngleGains()
+        angles = {name: np.full((1, 1), angle * gains.of(name)) for name in EVERY_ANGLE}
         return Sensitivities(arrays[0], arrays[1], arrays[2], angles, arrays[3], np.array([angle_squared]))
 
 
@@ -72,6 +75,8 @@ class SourceLines:
     lines: tuple[BudgetLine, ...]
     covariance: Array  #: (n, n); zero where the source is unknown
 
+
+EVERY_ANGLE = (*ANGLE_QUANTITIES, TILTED)
 
 #: Quantity and unit -> sensitivity in the unit of the result per unit of the standard; None: not known.
 _SENSITIVITY: dict[tuple[str, str], Callable[[Sensitivities, BenchConditions], Array | None]] = {
@@ -84,6 +89,7 @@ _SENSITIVITY: dict[tuple[str, str], Callable[[Sensitivities, BenchConditions], A
     ("fixture_angle", "deg"): lambda s, _: RAD_PER_DEG * s.angles["fixture_angle"],
     ("tilt", "deg"): lambda s, _: RAD_PER_DEG * s.angles["tilt"],
     ("mounting_repeatability", "deg"): lambda s, _: RAD_PER_DEG * s.angles["mounting_repeatability"],
+    (TILTED, "deg"): lambda s, _: RAD_PER_DEG * s.angles[TILTED],
     ("level", "deg"): lambda s, c: None if c.latitude_deg is None else s.level * _level_dps_per_deg(c.latitude_deg),
     ("supply", "V"): lambda _, __: None,
 }
@@ -119,6 +125,8 @@ def _of_all(line: BudgetLine, n: int) -> SourceLines:
 
 def _matters(quantity: str, bench: BenchConditions) -> bool:
     """Return whether a quantity of the bench enters a calibration that was made by such a motion."""
+    if quantity == TILTED:
+        return bench.motion in {"rates", "profile"} and any(Position.of(each).is_tilted for each in bench.mountings)
     if quantity in {"clock", "table_rate", *ANGLE_QUANTITIES}:
         return bench.motion in {"rates", "profile"}
     return bench.motion == "turns" if quantity == "turn_angle" else True
@@ -153,7 +161,7 @@ def _sensitivity(standard: Standard, bench: BenchConditions, s: Sensitivities) -
         return np.zeros_like(s.temperature), OWN_THERMOMETER
     if standard.quantity == "turn_angle" and bench.turn_common_u is not None:
         return np.zeros_like(s.relative_rate), IN_COEFFICIENTS
-    if standard.quantity in ANGLE_QUANTITIES and (reason := _why_less(standard.quantity, bench)):
+    if standard.quantity in EVERY_ANGLE and (reason := _why_less(standard.quantity, bench)):
         return _SENSITIVITY[standard.quantity, standard.unit_name](s, bench), reason
     sensitivity = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)
     if sensitivity is None:
@@ -163,6 +171,8 @@ def _sensitivity(standard: Standard, bench: BenchConditions, s: Sensitivities) -
 
 def _why_less(quantity: str, bench: BenchConditions) -> str:
     """Return why an angle of the mountings is smaller in the result than it is stated; empty where it is not."""
+    if quantity == TILTED:
+        return "" if bench.has_tilted else BESIDE_STRAIGHT
     if not bench.separates or not any(separates_any(bench.mountings, axis) for axis in BODY_AXES):
         return ""
     if quantity == "mounting_repeatability":
@@ -217,6 +227,7 @@ def _missing(bench: BenchConditions) -> list[BudgetLine]:
         Position.of(mounting).turned_deg for mounting in bench.mountings
     ):  # then little else is left of these angles
         quantities.append("mounting_repeatability")
+    quantities += [TILTED] if bench.has_tilted else []
     missing = [name for name in quantities if not bench.of(name)]
     lines = [
         _unknown(name, NO_TIME_BASE if name == "clock" and bench.of("table_rate") else NOT_STATED) for name in missing

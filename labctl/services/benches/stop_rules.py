@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from instruments.bench_config import BenchFile
-from instruments.positions import Position
+from instruments.positions import AXES, Position
 from labctl.recording import RecordingInfo
 from labctl.recording.info import NO_DATE
 from labctl.services.benches.standards import standards_of
@@ -83,10 +83,7 @@ def _check_near(plan: Plan, info: RecordingInfo, over: Range) -> None:
     warm = np.array([step.temperature_c for step in steps])
     for axis in info.axes:
         positions = [Position.of(step.position) for step in steps]
-        rates = [
-            step.rate_dps * position.sign * (position.axis == axis)
-            for step, position in zip(steps, positions, strict=True)
-        ]
+        rates = [step.rate_dps * position.up[AXES.index(axis)] for step, position in zip(steps, positions, strict=True)]
         if place := not_near(np.array(rates), warm, over):
             text = f"U of unit {info.serial} about {axis} stays unknown: {place}"
             raise PlanRefused(plan.recipe.name, [text], MEASURE_THERE)

@@ -193,7 +193,10 @@ def prepare(
 
 
 def _limits(bench: Bench, file: BenchFile, earlier: EarlierTimes | None = None) -> BenchLimits:
-    return BenchLimits.of(bench, needs_person=file.needs_person, air_tau_s=file.air_tau_s, earlier=earlier)
+    return BenchLimits.of(
+        bench, needs_person=file.needs_person, air_tau_s=file.air_tau_s, earlier=earlier,
+        tilted_positions=file.tilted_positions,
+    )  # fmt: skip
 
 
 def _log_planned(number: int, bench: BenchFile, plan: Plan, units: tuple[NewUnit, ...]) -> None:

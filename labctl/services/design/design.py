@@ -9,7 +9,15 @@ import tomli_w
 
 from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile
 from instruments.positions import Position
-from labctl.answers.design import DesignBound, DesignedCampaign, DesignPrior, DesignRequest, DesignResponse, Range
+from labctl.answers.design import (
+    DesignBound,
+    DesignedCampaign,
+    DesignPrior,
+    DesignRequest,
+    DesignResponse,
+    Range,
+    TiltedDesign,
+)
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.design.bound import least_heat_h, u_of_one_hour_dps
@@ -21,6 +29,7 @@ from labctl.services.design.known import Known, known_noise
 from labctl.services.design.problem import Candidate, Goal, Problem
 from labctl.services.design.search import chosen, next_best, search
 from labctl.services.design.sentences import decisions
+from labctl.services.design.tilted_fixture import TiltedChoice, is_useful, tilted_choice
 from labctl.services.planning.earlier_campaigns import times_on_bench
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
@@ -64,19 +73,21 @@ def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFil
     choice = chosen(tried, goal)
     if choice is None:
         raise _nothing(problem, goal, tried)
-    answer = _answer(_Found(problem, goal, tried, choice), posed.bench, posed.known, posed.like)
+    tilted = tilted_choice(problem, goal, tried) if ramps else None
+    found = _Found(problem, goal, tried, choice, tilted, posed.bench.units_at_once)
+    answer = _answer(found, posed.bench, posed.known, posed.like)
     if posed.of_type is None:
         return answer
     without = chosen(search(replace(problem, prior=None, evaluated={}), goal, ramps=ramps), goal)
     return answer.model_copy(update={"type_prior": DesignPrior(
         type=posed.of_type.type, model=posed.of_type.model, units=posed.of_type.prior.units,
-        without=None if without is None else _designed(without, goal),
+        without=None if without is None else found.designed(without),
     )})  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Posed:
-    """A problem, the bench that it is of, what is known of the noise there and of the type, and the recipe it is like."""
+    """A problem, its bench, what is known of the noise there and of the type, and the recipe that it is like."""
 
     problem: Problem
     bench: BenchFile
@@ -100,7 +111,8 @@ def pose(store: Store | None, request: DesignRequest, bench: BenchFile | None) -
     used = tuple(each for each in BODY_AXES if each in {Position.of(position).axis for position in base.positions})
     use = RangeOfUse(used, span.rate_dps, (span.low_c, span.high_c))
     name = f"{base.name}-designed"
-    problem = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name)
+    useful = tuple(each for each in on.tilted_positions if is_useful(base.positions, axes, each))
+    problem = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name, useful)
     of_type = _prior(store, request, model, effects)
     problem = problem if of_type is None else replace(problem, prior=of_type.prior)
     return Posed(problem, on, known, like, of_type)
@@ -118,6 +130,12 @@ class _Found:
     goal: Goal
     tried: list[Candidate]
     choice: Candidate
+    tilted: TiltedChoice | None
+    units: int  #: measured at once
+
+    def designed(self, candidate: Candidate) -> DesignedCampaign:
+        """Return a recipe with its figures."""
+        return designed_campaign(candidate, self.goal, self.units)
 
 
 def _prior(
@@ -239,28 +257,42 @@ def _answer(found: _Found, bench: BenchFile, known: Known, like: Recipe | None) 
         rates_dps=(-problem.span.rate_dps, problem.span.rate_dps),
         temperatures_c=(problem.span.low_c, problem.span.high_c),
         is_reached=goal.reached_by(choice),
-        chosen=designed_campaign(choice, goal),
+        chosen=found.designed(choice),
         recipe_toml=tomli_w.dumps(recipe_document(recipe)),
         schedule_hash=choice.plan.schedule_hash,
         decisions=list(decisions(problem, found.tried, choice, goal)),
-        others=[designed_campaign(each, goal) for each in next_best(found.tried, choice, goal, COMPARED)],
-        reference=None if reference is None else designed_campaign(reference, goal),
+        others=[found.designed(each) for each in next_best(found.tried, choice, goal, COMPARED)],
+        reference=None if reference is None else found.designed(reference),
         reference_name=REFERENCE if like is None else like.name,
         reference_refused=refused,
-        bound=_bound(found),
+        bound=_bound(problem, goal, choice),
+        tilted=None if found.tilted is None else _tilted(found, found.tilted),
+        units_at_once=found.units,
         standards_u_dps=None if outlook is None else outlook.expanded * problem.span.rate_dps,
-        assumptions=[*known.sources, _heat_text(problem.flow, bench)],
+        assumptions=[*known.sources, _heat_text(problem.flow, bench), _units_text(bench)],
         tried=len(found.tried),
     )
 
 
-def designed_campaign(candidate: Candidate, goal: Goal) -> DesignedCampaign:
-    """Return what a recipe costs and gives, as an answer states it."""
+def _tilted(found: _Found, tilted: TiltedChoice) -> TiltedDesign:
+    return TiltedDesign(
+        position=tilted.position,
+        is_on_bench=tilted.is_on_bench,
+        best=found.designed(tilted.best),
+        recipe_toml=tomli_w.dumps(recipe_document(tilted.best.recipe)),
+        without=None if tilted.without is None else found.designed(tilted.without),
+        bound=_bound(tilted.problem, found.goal, tilted.best),
+    )
+
+
+def designed_campaign(candidate: Candidate, goal: Goal, units: int) -> DesignedCampaign:
+    """Return what a recipe for so many units at once costs and gives, as an answer states it."""
     predicted = candidate.predicted
     return DesignedCampaign(
         text=candidate.recipe.description if candidate.scheme is None else scheme_text(candidate.scheme),
-        hours=candidate.hours, u_worst_dps=predicted.worst_dps, u_rms_dps=predicted.rms_dps,
-        u_heat_dps=predicted.heat_rms_dps, worst_axis=predicted.worst_axis,
+        hours=candidate.hours, hours_per_unit=candidate.hours / units,
+        u_worst_dps=predicted.worst_dps, u_rms_dps=predicted.rms_dps, u_heat_dps=predicted.heat_rms_dps,
+        worst_axis=predicted.worst_axis,
         worst_temperature_c=predicted.worst_temperature_c, datasets=candidate.plan.datasets,
         coefficients=predicted.coefficients, mountings=_mountings(candidate), covered_c=candidate.covered_c,
         is_reaching=goal.reached_by(candidate),
@@ -281,22 +313,32 @@ def _reference(problem: Problem, like: Recipe | None) -> tuple[Candidate | None,
         return None, str(error)
 
 
-def _bound(found: _Found) -> DesignBound | None:
-    """Return the least hours for the goal, or for what the chosen recipe gives where it does not reach one."""
-    problem, choice = found.problem, found.choice
-    wanted = max(found.goal.u_dps or 0.0, choice.predicted.worst_dps)
+def _bound(problem: Problem, goal: Goal, choice: Candidate) -> DesignBound | None:
+    """Return the least hours for the goal, or for what the chosen recipe gives where it does not reach one.
+
+    With a tilted fixture the temperature goes through the range in one mounting.
+    """
+    wanted = max(goal.u_dps or 0.0, choice.predicted.worst_dps)
+    positions = (*problem.base.positions, *problem.tilted)
     try:
         preset = preset_for(problem.model, list(problem.effects))
-        hour = u_of_one_hour_dps(problem.base.positions, problem.axes, preset, problem.noise, problem.use)
+        hour = u_of_one_hour_dps(positions, problem.axes, preset, problem.noise, problem.use)
     except LabctlError:
         return None
     noise_h = (hour / wanted) ** 2
+    heated = 1 if problem.tilted else len(problem.base.positions)
     handling_c = problem.base.mounting.handling_c
-    mountings = len(problem.base.positions)
-    heat_h = least_heat_h(mountings, problem.use.temperature_c, handling_c, problem.limits.ramp_c_per_min)
-    heat_h += mountings * MOUNTING_S / 3600.0 if problem.limits.needs_person else 0.0
+    heat_h = least_heat_h(heated, problem.use.temperature_c, handling_c, problem.limits.ramp_c_per_min)
+    heat_h += len(positions) * MOUNTING_S / 3600.0 if problem.limits.needs_person else 0.0
     bound_h = max(noise_h, heat_h)
     return DesignBound(noise_h=noise_h, heat_h=heat_h, bound_h=bound_h, ratio=choice.hours / bound_h)
+
+
+def _units_text(bench: BenchFile) -> str:
+    stated = bench.table is not None and bench.table.places is not None
+    source = "table.places of the bench file" if stated else "those in the bench file, which states no table.places"
+    at_once = "1 unit" if bench.units_at_once == 1 else f"{bench.units_at_once} units"
+    return f"{at_once} at once ({source}); a person mounts all of them in {MOUNTING_S / 60:g} min (assumed)"
 
 
 def _heat_text(flow: HeatFlow, bench: BenchFile) -> str:

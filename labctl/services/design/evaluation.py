@@ -42,7 +42,7 @@ def evaluated(store: Store | None, request: EvaluateRequest, bench: BenchFile | 
     found, why = None, ""
     try:
         goal = Goal(request.u_dps, asked.hours)
-        found = designed_campaign(problem.of_recipe(fitted, None, problem.effects), goal)
+        found = designed_campaign(problem.of_recipe(fitted, None, problem.effects), goal, posed.bench.units_at_once)
     except (LabctlError, ProcedureError, ValueError) as error:
         why = str(error)
     return EvaluateResponse(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from labctl.errors import LabctlError
 from labctl.fitting.design.heat_course import HeatFlow
@@ -78,8 +78,14 @@ class Problem:
     noise: NoiseFigures
     use: RangeOfUse
     name: str
+    tilted: tuple[str, ...] = ()  #: directions that a tilted fixture brings up, of which one may be chosen
     prior: CoefficientPrior | None = None  #: what the type says of the coefficients; the recipe is fitted with it
     evaluated: dict[Scheme, Candidate | None] = field(default_factory=dict)  #: those that cannot be run are None
+
+    def with_fixture(self, position: str) -> Problem:
+        """Return the same problem on a bench with a tilted fixture."""
+        limits = replace(self.limits, tilted_positions=(*self.limits.tilted_positions, position))
+        return replace(self, limits=limits, tilted=(position,), evaluated={})
 
     def effects_of(self, scheme: Scheme) -> tuple[str, ...]:
         """Return the effects that are fitted beside the model to the recipe of a scheme."""

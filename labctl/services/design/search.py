@@ -25,7 +25,7 @@ DURATIONS_S = (60.0, 90.0, 120.0)
 HOLDS_S = (300.0, 600.0, 900.0, 1200.0, 1800.0, 2700.0, 3600.0)
 DWELLS_S = (0.0, 120.0, 240.0, 420.0, 600.0, 900.0, 1200.0, 1500.0, 1800.0, 2400.0, 3600.0)
 RAMP_SHARES = (1.0, 0.6, 0.35)
-CYCLES = (1, 2)
+CYCLES, REPEATS = (1, 2), (1, 2, 3)
 #: Powers of U in what the exchange makes small.
 POWERS = (0.5, 3.0)
 #: Weight of what must not be: hours beyond those given, and ends of the range that are missed.
@@ -49,7 +49,22 @@ def search(problem: Problem, goal: Goal, *, ramps: bool) -> list[Candidate]:
         if ramps:
             stays = (0.0, DWELLS_S[-3]) if len(problem.base.positions) > 1 else (DWELLS_S[-3], 0.0)
             _exchanged(problem, Cycle(RATES[0], 60.0, *stays), cost, _of_cycles)
+    search_tilted(problem, goal)
     return [candidate for candidate in problem.evaluated.values() if candidate is not None]
+
+
+def search_tilted(problem: Problem, goal: Goal) -> list[Candidate]:
+    """Return every recipe tried that moves the temperature in a tilted mounting alone."""
+    for tilted in problem.tilted:
+        for power in POWERS:
+            begin = Cycle(RATES[0], 60.0, DWELLS_S[-3], 0.0, tilted=tilted)
+            _exchanged(problem, begin, _cost(goal, power), _of_cycles)
+    return [each for each in problem.evaluated.values() if each is not None and is_tilted(each)]
+
+
+def is_tilted(candidate: Candidate) -> bool:
+    """Return whether a recipe moves the temperature in a tilted mounting alone."""
+    return isinstance(candidate.scheme, Cycle) and bool(candidate.scheme.tilted)
 
 
 def chosen(candidates: Sequence[Candidate], goal: Goal) -> Candidate | None:
@@ -145,7 +160,8 @@ def _of_levels(problem: Problem, scheme: Levels) -> list[list[Levels]]:
 
 
 def _of_cycles(problem: Problem, scheme: Cycle) -> list[list[Cycle]]:
-    further = DWELLS_S if len(problem.base.positions) > 1 else ()  # a single mounting is the first one
+    has_further = len(problem.base.positions) > 1 and not scheme.tilted  # a single mounting is the first one
+    further = DWELLS_S if has_further else ()
     return [
         [replace(scheme, rates=each) for each in RATES],
         [replace(scheme, duration_s=each) for each in DURATIONS_S],
@@ -153,6 +169,7 @@ def _of_cycles(problem: Problem, scheme: Cycle) -> list[list[Cycle]]:
         [replace(scheme, first_dwell_s=each) for each in further],
         [replace(scheme, ramp_share=each) for each in RAMP_SHARES],
         [replace(scheme, cycles=each) for each in CYCLES],
+        [replace(scheme, repeats=each) for each in REPEATS] if scheme.tilted else [],
     ]
 
 

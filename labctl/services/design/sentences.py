@@ -61,6 +61,13 @@ def _kind(candidates: Sequence[Candidate], choice: Candidate, goal: Goal) -> str
 
 
 def _of_cycle(problem: Problem, scheme: Cycle, choice: Candidate) -> Iterator[str]:
+    if scheme.tilted:
+        yield (
+            f"The temperature moves with {scheme.tilted} up alone, where all three axes turn with the table: this "
+            "shows how their scale factors change, as misalignments are constant in the model. The mountings with each "
+            "axis up, at the temperature where units are mounted, separate the nine elements of the matrix, and from "
+            "them the angle of the tilted fixture."
+        )
     yield (
         "Each temperature is passed while warming and while cooling: an element that follows the thermometer late then "
         "makes opposite errors, which cancel."

@@ -137,6 +137,8 @@ class DiagnosisRunner:
         """Start the campaign of a round, have it go on, or write down its end."""
         experiment = ChosenExperiment.model_validate(last.experiment)
         if (campaign := self._campaign(row, last)) is None:
+            if row.begins_at is not None and self._now() < row.begins_at:
+                return False
             try:
                 self._laboratory.start(ExperimentStart(experiment.toml, _bench(row), last.confirmed_by, last.since))
             except REFUSALS as error:

@@ -33,6 +33,7 @@ def _answer(store: Store, row: DiagnosisRow) -> DiagnosisResponse:
     return DiagnosisResponse(
         id=row.id, serial=row.serial, version=row.version, bench=row.bench_name, hours=row.hours,
         spent_hours=sum(each.took_hours or 0.0 for each in rounds), by=row.by, created_at=row.created_at,
+        begins_at=row.begins_at,
         state=row.state, ended=row.state == "done",
         outcome=cast(DiagnosisOutcome, row.outcome) if row.outcome else None,
         named=list(rounds[-1].named) if rounds else [], why=row.why if row.state in _EXPLAINED else "",
@@ -76,6 +77,11 @@ def _next(row: DiagnosisRow, rounds: list[RoundRow]) -> str:
         return (
             f"check bench {row.bench_name}, then confirm the experiment of round {rounds[-1].number}, or answer that "
             "it cannot be done"
+        )
+    if row.state == "measuring" and row.begins_at is not None and rounds[-1].campaign is None:
+        return (
+            f"leave `labctl serve` running: it begins the experiment of round {rounds[-1].number} on bench "
+            f"{row.bench_name}, not before {row.begins_at:%Y-%m-%d %H:%M %Z}"
         )
     if row.state in {"stopped", "failed"}:
         return f"`labctl diagnose {row.serial}` continues it; `labctl diagnose {row.serial} --end` ends it for good"

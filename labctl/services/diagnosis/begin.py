@@ -22,6 +22,7 @@ from labctl.services.diagnosis.advance import campaign_of_round, recipe_name
 from labctl.services.diagnosis.answer import diagnosis_answer
 from labctl.services.diagnosis.experiment_bench import bench_of_unit
 from labctl.services.recordings.loading import chosen_rows
+from labctl.services.schedule.planned_start import planned_start
 from labctl.store import CalibrationRecord, CampaignRow, DiagnosisRow, NewDiagnosis, Store
 
 #: States in which a process goes on by itself.
@@ -46,7 +47,7 @@ def begin(
 ) -> DiagnosisResponse:
     """Write down a diagnosis of a unit. `bench` is None where it is that of the unit's last campaign.
 
-    Raises NotFound, BadInput, Conflict while another diagnosis of the unit is open.
+    Raises NotFound, BadInput (also for a time that is past), Conflict while another diagnosis of the unit is open.
     """
     version = version_of(store, serial, request.version)
     recordings = list(request.recordings) or _known_recordings(store, version)
@@ -55,6 +56,7 @@ def begin(
     new = NewDiagnosis(
         serial=serial, version=version.version, bench_name=bench_file.name, bench=bench_file.model_dump(mode="json"),
         hours=request.hours, recordings=[row.id for row in chosen], by=actor().name,
+        begins_at=None if request.at is None else planned_start(request.at, None, request.time_zone, at)[0],
     )  # fmt: skip
     return diagnosis_answer(store, store.diagnoses.begin(new, at))
 

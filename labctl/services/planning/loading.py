@@ -119,6 +119,7 @@ def limits_of(bench: BenchFile, *, driven: bool = False, earlier: EarlierTimes |
         is_driven=driven,
         air_tau_s=bench.air_tau_s,
         earlier=earlier,
+        tilted_positions=bench.tilted_positions,
     )
 
 
@@ -130,7 +131,7 @@ def bench_for(recipe: Recipe, *, driven: bool = False) -> str:
     """
     if f"{recipe.name}-sim" in shipped_benches():
         return f"{recipe.name}-sim"
-    axes = {Position.of(position).axis for position in recipe.positions}
+    axes = {axis for position in recipe.positions for axis in Position.of(position).axes}
     fitting: list[tuple[bool, int, float, bool, str]] = []
     for name, path in shipped_benches().items():
         if name.endswith(OF_A_PAPER):

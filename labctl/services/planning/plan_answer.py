@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from datetime import date, datetime
+from itertools import product
 from typing import TYPE_CHECKING, Any
 from zoneinfo import ZoneInfo
 
@@ -12,7 +13,8 @@ from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile
 from instruments.positions import Position
 from labctl.answers.plans import FurtherMountings, MisalignmentOutlook, PlanResponse, Visibility
 from labctl.fitting.data.channels import BODY_AXES
-from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, angle_gains, shares_of
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, angle_gains, shares_of, tilted_beside
+from labctl.fitting.data.tilted_mountings import TILTED, has_tilted
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
 from labctl.services.planning.attendance import attendance, visits_s
@@ -50,7 +52,8 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
     None where no unit turns about an axis across one of its outputs, or where the bench states no such standard.
     """
     shares = _shares(plan, bench)
-    stated = sorted({each.quantity for each in bench.standards} & set(ANGLE_QUANTITIES))
+    counted = (*ANGLE_QUANTITIES, *((TILTED,) if has_tilted(shares) else ()))
+    stated = sorted({each.quantity for each in bench.standards} & set(counted))
     if not shares or not stated:
         return None
     now = _expanded(bench, shares)
@@ -70,24 +73,33 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
         found.append(more)
     return MisalignmentOutlook(
         expanded=now, further=sorted(found, key=lambda each: (each.expanded, each.more_s)),
-        not_stated=[each for each in ANGLE_QUANTITIES if each not in stated],
+        not_stated=[each for each in counted if each not in stated],
     )  # fmt: skip
 
 
 def _shares(plan: Plan, bench: BenchFile) -> dict[str, float]:
-    """Return position -> its share in what is known of misalignments: where a unit has an output across the axis."""
+    """Return position -> its share in what is known of misalignments: where a unit has an output across the axis.
+
+    Tilted mountings are left out where the others separate their angles.
+    """
     across = {axis for axis in BODY_AXES for gyro in bench.gyros if set(gyro.axes) - {axis}}
     weights: dict[str, float] = {}
     for step in plan.steps:
-        if isinstance(step, Acquire) and not step.verification and Position.of(step.position).axis in across:
+        if isinstance(step, Acquire) and not step.verification and across & set(Position.of(step.position).axes):
             weights[step.position] = weights.get(step.position, 0.0) + step.rate_dps**2
+    separated = {str(position) for position in tilted_beside(weights)}
+    weights = {position: weight for position, weight in weights.items() if position not in separated}
     return shares_of(weights) if any(weights.values()) else {}
 
 
 def _expanded(bench: BenchFile, shares: dict[str, float]) -> float:
-    """Return U of the misalignment towards the axis whose mountings separate least."""
-    stated = tuple(each for each in bench.standards if each.quantity in ANGLE_QUANTITIES)
+    """Return U of the misalignment towards the axis whose mountings separate least; tilted, of any element."""
+    stated = tuple(each for each in bench.standards if each.quantity in (*ANGLE_QUANTITIES, TILTED))
     conditions = BenchConditions(ANY_DAY, standards=stated, mountings=shares)
+    if conditions.has_tilted:
+        elements = product(BODY_AXES, repeat=2)
+        gains = [conditions.element_gains(output, about) for output, about in elements]
+        return max(K * standards_u(conditions, Sensitivities.of_one(angle=1.0, gains=each)) for each in gains)
     return max(
         K * standards_u(conditions, Sensitivities.of_one(angle=1.0, gains=angle_gains(shares, axis)))
         for axis in {Position.of(position).axis for position in shares}

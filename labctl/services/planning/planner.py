@@ -49,7 +49,7 @@ def _recipe(name: str, text: str, bench: BenchFile | None, earlier: EarlierTimes
 def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
     """Return which axes a recipe turns that no unit of the bench records, if any; it would run, and show little."""
     recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
-    if lacking := sorted({Position.of(position).axis for position in positions} - recorded):
+    if lacking := sorted({axis for position in positions for axis in Position.of(position).axes} - recorded):
         return (
             f"the recipe turns the units about {', '.join(lacking)}, but no unit of bench {bench.name} "
             "measures that axis"

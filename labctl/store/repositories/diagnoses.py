@@ -34,6 +34,7 @@ class NewDiagnosis:
     hours: float
     recordings: Sequence[int]
     by: str
+    begins_at: datetime | None  #: no experiment is begun before; None: at once
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ diagnoses = sa.Table(
     sa.Column("recordings", sa.JSON, nullable=False),  #: numbers of those that it began with
     sa.Column("by", sa.String(200), nullable=False),
     sa.Column("created_at", Instant, nullable=False),
+    sa.Column("begins_at", Instant),  #: no experiment is begun before; null: at once
     sa.Column("state", sa.String(30), nullable=False),
     sa.Column("outcome", sa.String(30), nullable=False, server_default=""),  #: empty while it is not done
     sa.Column("why", sa.Text, nullable=False, server_default=""),  #: the outcome, or the stop, in a sentence

@@ -77,6 +77,7 @@ export type TurnColumns = Schema<"TurnColumns">;
 export type Uncertainty = Schema<"UncertaintyResponse">;
 export type Design = Schema<"DesignResponse">;
 export type DesignedCampaign = Schema<"DesignedCampaign">;
+export type TiltedDesign = Schema<"TiltedDesign">;
 export type Batch = Schema<"BatchResponse">;
 export type FleetChart = Schema<"FleetChartResponse">;
 export type FleetChartPoint = Schema<"FleetChartPoint">;

@@ -7063,6 +7063,13 @@ export interface components {
             reference_refused: string;
             /** @description The least hours; null: the model has no law over the range. */
             bound: components["schemas"]["DesignBound"] | null;
+            /** @description What a tilted fixture is worth; null: the unit has fewer than three outputs, or the data sets are at fixed temperatures. */
+            tilted: components["schemas"]["TiltedDesign"] | null;
+            /**
+             * Units At Once
+             * @description Units that one campaign measures: table.places of the bench file, else the units in it.
+             */
+            units_at_once: number;
             /**
              * Standards U Dps
              * @description U (k = 2) that fixture and table leave at the largest rate, whatever the noise, deg/s: beside the U of the recipe, and only by further mountings made smaller; null: not stated, or no output across the axis.
@@ -7094,6 +7101,11 @@ export interface components {
              * @description Expected duration by the plan on the bench, h.
              */
             hours: number;
+            /**
+             * Hours Per Unit
+             * @description The same over the units that are measured at once, h.
+             */
+            hours_per_unit: number;
             /**
              * U Worst Dps
              * @description Largest U (k = 2) of a component of the corrected rate vector in the range, deg/s, by what the campaign decides: noise, drift and unsettled heat.
@@ -7240,6 +7252,16 @@ export interface components {
              * @description Recordings that the version is judged by at first; default: those that it was fitted to, and those of earlier diagnoses of the unit.
              */
             recordings?: number[];
+            /**
+             * At
+             * @description Time before which no experiment is begun, ISO 8601; a time without an offset is in `time_zone`. The recordings so far are judged at once. Default: as soon as the bench is free.
+             */
+            at?: string | null;
+            /**
+             * Time Zone
+             * @description Time zone of `at`, such as Europe/Berlin; default: that of the service's computer.
+             */
+            time_zone?: string | null;
         };
         /**
          * DiagnosisResponse
@@ -7287,6 +7309,11 @@ export interface components {
              * @description Time at which it was asked for.
              */
             created_at: string;
+            /**
+             * Begins At
+             * @description Time before which it begins no experiment; null: it begins at once.
+             */
+            begins_at: string | null;
             /**
              * State
              * @description criticising: the recordings so far are judged; awaiting_confirmation: a person has to confirm the experiment; measuring: the campaign of the experiment runs; done: see `outcome`; stopped: a person stopped it, and it can be resumed; failed: it could not go on, see `why`, and it can be resumed.
@@ -15675,6 +15702,33 @@ export interface components {
              * @description The hint in a sentence.
              */
             text: string;
+        };
+        /**
+         * TiltedDesign
+         * @description What a tilted fixture is worth, which brings a direction of the units between their axes up.
+         */
+        TiltedDesign: {
+            /**
+             * Position
+             * @description The direction that points up, such as x+y+z.
+             */
+            position: string;
+            /**
+             * Is On Bench
+             * @description Whether the bench file states such a fixture; false: these are the hours of a bench that has one.
+             */
+            is_on_bench: boolean;
+            /** @description The best recipe with it: the temperature moves in this mounting alone. */
+            best: components["schemas"]["DesignedCampaign"];
+            /**
+             * Recipe Toml
+             * @description That recipe as a recipe file, TOML.
+             */
+            recipe_toml: string;
+            /** @description The best recipe without it; null: there is none. */
+            without: components["schemas"]["DesignedCampaign"] | null;
+            /** @description The least hours with it; null: the model has no law over the range. */
+            bound: components["schemas"]["DesignBound"] | null;
         };
         /**
          * TimeLine

@@ -65,3 +65,10 @@ def test_without_hours_for_an_experiment_nothing_runs(ambiguous: Lab, tmp_path: 
     assert (answer["outcome"], answer["spent_hours"]) == ("hours_spent", 0.0)
     assert len(lab.json("campaign", "list")) == 1
     assert "no open diagnosis" in lab.run("diagnose", UNIT, "--end", status=2).stderr
+
+
+def test_a_diagnosis_for_later_needs_a_service(ambiguous: Lab, tmp_path: Path) -> None:
+    lab = ambiguous.copy(tmp_path)
+    refused = lab.run("diagnose", UNIT, "--at", "2099-01-01T22:00", status=2)
+    assert "nothing begins a diagnosis later; start `labctl serve`, or leave the option out" in refused.stderr
+    assert lab.json("campaign", "list")[0]["recipe"] == "few-rates"

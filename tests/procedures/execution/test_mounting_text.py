@@ -12,8 +12,13 @@ ON_FACE = (
     f"{STRAIGHT.format('x')}, and each unit on the same face of its fixture by 180 deg from where it was first {SEEN}"
 )
 CUBE = f"{STRAIGHT.format('z')}, and the fixture with the units on the table by 90 deg from where it was first {SEEN}"
+TILTED = (
+    "mount the units on the tilted fixture so that body direction x+y+z, 54.74 deg from x, 54.74 deg from y, 54.74 deg "
+    "from z, points up along the table axis"
+)
+ASKED = [("-x", STRAIGHT.format("-x")), ("x@180", ON_FACE), ("z@0/90", CUBE), ("x+y+z", TILTED)]
 
 
-@pytest.mark.parametrize(("position", "asked"), [("-x", STRAIGHT.format("-x")), ("x@180", ON_FACE), ("z@0/90", CUBE)])
+@pytest.mark.parametrize(("position", "asked"), ASKED)
 def test_a_mounting_is_asked_for_in_words(position: str, asked: str) -> None:
     assert mounting_text(position) == asked

@@ -41,6 +41,18 @@ def test_a_unit_that_follows_the_table_is_not_complained_of(position: str, sign:
     assert complaints(position, *sets) == [""] * 4
 
 
+def test_each_axis_of_a_tilted_unit_follows_by_its_share() -> None:
+    third = 3**-0.5
+    sets = [(rate, dict.fromkeys("xyz", third * rate)) for rate in (-90.0, 0.0, 90.0)]
+    assert complaints("x+y+z", *sets) == [""] * 3
+    one = [(rate, {"x": third * rate, "y": third * rate, "z": -third * rate}) for rate in (0.0, 90.0)]
+    said = complaints("x+y+z", *one)[1]
+    assert "its output about z changed by -52" in said
+    assert "-100 % of the 57.7 % of that which turn about this axis" in said
+    assert "its sign is reversed: mount the unit with x+y+z up" in said
+    assert complaints("x+y-z", *one) == [""] * 2
+
+
 @pytest.mark.parametrize(
     ("output", "advice"),
     [

@@ -70,6 +70,26 @@ def service(location: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]
     opened.lab.close()
 
 
+def test_a_diagnosis_for_the_night_judges_at_once_and_begins_no_experiment_before_its_time(service: Service) -> None:
+    path = f"/api/units/{UNIT}/diagnoses"
+    past = service.post(path, 400, at="2026-10-31T22:00Z")
+    assert "is in the past" in past["detail"]
+    started = service.post(path, 201, hours=8, at="2026-11-01T22:00", time_zone="Europe/Berlin")
+    assert started["begins_at"] == "2026-11-01T21:00:00Z"
+    campaigns = len(service.http.get("/api/campaigns").json())
+    for _ in range(3):
+        service.tick()
+    waits = service.http.get(f"/api/diagnoses/{started['id']}").json()
+    assert (waits["state"], len(waits["rounds"]), waits["rounds"][0]["campaign"]) == ("measuring", 1, None)
+    assert waits["next"].endswith("of round 1 on bench single-axis-sim, not before 2026-11-01 21:00 UTC")
+    assert len(service.http.get("/api/campaigns").json()) == campaigns
+    service.clock.sleep(21 * 3600.0 + 1.0)
+    for _ in range(4):
+        service.tick()
+    answer = service.http.get(f"/api/diagnoses/{started['id']}").json()
+    assert (answer["state"], answer["outcome"], answer["named"]) == ("done", "one_cause", ["warm_up"])
+
+
 def test_a_service_carries_a_diagnosis_out(service: Service) -> None:
     started = service.post(f"/api/units/{UNIT}/diagnoses", 201, hours=8)
     assert (started["state"], started["rounds"]) == ("criticising", [])

@@ -2,7 +2,7 @@
 
 import { h, svg } from "../core/elements.js";
 import { duration } from "../core/format.js";
-import { axisOf, endOf, signOf, turnedDeg } from "../core/positions.js";
+import { axisOf, endOf, isTilted, signOf, turnedDeg } from "../core/positions.js";
 import { answerButtons } from "./actions.js";
 import { AXES, bodyAxes } from "./mounting_axes.js";
 
@@ -81,8 +81,15 @@ export function mountingDrawing(position) {
       svg("text", { x: word[0], y: word[1] + 5, "text-anchor": "middle" }, large > 11 ? `${name} up` : name),
     );
   };
+  const tops = tableTops();
+  const axis = axisOf(position);
+  if (axis === null)
+    return tiltedDrawing(
+      position,
+      tops,
+      AXES.map((name) => arrow(name)),
+    );
   const [low, high] = [-1, 1];
-  const up = project([0, 0, 2.05]);
   const down = signOf(position) < 0;
   return svg(
     "svg",
@@ -92,8 +99,7 @@ export function mountingDrawing(position) {
       role: "img",
       "aria-label": `The unit with its ${endOf(position)} axis pointing up along the table axis${turnedText(position)}`,
     },
-    svg("ellipse", { cx: 150, cy: 188, rx: 132, ry: 56, class: "table" }),
-    svg("ellipse", { cx: 150, cy: 182, rx: 132, ry: 56, class: "table top" }),
+    tops,
     AXES.filter((name) => axes[name][2] < 0).map((name) => arrow(name)),
     face(
       [
@@ -123,16 +129,49 @@ export function mountingDrawing(position) {
       "top",
     ),
     AXES.filter((name) => axes[name][2] === 0).map((name) => arrow(name)),
-    down
-      ? svg(
-          "g",
-          { class: "axis up inverted" },
-          svg("line", { x1: 150, y1: project([0, 0, 1])[1], x2: 150, y2: project([0, 0, 1.75])[1] }),
-          svg("text", { x: up[0], y: up[1] + 5, "text-anchor": "middle" }, `${endOf(position)} up`),
-        )
-      : svg("g", { class: "up" }, arrow(axisOf(position), 20)),
+    down ? upwards(position, 1) : svg("g", { class: "up" }, arrow(axis, 20)),
   );
 }
+
+const tableTops = () => [
+  svg("ellipse", { cx: 150, cy: 188, rx: 132, ry: 56, class: "table" }),
+  svg("ellipse", { cx: 150, cy: 182, rx: 132, ry: 56, class: "table top" }),
+];
+
+/**
+ * A line upwards with the name of what points up, where that is no arrow of an axis.
+ * @param {string} position
+ * @param {number} from height
+ */
+function upwards(position, from) {
+  const up = project([0, 0, 2.05]);
+  return svg(
+    "g",
+    { class: "axis up inverted" },
+    svg("line", { x1: 150, y1: project([0, 0, from])[1], x2: 150, y2: project([0, 0, 1.75])[1] }),
+    svg("text", { x: up[0], y: up[1] + 5, "text-anchor": "middle" }, `${endOf(position)} up`),
+  );
+}
+
+/**
+ * The axes of a tilted unit above the table, without the unit, and the direction that points up.
+ * @param {string} position
+ * @param {readonly SVGElement[]} tops
+ * @param {readonly SVGElement[]} arrows
+ */
+const tiltedDrawing = (position, tops, arrows) =>
+  svg(
+    "svg",
+    {
+      viewBox: "0 0 300 265",
+      class: "mounting",
+      role: "img",
+      "aria-label": `The unit tilted, with ${endOf(position)} pointing up along the table axis${turnedText(position)}`,
+    },
+    tops,
+    arrows,
+    upwards(position, 0),
+  );
 
 /**
  * What is turned against the first mounting, in words; nothing where nothing is.
@@ -149,6 +188,8 @@ function turnedText(position) {
 
 /** @param {Prompt} prompt */
 function heading({ kind, position, turn_deg: angle }) {
+  if (kind === "mount" && position && isTilted(position))
+    return `Mount the unit on the tilted fixture with ${endOf(position)} pointing up${turnedText(position)}`;
   if (kind === "mount")
     return `Mount the unit with axis ${position && endOf(position)} pointing up${position ? turnedText(position) : ""}`;
   if (kind === "turn") return `Keep axis ${position} pointing up, and turn the unit by ${angle} deg about this axis`;

@@ -11,7 +11,7 @@ import { firstModels } from "../explore/first_models.js";
 import { designBody } from "./designer_request.js";
 import { movedPoints } from "./moved_points.js";
 
-/** @import { Design, DesignedCampaign, Recipe } from "../../../types/api.js" */
+/** @import { Design, DesignedCampaign, Recipe, TiltedDesign } from "../../../types/api.js" */
 
 const MODELS = firstModels("rates");
 
@@ -160,6 +160,10 @@ function shown(found, taken) {
           `At best ${number(bound.bound_h)} h: ${number(bound.heat_h)} h of ramps and mountings, ${number(bound.noise_h)} h of readings against white noise. The chosen recipe takes ${number(bound.ratio)} times as long.`,
         )
       : null,
+    found.tilted ? tiltedText(found.tilted, taken) : null,
+    found.units_at_once > 1
+      ? h("p", { class: "small" }, `${found.units_at_once} units at once: ${number(chosen.hours_per_unit)} h per unit.`)
+      : null,
     found.standards_u_dps === null
       ? null
       : h(
@@ -178,6 +182,27 @@ function shown(found, taken) {
       ),
     ),
   ];
+}
+
+/**
+ * What a tilted fixture is worth; its recipe can be taken where the bench has one.
+ * @param {TiltedDesign} tilted
+ * @param {(text: string) => unknown} taken
+ */
+function tiltedText({ position, is_on_bench: has, best, without, bound, recipe_toml: text }, taken) {
+  const others = without ? ` Without it ${number(without.hours)} h for U = ${number(without.u_worst_dps)} deg/s.` : "";
+  const least = bound ? ` (at best ${number(bound.bound_h)} h)` : "";
+  const fixture = has ? "the tilted fixture" : "a tilted fixture, which the bench file does not state,";
+  return h(
+    "div",
+    { class: "row" },
+    h(
+      "p",
+      { class: "small" },
+      `With ${fixture} that brings ${position} up: ${number(best.hours)} h for U = ${number(best.u_worst_dps)} deg/s${least}.${others}`,
+    ),
+    has ? button("Take this one", () => taken(text), { kind: "tiny" }) : null,
+  );
 }
 
 /**

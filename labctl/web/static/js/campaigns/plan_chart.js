@@ -24,6 +24,12 @@ const STATES = [
 const HOURS_FROM_S = 3 * 3600;
 
 /**
+ * The colour of the axis that points up; of a tilted unit that of plain text.
+ * @param {string} position
+ */
+const bandColour = (position) => (axisOf(position) ? `axis-${axisOf(position)}` : "text-muted");
+
+/**
  * The chart of a plan. `give()` returns {timeline, now_s, live}: the columns of the API, the present moment in seconds of
  * the campaign (null: it does not run; `scrubbed`: one that was chosen), and whether to show states. `pick(dataset)` is called for a clicked data set.
  * @param {string} name
@@ -95,7 +101,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
       y0: 0,
       y1: 1,
       line: { width: 0 },
-      fillcolor: colour(`axis-${axisOf(band.position)}`),
+      fillcolor: colour(bandColour(band.position)),
       opacity: 0.1,
       layer: "below",
     }));
@@ -110,7 +116,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
         x: (band.from + band.until) / 2,
         y: 1,
         yanchor: "bottom",
-        font: { size: 11.5, color: colour(`axis-${axisOf(band.position)}`) },
+        font: { size: 11.5, color: colour(bandColour(band.position)) },
       }));
     if (now_s !== null) {
       shapes.push({
