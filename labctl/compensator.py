@@ -195,20 +195,18 @@ class Compensator:
                 f"rates of {raw.shape[1]} axes given; the calibration has axes {', '.join(self.axes)}; give one rate "
                 "for each"
             )
-        temperatures_c = self._fitting(self._known(temperature_c), known, len(raw))
+        checked_c = self._fitting(self._known(temperature_c), known, len(raw))
         beside = self._by_force(specific_force_g, len(raw))
         correct = self._correct if cross_rates_dps is None else self._correct_across(cross_rates_dps, len(raw))
         if self._memory is None or history is not None:
             if self._memory is not None and history is not None:
-                remembered = self._memory.of_history(
-                    history, {"temperature_c": _one_c(temperatures_c, len(raw)), **known}
-                )
+                remembered = self._memory.of_history(history, {"temperature_c": _one_c(checked_c, len(raw)), **known})
                 beside = remembered if beside is None else remembered.with_bias(beside.bias_dps)
-            compensated = self._beside(beside, raw, temperatures_c, known, correct)
+            compensated = self._beside(beside, raw, checked_c, known, correct)
         else:
             running = self._running if continued and self._running is not None else RunningMemory(self._memory)
             compensated = self._followed(
-                running, beside, raw, temperatures_c, known, correct, len(raw) if cross_rates_dps else BLOCK
+                running, beside, raw, checked_c, known, correct, len(raw) if cross_rates_dps else BLOCK
             )
         left_out = self._left_out_dps if specific_force_g is None else None
         return Compensated(compensated.rate_dps.reshape(raw_rows.shape), compensated.outside, left_out)

@@ -24,6 +24,7 @@ PROVEN = frozenset({"/api/certificates/state"})
 ASKING = (
     "/api/plans",
     "/api/designs",
+    "/api/designs/evaluation",
     "/api/units/{serial}/calibrations/{version}/preview",
     "/api/recordings/logs/preview",
 )
