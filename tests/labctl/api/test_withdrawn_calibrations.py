@@ -6,7 +6,8 @@ import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from fastapi.testclient import TestClient
@@ -169,9 +170,7 @@ class Failing:
 
 
 def log_over(fetches: object) -> FetchLog:
-    store = object.__new__(Store)
-    store.fetches = fetches  # type: ignore[assignment]
-    return FetchLog(store)
+    return FetchLog(cast(Store, SimpleNamespace(fetches=fetches, is_read_only=False)))
 
 
 def test_fetches_that_could_not_be_written_are_written_later_with_their_first_time() -> None:

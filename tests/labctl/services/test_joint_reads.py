@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import ExitStack, closing
+from typing import Any
 
 import pytest
 
 from labctl.errors import StoreError
 from labctl.services.joint_reads import MAX_JOINED, JointReads
 
+InLoop = Callable[[Coroutine[Any, Any, Any]], Any]
 Open = Callable[[Callable[[Sequence[str]], dict[str, int]]], JointReads[str, int]]
 
 
@@ -47,7 +49,7 @@ async def begun(source: Source) -> None:
     await asyncio.to_thread(source.begun.wait, 30)
 
 
-def test_requests_during_a_statement_share_the_next_one(source: Source, open_reads: Open) -> None:
+def test_requests_during_a_statement_share_the_next_one(source: Source, open_reads: Open, in_a_loop: InLoop) -> None:
     async def ask() -> list[int | None]:
         reads = open_reads(source.read)
         first = asyncio.create_task(reads.get("k0"))
@@ -57,11 +59,11 @@ def test_requests_during_a_statement_share_the_next_one(source: Source, open_rea
         source.go.set()
         return [await first, *[await each for each in others]]
 
-    assert asyncio.run(ask()) == [0, 1, 2, 1, None]
+    assert in_a_loop(ask()) == [0, 1, 2, 1, None]
     assert source.asked == [["k0"], ["k1", "k2", "absent"]]
 
 
-def test_a_request_gets_what_is_true_after_it_asked(source: Source, open_reads: Open) -> None:
+def test_a_request_gets_what_is_true_after_it_asked(source: Source, open_reads: Open, in_a_loop: InLoop) -> None:
     async def ask() -> tuple[int | None, int | None]:
         reads = open_reads(source.read)
         before = asyncio.create_task(reads.get("k5"))
@@ -72,10 +74,12 @@ def test_a_request_gets_what_is_true_after_it_asked(source: Source, open_reads: 
         source.go.set()
         return await before, await after
 
-    assert asyncio.run(ask()) == (5, -1)
+    assert in_a_loop(ask()) == (5, -1)
 
 
-def test_an_error_reaches_every_request_and_the_next_statement_is_tried(source: Source, open_reads: Open) -> None:
+def test_an_error_reaches_every_request_and_the_next_statement_is_tried(
+    source: Source, open_reads: Open, in_a_loop: InLoop
+) -> None:
     source.go.set()
     fails = [True]
 
@@ -90,11 +94,13 @@ def test_an_error_reaches_every_request_and_the_next_statement_is_tried(source: 
         fails[0] = False
         return [*refused, await reads.get("k1")]
 
-    one, two, value = asyncio.run(ask())
+    one, two, value = in_a_loop(ask())
     assert (str(one), str(two), value) == ("away; try again", "away; try again", 1)
 
 
-def test_a_client_that_leaves_takes_nothing_from_the_others(source: Source, open_reads: Open) -> None:
+def test_a_client_that_leaves_takes_nothing_from_the_others(
+    source: Source, open_reads: Open, in_a_loop: InLoop
+) -> None:
     async def ask() -> int | None:
         reads = open_reads(source.read)
         leaves, stays = asyncio.create_task(reads.get("k3")), asyncio.create_task(reads.get("k3"))
@@ -103,17 +109,17 @@ def test_a_client_that_leaves_takes_nothing_from_the_others(source: Source, open
         source.go.set()
         return await stays
 
-    assert asyncio.run(ask()) == 3
+    assert in_a_loop(ask()) == 3
     assert source.asked == [["k3"]]
 
 
-def test_one_statement_takes_no_more_than_its_limit(source: Source, open_reads: Open) -> None:
+def test_one_statement_takes_no_more_than_its_limit(source: Source, open_reads: Open, in_a_loop: InLoop) -> None:
     source.go.set()
 
     async def ask() -> list[int | None]:
         reads = open_reads(source.read)
         return list(await asyncio.gather(*(reads.get(f"k{n}") for n in range(150))))
 
-    assert asyncio.run(ask()) == list(range(150))
+    assert in_a_loop(ask()) == list(range(150))
     assert max(map(len, source.asked)) == MAX_JOINED
     assert sum(map(len, source.asked)) == 150

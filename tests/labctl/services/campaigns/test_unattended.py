@@ -365,7 +365,7 @@ def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes
 
 def test_a_service_that_starts_says_what_it_finds(left: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def serve(_request: Any, ready: Any) -> str:
-        ready(Ready("http://127.0.0.1:1", 1, 2))
+        ready(Ready("http://127.0.0.1:1", 1, 2, (2,)))
         return ""
 
     monkeypatch.setattr("labctl.processes.supervisor.serve_forever", serve)
