@@ -23,6 +23,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[s
     return dict(units(tmp_path_factory.mktemp("figures") / "lab.sqlite"))
 
 
+@pytest.mark.slow
 def test_figures_of_three_units_are_those_of_the_database(
     compared: dict[str, list[tuple[str, float, int]]],
 ) -> None:

@@ -56,6 +56,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Row]]:
         return {each.name: compared(each, folder).rows for each in RECORDINGS if each.name in SMALL}
 
 
+@pytest.mark.slow
 def test_labctl_and_the_independent_analyses_agree(small: dict[str, list[Row]]) -> None:
     assert set(small) == set(SMALL)
     counts = {name: sum(not row.is_error for row in rows) for name, rows in small.items()}

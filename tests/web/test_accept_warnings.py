@@ -18,6 +18,7 @@ pytestmark = pytest.mark.timeout(400)
 FOG = "FOG-0001"
 
 
+@pytest.mark.slow
 def test_wrong_data_are_refused_in_words_and_fitted_only_when_it_is_insisted_on(
     service: Service, visit: Callable[..., Page], faults: Faults
 ) -> None:

@@ -174,6 +174,7 @@ def check_turns(drawn: dict[str, Any], rows: list[dict[str, Any]]) -> None:
         assert [shades[k] for k in np.argsort(warm, kind="stable")] == sorted(shades)
 
 
+@pytest.mark.slow
 def test_a_recording_without_times_has_no_time_axis_and_every_data_set(
     service: Service, visit: Callable[..., Page]
 ) -> None:

@@ -73,6 +73,7 @@ def test_at_rest_both_legs_are_drawn_and_the_map_is_not(service: Service, visit:
     expect(legs.get_by_role("row")).to_have_count(4)
 
 
+@pytest.mark.slow
 def test_turns_profiles_and_poses_are_drawn_as_they_are(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

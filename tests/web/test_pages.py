@@ -58,6 +58,7 @@ PAGES = {
 }
 
 
+@pytest.mark.slow
 def test_every_page_opens_in_every_dress(furnished: Service, visit: Callable[..., Page], faults: Faults) -> None:
     from axe_playwright_python.sync_playwright import Axe
 

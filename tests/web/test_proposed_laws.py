@@ -36,6 +36,7 @@ def shown(value_dps: float) -> str:
     return f"{value_dps:.3g}"
 
 
+@pytest.mark.slow
 def test_a_law_is_tried_and_the_error_falls_as_it_says(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

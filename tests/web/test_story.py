@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.timeout(400)
 
 
+@pytest.mark.slow
 def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

@@ -36,6 +36,7 @@ def trace_of(drawn: dict[str, Any], name: str) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_recordings_are_chosen_fitted_and_drawn_together(unit: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

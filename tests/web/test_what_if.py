@@ -87,6 +87,7 @@ def test_a_second_effect_lies_over_it_and_their_parting_rates_become_a_plan(
     assert [min(rates), max(rates)] == pytest.approx([min(marked), max(marked)], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_another_shape_is_fitted_again_by_the_service_and_the_fitted_one_comes_back(
     opened: tuple[Page, Locator], service: Service
 ) -> None:

@@ -93,6 +93,7 @@ def foreign(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Foreign]
     opened.process.communicate()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("foreign", [SPEED], indirect=True)
 def test_a_campaign_from_end_to_end(foreign: Foreign) -> None:
     recipe, database = foreign.folder / "recipe.toml", foreign.folder / "x.db"

@@ -102,6 +102,7 @@ def test_an_answer_with_an_undeclared_key_is_not_made(lab: Lab) -> None:
         FitResponse.model_validate({**kept, "surprise": 1}, extra="forbid")
 
 
+@pytest.mark.slow
 def test_a_document_survives_its_declaration(lab: Lab) -> None:
     """What a criticism prints is what its model reads back: no key is dropped, no number changes its kind."""
     from labctl.answers.criticism import CriticismResponse

@@ -47,6 +47,7 @@ def far() -> Iterator[tuple[SimulationServer, BenchFile, io.StringIO]]:
     yield from serve(record)
 
 
+@pytest.mark.slow
 def test_it_finds_what_is_on_each_port_and_writes_a_file_that_passes_the_check(
     lab: Lab, far: tuple[SimulationServer, BenchFile, io.StringIO]
 ) -> None:

@@ -59,6 +59,7 @@ def test_one_experiment_names_the_cause(ambiguous: Lab, tmp_path: Path) -> None:
     assert lab.json("criticise", UNIT, status=None)["recording"] == 3  # a campaign after the diagnosis stands alone
 
 
+@pytest.mark.slow
 def test_without_hours_for_an_experiment_nothing_runs(ambiguous: Lab, tmp_path: Path) -> None:
     lab = ambiguous.copy(tmp_path)
     answer = lab.json("diagnose", UNIT, "--hours", "0.1")

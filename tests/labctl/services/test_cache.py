@@ -187,6 +187,7 @@ def test_of_results_in_memory_only_those_used_last_stay() -> None:
     assert made == ["a", "b", "c", "b"]
 
 
+@pytest.mark.slow
 def test_a_fit_of_the_same_readings_at_another_time_is_criticised_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -110,6 +110,7 @@ def test_limits_of_a_course_are_named_with_what_to_do() -> None:
     assert "needs inf deg/s^2" in course_complaint(SineSweep(1, 1, 1, 10, 0.0), 100, 500)
 
 
+@pytest.mark.slow
 def test_the_angle_of_a_sweep_is_the_integral_of_its_rate() -> None:
     at = np.linspace(0.0, 42.0, 420_001)
     for course in (SWEEP, SineSweep(20.0, 5.0, 0.2, 40.0, 0.0), SineSweep(5.0, 1.0, 1.0, 40.0, 4.0, 0.35)):

@@ -92,6 +92,7 @@ def test_an_axis_is_off_where_all_have_one_expectation() -> None:
     assert np.sqrt(np.mean([each.rms_dps**2 for each in found.values()])) < 2 * 0.023
 
 
+@pytest.mark.slow
 def test_nothing_is_off_in_recordings_of_a_unit_that_did_not_change(lab: Lab) -> None:
     for seed in range(100, 100 + CLEAN):
         found = lab.json("verify", UNIT, "--recording", add(lab, recording(seed)))

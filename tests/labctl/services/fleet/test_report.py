@@ -56,6 +56,7 @@ def test_an_effect_that_hardly_a_unit_shows_is_named_for_the_type(store: Store, 
     assert report.figures.verdicts.get("adequate", 0) >= UNITS - 2
 
 
+@pytest.mark.slow
 def test_the_batch_that_differs_is_found_and_said(report: FleetReportResponse) -> None:
     (group,) = [each for each in report.groups if each.factor == "batch"]
     assert group.level == "B1"

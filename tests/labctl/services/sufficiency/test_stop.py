@@ -85,6 +85,7 @@ def store(ended: Path, tmp_path: Path) -> Iterator[Store]:
         yield opened
 
 
+@pytest.mark.slow
 def test_it_is_done_before_its_plan_and_says_why(store: Store) -> None:
     status = campaign_status(store, 1)
     course = uncertainty_course(store, 1).units["fog"]

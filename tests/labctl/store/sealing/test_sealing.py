@@ -243,6 +243,7 @@ class _Laboratory:
 OPERATIONS = [name for name in vars(_Laboratory) if not name.startswith("_")]
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.lists(st.sampled_from(OPERATIONS), min_size=1, max_size=8))
 def test_no_order_of_acts_in_order_gives_a_finding(
