@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,8 @@ from labctl.recording.data_files.damaged_files import reason_of
 CHUNK_BYTES = 8 << 20
 #: Schemes of stores that have no folders: a file is there whole or not at all, and its folder need not be made.
 WITHOUT_FOLDERS = frozenset({"abfs", "abfss", "az", "gcs", "gs", "memory", "oci", "oss", "s3", "s3a", "tos"})
-#: The package of a scheme is asked for by fsspec in these words.
-_NOT_INSTALLED = "{url}: {reason}; install it on each computer of the job, as `pip install s3fs` for s3://"
+#: What the system says where there is no room for a copy.
+NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT})
 
 
 class ObjectStorage:
@@ -34,7 +35,10 @@ class ObjectStorage:
         try:
             opened: tuple[Any, str] = fsspec.url_to_fs(url)
         except ImportError as error:
-            raise BadInput(_NOT_INSTALLED.format(url=url, reason=error)) from error
+            raise BadInput(
+                f"{url}: its scheme needs a package that is not installed ({error}); install it on each computer that "
+                "reads there, as `pip install s3fs` for s3://"
+            ) from error
         except ValueError as error:
             raise BadInput(
                 f"{url}: {error}; choose a scheme that fsspec knows, such as s3://, gs://, abfs:// or file://"
@@ -83,6 +87,8 @@ class ObjectStorage:
                 f"{shown}: there is no such object; `labctl fleet publish {self.url}` writes what is missing"
             ) from error
         except Exception as error:
+            if isinstance(error, OSError) and error.errno in NO_ROOM:
+                raise BadRecording(f"{shown}: {target.parent} has no room for a copy; free space there") from error
             raise BadRecording(self._unreadable(shown, error)) from error
 
     def put(self, name: str, source: Path) -> None:

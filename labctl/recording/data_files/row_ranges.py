@@ -97,7 +97,7 @@ class RowRanges:
             pq.ParquetFile(self._path, read_dictionary=self._words, page_checksum_verification=True) as opened,
         ):
             table = opened.read_row_groups(wanted, use_threads=False)
-            first = self._ends[wanted[0]] if wanted else 0
+            first = self._ends[wanted[0]] if wanted else start
             table = table.slice(start - first, stop - start)
             return {name: self._values(table.column(name)) for name in table.column_names}
 

@@ -79,7 +79,7 @@ def _read_by_jobs(store: Store, serial: str) -> list[RecordingRow]:
     chosen = chosen_rows(store, serial, None)
     numbers = {row.id for row in chosen}
     newer = [row for row in store.recordings.of_unit(serial) if row.id > max(numbers)]
-    return [*chosen, *(row for row in newer if row.kind != "samples" or row.datasets)]
+    return [*chosen, *(row for row in newer if row.kind == "points")]  # of readings, rows say what they verify
 
 
 def _files_of(

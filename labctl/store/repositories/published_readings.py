@@ -145,6 +145,8 @@ def _differing(
         raw = raw_of(copied, channels)
     except KeyError as error:
         return f"column {error.args[0]!r} is missing"
+    except ValueError:
+        return "a column of numbers holds text"
     start = 0
     for block in blocks:
         found = block_digests({name: values[start : start + block.n] for name, values in raw.items()})

@@ -16,6 +16,7 @@ from fsspec.implementations.memory import MemoryFileSystem
 
 from instruments.clock import VirtualClock
 from labctl.answers.fleet import FleetPublishRequest
+from labctl.answers.storage_url import refused_because
 from labctl.errors import BadInput, NotFound
 from labctl.recording import read_recording
 from labctl.recording.files import write_recording
@@ -29,6 +30,7 @@ from labctl.store.paging import PageRequest
 from labctl.store.repositories.published_readings import raw_of
 from labctl.store.repositories.sample_blocks import DataSetHead, in_units
 from tests.helpers.fleets import AT, add_units, run_job
+from tests.helpers.lab import Lab
 from tests.helpers.one_row_sets import one_row_sets
 
 #: Readings of 4 data sets of a unit with three axes, which the bench keeps as the device sent them.
@@ -197,6 +199,39 @@ def test_a_storage_of_this_process_is_read_too_and_one_without_recordings_ends_t
             publish(store, FleetPublishRequest(url="s3://bucket/lab"))
         with pytest.raises(BadInput, match="choose a scheme that fsspec knows"):
             publish(store, FleetPublishRequest(url="sausage://bucket/lab"))
+
+
+def test_the_command_publishes_and_shows_no_password(lab: Path) -> None:
+    commands = Lab(lab)
+    done = commands.json("fleet", "publish", f"file://{lab}/elsewhere", "--search", "U0000")
+    assert (done["written"], done["unchanged"], done["failed"]) == (2, 0, [])
+    assert done["size_bytes"] == sum(file.stat().st_size for file in (lab / "elsewhere").rglob("*.*"))
+    again = commands.run("fleet", "publish", f"file://{lab}/elsewhere", "--search", "U0000").stdout
+    assert "0 recordings written (0 MB), 2 unchanged" in again
+    secret = "s3://ann:hunter2@bucket/lab"
+    for command in (["publish", secret], ["fit", "--effects", "bias", "--source", secret]):
+        refused = commands.run("fleet", *command, status=2)
+        assert "refused: it holds a user, a password" in refused.stderr
+        assert "hunter2" not in refused.output + refused.stderr
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("https://host/lab?X-Amz-Signature=1", "a query"),
+        ("sftp://ann@host/lab", "a user"),
+        ("abfs://lab:key@account.dfs.core.windows.net/x", "a password"),
+        ("simplecache::s3://bucket/lab", "not of the form"),
+        ("/data/lab", "not of the form"),
+        ("s3://", "not of the form"),
+        ("file://data/lab", "begins with a slash"),
+        ("s3://" + "b" * 1000, "1005 characters"),
+    ],
+)
+def test_urls_that_hold_secrets_or_name_no_place_are_refused(url: str, said: str) -> None:
+    assert said in refused_because(url)
+    for scheme in ("s3://bucket/lab", "file:///data/my lab", "abfs://lab@account.dfs.core.windows.net/x", "memory://x"):
+        assert not refused_because(scheme)
 
 
 def test_readings_in_their_units_are_turned_back_into_what_the_device_sent() -> None:
