@@ -19,8 +19,6 @@ from labctl.recording.data_files.parquet import refuse_large_footer
 from labctl.recording.data_files.values import holds_words
 from labctl.recording.recording import Columns
 
-_ADVICE = "write or copy it again"
-
 
 def write_parts(parts: Iterable[Columns], path: Path) -> None:
     """Write tables of the same columns as one Parquet file, each in row groups of its own.
@@ -63,10 +61,10 @@ def layout_of(schema: pa.Schema) -> dict[str, Any]:
 class RowRanges:
     """A Parquet file of numbers and words; its values keep their kind: whole numbers, float64 or text."""
 
-    def __init__(self, path: Path) -> None:
-        """Read the footer alone. Raises BadRecording."""
-        self._path = path
-        with parsed_by_library(path, "Parquet file", _ADVICE):
+    def __init__(self, path: Path, advice: str = "write or copy it again") -> None:
+        """Read the footer alone; `advice` says what to do about a file that is damaged. Raises BadRecording."""
+        self._path, self._advice = path, advice
+        with parsed_by_library(path, "Parquet file", advice):
             refuse_large_footer(path)
             with pq.ParquetFile(path) as opened:
                 metadata, schema = opened.metadata, opened.schema_arrow
@@ -76,7 +74,7 @@ class RowRanges:
             if field.name not in self._words and field.type not in {pa.int64(), pa.float64()}:
                 raise BadRecording(
                     f"{path}: column {field.name[:80]!r} holds {str(field.type)[:80]}; expected int64, double or "
-                    f"string; {_ADVICE}"
+                    f"string; {advice}"
                 )
         groups = [metadata.row_group(index) for index in range(metadata.num_row_groups)]
         self._ends = [0, *np.cumsum([group.num_rows for group in groups], dtype=np.int64).tolist()]
@@ -90,10 +88,10 @@ class RowRanges:
         if size > MAX_UNPACKED_BYTES:
             raise BadRecording(
                 f"{self._path}: a data set has an unpacked size of {size / 1e6:g} MB; at most "
-                f"{MAX_UNPACKED_BYTES / 1e6:g} MB are read; {_ADVICE}"
+                f"{MAX_UNPACKED_BYTES / 1e6:g} MB are read; {self._advice}"
             )
         with (
-            parsed_by_library(self._path, "Parquet file", _ADVICE),
+            parsed_by_library(self._path, "Parquet file", self._advice),
             pq.ParquetFile(self._path, read_dictionary=self._words, page_checksum_verification=True) as opened,
         ):
             table = opened.read_row_groups(wanted, use_threads=False)
@@ -103,7 +101,7 @@ class RowRanges:
 
     def _values(self, column: pa.ChunkedArray) -> NDArray[np.generic]:
         if column.null_count:
-            raise BadRecording(f"{self._path}: an empty value among {column.type}; expected none; {_ADVICE}")
+            raise BadRecording(f"{self._path}: an empty value among {column.type}; expected none; {self._advice}")
         if not pa.types.is_dictionary(column.type):
             return np.asarray(column.to_numpy())
         parts = [(chunk.dictionary.to_pylist(), chunk.indices.to_numpy()) for chunk in column.chunks]

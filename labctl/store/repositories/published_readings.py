@@ -25,6 +25,8 @@ from labctl.store.schema import tables
 
 #: Bytes that a row of a copy has at most: 256 columns of 8 bytes; and what a file has beside its rows.
 MAX_ROW_BYTES, MAX_BESIDE_BYTES = 256 * 8, 16 << 20
+#: What to do about a copy that is not as it was written.
+PUBLISH_AGAIN = "publish it again with --again"
 #: Copies a data file, by the number of a recording and the file's name, to a path. Raises NotFound, BadRecording.
 Fetch = Callable[[int, str, Path, int], None]
 Block = dict[str, NDArray[np.generic]]
@@ -63,7 +65,7 @@ class PublishedReadings:
         checked = self._checked.get(recording)
         if checked is None:
             checked = self._checked[recording] = self._check(connection, recording)
-        ranges = RowRanges(checked.file)
+        ranges = RowRanges(checked.file, PUBLISH_AGAIN)
         return {
             number: [raw_of(ranges.read(*checked.rows[number]), checked.channels)]
             for number in numbers
@@ -89,11 +91,11 @@ class PublishedReadings:
     def _compared(connection: sa.Connection, recording: int, file: Path, blocks: Sequence[_StoredBlock]) -> _Checked:
         from labctl.recording.data_files.row_ranges import RowRanges  # noqa: PLC0415  as above
 
-        ranges, n = RowRanges(file), sum(block.n for block in blocks)
+        ranges, n = RowRanges(file, PUBLISH_AGAIN), sum(block.n for block in blocks)
         if ranges.rows != n:
             raise BadRecording(
                 f"{file}: has {ranges.rows} rows, but recording {recording} has {n} in its complete data sets; "
-                "publish it again with --again"
+                f"{PUBLISH_AGAIN}"
             )
         checked = _Checked(file, _rows_of(blocks), channels_of(connection, recording))
         query = sa.select(tables.data_sets).where(tables.data_sets.c.recording_id == recording)
@@ -103,8 +105,8 @@ class PublishedReadings:
             if differing := _differing(ranges.read(start, stop), own, checked.channels, heads.get(number)):
                 what = f"data set {number}" if number in heads else "the table"
                 raise BadRecording(
-                    f"{file}: {what} is not that of recording {recording} in the database ({differing}); publish it "
-                    "again with --again"
+                    f"{file}: {what} is not that of recording {recording} in the database ({differing}); "
+                    f"{PUBLISH_AGAIN}"
                 )
         return checked
 
