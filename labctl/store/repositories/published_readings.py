@@ -118,7 +118,7 @@ def _stored_blocks(connection: sa.Connection, recording: int) -> list[_StoredBlo
     complete = sa.exists().where(d.c.recording_id == recording, d.c.number == b.number, d.c.state == "complete")
     is_table = sa.exists().where(tables.recordings.c.id == recording, tables.recordings.c.kind != "samples")
     query = (
-        sa.select(b.number, b.n, *(g[group] for group in GROUPS))
+        sa.select(b.number, b.n, g.readings, g.temperatures, g.table_rates)
         .select_from(tables.sample_blocks.outerjoin(tables.block_digests, same))
         .where(b.recording_id == recording, sa.or_(is_table, complete))
         .order_by(b.number, b.seq)
@@ -173,7 +173,7 @@ def raw_of(columns: Columns, channels: Sequence[RawChannelJson]) -> Block:
     """
     if not channels:
         return dict(columns)
-    replaced = {channel["stands_for"] for channel in channels if channel.get("stands_for") is not None}
+    replaced = {channel.get("stands_for") for channel in channels}
 
     def own(name: str) -> NDArray[np.float64]:
         return np.asarray(columns[f"own_{name}" if name in replaced else name], dtype=np.float64)
