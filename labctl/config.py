@@ -16,6 +16,7 @@ SIGN_PASSWORD_VARIABLE = "LABCTL_SIGN_PASSWORD_FILE"  # noqa: S105  the name of 
 SIGNER_VARIABLE = "LABCTL_EXPECTED_SIGNER"
 LOG_LEVEL_VARIABLE = "LABCTL_LOG_LEVEL"
 FLEET_ENGINE_VARIABLE = "LABCTL_FLEET_ENGINE"
+FLEET_SOURCE_VARIABLE = "LABCTL_FLEET_SOURCE"
 
 
 def variable(name: str) -> str:
@@ -36,6 +37,11 @@ def seal_key() -> str:
 def fleet_engine() -> str:
     """Return the cluster that a service may use for work on many units, as dask://HOST:PORT; empty for none."""
     return variable(FLEET_ENGINE_VARIABLE)
+
+
+def fleet_source() -> str:
+    """Return the URL of the storage that a service may read published recordings from; empty for none."""
+    return variable(FLEET_SOURCE_VARIABLE)
 
 
 def os_user() -> str:

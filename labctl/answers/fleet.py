@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from labctl.answers.base import Request, ResponseModel
 from labctl.answers.common_fields import CriticismVerdict, Serial
+from labctl.answers.storage_url import StorageUrl
 
 #: What a job does with each unit.
 FleetKind = Literal["fit", "criticise"]
@@ -79,6 +80,36 @@ class FleetJobRequest(FleetUnits):
         description="What computes: local (processes of this computer), dask (a cluster of Dask on this computer) or "
         "dask://HOST:PORT (the scheduler of a cluster).",
     )
+    source: StorageUrl = Field(
+        default="",
+        description="URL of a storage with published recordings that the readings are read from, such as "
+        "s3://bucket/lab, without credentials; empty: from the database.",
+    )
+
+
+class FleetPublishRequest(FleetUnits):
+    """Which units' recordings are written to a storage, and where."""
+
+    url: StorageUrl = Field(description="URL of the storage, such as s3://bucket/lab, without credentials.")
+    again: bool = Field(default=False, description="Whether to write also recordings that are there unchanged.")
+
+
+class FleetUnpublished(ResponseModel):
+    """A unit whose recordings could not be published."""
+
+    serial: Serial
+    reason: str = Field(description="Why, and what to do.")
+
+
+class FleetPublishResponse(ResponseModel):
+    """What was written to a storage."""
+
+    url: str = Field(description="URL of the storage.")
+    units: int = Field(description="Number of units that match.")
+    written: int = Field(description="Recordings that were written.")
+    unchanged: int = Field(description="Recordings that were there already, with the same readings.")
+    size_bytes: int = Field(description="Size of the files that were written, byte.")
+    failed: list[FleetUnpublished] = Field(description="Units whose recordings could not be published, with reasons.")
 
 
 class FleetCancelRequest(Request):

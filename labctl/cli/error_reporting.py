@@ -30,6 +30,7 @@ def one_clear_line() -> Iterator[None]:
 @contextmanager
 def _errors_as_lines() -> Iterator[None]:
     from instruments.errors import InstrumentError
+    from labctl.answers.storage_url import REFUSED
     from labctl.errors import BadFile, LabctlError, Stopped
     from procedures.contracts.errors import ProcedureError
 
@@ -47,7 +48,8 @@ def _errors_as_lines() -> Iterator[None]:
     except ValidationError as error:
         first = error.errors()[0]
         option = "--" + "-".join(str(part) for part in first["loc"]).replace("_", "-")
-        raise _exit(f"{option} {first['input']!r}: {first['msg'][0].lower()}{first['msg'][1:]}", 2) from error
+        value = "" if first["type"] == REFUSED else f" {first['input']!r}"  # a URL may hold a password
+        raise _exit(f"{option}{value}: {first['msg'][0].lower()}{first['msg'][1:]}", 2) from error
     except OverflowError as error:
         raise _exit(f"a number is too large ({error}); give a smaller number", 2) from error
     except OSError as error:

@@ -86,6 +86,7 @@ from labctl.store.repositories.keys import Keys as Keys
 from labctl.store.repositories.leases import LeaseRow as LeaseRow, Leases as Leases
 from labctl.store.repositories.manifests import ManifestRow as ManifestRow, Manifests as Manifests
 from labctl.store.repositories.imports import ImportTicket as ImportTicket, Imports as Imports
+from labctl.store.repositories.published_readings import PublishedReadings as PublishedReadings
 from labctl.store.repositories.recordings import Recordings as Recordings
 from labctl.store.repositories.releases import (
     NewReleaseRequest as NewReleaseRequest,

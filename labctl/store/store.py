@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 
 from labctl.config import seal_key
@@ -32,6 +33,7 @@ from labctl.store.repositories.releases import ReleaseRequests
 from labctl.store.repositories.replication import Replication
 from labctl.store.repositories.resume_points import ResumePoints
 from labctl.store.repositories.room_environment import RoomEnvironment
+from labctl.store.repositories.sample_blocks import ReadBlocks, blocks_of_sets
 from labctl.store.repositories.scheduled_starts import Starts
 from labctl.store.repositories.sensors import SensorVersions
 from labctl.store.repositories.standards import Standards
@@ -42,10 +44,11 @@ from labctl.store.sealing.signing import begin_signing
 class Store:
     """An open database with its repositories."""
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    def __init__(self, database: Database, read_blocks: ReadBlocks = blocks_of_sets) -> None:
+        """`read_blocks` returns the readings of recordings, by default those of the database."""
+        self._database, self.read_blocks = database, read_blocks
         self.units = Units(database)
-        self.recordings = Recordings(database)
+        self.recordings = Recordings(database, read_blocks)
         self.imports = Imports(database)
         self.campaigns = Campaigns(database)
         self.resume_points = ResumePoints(database)
@@ -97,6 +100,12 @@ class Store:
         """Whether several processes may write to the database at the same time, each with a bench of its own."""
         return is_url(self.location)
 
+    def reading_from(self, read_blocks: ReadBlocks) -> Store:
+        """Return this store with the readings of recordings from elsewhere; it is open for as long as this one."""
+        other = copy(self)
+        other.read_blocks, other.recordings = read_blocks, Recordings(self._database, read_blocks)
+        return other
+
     @property
     def address(self) -> StoreAddress:
         """The address by which another process opens the same database."""
@@ -130,16 +139,18 @@ def open_store(
     address: ServiceAddress = NO_SERVICE,
     writer: Writer | None = None,
     read_only: bool = False,
+    read_blocks: ReadBlocks = blocks_of_sets,
 ) -> Iterator[Store]:
     """Open a database by path or URL, made on first use; `write` holds it for this process.
 
     Without, transactions run by `writer`, the process that holds it. With `read_only` every transaction is refused, and
-    no database is made.
+    no database is made. `read_blocks` returns the readings of recordings where they are not those of the database.
 
     Raises Conflict when another process holds it, StoreError when it is newer than the code or damaged, OldSchema
     when it has to be migrated first.
     """
-    store = Store(Database(location, write=write, address=address, writer=writer, read_only=read_only))
+    database = Database(location, write=write, address=address, writer=writer, read_only=read_only)
+    store = Store(database, read_blocks)
     try:
         if write:
             store.imports.discard_unfinished()

@@ -13,10 +13,11 @@ from pathlib import Path
 import pytest
 
 from instruments.clock import SystemClock
-from labctl.answers.fleet import FleetJobRequest, FleetJobResponse
+from labctl.answers.fleet import FleetJobRequest, FleetJobResponse, FleetPublishRequest
 from labctl.services.fleet.engines import DaskEngine, Engine
 from labctl.services.fleet.foreground import run_with
 from labctl.services.fleet.processes import ProcessEngine
+from labctl.services.fleet.publishing import publish
 from labctl.services.fleet.source import Source
 from labctl.store import Store, open_store
 from tests.helpers.fleets import add_units
@@ -65,8 +66,9 @@ def store(tmp_path: Path) -> Iterator[Store]:
         yield opened
 
 
-def fit_all(store: Store, engine: Engine, worker: Callable[[], int]) -> None:
+def fit_all(store: Store, engine: Engine, worker: Callable[[], int], source: str = "") -> None:
     """Fit every unit on an engine of which a worker is killed on the way; each gets one version."""
+    request = FIT.model_copy(update={"source": source})
     before = [len(store.calibrations.versions(f"U{number:05d}")) for number in range(UNITS)]
     killed: list[int] = []
 
@@ -75,7 +77,7 @@ def fit_all(store: Store, engine: Engine, worker: Callable[[], int]) -> None:
             killed.append(worker())
             os.kill(killed[0], signal.SIGKILL)
 
-    job = run_with(store, SystemClock(), FIT, lambda: engine, kill_worker)
+    job = run_with(store, SystemClock(), request, lambda: engine, kill_worker)
     assert killed
     assert (job.state, job.done, job.failed) == ("done", UNITS, 0)
     after = [len(store.calibrations.versions(f"U{number:05d}")) for number in range(UNITS)]
@@ -84,9 +86,12 @@ def fit_all(store: Store, engine: Engine, worker: Callable[[], int]) -> None:
 
 @pytest.mark.slow
 def test_a_cluster_and_processes_of_this_computer_give_the_same_coefficients_though_a_worker_is_killed(
-    store: Store, cluster: Cluster
+    store: Store, cluster: Cluster, tmp_path: Path
 ) -> None:
-    fit_all(store, DaskEngine(f"dask://{cluster.address}", Source(store.address)), lambda: cluster.workers[0].pid)
+    published = f"file://{tmp_path}/published"  # the workers of the cluster read there, the processes the database
+    assert publish(store, FleetPublishRequest(url=published)).written == UNITS
+    on_cluster = DaskEngine(f"dask://{cluster.address}", Source(store.address))
+    fit_all(store, on_cluster, lambda: cluster.workers[0].pid, published)
     engine = ProcessEngine(store.address, 2)
     fit_all(store, engine, lambda: next(iter(engine._pool._processes)))
     for number in range(UNITS):

@@ -60,6 +60,15 @@ EngineName = Annotated[
         "dask://HOST:PORT (the scheduler of a cluster).",
     ),
 ]
+SourceUrl = Annotated[
+    str,
+    typer.Option(
+        "--source",
+        metavar="URL",
+        help="Storage that the readings are read from instead of the database, as s3://bucket/lab; `labctl fleet "
+        "publish` writes them there.",
+    ),
+]
 Again = Annotated[
     bool,
     typer.Option(
@@ -86,6 +95,7 @@ def fit(
     supplier: Supplier = "",
     search: Search = "",
     engine: EngineName = "local",
+    source: SourceUrl = "",
     again: Again = False,
     accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
@@ -101,7 +111,7 @@ def fit(
     with one_clear_line():
         request = FleetJobRequest(
             kind="fit", model=model, effects=names_in(effects), type=type_, batch=batch, supplier=supplier,
-            search=search, engine=engine, again=again, accept_warnings=accept_warnings,
+            search=search, engine=engine, source=source, again=again, accept_warnings=accept_warnings,
         )  # fmt: skip
         _carry_out(database, request, as_json=as_json)
 
@@ -114,6 +124,7 @@ def criticise(
     supplier: Supplier = "",
     search: Search = "",
     engine: EngineName = "local",
+    source: SourceUrl = "",
     again: Again = False,
     as_json: Json = False,
     database: Database = None,
@@ -124,9 +135,51 @@ def criticise(
     with one_clear_line():
         request = FleetJobRequest(
             kind="criticise", model=model, type=type_, batch=batch, supplier=supplier, search=search, engine=engine,
-            again=again,
+            source=source, again=again,
         )  # fmt: skip
         _carry_out(database, request, as_json=as_json)
+
+
+@app.command()
+def publish(
+    url: Annotated[
+        str,
+        typer.Argument(metavar="URL", help="Storage, as s3://bucket/lab or file:///data/lab, without credentials."),
+    ],
+    type_: UnitType = "",
+    batch: Batch = "",
+    supplier: Supplier = "",
+    search: Search = "",
+    again: Annotated[bool, typer.Option("--again", help="Write also recordings that are there unchanged.")] = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Write the recordings that a job reads to a storage, one folder each; exit status 1 where one could not be.
+
+    A recording that is there unchanged is not written again.
+    """
+    from labctl.answers.fleet import FleetPublishRequest
+    from labctl.answers.storage_url import refused_because
+    from labctl.cli.stage_line import stage_line
+    from labctl.errors import BadInput
+    from labctl.services.fleet.publishing import publish as publish_recordings
+    from labctl.services.read_access import open_readonly
+
+    with one_clear_line(), open_readonly(database) as store, stage_line():
+        if reason := refused_because(url):
+            raise BadInput(f"URL is refused: {reason}")
+        request = FleetPublishRequest(
+            url=url, type=type_, batch=batch, supplier=supplier, search=search, again=again
+        )  # fmt: skip
+        answer = publish_recordings(store, request)
+    if as_json:
+        print_json(answer)
+    else:
+        from labctl.cli.printing.fleet import print_published
+
+        print_published(answer)
+    if answer.failed:
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -10,10 +10,18 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from labctl.cli.output import console, format_number, print_part, stderr, table
 
 if TYPE_CHECKING:
-    from labctl.answers.fleet import FleetJobResponse, FleetReportResponse, FleetTypeResponse, FleetUnitResponse
+    from labctl.answers.fleet import (
+        FleetJobResponse,
+        FleetPublishResponse,
+        FleetReportResponse,
+        FleetTypeResponse,
+        FleetUnitResponse,
+    )
 
 #: Outliers that are printed; --json has more.
 MAX_OUTLIERS = 20
+#: Units that could not be published that are printed; --json has more.
+MAX_UNPUBLISHED = 20
 
 
 class FleetProgress:
@@ -94,6 +102,18 @@ def print_units(answers: list[FleetUnitResponse], total: int) -> None:
         rows.add_row(each.serial, each.state, version, each.verdict or "–", each.reason)
     console.print(rows)
     print_part(len(answers), total, "units")
+
+
+def print_published(answer: FleetPublishResponse) -> None:
+    """Print what was written to a storage."""
+    console.print(f"{answer.url}: recordings of {answer.units} units", style="bold", soft_wrap=True)
+    console.print(
+        f"  {answer.written} recordings written ({answer.size_bytes / 1e6:.3g} MB), {answer.unchanged} unchanged"
+    )
+    for each in answer.failed[:MAX_UNPUBLISHED]:
+        console.print(f"  {each.serial}: {each.reason}", soft_wrap=True)
+    if len(answer.failed) > MAX_UNPUBLISHED:
+        console.print(f"  {len(answer.failed) - MAX_UNPUBLISHED} more could not be published; --json lists all")
 
 
 def print_report(answer: FleetReportResponse) -> None:

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
 from labctl.recording.data_files.parquet import read_parquet, refuse_booleans
+from labctl.recording.data_files.row_ranges import layout_of, table_of
 from labctl.recording.data_files.text import read_csv
 from labctl.recording.recording import Columns
 
@@ -32,17 +31,8 @@ def read_table(path: Path) -> dict[str, NDArray[np.generic]]:
 
 def write_table(columns: Columns, path: Path) -> None:
     """Write columns as a .parquet or .csv file."""
-    table: Any = pa.table({name: pa.array(values) for name, values in columns.items()})
+    table = table_of(columns)
     if path.suffix == ".parquet":
-        floats = [name for name in table.column_names if pa.types.is_floating(table.schema.field(name).type)]
-        other_columns = [name for name in table.column_names if name not in floats]
-        pq.write_table(
-            table,
-            path,
-            compression="zstd",
-            use_dictionary=other_columns,
-            use_byte_stream_split=floats,
-            write_page_checksum=True,
-        )
+        pq.write_table(table, path, **layout_of(table.schema))
     else:
         pacsv.write_csv(table, path)

@@ -58,7 +58,7 @@ def is_boolean(kind: pa.DataType) -> bool:
 def _read(
     path: Path, accept: Callable[[pa.Schema], None] | None, *, with_stamps: bool
 ) -> dict[str, NDArray[np.generic]]:
-    _refuse_large_footer(path)
+    refuse_large_footer(path)
     with pq.ParquetFile(path, buffer_size=BUFFER_BYTES, pre_buffer=False) as opened:
         metadata, schema = opened.metadata, opened.schema_arrow
     rows = metadata.num_rows
@@ -98,7 +98,8 @@ def _without_stamps(stamps: pa.Array) -> pa.Array:
     return stamps.cast(pa.timestamp("ns", stamps.type.tz)).cast(pa.int64()).cast(pa.float64(), safe=False)
 
 
-def _refuse_large_footer(path: Path) -> None:
+def refuse_large_footer(path: Path) -> None:
+    """Raise BadRecording for a Parquet file whose footer is larger than any of a recording."""
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - 8))
         tail = file.read(8)

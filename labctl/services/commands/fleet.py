@@ -21,6 +21,7 @@ class ToFleetJob(Addressed):
 
 def _start(context: CommandContext, asked: FleetJobRequest) -> FleetJobResponse:
     jobs.refuse_other_engine(asked.engine)
+    jobs.refuse_other_source(asked.source)
     return jobs.begin(context.store, asked, context.now())
 
 

@@ -68,7 +68,7 @@ def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decim
     wanted = [row for row in rows if is_decimated(row)]
 
     def read() -> dict[int, ReadRecording]:
-        with open_store(store.location, write=False) as second_store:
+        with open_store(store.location, write=False, read_blocks=store.read_blocks) as second_store:
             return {row.id: read_recording_of(second_store, row) for row in wanted}
 
     with closing(Forked(read)) as forked:

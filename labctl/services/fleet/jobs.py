@@ -12,7 +12,8 @@ from labctl.answers.fleet import (
     FleetUnitResponse,
     FleetUnitState,
 )
-from labctl.config import FLEET_ENGINE_VARIABLE, fleet_engine
+from labctl.answers.storage_url import refused_because
+from labctl.config import FLEET_ENGINE_VARIABLE, FLEET_SOURCE_VARIABLE, fleet_engine, fleet_source
 from labctl.errors import BadInput
 from labctl.fitting.models.presets import preset_for
 from labctl.services.fleet.engines import LOCAL, refuse_unknown
@@ -28,6 +29,18 @@ def refuse_other_engine(engine: str) -> None:
         raise BadInput(
             f"engine {engine!r}: this service may use {' or '.join(filter(None, (LOCAL, allowed)))}; start the service "
             f"with {FLEET_ENGINE_VARIABLE}={engine} to allow it"
+        )
+
+
+def refuse_other_source(source: str) -> None:
+    """Raise BadInput for a storage that this service may not read: its URL names a place of the service's computer."""
+    allowed = fleet_source()
+    if reason := allowed and refused_because(allowed):
+        raise BadInput(f"{FLEET_SOURCE_VARIABLE} of this service is refused: {reason}")
+    if source not in {"", allowed}:
+        raise BadInput(
+            f"source {source!r}: this service may read {' or '.join(filter(None, ('its database', allowed)))}; start "
+            f"the service with {FLEET_SOURCE_VARIABLE}={source} to allow it"
         )
 
 

@@ -16,6 +16,7 @@ from labctl.errors import ComputationEnded, LabctlError, StoreError, TooBusy, Ve
 from labctl.log import get_logger
 from labctl.services.cache import code_digest
 from labctl.services.fleet.engines import Engine, UnderWay
+from labctl.services.fleet.source import refuse_missing_source
 from labctl.services.fleet.task import FleetTask, Outcome, skipped
 from labctl.store import FleetJobRow, FleetResult, Store
 from labctl.store.paging import PageRequest
@@ -46,6 +47,7 @@ def carry_out(
     if not store.fleet.take(job, runner, clock.utc() - LEFT_AFTER, clock.utc()):
         return
     try:
+        refuse_missing_source(FleetJobRequest.model_validate(store.fleet.get(job).request).source)
         engine = make_engine()
     except LabctlError as error:
         store.fleet.end(job, runner, "failed", str(error), clock.utc())

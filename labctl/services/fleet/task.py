@@ -18,6 +18,7 @@ from labctl.answers.calibrations import FitRequest
 from labctl.answers.fleet import FleetJobRequest
 from labctl.errors import BadInput, ComputationEnded, LabctlError
 from labctl.services.cache import code_digest
+from labctl.services.fleet.source import readings_from
 from labctl.services.recordings.loading import chosen_rows, readings_question
 from labctl.store import CalibrationRecord, FleetCoefficient, FleetFit, FleetResult, NewCalibration, RecordingRow, Store
 
@@ -45,21 +46,32 @@ class Outcome:
 
 
 def perform(store: Store, task: FleetTask) -> Outcome:
-    """Do a task. An error of the unit is its result; raises ComputationEnded and what is wrong with the engine."""
+    """Do a task. An error of the unit is its result; raises ComputationEnded and what is wrong with the engine.
+
+    Raises BadInput where a worker cannot use the storage that the readings are in.
+    """
     begun_s = processor_s()
     refuse_other_program(task.program)
+    with readings_from(store, task.request.source) as source:
+        outcome = _performed(source, task)
+    return replace(outcome, result=replace(outcome.result, processor_s=processor_s() - begun_s))
+
+
+def _performed(store: Store, task: FleetTask) -> Outcome:
     try:
-        outcome = _fitted(store, task) if task.request.kind == "fit" else _criticised(store, task)
+        if task.request.source:
+            for row in chosen_rows(store, task.serial, None):
+                store.recordings.check_readings(row.id)
+        return _fitted(store, task) if task.request.kind == "fit" else _criticised(store, task)
     except ComputationEnded:
         raise
     except LabctlError as error:
-        outcome = Outcome(FleetResult(task.serial, "failed", reason=str(error)))
+        return Outcome(FleetResult(task.serial, "failed", reason=str(error)))
     except MemoryError:
         raise
     except Exception as error:  # noqa: BLE001  one unit must not end the job of all
         reason = f"{type(error).__name__}: {error}; report this text to the maintainers of labctl"
-        outcome = Outcome(FleetResult(task.serial, "failed", reason=reason))
-    return replace(outcome, result=replace(outcome.result, processor_s=processor_s() - begun_s))
+        return Outcome(FleetResult(task.serial, "failed", reason=reason))
 
 
 def refuse_other_program(program: str) -> None:

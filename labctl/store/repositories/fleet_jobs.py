@@ -208,6 +208,13 @@ class FleetJobs:
             total = int(connection.scalar(sa.select(sa.func.count()).select_from(tables.fleet_jobs)) or 0)
         return Page.of(rows, lambda row: row.id, request, total)
 
+    def serials(self, wanted: FleetFilter, after: str, limit: int) -> list[str]:
+        """Return the serial numbers of measured units that are wanted, in order, the first `limit` beyond `after`."""
+        c = tables.units.c
+        query = sa.select(c.serial).where(wanted.condition, c.serial > after).order_by(c.serial).limit(limit)
+        with self._database.reading() as connection:
+            return [str(serial) for serial in connection.scalars(query)]
+
     def open(self) -> list[FleetJobRow]:
         """Return the jobs that have not ended, oldest first."""
         query = sa.select(tables.fleet_jobs).where(tables.fleet_jobs.c.state.in_(OPEN))

@@ -25,13 +25,12 @@ from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.repositories.imports import Imports
 from labctl.store.repositories.records_by_name import records_of
 from labctl.store.repositories.sample_blocks import (
-    blocks_of,
+    ReadBlocks,
     blocks_of_sets,
     channels_of,
     head_of,
     in_units,
     join_blocks,
-    readings_in_units,
 )
 from labctl.store.schema import tables
 
@@ -89,8 +88,9 @@ READ_AT_ONCE = 20_000
 class Recordings:
     """Everything measured on one unit in one campaign or import."""
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    def __init__(self, database: Database, read_blocks: ReadBlocks = blocks_of_sets) -> None:
+        """`read_blocks` returns the blocks of readings, and of tables that were imported."""
+        self._database, self._read_blocks = database, read_blocks
 
     def add_import(self, recording: Recording, at: datetime, simulated: JsonObject | None = None) -> int:
         """Import a recording made elsewhere; returns its number. All of it is kept, or nothing. Raises BadRecording.
@@ -206,7 +206,8 @@ class Recordings:
         with self._database.reading() as connection:
             environment = _environment(connection, recording)
             if head.kind != "samples":
-                return Recording(info, join_blocks(blocks_of(connection, recording, WHOLE_TABLE)), environment)
+                blocks = self._read_blocks(connection, recording, [WHOLE_TABLE]).get(WHOLE_TABLE, [])
+                return Recording(info, join_blocks(blocks), environment)
             columns = points_columns(connection, recording)
         return Recording(info.model_copy(update={"kind": "points"}), columns, environment)
 
@@ -249,7 +250,7 @@ class Recordings:
         is_timed = any("time_u_s" in (head["encoder"] or {}) for head in rows)
         for together in _by_readings(rows):
             with self._database.reading() as connection:
-                blocks = blocks_of_sets(connection, recording, [int(head["number"]) for head in together])
+                blocks = self._read_blocks(connection, recording, [int(head["number"]) for head in together])
             for head in together:
                 number = int(head["number"])
                 columns = in_units(blocks.pop(number, []), head_of(head), channels, times=times)
@@ -258,6 +259,11 @@ class Recordings:
                 if is_timed and "course" not in (head["encoder"] or {}):  # of a constant rate no time matters
                     columns |= {name: np.zeros(len(columns["dataset"])) for name in sorted(RATE_TIME_U)}
                 yield number, columns
+
+    def check_readings(self, recording: int) -> None:
+        """Compare the readings with the digests in the database where they are from elsewhere. Raises BadRecording."""
+        with self._database.reading() as connection:
+            self._read_blocks(connection, recording, [])
 
     def data_sets(self, recording: int) -> list[DataSetRow]:
         """Return every data set of a recording, also those that were not completed, in order."""
@@ -287,7 +293,8 @@ class Recordings:
             head = connection.execute(chosen).mappings().first()
             if head is None:
                 raise NotFound(f"recording {recording} has no data set {number}; check its number")
-            return readings_in_units(connection, head_of(head), channels_of(connection, recording))
+            blocks = self._read_blocks(connection, recording, [number]).get(number, [])
+            return in_units(blocks, head_of(head), channels_of(connection, recording))
 
 
 def _by_readings(heads: Sequence[sa.RowMapping]) -> Iterator[list[sa.RowMapping]]:

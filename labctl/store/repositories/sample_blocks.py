@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NotRequired
 
 import numpy as np
@@ -95,6 +95,10 @@ def head_of(row: sa.RowMapping) -> DataSetHead:
     )  # fmt: skip
 
 
+#: Returns number -> blocks, in order, of some data sets of a recording: of the database, or of a copy of its readings.
+ReadBlocks = Callable[[sa.Connection, int, Sequence[int]], dict[int, list[dict[str, NDArray[np.generic]]]]]
+
+
 def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[np.generic]]]:
     """Return the unpacked blocks of a data set, in order."""
     return blocks_of_sets(connection, recording, [number]).get(number, [])
@@ -123,13 +127,6 @@ def channels_of(connection: sa.Connection, recording: int) -> list[RawChannelJso
     """Return name, unit, scale and offset of each raw channel; empty for a recording that was imported."""
     query = sa.select(tables.recordings.c.channels).where(tables.recordings.c.id == recording)
     return connection.scalar(query) or []
-
-
-def readings_in_units(
-    connection: sa.Connection, head: DataSetHead, channels: list[RawChannelJson]
-) -> dict[str, NDArray[np.generic]]:
-    """Return the readings of one data set: as they came in from elsewhere, or in their units from what was sent."""
-    return in_units(blocks_of(connection, head["recording_id"], head["number"]), head, channels)
 
 
 def in_units(

@@ -9116,6 +9116,12 @@ export interface components {
              * @default local
              */
             engine?: string;
+            /**
+             * Source
+             * @description URL of a storage with published recordings that the readings are read from, such as s3://bucket/lab, without credentials; empty: from the database.
+             * @default
+             */
+            source?: string;
         };
         /**
          * FleetJobResponse

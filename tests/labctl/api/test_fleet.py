@@ -10,12 +10,13 @@ import pytest
 from fastapi.testclient import TestClient
 
 from instruments.clock import VirtualClock
-from labctl.answers.fleet import FleetCancelRequest, FleetJobRequest, FleetReportRequest
+from labctl.answers.fleet import FleetCancelRequest, FleetJobRequest, FleetPublishRequest, FleetReportRequest
 from labctl.api import create_app
 from labctl.client import Client, ServiceRefused
 from labctl.service_connection import ServiceConnection
 from labctl.services.commands.fleet import CANCEL_FLEET_JOB, START_FLEET_JOB, ToFleetJob
 from labctl.services.commands.remote import HttpExecutor
+from labctl.services.fleet.publishing import publish
 from labctl.services.lab_service import LabService
 from labctl.store import Store
 from labctl.store.connection.database import Database
@@ -98,6 +99,26 @@ def test_an_engine_is_used_only_where_the_service_was_started_with_it(
     unknown = http.post("/api/fleet/jobs", json={**FIT, "engine": "sausage"})
     assert (unknown.status_code, "choose local, dask or dask://" in unknown.text) == (422, True)
     assert http.post("/api/fleet/jobs", json={**FIT, "type": "none"}).status_code == 404
+
+
+def test_a_storage_is_read_only_where_the_service_was_started_with_it_and_never_with_a_password(
+    http: TestClient, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    url = f"file://{tmp_path}/published"
+    refused = http.post("/api/fleet/jobs", json={**FIT, "source": url})
+    assert (refused.status_code, f"LABCTL_FLEET_SOURCE={url}" in refused.json()["detail"]) == (400, True)
+    publish(service_of(http).store, FleetPublishRequest(url=url))
+    monkeypatch.setenv("LABCTL_FLEET_SOURCE", url)
+    assert http.post("/api/fleet/jobs", json={**FIT, "source": url}).json()["request"]["source"] == url
+    carry_out(http)
+    assert get(http, "/api/fleet/jobs/1")["done"] == UNITS
+    secret = http.post("/api/fleet/jobs", json={**FIT, "source": "s3://ann:hunter2@bucket/lab"})
+    assert (secret.status_code, "credentials in the environment" in secret.text) == (422, True)
+    monkeypatch.setenv("LABCTL_FLEET_SOURCE", "s3://ann:hunter2@bucket/lab")
+    wrong = http.post("/api/fleet/jobs", json={**FIT, "source": url})
+    assert (wrong.status_code, "LABCTL_FLEET_SOURCE of this service is refused" in wrong.text) == (400, True)
+    said = secret.text + wrong.text + str(get(http, "/api/audit", limit=100)) + str(get(http, "/api/fleet/jobs"))
+    assert "hunter2" not in said
 
 
 def test_types_chart_and_report_are_answered(http: TestClient) -> None:
