@@ -20,25 +20,26 @@ _WITH_ACCOUNT = frozenset({"abfs", "abfss", "az"})
 def refused_because(url: str) -> str:
     """Return why a URL of a storage is refused, without repeating it; empty: it is not."""
     if len(url) > MAX_URL_CHARACTERS:
-        return f"it has {len(url)} characters; give at most {MAX_URL_CHARACTERS}"
+        return f"it has {len(url)} characters, at most {MAX_URL_CHARACTERS} are allowed"
     scheme, _, place = url.partition("://")
     authority = place.partition("/")[0]
     has_user = "@" in authority and (scheme not in _WITH_ACCOUNT or ":" in authority)
     if has_user or "?" in place or "#" in place:
         return (
-            "it holds a user, a password, a query or a fragment, which would be recorded; give scheme, place and "
-            "folder only, and the credentials in the environment, as AWS_ACCESS_KEY_ID for s3://"
+            "it holds a user, a password, a query or a fragment, which would be recorded (credentials belong in the "
+            "environment, as AWS_ACCESS_KEY_ID for s3://)"
         )
     if not re.fullmatch(URL, url) or "::" in url or not place.strip("/"):
-        return "it is not of the form s3://bucket/folder; give scheme, place and folder"
+        return "it is not of the form scheme://place/folder"
     if scheme in {"file", "local"} and not place.startswith("/"):
-        return "a path of this computer begins with a slash; write file:///folder"
+        return "a path of this computer begins with a slash, as in file:///data/lab"
     return ""
 
 
 def _checked(url: str) -> str:
     if url and (reason := refused_because(url)):
-        raise PydanticCustomError(REFUSED, "the URL is refused: {reason}", {"reason": reason})
+        text = "the URL is refused: {reason}; give scheme, place and folder only, as s3://bucket/lab"
+        raise PydanticCustomError(REFUSED, text, {"reason": reason})
     return url
 
 

@@ -26,7 +26,9 @@ class ObjectStorage:
     def __init__(self, url: str) -> None:
         """Open the storage; nothing is read yet. Raises BadInput where the URL or its scheme cannot be used."""
         if reason := refused_because(url):
-            raise BadInput(f"the URL of a storage is refused: {reason}")
+            raise BadInput(
+                f"the URL of a storage is refused: {reason}; give scheme, place and folder only, as s3://bucket/lab"
+            )
         with needs_extra("fleet", f"the storage {url}"):
             import fsspec  # noqa: PLC0415  of the extra `fleet`
 

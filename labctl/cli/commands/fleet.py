@@ -167,7 +167,7 @@ def publish(
 
     with one_clear_line(), open_readonly(database) as store, stage_line():
         if reason := refused_because(url):
-            raise BadInput(f"URL is refused: {reason}")
+            raise BadInput(f"URL is refused: {reason}; give scheme, place and folder only, as s3://bucket/lab")
         request = FleetPublishRequest(
             url=url, type=type_, batch=batch, supplier=supplier, search=search, again=again
         )  # fmt: skip

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -47,7 +46,7 @@ def table_of(columns: Columns) -> pa.Table:
     return pa.table({name: pa.array(values) for name, values in columns.items()})
 
 
-def layout_of(schema: pa.Schema) -> dict[str, Any]:
+def layout_of(schema: pa.Schema) -> dict[str, object]:
     """Return the options by which a Parquet file of a recording is written."""
     floats = [field.name for field in schema if pa.types.is_floating(field.type)]
     return {

@@ -36,7 +36,10 @@ def refuse_other_source(source: str) -> None:
     """Raise BadInput for a storage that this service may not read: its URL names a place of the service's computer."""
     allowed = fleet_source()
     if reason := allowed and refused_because(allowed):
-        raise BadInput(f"{FLEET_SOURCE_VARIABLE} of this service is refused: {reason}")
+        raise BadInput(
+            f"{FLEET_SOURCE_VARIABLE} of this service is refused: {reason}; start the service with scheme, place and "
+            "folder only, as s3://bucket/lab"
+        )
     if source not in {"", allowed}:
         raise BadInput(
             f"source {source!r}: this service may read {' or '.join(filter(None, ('its database', allowed)))}; start "

@@ -95,7 +95,7 @@ class PublishedReadings:
         if ranges.rows != n:
             raise BadRecording(
                 f"{file}: has {ranges.rows} rows, but recording {recording} has {n} in its complete data sets; "
-                f"{PUBLISH_AGAIN}"
+                "publish it again with --again"
             )
         checked = _Checked(file, _rows_of(blocks), channels_of(connection, recording))
         query = sa.select(tables.data_sets).where(tables.data_sets.c.recording_id == recording)
@@ -106,7 +106,7 @@ class PublishedReadings:
                 what = f"data set {number}" if number in heads else "the table"
                 raise BadRecording(
                     f"{file}: {what} is not that of recording {recording} in the database ({differing}); "
-                    f"{PUBLISH_AGAIN}"
+                    "publish it again with --again"
                 )
         return checked
 

@@ -113,7 +113,7 @@ def test_a_storage_is_read_only_where_the_service_was_started_with_it_and_never_
     carry_out(http)
     assert get(http, "/api/fleet/jobs/1")["done"] == UNITS
     secret = http.post("/api/fleet/jobs", json={**FIT, "source": "s3://ann:hunter2@bucket/lab"})
-    assert (secret.status_code, "credentials in the environment" in secret.text) == (422, True)
+    assert (secret.status_code, "credentials belong in the environment" in secret.text) == (422, True)
     monkeypatch.setenv("LABCTL_FLEET_SOURCE", "s3://ann:hunter2@bucket/lab")
     wrong = http.post("/api/fleet/jobs", json={**FIT, "source": url})
     assert (wrong.status_code, "LABCTL_FLEET_SOURCE of this service is refused" in wrong.text) == (400, True)
