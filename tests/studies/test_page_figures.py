@@ -35,6 +35,7 @@ def test_figures_of_three_units_are_those_of_the_database(
     assert sum(n for rows in compared.values() for _, _, n in rows) > 3000
 
 
+@pytest.mark.slow
 def test_no_kind_of_figure_is_left_out(compared: dict[str, list[tuple[str, float, int]]]) -> None:
     kinds = {figure for rows in compared.values() for figure, _, _ in rows}
     assert kinds == {

@@ -192,6 +192,7 @@ def test_a_recording_without_times_has_no_time_axis_and_every_data_set(
     assert "data sets in order" in options
 
 
+@pytest.mark.slow
 def test_evidence_bars_differ_and_coefficients_are_all_shown(
     service: Service, visit: Callable[..., Page], unit: str
 ) -> None:
