@@ -8,19 +8,18 @@ process writes; `writer_lock` enforces it.
 from __future__ import annotations
 
 import os
-import sqlite3
 from contextlib import suppress
 from pathlib import Path
 
 import sqlalchemy as sa
 from sqlalchemy import event as sa_event
-from sqlalchemy import exc
 
 from labctl.errors import StoreError
 from labctl.store.connection.anchor_file import anchor_fits, write_anchor
 from labctl.store.connection.commit_seal import count_commit, missing, seal
 from labctl.store.connection.engines import sqlite_engine
 from labctl.store.connection.private_files import close_to_others, make_private
+from labctl.store.connection.sqlite_errors import SqliteErrors
 from labctl.store.connection.writer_lock import ServiceAddress, WriterLock
 from labctl.store.manifests.chain import ChainHead
 
@@ -101,7 +100,7 @@ def _damage(connection: sa.Connection, check: str) -> str:
     return "" if text == "ok" else " ".join(text.split())
 
 
-class SqliteFile:
+class SqliteFile(SqliteErrors):
     """The backend of a database by path. With `address` it is held for writing, by a process that is reached there."""
 
     patience_s = 0.0  #: a file is there, or it is not
@@ -205,18 +204,6 @@ class SqliteFile:
         """Note it in the anchor file, which is outside the database."""
         if self.anchor_fits:
             write_anchor(self._location, head)
-
-    def is_unreachable(self, error: exc.DatabaseError) -> bool:  # noqa: ARG002
-        """Return False: every error is about the file itself."""
-        return False
-
-    def is_disk_full(self, error: exc.DatabaseError) -> bool:
-        """Return whether SQLite says SQLITE_FULL."""
-        return getattr(error.orig, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
-
-    def words_for(self, error: exc.DatabaseError) -> str:  # noqa: ARG002
-        """Return an empty text: SQLite's own message is enough."""
-        return ""
 
     def was_committed(self, number: int) -> bool:  # noqa: ARG002
         """Return False: a commit that failed was not made."""

@@ -8,16 +8,15 @@ a file is compared before and after each reading: what was changed meanwhile is 
 from __future__ import annotations
 
 import os
-import sqlite3
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
 
 import sqlalchemy as sa
-from sqlalchemy import exc
 
 from labctl.errors import StoreError
 from labctl.store.connection.engines import sqlite_reading_engine
+from labctl.store.connection.sqlite_errors import SqliteErrors
 from labctl.store.connection.writer_lock import ServiceAddress
 from labctl.store.manifests.chain import ChainHead
 
@@ -32,7 +31,7 @@ class FileState(NamedTuple):
     is_immutable: bool  #: whether SQLite is made to take the file for one that does not change
 
 
-class SqliteReader:
+class SqliteReader(SqliteErrors):
     """The backend of a database by path that is only read: no lock, no note and no file is made beside it."""
 
     patience_s = 0.0  #: a file is there, or it is not
@@ -122,18 +121,6 @@ class SqliteReader:
 
     def grown(self, head: ChainHead) -> None:
         """Do nothing."""
-
-    def is_unreachable(self, error: exc.DatabaseError) -> bool:  # noqa: ARG002
-        """Return False: every error is about the file itself."""
-        return False
-
-    def is_disk_full(self, error: exc.DatabaseError) -> bool:
-        """Return whether SQLite says SQLITE_FULL."""
-        return getattr(error.orig, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
-
-    def words_for(self, error: exc.DatabaseError) -> str:  # noqa: ARG002
-        """Return an empty text: SQLite's own message is enough."""
-        return ""
 
     def was_committed(self, number: int) -> bool:  # noqa: ARG002
         """Return False: nothing is committed."""
