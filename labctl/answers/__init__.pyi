@@ -53,7 +53,6 @@ from labctl.answers.benches import (
     WiggleUnit as WiggleUnit,
 )
 from labctl.answers.budget import (
-    AnyAxisUncertainty as AnyAxisUncertainty,
     AxisBoundJson as AxisBoundJson,
     BenchConditionsJson as BenchConditionsJson,
     BudgetJson as BudgetJson,
@@ -134,6 +133,7 @@ from labctl.answers.certificates import (
     WithdrawRequest as WithdrawRequest,
 )
 from labctl.answers.certification import (
+    AnyAxisUncertainty as AnyAxisUncertainty,
     AssessmentResponse as AssessmentResponse,
     CalibrationStateResponse as CalibrationStateResponse,
     CertificationResponse as CertificationResponse,

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NotRequired
 
-from pydantic import Field
 from typing_extensions import TypedDict
-
-from labctl.answers.base import ResponseModel
 
 
 class StandardJson(TypedDict):
@@ -236,15 +233,3 @@ class ContributionsOverJson(TypedDict):
     """Contributions over the rate."""
     over_temperature: ContributionLinesJson
     """Contributions over the temperature."""
-
-
-class AnyAxisUncertainty(ResponseModel):
-    """Largest U of one output over all rate vectors up to the calibrated rate, about any axis."""
-
-    bound_dps: float | None = Field(description="U in the frame of the case, deg/s; null: unknown somewhere.")
-    aligned_bound_dps: float | None = Field(description="U up to a rotation of the frame, deg/s.")
-    reach_dps: float = Field(description="Largest magnitude of the rate vectors, deg/s.")
-    rates_dps: dict[str, float] = Field(description="Rate vector where U is largest, or unknown, deg/s.")
-    temperature_c: float = Field(description="Temperature there, deg C.")
-    why: str = Field(description="Why it is unknown; empty where it is known.")
-    cross_rates: CrossRatesJson | None = Field(description="null: every body axis has an output.")

@@ -9,7 +9,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from labctl.answers.base import BY_KEY, Request, ResponseModel
-from labctl.answers.budget import AnyAxisUncertainty
+from labctl.answers.budget import CrossRatesJson
 from labctl.answers.common_fields import (
     ActTime,
     CalibrationHash,
@@ -30,6 +30,18 @@ NO_VERDICT = (
     "Verdict of the newest criticism of the version on the recording that it was fitted to; null: none, see "
     "`verdict_reason`."
 )
+
+
+class AnyAxisUncertainty(ResponseModel):
+    """Largest U of one output over all rate vectors up to the calibrated rate, about any axis."""
+
+    bound_dps: float | None = Field(description="U in the frame of the case, deg/s; null: unknown somewhere.")
+    aligned_bound_dps: float | None = Field(description="U up to a rotation of the frame, deg/s.")
+    reach_dps: float = Field(description="Largest magnitude of the rate vectors, deg/s.")
+    rates_dps: dict[str, float] = Field(description="Rate vector where U is largest, or unknown, deg/s.")
+    temperature_c: float = Field(description="Temperature there, deg C.")
+    why: str = Field(description="Why it is unknown; empty where it is known.")
+    cross_rates: CrossRatesJson | None = Field(description="null: every body axis has an output.")
 
 
 class RevokeRequest(Request):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pydantic import Field
 
 from labctl.answers.base import ResponseModel
-from labctl.answers.budget import AnyAxisUncertainty, BudgetJson, ContributionsOverJson
+from labctl.answers.budget import BudgetJson, ContributionsOverJson
 from labctl.answers.calibrations import Validity
+from labctl.answers.certification import AnyAxisUncertainty
 from labctl.answers.common_fields import Serial, VersionNumber
 from labctl.answers.fitted_model import LeftOutEffect
 

@@ -74,6 +74,7 @@ def test_a_robot_corrects_rates_with_the_core_alone(calibration: Calibration, tm
     done = in_core(
         "import numpy as np\n"
         "from labctl.compensator import Compensator\n"
+        "assert 'pydantic' not in sys.modules\n"
         "given = np.load(sys.argv[3])\n"
         "use = Compensator.from_file(sys.argv[2])\n"
         "np.save(sys.argv[4], use.compensate(given['output'], given['warm'], {'t_s': given['t_s']}).rate_dps)\n"

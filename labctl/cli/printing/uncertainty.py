@@ -9,11 +9,12 @@ from labctl.cli.output import console, format_number, stderr, table
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from labctl.answers.budget import AnyAxisUncertainty, BudgetJson, BudgetLineJson
-    from labctl.answers.uncertainty import (
-        UncertaintyResponse,
-        VectorUncertainty,
-    )
+    from labctl.answers.budget import BudgetJson, BudgetLineJson
+    from labctl.answers.certification import AnyAxisUncertainty
+from labctl.answers.uncertainty import (
+    UncertaintyResponse,
+    VectorUncertainty,
+)
 
 #: Lines that are evaluated from the recording; the others are standards, whose names say what they are.
 EVALUATED = frozenset({"coefficients", "model", "repeatability", "cross_rates"})

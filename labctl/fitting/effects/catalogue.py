@@ -5,7 +5,6 @@ An entry point is one class of effect, or several in a row; labctl's own stand i
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
@@ -27,7 +26,6 @@ from labctl.fitting.effects import (
     thermal,
 )
 from labctl.fitting.effects.base import Effect, Term
-from labctl.fitting.effects.description import equation_of, parameters_of, sources_of
 from labctl.fitting.effects.formula import NAME, Formula
 from labctl.fitting.effects.trial import refuse_useless
 
@@ -100,7 +98,9 @@ def effect(effect_id: str) -> Effect:
     """Return an effect of the catalogue; raises BadInput naming the nearest ids."""
     if effect_id in CATALOGUE:
         return CATALOGUE[effect_id]
-    near = difflib.get_close_matches(effect_id, CATALOGUE, n=3, cutoff=0.4)
+    from difflib import get_close_matches  # noqa: PLC0415  for a mistake only
+
+    near = get_close_matches(effect_id, CATALOGUE, n=3, cutoff=0.4)
     hint = (
         f"did you mean {' or '.join(near)}?"
         if near
@@ -171,6 +171,12 @@ def _ordered(text: str) -> Term:
 
 def describe_effects() -> list[EffectJson]:
     """Return the catalogue as JSON, one record per effect."""
+    from labctl.fitting.effects.description import (  # noqa: PLC0415  draws MathML, which a robot's program does not
+        equation_of,
+        parameters_of,
+        sources_of,
+    )
+
     return [
         {
             "id": kind.id,

@@ -11,12 +11,10 @@ import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from tomllib import TOMLDecodeError
 from typing import Any, ClassVar
 
 import numpy as np
 
-from instruments.toml_documents import read_toml
 from labctl.answers.fitted_model import Origin
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
@@ -215,6 +213,10 @@ def read_formula(line: str) -> Formula:
 
 
 def _from_file(path: Path) -> list[Formula]:
+    from tomllib import TOMLDecodeError  # noqa: PLC0415  a robot's program reads no TOML
+
+    from instruments.toml_documents import read_toml  # noqa: PLC0415
+
     try:
         records = read_toml(path)["effects"]
         if not isinstance(records, list):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping
-from xml.sax.saxutils import escape
+from html import escape
 
 from labctl.fitting.effects.equation import Equation
 
@@ -32,21 +32,17 @@ def equation_mathml(equation: Equation) -> str:
     )
     text = "; ".join(f"{left} = {right}" for left, right in lines)
     table = f'<mtable displaystyle="true">{rows}</mtable>'
-    return f'<math xmlns="{NAMESPACE}" display="block" alttext="{_quoted(text)}">{table}</math>'
+    return f'<math xmlns="{NAMESPACE}" display="block" alttext="{escape(text)}">{table}</math>'
 
 
 def symbol_mathml(symbol: str) -> str:
     """Return one symbol, such as `b[k]`, as a MathML element `math`."""
-    return f'<math xmlns="{NAMESPACE}" alttext="{_quoted(symbol)}">{expression(symbol)}</math>'
+    return f'<math xmlns="{NAMESPACE}" alttext="{escape(symbol)}">{expression(symbol)}</math>'
 
 
 def expression(text: str) -> str:
     """Return an expression as presentation MathML; raises ValueError for one that has no notation here."""
     return _drawn(ast.parse(text, mode="eval").body)
-
-
-def _quoted(text: str) -> str:
-    return escape(text, {'"': "&quot;"})
 
 
 def _drawn(node: ast.expr, least: int = SUM) -> str:

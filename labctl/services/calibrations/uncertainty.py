@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from labctl.answers.budget import AnyAxisUncertainty
+from labctl.answers.certification import AnyAxisUncertainty
 from labctl.answers.uncertainty import (
     AxisUncertainty,
     UncertaintyGrid,
