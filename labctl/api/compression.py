@@ -13,7 +13,7 @@ ACCEPTED = b"accept-encoding"
 #: Events of a computation: some stages, then a large answer. Those that go on for hours pass as they are.
 ENDING_STREAMS = ("/criticism/events",)
 #: Half the time of the highest level, for a twentieth more bytes.
-LEVEL = 5
+COMPRESSION_LEVEL = 5
 
 
 class CompressionMiddleware:
@@ -30,7 +30,7 @@ class CompressionMiddleware:
         if scope["type"] == "http" and any(b"gzip" in value for name, value in scope["headers"] if name == ACCEPTED):
             ends = scope["path"].endswith(ENDING_STREAMS)
             passing = tuple(kind for kind in DEFAULT_EXCLUDED_CONTENT_TYPES if not (ends and kind == EVENTS))
-            responder = _Responder(self._app, MIN_COMPRESSED_BYTES, LEVEL, exclude_content_types=passing)
+            responder = _Responder(self._app, MIN_COMPRESSED_BYTES, COMPRESSION_LEVEL, exclude_content_types=passing)
             await responder(scope, receive, send)
         else:
             await self._app(scope, receive, send)

@@ -20,7 +20,7 @@ from labctl.services.admin.replica import ReplicaWatch, replica
 from labctl.services.background import BackgroundWork
 from labctl.services.bench_access import BenchAccess
 from labctl.services.benches.bench_left import BenchLeft
-from labctl.services.benches.drivers import driven_benches
+from labctl.services.benches.driving_process import driven_benches
 from labctl.services.benches.start_confirmation import start_questions
 from labctl.services.calibrations.fetch_log import FetchLog
 from labctl.services.campaigns.bench_runner import BenchRunner

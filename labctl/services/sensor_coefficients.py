@@ -8,7 +8,7 @@ from labctl.answers.accelerometer import AccelerometerResponse, AccelerometerTem
 from labctl.answers.magnetometer import Estimate, MagnetometerResponse
 from labctl.answers.poses import AccelerometerCoefficient
 from labctl.answers.sensors import SensorCoefficientResponse
-from labctl.fitting.numeric.freedom import student_factor
+from labctl.fitting.numeric.degrees_of_freedom import student_factor
 
 
 def coefficients_of(answer: AccelerometerResponse | MagnetometerResponse) -> list[SensorCoefficientResponse]:

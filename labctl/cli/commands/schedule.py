@@ -26,7 +26,7 @@ def list_(
     database: Database = None,
 ) -> None:
     """List the scheduled starts, the next first. A start that was missed is listed until it is cancelled."""
-    from labctl.services.benches.drivers import driven_benches
+    from labctl.services.benches.driving_process import driven_benches
     from labctl.services.commands.open import service_url
     from labctl.services.read_access import open_readonly
     from labctl.services.schedule.queue import list_starts

@@ -18,8 +18,8 @@ from labctl.exports.sensors.parameters import AccelerometerParameters, Parameter
 from labctl.fitting.numeric.arrays import Array
 
 PARENT = "accelerometer"
-#: A pitch whose cosine is below this is 90 deg: roll and yaw turn about the same axis then.
-LEVEL = 1e-9
+#: Below this cosine of the pitch, the pitch is 90 deg: roll and yaw turn about the same axis then.
+MIN_COS_PITCH = 1e-9
 OFFSET = "The distance of the sensors from each other is not measured: x, y and z are 0."
 RATES = (
     "For rates and forces that labctl's matrices have not corrected: corrected rates are in the accelerometer's axes "
@@ -40,9 +40,9 @@ def roll_pitch_yaw_of(turned_rad: Array) -> Array:
     Where the pitch is 90 deg the yaw is 0.
     """
     r = _matrix_of(quaternion_of(turned_rad))
-    level = float(np.hypot(r[0, 0], r[1, 0]))
-    pitch = np.arctan2(-r[2, 0], level)
-    if level < LEVEL:
+    cos_pitch = float(np.hypot(r[0, 0], r[1, 0]))
+    pitch = np.arctan2(-r[2, 0], cos_pitch)
+    if cos_pitch < MIN_COS_PITCH:
         return np.array([np.arctan2(-r[1, 2], r[1, 1]), pitch, 0.0])
     return np.array([np.arctan2(r[2, 1], r[2, 2]), pitch, np.arctan2(r[1, 0], r[0, 0])])
 

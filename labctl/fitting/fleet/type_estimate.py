@@ -15,7 +15,7 @@ from labctl.fitting.fleet.group_effects import DATE, Levels, RobustFit, Shift, h
 from labctl.fitting.fleet.spread import Spread, reml, weighted_fit
 from labctl.fitting.fleet.unit_coefficients import UnitTable
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import student_factor
+from labctl.fitting.numeric.degrees_of_freedom import student_factor
 
 #: Probability that any unit is called an outlier of a type without any, over all units and coefficients.
 OUTLIER_ALARM = 0.01

@@ -18,9 +18,9 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.magnetometer.calibrate import Magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import combined_freedom, expanded_u, information_of, scatter_by_variances
+from labctl.fitting.numeric.degrees_of_freedom import combined_freedom, expanded_u, information_of, scatter_by_variances
 from labctl.fitting.poses.at_rest.rests import density_in_rests
-from labctl.fitting.poses.between import components, gls, gls_weights
+from labctl.fitting.poses.between_variance import components, gls, gls_weights
 from labctl.fitting.poses.covariance import level_by_parameters, level_by_reading, of_each_move, of_readings
 from labctl.fitting.poses.fit import Solved
 from labctl.fitting.poses.readings import AXES, PoseReadings

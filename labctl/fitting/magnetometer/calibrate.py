@@ -22,7 +22,7 @@ from labctl.fitting.magnetometer.ellipsoid import (
 from labctl.fitting.magnetometer.places import Places, Weights
 from labctl.fitting.magnetometer.rest_scatter import RestScatter, scatter_of
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import combined_freedom, expanded_u
+from labctl.fitting.numeric.degrees_of_freedom import combined_freedom, expanded_u
 
 AXES = ("x", "y", "z")
 MIN_READINGS = 60

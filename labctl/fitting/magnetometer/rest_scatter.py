@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.magnetometer.places import Places, Weights
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import combined_freedom, scatter_by_variances
+from labctl.fitting.numeric.degrees_of_freedom import combined_freedom, scatter_by_variances
 
 #: Where the ratios of the variances to that of a reading are searched, a logarithm, and where the search starts.
 LOG_RATIO, START = (-18.0, 8.0), (-1.0, -1.0)

@@ -13,7 +13,7 @@ from labctl.fitting.numeric.arrays import Array
 #: Least number of points for an uncertainty of the slope.
 MIN_POINTS = 3
 #: Probability of the intervals.
-LEVEL = 0.95
+COVERAGE_PROBABILITY = 0.95
 #: Extrapolation: how far, in the unit of the times, and in how many steps.
 HORIZON, STEPS = 50.0, 5000
 
@@ -31,7 +31,7 @@ class TrendLine:
     @property
     def factor(self) -> float:
         """Student's t of a 95 % interval; NaN without a degree of freedom."""
-        return float(stdtrit(self.freedom, (1 + LEVEL) / 2)) if self.freedom > 0 else float("nan")
+        return float(stdtrit(self.freedom, (1 + COVERAGE_PROBABILITY) / 2)) if self.freedom > 0 else float("nan")
 
     @property
     def u_slope(self) -> float:

@@ -22,7 +22,7 @@ MOST, IMPOSSIBLE = 200.0, 30.0
 #: Points that together hold less than this share of the evidence are left out.
 NEGLIGIBLE = 1e-4
 #: Probability of an interval, and its half width over the standard deviation of a normal distribution.
-LEVEL, FACTOR = 0.95, 1.959963984540054
+COVERAGE_PROBABILITY, FACTOR = 0.95, 1.959963984540054
 BISECTIONS = 40
 
 
@@ -126,16 +126,20 @@ def mixture(triangles: Triangles, random: RandomEffects) -> Mixture:
 
 
 def half_width(
-    values: NDArray[np.float64], spreads: NDArray[np.float64], share: Array, centre: Array, level: float = LEVEL
+    values: NDArray[np.float64],
+    spreads: NDArray[np.float64],
+    share: Array,
+    centre: Array,
+    probability: float = COVERAGE_PROBABILITY,
 ) -> Array:
-    """Return the half width (k,) about `centre` (k,) that holds `level` of n normal distributions (n, k) by `share`."""
+    """Return the half width (k,) about `centre` (k,) with `probability` of n normal distributions (n, k) by `share`."""
     low = np.zeros(len(centre))
     high = np.max(np.abs(values - centre) + 8.0 * spreads, axis=0)
     off, spreads = values - centre, np.maximum(spreads, 1e-300)
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
         inside = share @ (ndtr((middle - off) / spreads) - ndtr((-middle - off) / spreads))
-        enough = inside >= level
+        enough = inside >= probability
         low, high = np.where(enough, low, middle), np.where(enough, middle, high)
     return np.asarray((low + high) / 2)
 

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import combined_freedom, expanded_u
+from labctl.fitting.numeric.degrees_of_freedom import combined_freedom, expanded_u
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
-from labctl.fitting.poses.between import gls_weights
+from labctl.fitting.poses.between_variance import gls_weights
 from labctl.fitting.poses.covariance import by_accelerometer
 from labctl.fitting.poses.gyroscope import Gyroscope
 from labctl.fitting.poses.moves import Moves

@@ -14,7 +14,7 @@ from labctl.answers.poses import (
     PosesJson,
     RestsJson,
 )
-from labctl.fitting.numeric.freedom import student_factor
+from labctl.fitting.numeric.degrees_of_freedom import student_factor
 from labctl.fitting.poses.alignment import Alignment
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, different_poses
 from labctl.fitting.poses.at_rest.bias import Bias

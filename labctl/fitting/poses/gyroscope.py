@@ -11,7 +11,7 @@ from scipy.special import chdtri
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
 from labctl.fitting.poses.at_rest.bias import Bias
-from labctl.fitting.poses.between import components, gls
+from labctl.fitting.poses.between_variance import components, gls
 from labctl.fitting.poses.covariance import move_covariance
 from labctl.fitting.poses.determination import MIN_MOVES
 from labctl.fitting.poses.equations import Equations, equations_of

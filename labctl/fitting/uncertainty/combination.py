@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import j0, ndtr
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import LEVEL, student_factor
+from labctl.fitting.numeric.degrees_of_freedom import COVERAGE_PROBABILITY, student_factor
 
 #: Share of the variance that is not normal below which the factor is that of a normal distribution.
 MIN_SHARE = 0.1
@@ -44,9 +44,12 @@ def effective_freedom(contributions: Sequence[float], freedom: Sequence[float | 
 
 
 def coverage_factor(
-    contributions: Sequence[float], distributions: Sequence[str], freedom: float | None, level: float = LEVEL
+    contributions: Sequence[float],
+    distributions: Sequence[str],
+    freedom: float | None,
+    probability: float = COVERAGE_PROBABILITY,
 ) -> float:
-    """Return k of an interval k u_c that covers with a probability of `level`.
+    """Return k of an interval k u_c that covers with a `probability`.
 
     Contributions that are not normal count by their own distribution (JCGM 101, here by the product of the
     characteristic functions instead of by trials): where a rectangular one dominates, k is nearer 1.65 than 2. Few
@@ -55,9 +58,9 @@ def coverage_factor(
     size = np.abs(np.asarray(contributions, dtype=np.float64))
     total = float(np.sqrt(size @ size))
     normal = np.array([name not in _CHARACTERISTIC for name in distributions])
-    widening = student_factor(freedom, level) / student_factor(None, level)
+    widening = student_factor(freedom, probability) / student_factor(None, probability)
     if total == 0 or float(size[~normal] @ size[~normal]) < MIN_SHARE * total**2:
-        return student_factor(None, level) * widening
+        return student_factor(None, probability) * widening
     shares = size / total
     spread = math.hypot(float(np.sqrt(shares[normal] @ shares[normal])), SMOOTHING)
     t = np.linspace(0.0, REACH / spread, NODES)[1:]
@@ -68,28 +71,30 @@ def coverage_factor(
 
     def excess(k: float) -> float:
         # (2/pi) times the integral of phi(t) sin(k t) / t, by the trapezoidal rule
-        return 2 / math.pi * float(np.sum(phi * np.sin(k * t) / t) + 0.5 * k) * float(t[0]) - level
+        return 2 / math.pi * float(np.sum(phi * np.sin(k * t) / t) + 0.5 * k) * float(t[0]) - probability
 
     from scipy.optimize import brentq
 
     return float(brentq(excess, MIN_K, MAX_K, xtol=TOLERANCE)) * widening
 
 
-def half_width(expanded: float, offset: float, level: float = LEVEL) -> float:
+def half_width(expanded: float, offset: float, probability: float = COVERAGE_PROBABILITY) -> float:
     """Return the half width of an interval about a stated value that is off by a known, uncorrected error, in its unit.
 
-    The rest of the error is normal with an expanded uncertainty of `expanded` for the same `level`. Adding the size of
-    the known error to it (GUM F.2.4.5) would cover more: of an error that is large beside the rest only one side counts
-    (Phillips, Eberhardt and Parry 1997, J. Res. NIST 102, 577).
+    The rest of the error is normal with an expanded uncertainty of `expanded` for the same `probability`. Adding the
+    size of the known error to it (GUM F.2.4.5) would cover more: of an error that is large beside the rest only one
+    side counts (Phillips, Eberhardt and Parry 1997, J. Res. NIST 102, 577).
     """
-    u = expanded / student_factor(None, level)
+    u = expanded / student_factor(None, probability)
     if offset == 0 or u == 0:
         return expanded + abs(offset)
     off = abs(offset) / u
-    most = off + student_factor(None, level) + TOLERANCE  # beyond the root also where rounding hides a tiny offset
+    most = (
+        off + student_factor(None, probability) + TOLERANCE
+    )  # beyond the root also where rounding hides a tiny offset
     from scipy.optimize import brentq
 
-    return u * float(brentq(lambda k: ndtr(k - off) - ndtr(-k - off) - level, off, most, xtol=TOLERANCE))
+    return u * float(brentq(lambda k: ndtr(k - off) - ndtr(-k - off) - probability, off, most, xtol=TOLERANCE))
 
 
 def _rectangular(t: Array) -> Array:

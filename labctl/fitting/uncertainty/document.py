@@ -9,7 +9,7 @@ from labctl.answers.budget import AxisBoundJson, ExpandedJson, UncertaintyJson
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.blas_threads import single_threaded
-from labctl.fitting.numeric.freedom import LEVEL
+from labctl.fitting.numeric.degrees_of_freedom import COVERAGE_PROBABILITY
 from labctl.fitting.uncertainty.budget import Budget
 from labctl.fitting.uncertainty.coefficient_budget import coefficient_budgets
 from labctl.fitting.uncertainty.conditions import BenchConditions
@@ -73,7 +73,7 @@ def uncertainty_json(
         bound["vector"], bound["cross_rates"] = vectors[axis], cross_rates(fitted, coefficients[axis])
     unstated = [source for one in axes.values() for source in one["budget"]["not_stated"]]
     return {
-        "coverage": LEVEL,
+        "coverage": COVERAGE_PROBABILITY,
         "coefficients_at_c": at_c,
         "not_stated": list(dict.fromkeys(unstated)),
         "overdue": any(one["budget"]["overdue"] for one in axes.values()),

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import LEVEL, MAX_FREEDOM
+from labctl.fitting.numeric.degrees_of_freedom import COVERAGE_PROBABILITY, MAX_FREEDOM
 from labctl.fitting.uncertainty.combination import half_width
 
 #: Units without which nothing is said of a population: two degrees of freedom, and k = 4.5.
@@ -31,7 +31,9 @@ class DriftPrediction:
     @property
     def expanded_about_mean_dps(self) -> Array:
         """Half width about the mean that covers as often as U, (places,), by Student's t (GUM G.3)."""
-        return np.asarray(stdtrit(np.clip(self.freedom, 1.0, MAX_FREEDOM), 0.5 * (1.0 + LEVEL)) * self.u_dps)
+        return np.asarray(
+            stdtrit(np.clip(self.freedom, 1.0, MAX_FREEDOM), 0.5 * (1.0 + COVERAGE_PROBABILITY)) * self.u_dps
+        )
 
 
 def of_item(rates_dps: Array) -> DriftPrediction:

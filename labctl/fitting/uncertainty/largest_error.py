@@ -18,7 +18,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.rate_vector import RateVectorUncertainty
 
 #: Probability that no error is beyond the bound: that which a one-sided guard band of U has (ILAC-G8, table 1).
-LEVEL = 0.975
+COVERAGE_PROBABILITY = 0.975
 #: Coverage factor of U for a normal distribution.
 NORMAL_K = 2.0
 #: Draws of the simulation, and the seed: a bound is the same each time that it is computed.
@@ -52,7 +52,7 @@ def widening(
     drawn = np.random.default_rng(SEED).normal(size=(DRAWS, len(outputs) * terms.shape[1])) @ _root(terms, covariance).T
     errors = np.einsum("dit,pt->dpi", drawn.reshape(DRAWS, len(outputs), -1), terms)
     largest = np.abs(errors)[:, counts].max(axis=1)
-    return max(float(np.quantile(largest, LEVEL)) / (NORMAL_K * float(u)), 1.0)
+    return max(float(np.quantile(largest, COVERAGE_PROBABILITY)) / (NORMAL_K * float(u)), 1.0)
 
 
 def _root(terms: Array, covariance: Array) -> Array:

@@ -21,7 +21,7 @@ from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.blas_threads import single_threaded
-from labctl.fitting.numeric.freedom import LEVEL
+from labctl.fitting.numeric.degrees_of_freedom import COVERAGE_PROBABILITY
 from labctl.fitting.numeric.json_numbers import none_for_nan
 from labctl.fitting.uncertainty import (
     COVERAGE,
@@ -100,7 +100,7 @@ def uncertainty_answer(
         rate_dps=math.hypot(*rate_dps) if vector is not None else rate_dps[0],
         temperature_c=temperature_c,
         coverage_factor=COVERAGE,
-        coverage=LEVEL,
+        coverage=COVERAGE_PROBABILITY,
         inside=is_inside(calibration, rate_dps, temperature_c),
         axes={axis: _response(one) for axis, one in found.items()},
         budget=budgets,

@@ -7,7 +7,7 @@ from datetime import datetime
 
 from labctl.answers.benches import BenchStatus, ClearRequest
 from labctl.errors import Conflict
-from labctl.services.benches.drivers import bench_drivers
+from labctl.services.benches.driving_process import bench_drivers
 from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.status import abandoned_campaigns, describe_interrupted, outlives_its_process
 from labctl.store import BenchRow, Store

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from instruments.bench_config import BenchFile
 from labctl.answers.campaigns import CampaignResponse
-from labctl.services.benches.drivers import whereabouts
+from labctl.services.benches.driving_process import whereabouts
 from labctl.store import ResumePoint, Store
 from procedures.contracts.campaign_state import CampaignState
 

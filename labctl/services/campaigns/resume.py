@@ -18,7 +18,7 @@ from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.log import get_logger
 from labctl.services.benches.confirmation import SafeStateRetry
-from labctl.services.benches.drivers import whereabouts
+from labctl.services.benches.driving_process import whereabouts
 from labctl.services.benches.identity import pinned, reported_in
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed

@@ -18,7 +18,7 @@ from labctl.answers.campaign_parts import (
 )
 from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.services.benches.bench_clock import has_simulated_time
-from labctl.services.benches.drivers import driven_benches
+from labctl.services.benches.driving_process import driven_benches
 from labctl.services.benches.identity import reported_in
 from labctl.services.campaigns.failure_advice import advice_of
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store

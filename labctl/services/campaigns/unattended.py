@@ -7,7 +7,7 @@ from datetime import datetime
 from labctl.answers.campaigns import CampaignResponse
 from labctl.errors import Conflict
 from labctl.log import get_logger
-from labctl.services.benches.drivers import driven_benches, whereabouts
+from labctl.services.benches.driving_process import driven_benches, whereabouts
 from labctl.services.benches.lease import described, driver_of
 from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.status import campaign_status, outlives_its_process

@@ -23,7 +23,7 @@ from labctl.certificates.document import (
 )
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import fit_data_of
-from labctl.fitting.numeric.freedom import LEVEL
+from labctl.fitting.numeric.degrees_of_freedom import COVERAGE_PROBABILITY
 from labctl.fitting.uncertainty.budget import Budget
 from labctl.recording import Recording
 from labctl.services.calibrations.surface import errors_on_grid
@@ -151,8 +151,8 @@ def _largest(point: ResultPoint, budget: Budget) -> Uncertainty:
         if line.contribution
     )  # fmt: skip
     return Uncertainty(
-        coverage_probability=LEVEL, axis=point.axis, rate_dps=point.rate_dps, temperature_c=point.temperature_c,
-        budget=lines,
+        coverage_probability=COVERAGE_PROBABILITY, axis=point.axis, rate_dps=point.rate_dps,
+        temperature_c=point.temperature_c, budget=lines,
     )  # fmt: skip
 
 

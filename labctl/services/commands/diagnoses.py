@@ -5,7 +5,7 @@ from __future__ import annotations
 from labctl.answers.campaigns import ReasonRequest, ResumeRequest
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
 from labctl.errors import Conflict
-from labctl.services.benches.drivers import driven_benches, whereabouts
+from labctl.services.benches.driving_process import driven_benches, whereabouts
 from labctl.services.commands.acts.abort import ABORT
 from labctl.services.commands.acts.resume import RESUME
 from labctl.services.commands.command import Command

@@ -6,7 +6,7 @@ from datetime import datetime, time, timedelta
 
 from instruments.bench_config import BenchFile
 from labctl.errors import BadInput, Conflict
-from labctl.services.benches.drivers import whereabouts
+from labctl.services.benches.driving_process import whereabouts
 from labctl.services.campaigns.resume import with_original_simulation
 from labctl.store import CampaignRow, Store
 

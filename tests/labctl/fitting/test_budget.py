@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from labctl.fitting import fit
-from labctl.fitting.numeric.freedom import student_factor
+from labctl.fitting.numeric.degrees_of_freedom import student_factor
 from labctl.fitting.uncertainty import BenchConditions, coefficient_budgets, evidence_of, rate_uncertainty
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.combination import (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from labctl.fitting.numeric.freedom import LEVEL
+from labctl.fitting.numeric.degrees_of_freedom import COVERAGE_PROBABILITY
 from labctl.fitting.uncertainty.drift_prediction import of_item, of_type, with_drift
 
 
@@ -17,7 +17,9 @@ def test_units_with_one_interval_predict_as_a_sample_does() -> None:
     assert found.mean_dps == pytest.approx(drifts.mean())
     assert found.u_dps == pytest.approx(drifts.std(ddof=1) * np.sqrt(1 + 1 / 4))
     assert found.freedom == pytest.approx(3)
-    assert found.expanded_about_mean_dps == pytest.approx(student(3).ppf(0.5 * (1 + LEVEL)) * found.u_dps)
+    assert found.expanded_about_mean_dps == pytest.approx(
+        student(3).ppf(0.5 * (1 + COVERAGE_PROBABILITY)) * found.u_dps
+    )
 
 
 def test_equal_histories_are_an_analysis_of_variance() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi, norm
 
-from labctl.fitting.uncertainty.largest_error import LEVEL, widening
+from labctl.fitting.uncertainty.largest_error import COVERAGE_PROBABILITY, widening
 from labctl.fitting.uncertainty.vector_bound import PLACES
 
 
@@ -35,7 +35,7 @@ def found(offset: float, slopes: Any, *, outputs: str = "xyz", places: Any = PLA
 
 def test_widening_for_one_output_is_the_normal_quantile() -> None:
     alone = found(1.0, np.zeros((3, 3)), outputs="x", places=[(0.0, 0.0, 0.0)])
-    assert widening(alone) == pytest.approx(norm.ppf(0.5 * (1 + LEVEL)) / 2.0, rel=0.02)
+    assert widening(alone) == pytest.approx(norm.ppf(0.5 * (1 + COVERAGE_PROBABILITY)) / 2.0, rel=0.02)
 
 
 def test_over_all_directions_it_is_that_of_the_length_of_a_vector() -> None:
@@ -43,24 +43,24 @@ def test_over_all_directions_it_is_that_of_the_length_of_a_vector() -> None:
     directions = np.random.default_rng(1).normal(size=(800, 3))
     sphere = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     every = found(0.0, np.full((3, 3), 1e-3), outputs="x", places=np.concatenate([sphere, 0.5 * sphere]))
-    assert widening(every) == pytest.approx(chi(3).ppf(LEVEL) / 2.0, rel=0.02)
+    assert widening(every) == pytest.approx(chi(3).ppf(COVERAGE_PROBABILITY) / 2.0, rel=0.02)
 
 
 def test_over_independent_outputs_it_is_that_of_the_largest() -> None:
     every = found(1.0, np.zeros((3, 3)), places=[(0.0, 0.0, 0.0)])
-    assert widening(every) == pytest.approx(norm.ppf(0.5 * (1 + LEVEL ** (1 / 3))) / 2.0, rel=0.02)
+    assert widening(every) == pytest.approx(norm.ppf(0.5 * (1 + COVERAGE_PROBABILITY ** (1 / 3))) / 2.0, rel=0.02)
 
 
 def test_errors_that_are_one_error_are_not_counted_twice() -> None:
     every = found(1.0, np.zeros((3, 3)), places=[(0.0, 0.0, 0.0)])
     every[0].covariance = np.ones((3, 3))
-    assert widening(every) == pytest.approx(norm.ppf(0.5 * (1 + LEVEL)) / 2.0, rel=0.02)
+    assert widening(every) == pytest.approx(norm.ppf(0.5 * (1 + COVERAGE_PROBABILITY)) / 2.0, rel=0.02)
 
 
 def test_outputs_that_do_not_count_are_left_out() -> None:
     every = found(0.0, np.diag([1e-3, 1e-3, 1e-3]), places=np.eye(3))
     own = widening(every, [["x"], ["y"], ["z"]])
-    assert own == pytest.approx(norm.ppf(0.5 * (1 + LEVEL ** (1 / 3))) / 2.0, rel=0.02)
+    assert own == pytest.approx(norm.ppf(0.5 * (1 + COVERAGE_PROBABILITY ** (1 / 3))) / 2.0, rel=0.02)
 
 
 def test_it_is_unknown_where_a_covariance_is() -> None:

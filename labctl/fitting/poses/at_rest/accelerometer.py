@@ -15,10 +15,10 @@ from scipy.special import chdtr
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import expanded_u, freedom_of_bounded, student_factor
+from labctl.fitting.numeric.degrees_of_freedom import expanded_u, freedom_of_bounded, student_factor
 from labctl.fitting.poses.at_rest.gravity import local_gravity_g
 from labctl.fitting.poses.at_rest.rests import Rests
-from labctl.fitting.poses.between import between_variance
+from labctl.fitting.poses.between_variance import between_variance
 from labctl.fitting.poses.readings import AXES, PoseReadings
 from labctl.fitting.poses.triad import UPPER, corrected, unit
 

@@ -16,7 +16,7 @@ from scipy.special import chdtrc, fdtrc
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.freedom import combined_freedom, information_of, scatter_by_variances
+from labctl.fitting.numeric.degrees_of_freedom import combined_freedom, information_of, scatter_by_variances
 from labctl.fitting.poses.at_rest.accelerometer import (
     LARGEST_U,
     PARAMETERS,
@@ -27,7 +27,7 @@ from labctl.fitting.poses.at_rest.accelerometer import (
 )
 from labctl.fitting.poses.at_rest.gravity import local_gravity_g
 from labctl.fitting.poses.at_rest.rests import Rests
-from labctl.fitting.poses.between import negative_log_restricted_likelihood
+from labctl.fitting.poses.between_variance import negative_log_restricted_likelihood
 from labctl.fitting.poses.readings import AXES, PoseReadings
 from labctl.fitting.poses.triad import corrected, unit
 

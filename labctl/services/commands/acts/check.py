@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from labctl.answers.benches import BenchCheckResponse, CheckRequest
 from labctl.errors import NotFound
-from labctl.services.benches.drivers import whereabouts
+from labctl.services.benches.driving_process import whereabouts
 from labctl.services.commands.command import Command
 from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToBench

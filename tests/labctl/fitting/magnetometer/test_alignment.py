@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from labctl.errors import NotEnoughData
 from labctl.fitting.magnetometer.alignment import FieldAlignment, align_field
 from labctl.fitting.magnetometer.calibrate import Magnetometer, calibrate_magnetometer
-from labctl.fitting.numeric.freedom import student_factor
+from labctl.fitting.numeric.degrees_of_freedom import student_factor
 from labctl.fitting.poses.at_rest.rests import rest_of_each
 from labctl.fitting.poses.fit import Solved, solve
 from labctl.fitting.poses.readings import PoseReadings, readings_of

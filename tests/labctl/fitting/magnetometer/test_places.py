@@ -10,8 +10,8 @@ from scipy.sparse import csr_array
 
 from labctl.fitting.magnetometer.places import MAX_PLACES, Places, Weights
 from labctl.fitting.magnetometer.rest_scatter import scatter_of
-from labctl.fitting.numeric.freedom import information_of
-from labctl.fitting.poses.between import gls, negative_log_restricted_likelihood
+from labctl.fitting.numeric.degrees_of_freedom import information_of
+from labctl.fitting.poses.between_variance import gls, negative_log_restricted_likelihood
 
 #: A way to the first rest, two rests with a way between, and a way after the last.
 REST = np.array([0] * 2 + [1] * 3 + [0] * 4 + [2] * 3 + [0] * 2)

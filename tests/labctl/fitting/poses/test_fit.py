@@ -10,7 +10,7 @@ import pytest
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting import FitResult, fit
-from labctl.fitting.poses.between import gls
+from labctl.fitting.poses.between_variance import gls
 from labctl.fitting.poses.equations import Equations
 from labctl.fitting.poses.held_out import held_out_moves
 from labctl.fitting.poses.rotation import Rotations

@@ -17,7 +17,7 @@ from labctl.answers.sensors import AccelerometerRequest, MagnetometerRequest
 from labctl.certificates.document import Certificate, SensorResult
 from labctl.certificates.readable import readable_certificate
 from labctl.errors import BadInput, NotFound
-from labctl.fitting.numeric.freedom import student_factor
+from labctl.fitting.numeric.degrees_of_freedom import student_factor
 from labctl.recording.files import write_recording
 from labctl.services.accelerometer import Source as ForceSource
 from labctl.services.accelerometer import accelerometer_of_files

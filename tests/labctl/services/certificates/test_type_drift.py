@@ -14,7 +14,7 @@ from scipy.stats import t as student
 
 from labctl.certificates.document import Certificate
 from labctl.errors import BadCalibrationFile
-from labctl.fitting.numeric.freedom import LEVEL
+from labctl.fitting.numeric.degrees_of_freedom import COVERAGE_PROBABILITY
 from labctl.fitting.uncertainty.combination import half_width
 from labctl.services.calibrations import type_drift
 from labctl.services.calibrations.stability import NO_HISTORY, Stability, stability_of
@@ -52,7 +52,7 @@ def test_a_unit_without_a_history_takes_the_drift_of_its_type(store: Store) -> N
     assert u == pytest.approx(drifts.std(ddof=1) * np.sqrt(1 + 1 / 4), rel=1e-6)
     assert freedom == pytest.approx(3)
     assert found.mean_dps(2.0) == pytest.approx(2 * drifts.mean(), rel=1e-6)
-    spread = 2 * student(3).ppf(0.5 * (1 + LEVEL)) * u
+    spread = 2 * student(3).ppf(0.5 * (1 + COVERAGE_PROBABILITY)) * u
     assert found.expanded_dps(2.0) == pytest.approx(half_width(spread, 2 * drifts.mean()), rel=1e-6)
     assert found.of_type is not None
     assert (found.of_type.model, found.of_type.units) == (MODEL, 4)

@@ -16,16 +16,16 @@ from scipy.special import chdtr, chdtrc, ndtri, stdtrit
 from labctl.fitting.numeric.arrays import Array
 
 #: Probability of an interval of two standard uncertainties of a normal distribution.
-LEVEL = 0.9545
+COVERAGE_PROBABILITY = 0.9545
 #: Degrees of freedom beyond which a t-distribution is a normal one, and below which its factor has no meaning.
 MAX_FREEDOM, MIN_FREEDOM = 1e6, 1.0
 
 
-def student_factor(freedom: float | None, level: float = LEVEL) -> float:
+def student_factor(freedom: float | None, probability: float = COVERAGE_PROBABILITY) -> float:
     """Return the factor of Student's t for a coverage probability (GUM table G.2); of a normal one without freedom."""
     if freedom is None:
-        return float(ndtri((1 + level) / 2))
-    return float(stdtrit(min(max(freedom, MIN_FREEDOM), MAX_FREEDOM), (1 + level) / 2))
+        return float(ndtri((1 + probability) / 2))
+    return float(stdtrit(min(max(freedom, MIN_FREEDOM), MAX_FREEDOM), (1 + probability) / 2))
 
 
 def expanded_u(u: Array, freedom: Array) -> Array:

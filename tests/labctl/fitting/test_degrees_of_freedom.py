@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from labctl.fitting.numeric.freedom import (
+from labctl.fitting.numeric.degrees_of_freedom import (
     MAX_FREEDOM,
     combined_freedom,
     expanded_u,
