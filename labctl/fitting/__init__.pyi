@@ -4,7 +4,7 @@ from labctl.fitting.effects import CATALOGUE as CATALOGUE, describe_effects as d
 from labctl.fitting.estimation.axis_solutions import fit_turning as fit_turning, residuals as residuals
 from labctl.fitting.estimation.error_metrics import (
     ErrorFigures as ErrorFigures,
-    Spread as Spread,
+    ErrorSummary as ErrorSummary,
     by_turning_axis as by_turning_axis,
     rms as rms,
 )

@@ -7,7 +7,7 @@ import numpy as np
 from labctl.calibration import read_calibration
 from labctl.cli.demo.runner import DemoRunner
 from labctl.cli.output import table
-from labctl.fitting import FitData, Spread, by_turning_axis, fit_turning, residuals
+from labctl.fitting import ErrorSummary, FitData, by_turning_axis, fit_turning, residuals
 
 SERIAL = "STIM-0001"
 #: Recipe of the campaign that judges the fit.
@@ -62,7 +62,7 @@ def print_tables(demo: DemoRunner, context: FitData, errors: dict[str, dict[str,
     )
     for turning, outputs in split["raw"].items():
         for output, before in outputs.items():
-            after: Spread = split["yang2018"][turning][output]
+            after: ErrorSummary = split["yang2018"][turning][output]
             single = split["single_temperature"][turning][output]
             third.add_row(
                 turning, output, *(f"{v:.4f}" for v in (before.mean_dps, before.rms_dps, after.mean_dps, after.rms_dps))

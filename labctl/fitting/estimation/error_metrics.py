@@ -36,7 +36,7 @@ class ErrorFigures:
 
 
 @dataclass(frozen=True)
-class Spread:
+class ErrorSummary:
     """Mean, standard deviation, RMS and largest size of a set of errors: RMS^2 = mean^2 + SD^2."""
 
     mean_dps: float
@@ -45,9 +45,9 @@ class Spread:
     max_dps: float
 
     @staticmethod
-    def of(errors: Array) -> Spread:
+    def of(errors: Array) -> ErrorSummary:
         """Return the figures of errors (n,), n >= 1."""
-        return Spread(
+        return ErrorSummary(
             float(errors.mean()), float(errors.std()), float(np.sqrt(np.mean(errors**2))), float(np.abs(errors).max())
         )
 
@@ -68,10 +68,10 @@ def first_of_smallest(errors_dps: Sequence[float], n: int) -> int:
     return next(place for place, error in enumerate(errors_dps) if error <= clear)
 
 
-def by_turning_axis(data: FitData, errors: Mapping[str, Array]) -> dict[str, dict[str, Spread]]:
+def by_turning_axis(data: FitData, errors: Mapping[str, Array]) -> dict[str, dict[str, ErrorSummary]]:
     """Return the figures by axis that turns and output axis, as in Yang et al. 2018, Tables 3 and 4."""
     turning = np.char.lstrip(np.asarray(data.channels["position"]).astype(np.str_), "-")
     return {
-        str(axis): {output: Spread.of(values[turning == axis]) for output, values in errors.items()}
+        str(axis): {output: ErrorSummary.of(values[turning == axis]) for output, values in errors.items()}
         for axis in np.unique(turning)
     }

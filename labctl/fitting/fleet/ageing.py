@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.fleet.group_effects import robust_fit
-from labctl.fitting.fleet.spread import reml
+from labctl.fitting.fleet.reml import reml
 from labctl.fitting.fleet.unit_coefficients import YEAR, UnitCoefficients
 from labctl.fitting.numeric.arrays import Array
 

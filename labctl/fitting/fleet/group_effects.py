@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
-from labctl.fitting.fleet.spread import weighted_fit
+from labctl.fitting.fleet.reml import weighted_fit
 from labctl.fitting.fleet.unit_coefficients import UnitTable
 from labctl.fitting.numeric.arrays import Array
 

@@ -12,7 +12,7 @@ from scipy.special import chdtrc, stdtr, stdtrit
 from labctl.fitting.fleet.directions import Direction, directions_of
 from labctl.fitting.fleet.findings import CoefficientPopulation, GroupEffect, GroupSpread, OutlierUnit
 from labctl.fitting.fleet.group_effects import DATE, Levels, RobustFit, Shift, heterogeneity, robust_fit, select_shifts
-from labctl.fitting.fleet.spread import Spread, reml, weighted_fit
+from labctl.fitting.fleet.reml import RemlEstimate, reml, weighted_fit
 from labctl.fitting.fleet.unit_coefficients import UnitTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.degrees_of_freedom import student_factor
@@ -52,7 +52,7 @@ class _Settled:
     """A coefficient with its groups, beside which its spread is estimated without outliers."""
 
     found: RobustFit
-    spread: Spread
+    spread: RemlEstimate
     t: Array  #: (n,) distance of each unit from what the others expect of it, Student's t
     freedom: int  #: of it
     is_out: NDArray[np.bool_]  #: (n,)
@@ -143,7 +143,7 @@ def _settled(table: UnitTable, k: int, found: RobustFit, level: float) -> _Settl
 
 
 def _studentised(
-    y: Array, variance: Array, columns: NDArray[np.float64], spread: Spread, kept: NDArray[np.bool_], freedom: int
+    y: Array, variance: Array, columns: NDArray[np.float64], spread: RemlEstimate, kept: NDArray[np.bool_], freedom: int
 ) -> Array:
     """Return the distance of each unit from what the other units expect of it, (n,)."""
     total = np.maximum(variance + spread.tau**2, 1e-300)

@@ -25,14 +25,14 @@ UNEQUAL = 0.2
 
 
 @dataclass(frozen=True)
-class Spread:
+class InterpolatedTimes:
     """Times of readings, (n,) s, between coarse stamps, and what was done, in words."""
 
     t_s: Array
     said: str
 
 
-def spread_between(t_s: Array) -> Spread | str | None:
+def interpolate_between_stamps(t_s: Array) -> InterpolatedTimes | str | None:
     """Return the times of readings that several of a stamp share; None where no two of a row share one.
 
     In words why it cannot be done, where stamps do not follow each other evenly or have unequal numbers of readings.
@@ -53,14 +53,14 @@ def spread_between(t_s: Array) -> Spread | str | None:
             "taken at one rate, leave the column out of the map and write sample_rate_hz = readings per second"
         )
     rate = (edges[-1] - edges[0]) / (stamps[-1] - stamps[0])
-    spread_s = stamps[0] + (np.arange(len(t_s)) - edges[0]) / rate
-    return Spread(
-        spread_s,
+    interpolated_s = stamps[0] + (np.arange(len(t_s)) - edges[0]) / rate
+    return InterpolatedTimes(
+        interpolated_s,
         f"times between stamps {apart:g} s apart are interpolated: {rate:.6g} readings a second, at one rate",
     )
 
 
-def spread_packets(t_s: Array) -> Spread | None:
+def interpolate_in_packets(t_s: Array) -> InterpolatedTimes | None:
     """Return the times of readings whose stamps, (n,) s, are of their arrival in packets; None of other stamps.
 
     A link or an operating system hands over what a device measured at one rate in packets of any size: few steps are
@@ -82,7 +82,7 @@ def spread_packets(t_s: Array) -> Spread | None:
     apart_s = float(np.ptp(np.cumsum(late_s)))
     if scatter_s < UNEQUAL * span_s / len(begin) or apart_s > OF_RANDOM_WALK * scatter_s * np.sqrt(len(late_s)):
         return None
-    return Spread(
+    return InterpolatedTimes(
         t_s[0] + np.arange(len(t_s)) * period_s,
         f"the stamps are of the arrival of packets, up to {float(steps.max()):.2g} s apart: the readings were put at "
         f"their one rate, {1.0 / period_s:.6g} readings a second",

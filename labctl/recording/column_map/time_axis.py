@@ -14,7 +14,7 @@ from labctl.recording.column_map.guesses import time_unit, usual_step
 from labctl.recording.column_map.implied import EPOCH_S, FASTEST_HZ
 from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.problems import Problems, rows_text
-from labctl.recording.column_map.stamps import Spread, spread_between, spread_packets
+from labctl.recording.column_map.stamps import InterpolatedTimes, interpolate_between_stamps, interpolate_in_packets
 from labctl.recording.column_map.units import Unit, find_unit, names_of
 from labctl.recording.raw_table import RawColumn
 from labctl.recording.sanity.readings.series import Series
@@ -97,10 +97,10 @@ def _unknown(column: RawColumn, rows: int) -> str:
 
 def _finer(column: RawColumn, axis_read: TimeAxis, problems: Problems) -> TimeAxis:
     """Return the times of the readings where the stamps are coarser, such as whole seconds, or of their arrival."""
-    between = spread_between(axis_read.t_s) or spread_packets(axis_read.t_s)
+    between = interpolate_between_stamps(axis_read.t_s) or interpolate_in_packets(axis_read.t_s)
     if isinstance(between, str):
         problems.add(f"column {column.name!r} (time): {between}")
-    if not isinstance(between, Spread):
+    if not isinstance(between, InterpolatedTimes):
         return axis_read
     zero_s = float(between.t_s[0] - axis_read.t_s[0]) if axis_read.started_at is not None else 0.0
     started = None if axis_read.started_at is None else axis_read.started_at + timedelta(seconds=zero_s)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.sources import source
-from labctl.recording.column_map.stamps import spread_between
+from labctl.recording.column_map.stamps import interpolate_between_stamps
 from labctl.recording.column_map.units import find_unit
 from labctl.recording.raw_table import RawTable
 from labctl.recording.sanity.finding import Finding
@@ -29,7 +29,7 @@ def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, 
     values = column.values
     if len(values) < 2 or not np.isfinite(values).all() or bool(np.all(np.diff(values) > 0)):
         return table, None
-    if bool(np.all(np.diff(values) >= 0)) and spread_between(values - values[0]) is not None:
+    if bool(np.all(np.diff(values) >= 0)) and interpolate_between_stamps(values - values[0]) is not None:
         return table, None  # stamps that several readings share: the times between are found when they are read
     unit = find_unit("s", mapped.unit or column.unit) if mapped.unit or column.unit else None
     n = len(values)

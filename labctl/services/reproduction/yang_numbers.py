@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting import FitData, FittedModel, Spread, by_turning_axis
+from labctl.fitting import ErrorSummary, FitData, FittedModel, by_turning_axis
 from labctl.fitting.data.temperature.levels import level_means
 from labctl.papers import yang2018 as paper
 from labctl.services.reproduction.findings import Missing, Value
@@ -97,7 +97,9 @@ def tables(judged: Judged) -> Iterator[Value]:
             yield from _gains(of, turning, output, before, traditional, after)
 
 
-def _gains(of: str, turning: str, output: str, before: Spread, traditional: Spread, after: Spread) -> Iterator[Value]:
+def _gains(
+    of: str, turning: str, output: str, before: ErrorSummary, traditional: ErrorSummary, after: ErrorSummary
+) -> Iterator[Value]:
     """Yield by how much the proposed method is below no compensation, and below the traditional method, per cent."""
     mean = turning == paper.MEANS
     for against, spread in zip(paper.TABLE_4_COLUMNS[:2], (before, traditional), strict=True):
@@ -112,7 +114,9 @@ def _gains(of: str, turning: str, output: str, before: Spread, traditional: Spre
         yield _cell(f"gain_{turning}_{output}_{against}", of, 100.0 * (1.0 - abs(last) / abs(first)), reason)
 
 
-def _cells(of: str, turning: str, output: str, before: Spread, traditional: Spread, after: Spread) -> Iterator[Value]:
+def _cells(
+    of: str, turning: str, output: str, before: ErrorSummary, traditional: ErrorSummary, after: ErrorSummary
+) -> Iterator[Value]:
     is_own_axis, mean = turning == output, turning == paper.MEANS
     third = {
         "mean before": (before.mean_dps, "bias at this temperature, and its drift"),

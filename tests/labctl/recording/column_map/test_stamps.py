@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from labctl.recording.column_map.stamps import spread_packets
+from labctl.recording.column_map.stamps import interpolate_in_packets
 
 Array = NDArray[np.float64]
 RATE_HZ, WITHIN_S = 100.0, 0.001
@@ -35,7 +35,7 @@ def asleep(rng: np.random.Generator, packets: int = 2000, size: int | None = Non
 @pytest.mark.parametrize("seed", range(5))
 def test_readings_that_arrive_in_packets_are_put_at_their_one_rate(seed: int) -> None:
     stamps = arrived(np.random.default_rng(seed))
-    found = spread_packets(stamps)
+    found = interpolate_in_packets(stamps)
     assert found is not None
     assert float(np.median(1.0 / np.diff(found.t_s))) == pytest.approx(RATE_HZ, rel=2e-3)
     assert np.abs(found.t_s - stamps).max() < 2.0 * np.diff(stamps).max()
@@ -45,17 +45,17 @@ def test_readings_that_arrive_in_packets_are_put_at_their_one_rate(seed: int) ->
 @pytest.mark.parametrize("seed", range(5))
 def test_a_logger_that_slept_keeps_its_stamps(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    assert spread_packets(asleep(rng)) is None
-    assert spread_packets(asleep(rng, size=5)) is None
+    assert interpolate_in_packets(asleep(rng)) is None
+    assert interpolate_in_packets(asleep(rng, size=5)) is None
 
 
 def test_readings_that_were_lost_beside_packets_keep_the_stamps() -> None:
     stamps = arrived(np.random.default_rng(1))
     lost = stamps + 60.0 * (np.arange(len(stamps)) > 4000)
-    assert spread_packets(lost) is None
+    assert interpolate_in_packets(lost) is None
 
 
 def test_even_and_jittered_stamps_are_left_as_they_are() -> None:
     even = np.arange(5000) / RATE_HZ
-    assert spread_packets(even) is None
-    assert spread_packets(even + np.random.default_rng(2).uniform(0.0, 0.009, 5000)) is None
+    assert interpolate_in_packets(even) is None
+    assert interpolate_in_packets(even + np.random.default_rng(2).uniform(0.0, 0.009, 5000)) is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labctl.fitting.fleet.group_effects import heterogeneity
-from labctl.fitting.fleet.spread import reml
+from labctl.fitting.fleet.reml import reml
 
 #: Colditz et al. 1994: 13 trials of the BCG vaccine; with and without tuberculosis, vaccinated and not.
 BCG = np.array([

@@ -24,7 +24,7 @@ MIN_SHARE, MAX_SHARE, STEPS = 1e-4, 10.0, 24
 
 
 @dataclass(frozen=True)
-class Spread:
+class RemlEstimate:
     """Standard deviation of a coefficient over the units of a type, with its 95 % interval, and the fit beside it."""
 
     tau: float
@@ -36,7 +36,7 @@ class Spread:
     chi2: float  #: sum of squared weighted residuals at tau
 
 
-def reml(y: Array, variance: Array, columns: NDArray[np.float64]) -> Spread:
+def reml(y: Array, variance: Array, columns: NDArray[np.float64]) -> RemlEstimate:
     """Return the spread of y (n,) with known variances (n,) beside columns (n, p); n is more than p."""
     centred = y - np.mean(y)
     scale = float(np.sqrt(np.mean(centred**2) + np.mean(variance)))
@@ -60,7 +60,7 @@ def reml(y: Array, variance: Array, columns: NDArray[np.float64]) -> Spread:
     low, high = _interval(loss, tau, float(least), float(grid[0]), 4.0 * MAX_SHARE)
     values, covariance, chi2 = weighted_fit(y, variance + (tau * scale) ** 2, columns)
     predictive = _predictive(loss, low, high, float(least))
-    return Spread(tau * scale, low * scale, high * scale, predictive * scale, values, covariance, chi2)
+    return RemlEstimate(tau * scale, low * scale, high * scale, predictive * scale, values, covariance, chi2)
 
 
 def weighted_fit(y: Array, variance: Array, columns: NDArray[np.float64]) -> tuple[Array, NDArray[np.float64], float]:
