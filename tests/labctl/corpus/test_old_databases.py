@@ -43,6 +43,12 @@ FITS = {
 #: holds, and where it leaves hundreds of times the noise, so that the values hang on how the data sets are weighted.
 FITTED_WITHIN, UNFITTED_WITHIN, MAX_SCALE = 0.15, 1.0, 10.0
 of_each_entry = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
+#: What takes longer: the oldest and the newest database among the quick tests, those between among the slow ones.
+from_end_to_end = pytest.mark.parametrize(
+    "entry",
+    [pytest.param(entry, marks=[pytest.mark.slow] if entry in ENTRIES[1:-1] else []) for entry in ENTRIES],
+    ids=lambda entry: entry.name,
+)
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +153,7 @@ def migrate_and_be_killed(path: Path, step: str) -> None:
     assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGKILL
 
 
-@pytest.mark.parametrize("entry", [entry for entry in ENTRIES if entry.name < migrate.HEAD], ids=lambda each: each.name)
+@from_end_to_end
 def test_a_migration_that_is_killed_leaves_the_old_database_and_is_done_again(
     labs: Callable[[Entry], Lab], entry: Entry, tmp_path: Path
 ) -> None:
@@ -162,7 +168,7 @@ def test_a_migration_that_is_killed_leaves_the_old_database_and_is_done_again(
     assert lab.json("check")["ok"]
 
 
-@of_each_entry
+@from_end_to_end
 def test_the_unfinished_campaign_is_resumed_to_its_end(
     labs: Callable[[Entry], Lab], entry: Entry, tmp_path: Path
 ) -> None:
@@ -227,7 +233,7 @@ def test_its_recording_is_exported_as_it_was(labs: Callable[[Entry], Lab], entry
 
 
 @pytest.mark.parametrize(("number", "model"), FITS.items())
-@of_each_entry
+@from_end_to_end
 def test_its_recordings_are_fitted_as_they_were(
     labs: Callable[[Entry], Lab], entry: Entry, number: str, model: tuple[str, ...], tmp_path: Path
 ) -> None:
