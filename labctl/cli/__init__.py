@@ -28,8 +28,8 @@ def main() -> None:
 
         first_of_all()
         keep_memory()
-    # imports make some hundred thousand objects that stay; to look through them again and again is a sixth of a start
-    gc.set_threshold(COLLECTED_AFTER)
+    # imports make some hundred thousand objects that stay: to search them for garbage would take a sixth of a start
+    gc.disable()
     atexit.register(gc.freeze)  # nor are they looked through when the process ends: 0.4 s of a command that fits
     try:
         from labctl.cli.app import main as run
@@ -39,4 +39,7 @@ def main() -> None:
         from labctl.lazy_imports import install
 
         sys.exit(f"labctl: the command line needs {error.name}, which is not installed; run {install('lab')}")
+    gc.freeze()
+    gc.set_threshold(COLLECTED_AFTER)
+    gc.enable()
     run()

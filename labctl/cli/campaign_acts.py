@@ -9,7 +9,6 @@ from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from pydantic.fields import FieldInfo
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
@@ -19,6 +18,7 @@ from labctl.cli.output import print_json
 from labctl.cli.printing.campaigns import print_campaign, print_end
 
 if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
     from typer._click.core import Command, Context
 
     from labctl.answers.campaigns import CampaignResponse

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import typer
-from pydantic import ValidationError
 
 from labctl.cli.interrupts import INTERRUPTED, signals_restored
 from labctl.cli.output import stderr
@@ -29,6 +28,8 @@ def one_clear_line() -> Iterator[None]:
 
 @contextmanager
 def _errors_as_lines() -> Iterator[None]:
+    from pydantic import ValidationError
+
     from instruments.errors import InstrumentError
     from labctl.answers.storage_url import REFUSED
     from labctl.errors import BadFile, LabctlError, Stopped

@@ -8,12 +8,13 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from pydantic import BaseModel, JsonValue
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel, JsonValue
+
     from labctl.answers.inspection import DataWarning
 
 #: Without a terminal, lines are not cut to its width. Texts are printed as they are: a word in brackets is no markup.
@@ -56,6 +57,8 @@ def print_part(shown: int, total: int, what: str) -> None:
 
 def print_json(answer: BaseModel | Sequence[BaseModel] | Mapping[str, JsonValue], *, one_line: bool = False) -> None:
     """Print one JSON document on standard output; on one line and at once where a program waits for it."""
+    from pydantic import BaseModel
+
     document: object = answer
     if isinstance(answer, BaseModel):
         document = answer.model_dump(mode="json", by_alias=True)
