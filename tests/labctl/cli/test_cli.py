@@ -231,8 +231,8 @@ MANY = [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0]
             "'ghost' cannot be hidden",
         ),
         (lambda _: ["certify", "OSU-FOG-2024", "9", "--by", "A", "--reason", "B"], "no calibration version 9"),
-        (lambda _: ["serve", "--host", "0.0.0.0"], "no API key exists yet"),
-        (lambda _: ["serve", "--require-keys"], "--require-keys, but no API key exists yet"),
+        (lambda _: ["serve", "--host", "0.0.0.0", "--port", "0"], "no API key exists yet"),
+        (lambda _: ["serve", "--require-keys", "--port", "0"], "--require-keys, but no API key exists yet"),
         (lambda _: ["serve", "--port", "99999"], "--port 99999: give a port from 1 to 65535, or 0 for a free port"),
     ],
 )
