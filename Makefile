@@ -14,7 +14,7 @@ demo: install
 
 test: $(VENV)/.tested
 	@scripts/install-test-dependencies
-	@$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder -m "not slow"
+	@$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 # The tests of seconds each: searches, coverage over many draws, campaigns in real time. `.ci/run` runs them after `make test`.
 test-slow: $(VENV)/.tested

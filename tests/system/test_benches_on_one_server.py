@@ -90,6 +90,7 @@ def complete_data_sets(database: str) -> Counter[tuple[int, int]]:
     return found
 
 
+@pytest.mark.slow
 def test_a_service_that_is_killed_is_known_to_be_gone_and_resumes_alone(
     laboratory: Laboratory, cluster: Cluster
 ) -> None:

@@ -46,6 +46,7 @@ def until_drafted(service: ServiceProcess) -> None:
         pass  # the test has a time-out
 
 
+@pytest.mark.slow
 def test_a_draft_that_was_due_when_everything_was_killed_is_made_once_by_the_next_service(tmp_path: Path) -> None:
     database = tmp_path / "lab.sqlite"
     with running(database, *FAST) as service:

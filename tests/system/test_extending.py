@@ -125,6 +125,7 @@ def test_a_driver_with_its_simulator(outside: Callable[[str], Outside]) -> None:
     assert fitted["error"]["rms_dps"] < 0.2 * fitted["error"]["raw_rms_dps"]
 
 
+@pytest.mark.slow
 def test_an_effect_on_both_sides(outside: Callable[[str], Outside]) -> None:
     user = outside(EFFECT)
     printed = user.follow()

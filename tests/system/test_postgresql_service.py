@@ -65,6 +65,7 @@ def _audit(service: ServiceProcess) -> list[AuditRow]:
         return store.audit.rows()
 
 
+@pytest.mark.slow
 def test_a_bench_process_that_was_killed_has_an_heir(service: ServiceProcess) -> None:
     campaign = begin(service)
     os.kill(service.bench_pid, signal.SIGKILL)

@@ -79,6 +79,7 @@ def test_a_campaign_is_followed_through_all_processes_and_no_key_is_in_it(
     assert workers == ["worker.started", "worker.ended"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shell", "log"), [("exec 2>&-", None), ("", Path("/dev/full"))])
 def test_a_service_whose_log_cannot_be_written_runs_its_campaign(tmp_path: Path, shell: str, log: Path | None) -> None:
     """Only a shell starts a process with its standard error closed; one that is full is given to any process."""

@@ -43,6 +43,7 @@ def lasting_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Servic
         yield made
 
 
+@pytest.mark.slow
 def test_commands_ask_the_service_that_holds_the_database(lasting_service: ServiceProcess) -> None:
     service = lasting_service
     assert json.loads(service.run("import", str(EXAMPLES / "osu-fog"), "--json").stdout)["datasets"] == 695

@@ -89,6 +89,7 @@ u_dps = 0.1
 """
 
 
+@pytest.mark.slow
 def test_u_of_a_campaign_is_drawn_against_its_target(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 
@@ -141,6 +142,7 @@ def assert_course_is_scrubbed(service: Service, page: Page) -> None:
     expect(card.get_by_label("First soak").get_by_role("option")).to_have_count(len(soaks))
 
 
+@pytest.mark.slow
 def test_a_plan_says_what_further_mountings_are_worth(tmp_path: Path, chromium: Browser) -> None:
     from playwright.sync_api import expect
 

@@ -93,6 +93,7 @@ def test_a_click_on_a_point_shows_its_readings_and_the_same_computed_from_them(
     assert shown[1]["y"] == pytest.approx([readings.mean()] * 2)
 
 
+@pytest.mark.slow
 def test_a_link_opens_exactly_that_point_and_a_cell_gives_it(
     service: Service, visit: Callable[..., Page], recording: Recording
 ) -> None:

@@ -98,6 +98,7 @@ def test_the_error_runs_from_the_one_version_to_the_other_and_ends_green(
     assert f"/units/{unit}" in page.url
 
 
+@pytest.mark.slow
 def test_nothing_moves_where_less_motion_is_wanted(service: Service, visit: Callable[..., Page], unit: str) -> None:
     from playwright.sync_api import expect
 

@@ -114,6 +114,7 @@ def test_a_line_without_a_fault_waits_for_nothing() -> None:
     line.registers.close()
 
 
+@pytest.mark.slow
 def test_a_line_that_is_never_silent_is_said_in_bounded_time() -> None:
     line = Line()
     line.transmit = lambda _t_s: b"\x55\xaa"  # type: ignore[method-assign]

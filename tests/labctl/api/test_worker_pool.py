@@ -54,6 +54,7 @@ def fill(service: Service, folder: Path) -> Held:
     return held
 
 
+@pytest.mark.slow
 def test_of_many_at_once_so_many_are_computed_and_the_rest_told_when_to_come_back(service: Service, unit: str) -> None:
     path = f"{service.url}/api/units/{unit}/calibrations/1/criticism"
     formulas = [f"own: table_rate_dps**{5 + number}" for number in range(CLIENTS)]

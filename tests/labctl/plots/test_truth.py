@@ -183,6 +183,7 @@ def test_nine_panels_have_measured_dots_and_model_lines_redder_with_temperature(
         assert [r - b for r, _, b in reds] == sorted(r - b for r, _, b in reds)
 
 
+@pytest.mark.slow
 def test_the_error_per_turn_is_drawn_before_and_after_on_the_same_axes(
     compared: tuple[Recording, dict[str, Any]],
 ) -> None:
