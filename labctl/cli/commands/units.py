@@ -67,13 +67,25 @@ def units(
 
 
 def _print_units(units: list[UnitResponse], total: int) -> None:
-    rows = table("", "unit", "model", "in force", "due", "")
+    """Print what the page of units shows."""
+    heads = ("unit", "model", "batch", "recordings", "versions", "error / floor", "in force", "verdict", "due")
+    rows = table("", *heads)
     for each in units:
-        version = "none" if each.certified_version is None else f"version {each.certified_version}"
+        in_force = each.certified_version is not None
         due = "–" if each.due is None else f"{each.due:%Y-%m-%d}"
-        rows.add_row(each.serial, each.model or "–", version, due, Text("overdue" if each.overdue else "", "bold red"))
+        rows.add_row(
+            each.serial, each.model or "–", each.batch or "–", str(len(each.recordings)), str(len(each.calibrations)),
+            format_number(_newest_error(each)), f"version {each.certified_version}" if in_force else "none",
+            (each.certified_verdict or "none") if in_force else "–",
+            Text(f"{due}, overdue", "bold red") if each.overdue else due,
+        )  # fmt: skip
     console.print(rows)
     print_part(len(units), total, "units")
+
+
+def _newest_error(unit: UnitResponse) -> float | None:
+    """Return the error over the noise floor of the newest version that has one."""
+    return next((ratio for ratio in reversed(unit.newest_errors.over_floor) if ratio is not None), None)
 
 
 def trend(

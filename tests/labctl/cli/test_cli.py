@@ -76,6 +76,29 @@ def test_from_import_to_a_corrected_file(fog: Lab) -> None:
     fog.run("compensate", str(file), str(raw), str(out), "--outside", "refuse", status=2)
 
 
+def test_the_table_of_units_says_what_the_answer_says(fog: Lab) -> None:
+    serial = "OSU-FOG-2024"
+    fog.run("batches", "set", "B-7", serial, "--by", "A")
+    fog.run("fit", serial, "--model", "ojeda2000")
+    fog.run("certify", serial, "1", "--by", "A", "--reason", "B", "--due-days", "36500")
+    (unit,) = fog.json("units")
+    (error,) = unit["newest_errors"]["over_floor"]
+    heads, row = (line for line in fog.run("units").stdout.splitlines() if line.strip())
+    assert heads.split() == "unit model batch recordings versions error / floor in force verdict due".split()
+    words = [
+        serial,
+        unit["model"],
+        "B-7",
+        "1",
+        "1",
+        f"{error:.4g}",
+        "version 1",
+        unit["certified_verdict"],
+        unit["due"][:10],
+    ]
+    assert row.split() == " ".join(words).split()
+
+
 def test_a_published_table_becomes_a_calibration(lab: Lab) -> None:
     assert lab.json("import", str(EXAMPLES / "weiss-gyrostar"))["datasets"] == 0
     table = lab.json("fit", "WEISS-ENV05S", "--model", "weiss1995")["axes"]["z"]["coefficients"]
