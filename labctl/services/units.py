@@ -19,6 +19,7 @@ from labctl.answers.units import (
 )
 from labctl.errors import BadInput
 from labctl.exports import export_formats
+from labctl.natural_order import natural_key
 from labctl.services.calibrations.due import campaign_of
 from labctl.services.drafts.answers import newest_draft
 from labctl.services.planning.recipe_text import recipe_text
@@ -44,7 +45,7 @@ def list_units(
     verdict: str | None = None,
     batch: str | None = None,
 ) -> Page[UnitResponse, str]:
-    """Return units by serial number, as many as are asked for: all, those in a state, with a verdict, of a batch.
+    """Return units by serial number in natural order: all, those in a state, with a verdict, of a batch.
 
     `within` a span those that are due (`units_due`). Raises BadInput for a state or a verdict that there is not.
     """
@@ -69,8 +70,8 @@ def units_due(
     matching = {unit.serial for unit in store.units.page(PageRequest(request.search)).rows}
     due = [
         serial
-        for _, serial in sorted(
-            (act.due_at, act.serial)
+        for _, _, serial in sorted(
+            (act.due_at, natural_key(act.serial), act.serial)
             for act in store.certifications.in_force().values()
             if act.due_at is not None and act.due_at <= now + within and act.serial in matching
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import datetime
 from itertools import zip_longest
 from typing import Any
@@ -13,6 +13,7 @@ import sqlalchemy as sa
 
 from labctl.acting_user import acting_key
 from labctl.errors import NotFound
+from labctl.natural_order import natural_key
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.paging import Page, PageRequest, padded, parts_of, rows_to_read
@@ -107,6 +108,10 @@ class BatchRow:
     units: int
 
 
+def _unit_rows() -> sa.Select[*tuple[Any, ...]]:
+    return sa.select(*(tables.units.c[field.name] for field in fields(Unit)))
+
+
 def _count(connection: sa.Connection, condition: sa.ColumnElement[bool]) -> int:
     """Return how many measured units meet a condition: all that do without those that are not measured."""
     counted = sa.select(sa.func.count()).select_from(tables.units).where(condition)
@@ -123,7 +128,7 @@ class Units:
     def get(self, serial: str) -> Unit:
         """Return a unit; raises NotFound, which says how a unit is added."""
         with self._database.reading() as connection:
-            wanted = sa.select(tables.units).where(tables.units.c.serial == serial, SEEN)
+            wanted = _unit_rows().where(tables.units.c.serial == serial, SEEN)
             row = connection.execute(wanted).mappings().first()
         if row is None:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
@@ -155,19 +160,22 @@ class Units:
             return _count(connection, sa.true())
 
     def all(self) -> list[Unit]:
-        """Return every unit, by serial number."""
+        """Return every unit, by serial number in natural order."""
         with self._database.reading() as connection:
-            rows = connection.execute(sa.select(tables.units).where(SEEN).order_by(tables.units.c.serial))
+            rows = connection.execute(_unit_rows().where(SEEN).order_by(tables.units.c.serial_key))
             return records_of(Unit, rows)
 
     def page(self, request: PageRequest[str], wanted: UnitFilter | None = None) -> Page[Unit, str]:
-        """Return units by serial number; searched are serial number, model, technology, batch and supplier."""
+        """Return units by serial number in natural order.
+
+        Searched are serial number, model, technology, batch and supplier.
+        """
         c = tables.units.c
         filtered = sa.true() if wanted is None else wanted.condition
         found = request.matching((c.serial, c.model, c.technology, c.batch, c.supplier))
-        query = sa.select(tables.units).where(found, filtered, SEEN).order_by(c.serial).limit(rows_to_read(request))
+        query = _unit_rows().where(found, filtered, SEEN).order_by(c.serial_key).limit(rows_to_read(request))
         if request.after is not None:
-            query = query.where(c.serial > request.after)
+            query = query.where(c.serial_key > natural_key(request.after))
         with self._database.reading() as connection:
             units = records_of(Unit, connection.execute(query))
             is_whole = request.after is None and (request.limit is None or len(units) <= request.limit)
@@ -329,11 +337,15 @@ class Certifications:
         return {row.serial: _act(row.serial, row) for row in rows}
 
     def newest_versions(self, model: str | None = None) -> list[tuple[str, int]]:
-        """Return serial number and version of each unit's newest act, also a revocation; of one model, or of all."""
-        last = sa.select(sa.func.max(_X.id)).group_by(_X.serial)
-        query = sa.select(_X.serial, _X.version).where(_X.id.in_(last)).order_by(_X.serial)
+        """Return serial number and version of each unit's newest act, also a revocation; of one model, or of all.
+
+        They are in natural order.
+        """
+        u, last = tables.units.c, sa.select(sa.func.max(_X.id)).group_by(_X.serial)
+        newest = sa.select(_X.serial, _X.version).where(_X.id.in_(last))
+        query = newest.join(tables.units, u.serial == _X.serial).order_by(u.serial_key)
         if model is not None:
-            query = query.join(tables.units, tables.units.c.serial == _X.serial).where(tables.units.c.model == model)
+            query = query.where(u.model == model)
         with self._database.reading() as connection:
             return [(row.serial, row.version) for row in connection.execute(query)]
 

@@ -548,8 +548,8 @@ export interface paths {
         };
         /**
          * All units
-         * @description Every unit that was measured or imported, by serial number; `search` in serial number, model, technology,
-         *     batch and supplier.
+         * @description Every unit that was measured or imported, by serial number in natural order (A-2 before A-10); `search` in serial
+         *     number, model, technology, batch and supplier.
          *
          *     With `due_within`, which takes none of `calibration`, `verdict` and `batch`, those whose certification ends within
          *     that span or has ended, the earliest date first.
@@ -1418,7 +1418,7 @@ export interface paths {
         };
         /**
          * Units of a fleet job
-         * @description What came of each unit, by serial number; of one that could not be computed, the reason.
+         * @description What came of each unit, by serial number in natural order; of one that could not be computed, the reason.
          */
         get: operations["units_api_fleet_jobs__job__units_get"];
         put?: never;
