@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 
 import pytest
@@ -48,7 +49,7 @@ def is_before(one: str, other: str) -> bool:
     ],
 )
 def test_serial_numbers_are_in_natural_order(ordered: list[str]) -> None:
-    assert sorted(ordered[::-1], key=natural_key) == ordered
+    assert sorted(random.Random(1).sample(ordered, len(ordered)), key=natural_key) == ordered
 
 
 @given(SERIALS | ALIKE, SERIALS | ALIKE)

@@ -19,7 +19,7 @@ from labctl.store.paging import Page, PageRequest, rows_to_read
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.calibrations import NewCalibration, add_version
 from labctl.store.repositories.records_by_name import record_of, records_of
-from labctl.store.repositories.units import SEEN
+from labctl.store.repositories.units import SEEN, search_units
 from labctl.store.schema import tables
 
 #: States in which something is left to do.
@@ -49,8 +49,7 @@ class FleetFilter:
             for column, value in ((c.model, self.type), (c.batch, self.batch), (c.supplier, self.supplier))
             if value
         ]
-        found = PageRequest[str](self.search).matching((c.serial, c.model, c.technology, c.batch, c.supplier))
-        return sa.and_(found, *stated)
+        return sa.and_(search_units(PageRequest(self.search)), *stated)
 
 
 @dataclass(frozen=True)

@@ -108,8 +108,15 @@ class BatchRow:
     units: int
 
 
-def _unit_rows() -> sa.Select[*tuple[Any, ...]]:
+def unit_rows() -> sa.Select[*tuple[Any, ...]]:
+    """Return the query for units, whose rows are of `Unit`."""
     return sa.select(*(tables.units.c[field.name] for field in fields(Unit)))
+
+
+def search_units(request: PageRequest[str]) -> sa.ColumnElement[bool]:
+    """Return the condition that a unit holds the text that is searched for."""
+    c = tables.units.c
+    return request.matching((c.serial, c.model, c.technology, c.batch, c.supplier))
 
 
 def _count(connection: sa.Connection, condition: sa.ColumnElement[bool]) -> int:
@@ -128,7 +135,7 @@ class Units:
     def get(self, serial: str) -> Unit:
         """Return a unit; raises NotFound, which says how a unit is added."""
         with self._database.reading() as connection:
-            wanted = _unit_rows().where(tables.units.c.serial == serial, SEEN)
+            wanted = unit_rows().where(tables.units.c.serial == serial, SEEN)
             row = connection.execute(wanted).mappings().first()
         if row is None:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
@@ -162,7 +169,7 @@ class Units:
     def all(self) -> list[Unit]:
         """Return every unit, by serial number in natural order."""
         with self._database.reading() as connection:
-            rows = connection.execute(_unit_rows().where(SEEN).order_by(tables.units.c.serial_key))
+            rows = connection.execute(unit_rows().where(SEEN).order_by(tables.units.c.serial_key))
             return records_of(Unit, rows)
 
     def page(self, request: PageRequest[str], wanted: UnitFilter | None = None) -> Page[Unit, str]:
@@ -172,8 +179,8 @@ class Units:
         """
         c = tables.units.c
         filtered = sa.true() if wanted is None else wanted.condition
-        found = request.matching((c.serial, c.model, c.technology, c.batch, c.supplier))
-        query = _unit_rows().where(found, filtered, SEEN).order_by(c.serial_key).limit(rows_to_read(request))
+        found = search_units(request)
+        query = unit_rows().where(found, filtered, SEEN).order_by(c.serial_key).limit(rows_to_read(request))
         if request.after is not None:
             query = query.where(c.serial_key > natural_key(request.after))
         with self._database.reading() as connection:
