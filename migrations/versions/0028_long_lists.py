@@ -1,4 +1,4 @@
-"""What long lists need: a sort key of serial numbers, for the natural order, and the acts on a subject by an index."""
+"""What long lists need: a sort key of serial numbers, for the natural order, and indexes."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ _AT_ONCE = 5000
 
 
 def upgrade() -> None:
-    """Add the column with its index, the key of each unit, and the index of the audit trail."""
+    """Add the column with its index, the key of each unit, and indexes of acts by subject, recordings by campaign."""
     by_bytes = sa.Text().with_variant(sa.Text(collation="C"), "postgresql")
     op.add_column("units", sa.Column("serial_key", by_bytes, server_default="", nullable=False))
     if not context.is_offline_mode():
         _write_keys(op.get_bind())
     op.create_index(op.f("ix_units_serial_key"), "units", ["serial_key"])
     op.create_index(op.f("ix_audit_action_subject"), "audit", ["action", "subject"])
+    op.create_index(op.f("ix_recordings_campaign_id"), "recordings", ["campaign_id"])
 
 
 def downgrade() -> None:
     """Remove them; the keys follow from the serial numbers."""
+    op.drop_index(op.f("ix_recordings_campaign_id"), table_name="recordings")
     op.drop_index(op.f("ix_audit_action_subject"), table_name="audit")
     op.drop_index(op.f("ix_units_serial_key"), table_name="units")
     op.drop_column("units", "serial_key")

@@ -15,6 +15,7 @@ import sqlalchemy as sa
 from numpy.typing import NDArray
 
 from labctl.answers.json_object import JsonObject
+from labctl.answers.recording_head import RecordingKind
 from labctl.errors import LabctlError, NotFound
 from labctl.recording import Recording, refuse_too_many_data_sets
 from labctl.recording.columns import RATE_TIME_U, READING_TIMES, VERIFICATION
@@ -131,13 +132,20 @@ class Recordings:
         """Return every recording, newest first."""
         return self._heads(sa.true())
 
-    def page(self, request: PageRequest[int], serial: str | None = None) -> Page[RecordingRow, int]:
-        """Return recordings, newest first, of one unit with `serial`; searched are serial numbers and notes."""
+    def page(
+        self, request: PageRequest[int], serial: str | None = None, kind: RecordingKind | None = None
+    ) -> Page[RecordingRow, int]:
+        """Return recordings, newest first, of one unit with `serial`, of one `kind`.
+
+        Searched are serial numbers and notes.
+        """
         r = tables.recordings.c
         matching = sa.and_(
             request.matching((r.serial, r.info["notes"].as_string())),
             sa.true() if serial is None else r.serial == serial,
-            r.importing.is_(None),
+            sa.true() if kind is None else r.kind == kind,
+            # no index: a search reads the rows themselves, in the order of their numbers
+            sa.func.coalesce(r.importing, "") == "" if request.search else r.importing.is_(None),
         )
         with self._database.reading() as connection:
             of_page, total = newest_rows(connection, r.id, matching, request)

@@ -42,7 +42,7 @@ SEEN = _measured()
 def _unmeasured() -> tuple[sa.ColumnElement[bool], sa.ColumnElement[bool]]:
     u, r, s = tables.units.c, tables.recordings.c, tables.sensor_versions.c
     has_none = ~sa.exists().where(r.serial == u.serial)
-    importing = u.serial.in_(sa.select(r.serial).where(r.importing.is_not(None)))
+    importing = u.serial.in_(sa.select(r.serial).where(r.importing > ""))  # not null; this SQLite finds by the index
     return sa.and_(has_none, ~sa.exists().where(s.serial == u.serial)), sa.and_(importing, ~SEEN)
 
 
@@ -227,12 +227,15 @@ class Units:
         r, v = tables.recordings.c, tables.calibrations.c
         held = {serial: UnitHoldings([], []) for serial in serials}
         some_of: sa.BindParameter[Sequence[str]] = sa.bindparam("serials", expanding=True)
-        recordings = sa.select(r.serial, r.id).where(r.serial.in_(some_of), r.importing.is_(None)).order_by(r.id.desc())
+        # sorted and without imports under way: here, because SQLite would read all recordings by another index for it
+        recordings = sa.select(r.serial, r.id, r.importing).where(r.serial.in_(some_of))
         versions = sa.select(v.serial, v.version).where(v.serial.in_(some_of)).order_by(v.version)
         with self._database.reading() as connection:
             for some in parts_of(serials):
-                for serial, recording in connection.execute(recordings, {"serials": some}):
-                    held[serial].recordings.append(recording)
+                rows = connection.execute(recordings, {"serials": some}).all()
+                for serial, recording, importing in sorted(rows, key=lambda row: -row.id):
+                    if importing is None:
+                        held[serial].recordings.append(recording)
                 for serial, version in connection.execute(versions, {"serials": some}):
                     held[serial].versions.append(version)
         return held

@@ -19711,6 +19711,8 @@ export interface operations {
             query?: {
                 /** @description Only recordings of the unit of this number. */
                 unit?: string | null;
+                /** @description Only recordings that hold every reading (samples), or only means (points, coefficients). */
+                kind?: ("samples" | "points" | "coefficients") | null;
                 /** @description Only rows that hold this text, in any case; empty: all rows. */
                 search?: string;
                 /** @description Largest number of rows; default: all. The header Link names the next part. */
