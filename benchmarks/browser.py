@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,33 +25,41 @@ ARGUMENTS = (
 PATIENCE_S = 30.0
 
 
+@dataclass(frozen=True)
+class Chromium:
+    """A running browser."""
+
+    control: str  #: address of its DevTools interface
+    process: int
+
+
 @contextmanager
-def chromium() -> Iterator[str]:
-    """Start a browser with an empty profile; yields the address of its DevTools interface."""
+def chromium() -> Iterator[Chromium]:
+    """Start a browser with an empty profile."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         words = [shutil.which("chromium") or "chromium", *ARGUMENTS, f"--user-data-dir={folder}", "about:blank"]
         with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
             try:
                 reported = Path(folder) / "DevToolsActivePort"
                 _until(lambda: reported.exists() and bool(reported.read_text().strip()))
-                yield f"http://127.0.0.1:{reported.read_text().split()[0]}"
+                yield Chromium(f"http://127.0.0.1:{reported.read_text().split()[0]}", browser.pid)
             finally:
                 browser.terminate()
 
 
-def version(control: str) -> str:
+def version(browser: Chromium) -> str:
     """Return which browser it is."""
-    return str(httpx.get(f"{control}/json/version").json()["Browser"])
+    return str(httpx.get(f"{browser.control}/json/version").json()["Browser"])
 
 
 @contextmanager
-def opened(control: str, url: str, settled_s: float = 4.0) -> Iterator[Page]:
+def opened(browser: Chromium, url: str, settled_s: float = 4.0) -> Iterator[Page]:
     """Open an address in a tab of its own and leave it alone for a time; only then read it."""
-    httpx.put(f"{control}/json/new?{url}").raise_for_status()
+    httpx.put(f"{browser.control}/json/new?{url}").raise_for_status()
     time.sleep(settled_s)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.connect_over_cdp(control)
-        page = next(page for page in browser.contexts[0].pages if page.url.startswith(url))
+        contexts = playwright.chromium.connect_over_cdp(browser.control).contexts
+        page = next(page for page in contexts[0].pages if page.url.startswith(url))
         yield page
         page.close()
 

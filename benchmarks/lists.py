@@ -6,7 +6,7 @@ import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 
 import sqlalchemy as sa
 from fastapi.testclient import TestClient
@@ -22,7 +22,7 @@ from labctl.store.schema import tables
 
 UNITS, VERSIONS, RECORDINGS_OF_A_UNIT = 10_000, 200, 2
 CAMPAIGNS, EVENTS, STEPS = 2_000, 200, 60
-REPEATS = 5
+REPEATS = 7
 #: A limit that the project has set itself, of one part of a list.
 LIMIT_MS = 100.0
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -36,6 +36,7 @@ REQUESTS = {
     "units_without_calibration": "/api/units?limit=100&calibration=none",
     "units_overdue": "/api/units?limit=100&calibration=overdue",
     "units_by_verdict": "/api/units?limit=100&verdict=missing",
+    "units_due": "/api/units?limit=100&due_within=30d",
     "unit_with_200_versions": "/api/units/G00000",
     "recordings_first": "/api/recordings?limit=100",
     "recordings_search": "/api/recordings?limit=100&search=G07777",
@@ -46,35 +47,40 @@ REQUESTS = {
 
 
 def run() -> dict[str, float | str]:
-    """Fill a database, then ask for parts of its lists; returns the median time of each request, and bytes of two."""
+    """Fill a database, then ask for parts of its lists; returns the median of each request's wall and processor time.
+
+    On a busy machine the wall time is mostly that of other programs.
+    """
     with tempfile.TemporaryDirectory() as folder:
         database = Database(str(Path(folder) / "lab.sqlite"), write=True)
         fill(Store(database), database)
         figures: dict[str, float] = {}
         with TestClient(create_app(LabService(Store(database), VirtualClock()))) as client:
             for name, address in REQUESTS.items():
-                times = []
+                times, processor = [], []
                 for _ in range(REPEATS):
-                    begun_s = perf_counter()
+                    begun_s, processor_s = perf_counter(), process_time()
                     client.get(address).raise_for_status()
                     times.append(perf_counter() - begun_s)
-                figures[f"{name}_ms"] = 1000 * median(times)
+                    processor.append(process_time() - processor_s)
+                figures |= {f"{name}_ms": 1000 * median(times), f"{name}_processor_ms": 1000 * median(processor)}
     return {**describe("fastapi", "sqlalchemy", "pydantic"), **figures}
 
 
 def fill(store: Store, database: Database) -> None:
     """Write units with recordings and versions, and campaigns that have ended with steps and events."""
     step = {"kind": "acquire", "expected_s": 60.0, "rate_dps": 10.0}
-    for number in range(CAMPAIGNS):
-        bench = f"bench {number % 50}"
-        store.campaigns.create(NewCampaign("short", {}, bench, {}, "hash", 3600.0, [step] * STEPS, ()), AT)
+    campaigns = [
+        store.campaigns.create(NewCampaign("short", {}, f"bench {k % 50}", {}, "hash", 3600.0, [step] * STEPS, ()), AT)
+        for k in range(CAMPAIGNS)
+    ]
     event = {"at": AT, "kind": "note", "level": "info", "message": "something that happened in the campaign"}
     head = {"serial": "G", "axes": ["z"], "kind": "points", "started_at": AT}
     info = RecordingInfo.model_validate(head).model_dump(mode="json")
     made = {"document": b"{}", "answer": {}, "created_at": AT}
     with database.writing() as connection:
         connection.execute(sa.update(tables.campaigns).values(state="done"))
-        for number in range(1, CAMPAIGNS + 1):
+        for number in campaigns:
             rows = [{**event, "campaign_id": number, "t_s": float(k)} for k in range(EVENTS)]
             connection.execute(sa.insert(tables.events), rows)
         serials = [f"G{k:05d}" for k in range(UNITS)]

@@ -7,7 +7,9 @@ import platform
 import statistics
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
@@ -29,6 +31,20 @@ def describe(*packages: str) -> dict[str, str]:
         "python": sys.version.split()[0],
         **{name: version(name) for name in packages},
     }
+
+
+def processor_s(*processes: int) -> float:
+    """Return the processor time that running processes, and all that they started, have taken so far, s."""
+    own_s, children = {}, defaultdict(list)
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # it has ended
+            fields = stat.read_text().rsplit(")", 1)[1].split()
+            own_s[int(stat.parent.name)] = sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+            children[int(fields[1])].append(int(stat.parent.name))
+    tree = list(processes)
+    for process in tree:
+        tree += children[process]
+    return sum(own_s.get(process, 0.0) for process in tree)
 
 
 def median_s(work: Callable[[], object], runs: int = 5) -> float:

@@ -12,6 +12,8 @@ Axis = Literal["x", "y", "z"]
 #: nothing; `turns` a hand or a table, by a known angle in each data set; `profile` a table whose rate changes and is
 #: known reading by reading; `poses` a hand, between rests that gravity distinguishes.
 Motion = Literal["rates", "rest", "turns", "profile", "poses"]
+#: What a recording holds: every reading, a mean of each data set, or a table of coefficients that was published.
+RecordingKind = Literal["samples", "points", "coefficients"]
 
 #: Units that are rates already: what one deg/s is in them.
 RATE_UNITS = {"deg/s": 1.0, "rad/s": math.pi / 180.0, "deg/h": 3600.0}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from pathlib import Path
 
+from labctl.answers.recording_head import RecordingKind
 from labctl.answers.recordings import ImportResponse, RecordingResponse
 from labctl.client.connection import ClientPart
 from labctl.recording.files import recording_parts
@@ -15,13 +16,13 @@ class RecordingMethods(ClientPart):
     """Requests about recordings."""
 
     def recordings(
-        self, *, unit: str | None = None, search: str = "", limit: int | None = None
+        self, *, unit: str | None = None, kind: RecordingKind | None = None, search: str = "", limit: int | None = None
     ) -> list[RecordingResponse]:
-        """Return every recording, newest first, or those of one `unit`; at most `limit`.
+        """Return every recording, newest first, or those of one `unit` or `kind`; at most `limit`.
 
         With `search` those whose serial number or notes hold it.
         """
-        query = query_string(unit=unit, search=search, limit=limit)
+        query = query_string(unit=unit, kind=kind, search=search, limit=limit)
         return self._connection.get_list(f"/api/recordings{query}", RecordingResponse)
 
     def import_recording(self, folder: Path | str) -> ImportResponse:

@@ -9,13 +9,18 @@ import plotly.graph_objects as go
 from plotly.colors import qualitative
 
 from labctl.answers.budget import ContributionLinesJson, ContributionsOverJson
+from labctl.plots.page import figure_part, whole_page
+from labctl.plots.registry import Picture
 from labctl.plots.theme import INK, grid_of, place
 
 #: Colours of the sources, in the order in which they appear first; the sums are drawn in the colour of the text.
 COLOURS = [*qualitative.Safe, *qualitative.Vivid]
-#: Room for the legend below the panels.
-LEGEND_PX = 140
-STYLE = "body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }"
+#: Room for the axis below the panels, and for each line of the legend under it.
+AXIS_PX, LEGEND_LINE_PX = 70, 20
+#: Names of so many characters stand two in a line of the legend on a phone.
+TWO_IN_A_LINE = 16
+TITLE = "Contributions over rate and over temperature"
+CAPTION = "One line for each source of uncertainty, and for their sums; a source that is not stated has no line."
 
 
 def contributions(over: Mapping[str, ContributionsOverJson]) -> go.Figure:
@@ -31,20 +36,20 @@ def contributions(over: Mapping[str, ContributionsOverJson]) -> go.Figure:
             f"axis {axis} at {one['rate_dps']:.4g} deg/s",
         )
     ]
-    figure = grid_of(titles, 2, horizontal_spacing=0.09)
+    figure = grid_of(titles, 1)
     every = (lines for one in over.values() for lines in (one["over_rate"], one["over_temperature"]))
     names = list(dict.fromkeys(name for lines in every for name in lines["contributions"]))
     drawn: set[str] = set()
     for row, one in enumerate(over.values()):
-        _draw(figure, one["over_rate"], names, drawn, place(2 * row, 2))
-        _draw(figure, one["over_temperature"], names, drawn, place(2 * row + 1, 2))
-    figure.update_xaxes(title="rate, deg/s", col=1)
-    figure.update_xaxes(title="temperature, deg C", col=2)
-    figure.update_yaxes(title="standard uncertainty, deg/s", rangemode="tozero", col=1)
-    below = {"yref": "container", "y": 0.0, "yanchor": "bottom", "x": 0.0, "xanchor": "left"}
-    figure.update_layout(
-        showlegend=True, legend=below, margin={"b": LEGEND_PX}, height=figure.layout.height + LEGEND_PX
-    )
+        _draw(figure, one["over_rate"], names, drawn, place(2 * row, 1))
+        _draw(figure, one["over_temperature"], names, drawn, place(2 * row + 1, 1))
+        figure.update_xaxes(title="rate, deg/s", **place(2 * row, 1))
+        figure.update_xaxes(title="temperature, deg C", **place(2 * row + 1, 1))
+    figure.update_yaxes(title="standard uncertainty, deg/s", rangemode="tozero")
+    in_a_line = 2 if max(map(len, drawn), default=0) <= TWO_IN_A_LINE else 1
+    below_px = AXIS_PX + LEGEND_LINE_PX * -(-len(drawn) // in_a_line)
+    below = {"yref": "container", "y": 0.0, "yanchor": "bottom", "x": 0.0, "xanchor": "left", "tracegroupgap": 0}
+    figure.update_layout(showlegend=True, legend=below, margin={"b": below_px}, height=figure.layout.height + below_px)
     return figure
 
 
@@ -71,9 +76,6 @@ def _draw(
 
 def contributions_html(title: str, over: Mapping[str, ContributionsOverJson], not_stated: Sequence[str]) -> str:
     """Return a page that needs no server: the figure, and which standards are not in it."""
-    figure = contributions(over).to_html(full_html=False, include_plotlyjs=True, config={"displaylogo": False})
     note = f"<p>Not stated, and in no line: {escape(', '.join(not_stated))}.</p>" if not_stated else ""
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{escape(title)}</title>\n'
-        f"<style>{STYLE}</style></head>\n<body>\n<h1>{escape(title)}</h1>\n{note}\n{figure}\n</body>\n</html>\n"
-    )
+    drawn = figure_part(Picture("contributions", TITLE, CAPTION, contributions(over)))
+    return whole_page(title, [f"<h1>{escape(title)}</h1>", note, drawn], drawn=True)

@@ -10,9 +10,13 @@ import plotly.graph_objects as go
 from labctl.answers.inspection import CourseJson, MarkJson
 from labctl.plots.page import figure_part, whole_page
 from labctl.plots.registry import Picture
-from labctl.plots.theme import ACCENT, GAP_PX, TEMPLATE, WARM, colour_of, grid_of, place, translucent
+from labctl.plots.theme import ACCENT, WARM, colour_of, grid_of, place, translucent
+from labctl.texts import counted
 
-ROW_PX = 170
+#: A panel with a heading of one line, the part of it without readings, and a further line of its heading.
+ROW_PX, GAP_PX, LINE_PX = 170, 45, 17
+#: Left of the panels, where their headings begin too: on a phone there is no room for one in the middle.
+LEFT_PX = 60
 #: Colours of the kinds of findings, in the order in which they appear.
 COLOURS = ("#b3242f", WARM, ACCENT, "#7b5ea7", "#3a9d6e", "#a88b1f")
 TITLE = "All readings, and where something was found"
@@ -29,9 +33,11 @@ def inspection_picture(courses: Sequence[CourseJson], marks: Sequence[MarkJson])
         return None
     kinds = list(dict.fromkeys(mark["what"] for mark in marks))
     colours = {kind: COLOURS[k % len(COLOURS)] for k, kind in enumerate(kinds)}
-    figure = grid_of([_heading(course, _marks_of(course, marks)) for course in courses], 1, shared_xaxes=True)
-    height = ROW_PX * len(courses) + GAP_PX
-    figure.update_layout(template=TEMPLATE, height=height)
+    headings = [_heading(course, _marks_of(course, marks)) for course in courses]
+    further_px = LINE_PX * max(heading.count("<br>") for heading in headings)
+    figure = grid_of(headings, 1, row_px=ROW_PX + further_px, gap_px=GAP_PX + further_px, shared_xaxes=True)
+    figure.update_layout(margin={"t": 30 + LINE_PX * headings[0].count("<br>"), "l": LEFT_PX})
+    figure.update_annotations(x=0.0, xanchor="left", xshift=8 - LEFT_PX, yshift=4, align="left", font={"size": 12})
     bands: list[dict[str, object]] = []
     for panel, course in enumerate(courses):
         placement = place(panel, 1)
@@ -73,15 +79,15 @@ def _bands(mark: MarkJson, colour: str, panel: int) -> list[dict[str, object]]:
 
 def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:
     drawn = "reading by reading" if course["bins"] >= course["readings"] else f"in {course['bins']} bins"
-    parts = [f"{course['channel']}: all {course['readings']} readings, {drawn}"]
+    lines = [f"{course['channel']}: all {course['readings']} readings, {drawn}"]
     for mark in marks:
         if mark["whole"]:
-            parts.append(f"{mark['what']} (all of it)")
+            lines.append(f"{mark['what']} (all of it)")
         elif len(mark["from_s"]) < mark["places"]:
-            parts.append(f"{mark['what']} ({len(mark['from_s'])} of {mark['places']} places drawn)")
+            lines.append(f"{mark['what']} ({len(mark['from_s'])} of {mark['places']} places drawn)")
         else:
-            parts.append(f"{mark['what']} ({mark['places']} places)")
-    return "; ".join(parts)
+            lines.append(f"{mark['what']} ({counted(mark['places'], 'place')})")
+    return "<br>".join(lines)
 
 
 def _envelope(course: CourseJson) -> go.Scatter:

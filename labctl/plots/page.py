@@ -14,7 +14,7 @@ STYLE = """
 @media (prefers-color-scheme: dark) { :root { --ink: #d5dbe1; --soft: #9198a1; --paper: #14181d; --line: #343b44; } }
 body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 72rem;
        margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin: 2.5rem 0 .3rem; }
+h1, li { overflow-wrap: anywhere; } h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin: 2.5rem 0 .3rem; }
 .verdict { font-size: 1.25rem; font-weight: 600; } .soft, figcaption { color: var(--soft); }
 figure { margin: 0; } figcaption { max-width: 60rem; font-size: .92rem; }
 table { border-collapse: collapse; font-size: .92rem; } th, td { padding: .2rem .8rem; text-align: right;

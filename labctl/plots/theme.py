@@ -39,15 +39,17 @@ TEMPLATE = go.layout.Template(
 )
 
 
-def grid_of(titles: Sequence[str], columns: int = 1, **subplots: object) -> go.Figure:
-    """Return an empty figure with a panel for each title, filled row by row."""
+def grid_of(
+    titles: Sequence[str], columns: int = 1, *, row_px: float = ROW_PX, gap_px: float = GAP_PX, **subplots: object
+) -> go.Figure:
+    """Return an empty figure with a panel for each title, row by row; `gap_px` of each row are between panels."""
     rows = max(-(-len(titles) // columns), 1)
-    height = ROW_PX * rows + 90
+    height = row_px * rows + 90
     figure = make_subplots(
         rows=rows,
         cols=columns,
         subplot_titles=list(titles),
-        vertical_spacing=min(GAP_PX / height, 0.9 / rows),
+        vertical_spacing=min(gap_px / height, 0.9 / rows),
         **subplots,
     )
     figure.update_layout(template=TEMPLATE, height=height, showlegend=False)

@@ -10,7 +10,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validato
 
 from instruments.datasheet import Convention, DatasheetFigure, datasheet_figure, undeclared
 from instruments.standards import Standard
-from labctl.answers.recording_head import Axis, LeftOut, Motion, OutputUnit
+from labctl.answers.recording_head import Axis, LeftOut, Motion, OutputUnit, RecordingKind
 
 #: Serial number of a unit.
 SERIAL_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
@@ -39,7 +39,7 @@ class RecordingInfo(BaseModel):
     serial: str = Field(pattern=SERIAL_PATTERN)
     model: str = ""
     axes: tuple[Axis, ...] = Field(min_length=1, max_length=3)
-    kind: Literal["samples", "points", "coefficients"]
+    kind: RecordingKind
     motion: Motion = "rates"
     started_at: AwareDatetime
     #: Whether `started_at` is the date of the measurement; false: that is unknown, and it is the time of the import.

@@ -19,11 +19,10 @@ from labctl.answers.units import (
 )
 from labctl.errors import BadInput
 from labctl.exports import export_formats
-from labctl.services.calibrations.due import campaign_of
-from labctl.services.drafts.answers import newest_draft
+from labctl.services.drafts.answers import newest_drafts
 from labctl.services.planning.recipe_text import recipe_text
 from labctl.services.standards.usage import Notices
-from labctl.store import CertificationRow, Store, Unit
+from labctl.store import CampaignRow, CertificationRow, Store, Unit
 from labctl.store.paging import Page, PageRequest
 from labctl.store.records import UnitHoldings
 from labctl.store.repositories.calibrations import FitError
@@ -44,7 +43,7 @@ def list_units(
     verdict: str | None = None,
     batch: str | None = None,
 ) -> Page[UnitResponse, str]:
-    """Return units by serial number, as many as are asked for: all, those in a state, with a verdict, of a batch.
+    """Return units by serial number in natural order: all, those in a state, with a verdict, of a batch.
 
     `within` a span those that are due (`units_due`). Raises BadInput for a state or a verdict that there is not.
     """
@@ -66,28 +65,27 @@ def units_due(
 
     A unit without a date, or without a version in force, is never due.
     """
-    matching = {unit.serial for unit in store.units.page(PageRequest(request.search)).rows}
-    due = [
-        serial
-        for _, serial in sorted(
-            (act.due_at, act.serial)
-            for act in store.certifications.in_force().values()
-            if act.due_at is not None and act.due_at <= now + within and act.serial in matching
-        )
-    ]
-    first = due.index(request.after) + 1 if request.after in due else 0
-    last = None if request.limit is None else first + request.limit + 1
-    page = Page.of(due[first:last], str, request, len(due))
-    return Page([unit(store, serial, now) for serial in page.rows], page.total, page.next_after)
+    page = store.due_units.page(request, now + within)
+    return Page(_whole(store, _answers(store, now, page.rows)), page.total, page.next_after)
 
 
 def unit(store: Store, serial: str, now: datetime) -> UnitResponse:
     """Return one unit; raises NotFound."""
-    (answer,) = _answers(store, now, [store.units.get(serial)])
-    act = store.certifications.in_force([serial]).get(serial)
-    return answer.model_copy(
-        update={"recalibration": _recalibration(store, act) if act else None, "draft": newest_draft(store, serial)}
-    )
+    (answer,) = _whole(store, _answers(store, now, [store.units.get(serial)]))
+    return answer
+
+
+def _whole(store: Store, answers: Sequence[UnitResponse]) -> list[UnitResponse]:
+    """Return units with what lists of all units leave out: how each is recalibrated, and its newest draft."""
+    serials = [answer.serial for answer in answers]
+    campaigns, drafts = store.due_units.campaigns(serials), newest_drafts(store, serials)
+    again = {row.id: _recalibration(row) for row in store.campaigns.some(sorted(set(campaigns.values())))}
+    return [
+        answer.model_copy(
+            update={"recalibration": again.get(campaigns.get(answer.serial, 0)), "draft": drafts.get(answer.serial)}
+        )
+        for answer in answers
+    ]
 
 
 def batches(store: Store) -> list[BatchResponse]:
@@ -105,8 +103,8 @@ def set_batch(store: Store, asked: BatchRequest, at: datetime) -> BatchResponse:
 
 def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]:
     """Return how many units are overdue, and how many are or will be within a span."""
-    dates = [act.due_at for act in store.certifications.in_force().values() if act.due_at is not None]
-    return sum(date <= now for date in dates), sum(date <= now + within for date in dates)
+    overdue, due = store.due_units.count(now, now + within)
+    return overdue, due
 
 
 def _answers(store: Store, now: datetime, units: Sequence[Unit]) -> list[UnitResponse]:
@@ -171,10 +169,6 @@ def _notices(store: Store, notices: Notices, act: CertificationRow | None) -> li
     return notices.of_recordings(store.calibrations.get(act.serial, act.version).recordings)
 
 
-def _recalibration(store: Store, act: CertificationRow) -> RecalibrationResponse | None:
-    campaign = campaign_of(store, act.serial, act.version)
-    if campaign is None:
-        return None
-    row = store.campaigns.get(campaign)
+def _recalibration(row: CampaignRow) -> RecalibrationResponse | None:
     text = recipe_text(row.recipe)
     return RecalibrationResponse(recipe=text, name=row.recipe_name, bench=row.bench_name) if text else None

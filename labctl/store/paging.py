@@ -55,6 +55,25 @@ def rows_to_read(request: PageRequest[KeyT]) -> int | None:
     return None if request.limit is None else request.limit + 1
 
 
+def newest_rows(
+    connection: sa.Connection, number: sa.Column[int], matching: sa.ColumnElement[bool], request: PageRequest[int]
+) -> tuple[sa.ColumnElement[bool], int]:
+    """Return the condition on a page's rows of a table, those with the highest numbers first, and how many match.
+
+    A search reads every row of the table: it is made once, for the page and for the number of rows.
+    """
+    newest = sa.select(number).where(matching).order_by(number.desc())
+    if request.search and request.limit is not None:
+        found = list(connection.scalars(newest))
+        beyond = [each for each in found if request.after is None or each < request.after]
+        return number.in_(beyond[: rows_to_read(request)]), len(found)
+    chosen = newest.limit(rows_to_read(request))
+    if request.after is not None:
+        chosen = chosen.where(number < request.after)
+    total = connection.scalar(sa.select(sa.func.count()).select_from(number.table).where(matching)) or 0
+    return number.in_(chosen), total
+
+
 def parts_of(keys: Sequence[KeyT]) -> Iterator[Sequence[KeyT]]:
     """Yield keys in parts that fit into one statement: databases bound the number of its parameters."""
     for first in range(0, len(keys), MAX_PARAMETERS):

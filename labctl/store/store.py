@@ -21,6 +21,7 @@ from labctl.store.repositories.certified_versions import CertifiedVersions
 from labctl.store.repositories.check_gyros import CheckGyros
 from labctl.store.repositories.diagnoses import Diagnoses
 from labctl.store.repositories.drafts.repository import Drafts
+from labctl.store.repositories.due_units import DueUnits
 from labctl.store.repositories.fetches import Fetches
 from labctl.store.repositories.fleet_jobs import FleetJobs
 from labctl.store.repositories.fleet_reports import FleetReports
@@ -48,6 +49,7 @@ class Store:
         """`read_blocks` returns the readings of recordings, by default those of the database."""
         self._database, self.read_blocks = database, read_blocks
         self.units = Units(database)
+        self.due_units = DueUnits(database)
         self.recordings = Recordings(database, read_blocks)
         self.imports = Imports(database)
         self.campaigns = Campaigns(database)

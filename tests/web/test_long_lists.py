@@ -172,3 +172,37 @@ def test_the_batch_of_a_unit_is_stated_on_its_page_and_filters_the_list(
     assert page.url.endswith("/units?batch=26-W12")
     page.reload()
     expect(page.get_by_text("3 of 3 units found")).to_be_visible()
+
+
+@pytest.mark.usefixtures("many")
+def test_pages_that_show_a_part_of_a_list_say_so_and_find_the_rest(
+    service: Service, visit: Callable[..., Page]
+) -> None:
+    from playwright.sync_api import expect
+
+    made = {"version": 1, "model": "cubic", "document": b"{}", "answer": {}, "created_at": AT}
+    act = {"version": 1, "act": "certify", "by": "Ada", "reason": "", "at": AT, "due_at": AT}
+    due = [f"G{k:03d}" for k in range(50, 65)]
+    with service.lab_service.store._database.writing() as connection:
+        connection.execute(sa.insert(tables.calibrations), [{**made, "serial": each, "hash": each} for each in due])
+        connection.execute(sa.insert(tables.certifications), [{**act, "serial": each} for each in due])
+        connection.execute(sa.update(tables.recordings).values(kind="samples"))
+    page = visit("/")
+    listed = page.get_by_role("list", name="Units that are due").get_by_role("listitem")
+    expect(listed).to_have_count(11)
+    expect(listed.first).to_contain_text("G050")
+    expect(listed.last).to_contain_text("5 more units are due or overdue.")
+    listed.last.get_by_role("link").click()
+    expect(page.get_by_text(f"{len(due)} of {len(due)} units found")).to_be_visible()
+
+    page = visit("/noise?recordings=7")  # far behind the first part
+    boxes = page.get_by_role("checkbox")
+    expect(boxes).to_have_count(101)
+    expect(page.get_by_label("Recording 7, G006")).to_be_checked()
+    page.get_by_label("Search recordings").fill("g003")
+    expect(page.get_by_label("Recording 4, G003")).not_to_be_checked()
+    expect(page.get_by_label("Recording 7, G006")).to_be_checked()
+    expect(boxes).to_have_count(2)
+    page.get_by_label("Recording 7, G006").uncheck()
+    page.get_by_label("Recording 4, G003").check()
+    assert "recordings=4" in page.url

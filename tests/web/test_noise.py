@@ -36,6 +36,8 @@ def test_two_records_are_drawn_over_each_other_with_the_data_sheet(
     page.get_by_label("Recording 2, B-2").check()
     expect(page.get_by_role("region", name="Allan deviation").get_by_role("row")).to_have_count(3)
     assert "recordings=1%2C2" in page.url
+    page.get_by_label("Recording 2, B-2").uncheck()
+    page.get_by_label("Recording 2, B-2").check()
     page.reload()
     expect(page.get_by_label("Recording 2, B-2")).to_be_checked()
     expect(page.get_by_text("B-2, data sheet: bias stability")).to_be_visible()

@@ -67,7 +67,7 @@ def units(
     limit: Limit = None,
     after: AfterSerial = None,
 ) -> list[FleetUnitResponse]:
-    """What came of each unit, by serial number; of one that could not be computed, the reason."""
+    """What came of each unit, by serial number in natural order; of one that could not be computed, the reason."""
     return in_parts(request, response, unit_answers(service.store, job, PageRequest(search, limit, after), state))
 
 

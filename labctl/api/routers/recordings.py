@@ -10,7 +10,7 @@ from fastapi.responses import PlainTextResponse, StreamingResponse
 
 from labctl.answers.inspection import InspectionResponse
 from labctl.answers.orientation import OrientationQuery, OrientationResponse
-from labctl.answers.recording_head import Motion
+from labctl.answers.recording_head import Motion, RecordingKind
 from labctl.answers.recordings import (
     AllanResponse,
     DataSetsResponse,
@@ -186,6 +186,10 @@ def all_recordings(
     unit: Annotated[
         str | None, Query(max_length=200, description="Only recordings of the unit of this number.")
     ] = None,
+    kind: Annotated[
+        RecordingKind | None,
+        Query(description="Only recordings that hold every reading (samples), or only means (points, coefficients)."),
+    ] = None,
     search: Search = "",
     limit: Limit = None,
     after: AfterNumber = None,
@@ -194,7 +198,7 @@ def all_recordings(
 
     `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
     """
-    page = catalogue.page_of_recordings(service.store, PageRequest(search, limit, after), unit)
+    page = catalogue.page_of_recordings(service.store, PageRequest(search, limit, after), unit, kind)
     return in_parts(request, response, page)
 
 

@@ -42,8 +42,8 @@ def units(
     limit: Limit = None,
     after: AfterSerial = None,
 ) -> list[UnitResponse]:
-    """Every unit that was measured or imported, by serial number; `search` in serial number, model, technology,
-    batch and supplier.
+    """Every unit that was measured or imported, by serial number in natural order (A-2 before A-10); `search` in serial
+    number, model, technology, batch and supplier.
 
     With `due_within`, which takes none of `calibration`, `verdict` and `batch`, those whose certification ends within
     that span or has ended, the earliest date first.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.answers.course import CourseResponse
+from labctl.natural_order import natural_key
 from labctl.store import Store
 
 Column = NDArray[np.float64]
@@ -15,7 +16,8 @@ Logged = dict[str, NDArray[np.generic]]  #: columns of one unit
 def campaign_course(store: Store, campaign: int, points: int, from_s: float = 0.0) -> CourseResponse:
     """Return at most about `points` samples of the environment of a campaign from a time, s, on. Raises NotFound."""
     row = store.campaigns.get(campaign)
-    units = {serial: store.recordings.environment(recording) for serial, recording in sorted(row.recordings.items())}
+    serials = sorted(row.recordings, key=natural_key)
+    units = {serial: store.recordings.environment(row.recordings[serial]) for serial in serials}
     logged = {serial: columns for serial, columns in units.items() if columns}
     logged = {serial: _since(columns, from_s) for serial, columns in logged.items()}
     times = [np.asarray(columns["t_s"], dtype=np.float64) for columns in logged.values()]

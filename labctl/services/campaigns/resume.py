@@ -17,6 +17,7 @@ from labctl.answers.wire_logs import RecordedSession
 from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.log import get_logger
+from labctl.natural_order import natural_key
 from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.driving_process import whereabouts
 from labctl.services.benches.identity import pinned, reported_in
@@ -141,7 +142,7 @@ def _mark_resumed(store: Store, row: CampaignRow, standing: ResumePoint, how: Re
     store.resume_points.mark_resumed(row.id, standing, how)
     log.info(
         "campaign.resumed", campaign=row.id, bench=row.bench_name, step=standing.start_at + 1, reason=how.reason,
-        was=row.state, units=sorted(row.recordings),
+        was=row.state, units=sorted(row.recordings, key=natural_key),
     )  # fmt: skip
 
 
@@ -162,11 +163,13 @@ def _same_units(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
 
     Raises Conflict where it carries other units, BadBench for a driver.
     """
-    serials = {gyro.serial for gyro in bench_file.gyros}
-    if set(row.recordings) != serials:
+    measured, carried = (
+        sorted(serials, key=natural_key) for serials in (row.recordings, {gyro.serial for gyro in bench_file.gyros})
+    )
+    if measured != carried:
         raise Conflict(
-            f"campaign {row.id} measures the units {', '.join(sorted(row.recordings))}, but bench "
-            f"{bench_file.name} has the units {', '.join(sorted(serials))}; name the bench of the campaign with --bench"
+            f"campaign {row.id} measures the units {', '.join(measured)}, but bench "
+            f"{bench_file.name} has the units {', '.join(carried)}; name the bench of the campaign with --bench"
         )
     return pinned(with_drivers(bench_file), reported_in(row))
 

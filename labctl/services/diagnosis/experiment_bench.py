@@ -6,6 +6,7 @@ from datetime import datetime, time, timedelta
 
 from instruments.bench_config import BenchFile
 from labctl.errors import BadInput, Conflict
+from labctl.natural_order import natural_key
 from labctl.services.benches.driving_process import whereabouts
 from labctl.services.campaigns.resume import with_original_simulation
 from labctl.store import CampaignRow, Store
@@ -22,12 +23,12 @@ def bench_of_unit(store: Store, serial: str, named: BenchFile | None) -> BenchFi
     """
     last = store.campaigns.newest_of_unit(serial)
     bench = _same_simulation(last, named) if named is not None else _bench_of(last, serial)
-    serials = [gyro.serial for gyro in bench.gyros if gyro.serial is not None]
+    serials = sorted((gyro.serial for gyro in bench.gyros if gyro.serial is not None), key=natural_key)
     if serials and serial not in serials:
         advice = "name the bench that carries the unit with --bench FILE"
         if store.is_shared and last is not None and last.bench_name != bench.name:
             advice = whereabouts(store, last.bench_name)
-        raise Conflict(f"bench {bench.name} carries the units {', '.join(sorted(serials))}, not {serial}; {advice}")
+        raise Conflict(f"bench {bench.name} carries the units {', '.join(serials)}, not {serial}; {advice}")
     return bench
 
 

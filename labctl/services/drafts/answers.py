@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from labctl.answers.campaigns import CampaignResponse
 from labctl.answers.drafts import DraftReport, DraftResponse
 from labctl.store import DraftRow, Store
@@ -14,10 +16,10 @@ def drafts_of(store: Store, campaign: int) -> list[DraftResponse]:
     return _answers(store, rows)
 
 
-def newest_draft(store: Store, serial: str) -> DraftResponse | None:
-    """Return the draft that was made, or failed, last for a unit; None where no campaign of it ended in one."""
-    row = store.drafts.newest_of_unit(serial)
-    return None if row is None else _answers(store, [row])[0]
+def newest_drafts(store: Store, serials: Sequence[str]) -> dict[str, DraftResponse]:
+    """Return serial number -> the draft that was made, or failed, last; a unit none of whose campaigns ended in one is
+    left out."""
+    return {answer.serial: answer for answer in _answers(store, store.drafts.newest_of_units(serials))}
 
 
 def with_drafts(store: Store, answer: CampaignResponse) -> CampaignResponse:
@@ -31,7 +33,8 @@ def with_drafts(store: Store, answer: CampaignResponse) -> CampaignResponse:
 def _answers(store: Store, rows: list[DraftRow]) -> list[DraftResponse]:
     if not rows:
         return []
-    in_force = {serial: act.version for serial, act in store.certifications.in_force().items()}
+    serials = list({row.serial for row in rows})
+    in_force = {serial: act.version for serial, act in store.certifications.in_force(serials).items()}
     return [
         DraftResponse(
             serial=row.serial, campaign=row.campaign, recording=row.recording, state=row.state, version=row.version,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.recording_head import RecordingKind
 from labctl.answers.recordings import (
     ChannelColumns,
     DataSetsResponse,
@@ -24,10 +25,10 @@ from labctl.store.paging import Page, PageRequest
 
 
 def page_of_recordings(
-    store: Store, request: PageRequest[int], serial: str | None = None
+    store: Store, request: PageRequest[int], serial: str | None = None, kind: RecordingKind | None = None
 ) -> Page[RecordingResponse, int]:
-    """Return recordings, newest first, as many as are asked for."""
-    page = store.recordings.page(request, serial)
+    """Return recordings, newest first, as many as are asked for: all, those of a unit, of a kind."""
+    page = store.recordings.page(request, serial, kind)
     simulated = _of_simulated_time(store, page.rows)
     origins = _origins(store, page.rows)
     lines = [_line(row, row.campaign in simulated, origins[row.id]) for row in page.rows]

@@ -9,6 +9,7 @@ from datetime import date, timedelta
 from instruments.standards import Standard
 from labctl.answers.standards import AffectedCalibration, AffectedResponse
 from labctl.errors import BadInput
+from labctl.natural_order import natural_key
 from labctl.recording.info import measured_at
 from labctl.store import (
     CalibrationRecord,
@@ -92,7 +93,7 @@ def affected(store: Store, label: str, bad_from: date | None = None, bad_until: 
     inside = {
         row.id: row for row in touched if any(overlaps(*days[row.id], *span) for span in spans)
     }  # fmt: skip
-    serials = sorted({row.serial for row in inside.values()})
+    serials = sorted({row.serial for row in inside.values()}, key=natural_key)
     versions = [
         _affected(store, version, [inside[n] for n in version.recordings if n in inside], days, standard)
         for serial in serials

@@ -15,7 +15,7 @@ from labctl.errors import NotFound
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
-from labctl.store.paging import Page, PageRequest, rows_to_read
+from labctl.store.paging import Page, PageRequest, newest_rows, parts_of
 from labctl.store.records import CampaignRow, DoneStepRow, EventRow, NewUnit, StepRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
@@ -172,16 +172,13 @@ class Campaigns:
         matching = request.matching((c.recipe_name, c.bench_name, state)) | (
             c.id.in_(of_unit) if request.search else sa.false()
         )
-        chosen = sa.select(c.id).where(matching).order_by(c.id.desc()).limit(rows_to_read(request))
-        if request.after is not None:
-            chosen = chosen.where(c.id < request.after)
         with self._database.reading() as connection:
-            total = connection.scalar(sa.select(sa.func.count()).select_from(tables.campaigns).where(matching)) or 0
-        return Page.of(self._rows(c.id.in_(chosen)), lambda row: row.id, request, total)
+            of_page, total = newest_rows(connection, c.id, matching, request)
+        return Page.of(self._rows(of_page), lambda row: row.id, request, total)
 
     def some(self, campaigns: Sequence[int]) -> list[CampaignRow]:
-        """Return campaigns by their numbers, newest first; those that are not there are left out."""
-        return self._rows(tables.campaigns.c.id.in_(campaigns))
+        """Return campaigns by their numbers; those that are not there are left out."""
+        return [row for some in parts_of(campaigns) for row in self._rows(tables.campaigns.c.id.in_(some))]
 
     def first_after(self, campaign: int, bench: str) -> int | None:
         """Return the number of the first campaign on a bench that is newer than another campaign; None for none."""

@@ -37,10 +37,11 @@ class CheckGyros:
         self._database = database
 
     def all(self) -> list[CheckGyroRow]:
-        """Return the newest act of each unit that is marked, by serial number."""
-        t = tables.check_gyros
+        """Return the newest act of each unit that is marked, by serial number in natural order."""
+        t, u = tables.check_gyros, tables.units.c
         last = sa.select(sa.func.max(t.c.id)).group_by(t.c.serial)
-        query = sa.select(t).where(t.c.id.in_(last), t.c.act == "mark").order_by(t.c.serial)
+        marked = sa.select(t).where(t.c.id.in_(last), t.c.act == "mark")
+        query = marked.join(tables.units, u.serial == t.c.serial).order_by(u.serial_key)
         with self._database.reading() as connection:
             return [_row(row) for row in connection.execute(query)]
 

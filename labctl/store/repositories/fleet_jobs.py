@@ -12,13 +12,14 @@ from sqlalchemy import exc
 from labctl.answers.fleet import FleetJobState, FleetKind, FleetUnitState
 from labctl.answers.json_object import JsonObject
 from labctl.errors import Conflict, NotFound, VersionTaken
+from labctl.natural_order import natural_key
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.paging import Page, PageRequest, rows_to_read
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.calibrations import NewCalibration, add_version
 from labctl.store.repositories.records_by_name import record_of, records_of
-from labctl.store.repositories.units import SEEN
+from labctl.store.repositories.units import SEEN, search_units
 from labctl.store.schema import tables
 
 #: States in which something is left to do.
@@ -48,8 +49,7 @@ class FleetFilter:
             for column, value in ((c.model, self.type), (c.batch, self.batch), (c.supplier, self.supplier))
             if value
         ]
-        found = PageRequest[str](self.search).matching((c.serial, c.model, c.technology, c.batch, c.supplier))
-        return sa.and_(found, *stated)
+        return sa.and_(search_units(PageRequest(self.search)), *stated)
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,8 @@ class FleetJobs:
     def serials(self, wanted: FleetFilter, after: str, limit: int) -> list[str]:
         """Return the serial numbers of measured units that are wanted, in order, the first `limit` beyond `after`."""
         c = tables.units.c
-        query = sa.select(c.serial).where(wanted.condition, c.serial > after).order_by(c.serial).limit(limit)
+        beyond = c.serial_key > natural_key(after)
+        query = sa.select(c.serial).where(wanted.condition, beyond).order_by(c.serial_key).limit(limit)
         with self._database.reading() as connection:
             return [str(serial) for serial in connection.scalars(query)]
 
@@ -233,8 +234,8 @@ class FleetJobs:
     def units(
         self, job: int, request: PageRequest[str], state: FleetUnitState | None = None
     ) -> Page[FleetUnitRow, str]:
-        """Return the units of a job by serial number, or those in a state."""
-        x = tables.fleet_units.c
+        """Return the units of a job by serial number in natural order, or those in a state."""
+        x, key = tables.fleet_units.c, tables.units.c.serial_key
         columns = (
             x.serial, x.state, x.question, x.version, x.reason, x.processor_s, x.rms_dps, x.noise_floor_dps, x.verdict,
             x.named, x.at,
@@ -243,9 +244,10 @@ class FleetJobs:
         if state is not None:
             wanted.append(x.state == state)
         total = sa.select(sa.func.count()).select_from(tables.fleet_units).where(*wanted)
-        query = sa.select(*columns).where(*wanted).order_by(x.serial).limit(rows_to_read(request))
+        joined = tables.fleet_units.join(tables.units, tables.units.c.serial == x.serial)
+        query = sa.select(*columns).select_from(joined).where(*wanted).order_by(key).limit(rows_to_read(request))
         if request.after is not None:
-            query = query.where(x.serial > request.after)
+            query = query.where(key > natural_key(request.after))
         with self._database.reading() as connection:
             rows = records_of(FleetUnitRow, connection.execute(query))
             return Page.of(rows, lambda row: row.serial, request, int(connection.scalar(total) or 0))

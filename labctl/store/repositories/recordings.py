@@ -15,12 +15,13 @@ import sqlalchemy as sa
 from numpy.typing import NDArray
 
 from labctl.answers.json_object import JsonObject
+from labctl.answers.recording_head import RecordingKind
 from labctl.errors import LabctlError, NotFound
 from labctl.recording import Recording, refuse_too_many_data_sets
 from labctl.recording.columns import RATE_TIME_U, READING_TIMES, VERIFICATION
 from labctl.store.connection.database import Database
 from labctl.store.import_parts import WHOLE_TABLE, import_parts
-from labctl.store.paging import Page, PageRequest, rows_to_read
+from labctl.store.paging import Page, PageRequest, newest_rows
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.repositories.imports import Imports
 from labctl.store.repositories.records_by_name import records_of
@@ -131,20 +132,24 @@ class Recordings:
         """Return every recording, newest first."""
         return self._heads(sa.true())
 
-    def page(self, request: PageRequest[int], serial: str | None = None) -> Page[RecordingRow, int]:
-        """Return recordings, newest first, of one unit with `serial`; searched are serial numbers and notes."""
+    def page(
+        self, request: PageRequest[int], serial: str | None = None, kind: RecordingKind | None = None
+    ) -> Page[RecordingRow, int]:
+        """Return recordings, newest first, of one unit with `serial`, of one `kind`.
+
+        Searched are serial numbers and notes.
+        """
         r = tables.recordings.c
         matching = sa.and_(
             request.matching((r.serial, r.info["notes"].as_string())),
             sa.true() if serial is None else r.serial == serial,
-            r.importing.is_(None),
+            sa.true() if kind is None else r.kind == kind,
+            # no index: a search reads the rows themselves, in the order of their numbers
+            sa.func.coalesce(r.importing, "") == "" if request.search else r.importing.is_(None),
         )
-        chosen = sa.select(r.id).where(matching).order_by(r.id.desc()).limit(rows_to_read(request))
-        if request.after is not None:
-            chosen = chosen.where(r.id < request.after)
         with self._database.reading() as connection:
-            total = connection.scalar(sa.select(sa.func.count()).select_from(tables.recordings).where(matching)) or 0
-        return Page.of(self._heads(r.id.in_(chosen)), lambda row: row.id, request, total)
+            of_page, total = newest_rows(connection, r.id, matching, request)
+        return Page.of(self._heads(of_page), lambda row: row.id, request, total)
 
     def _heads(self, condition: sa.ColumnElement[bool]) -> list[RecordingRow]:
         r, d = tables.recordings.c, tables.data_sets.c

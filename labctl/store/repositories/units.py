@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import datetime
 from itertools import zip_longest
 from typing import Any
@@ -13,6 +13,7 @@ import sqlalchemy as sa
 
 from labctl.acting_user import acting_key
 from labctl.errors import NotFound
+from labctl.natural_order import natural_key
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.paging import Page, PageRequest, padded, parts_of, rows_to_read
@@ -41,7 +42,7 @@ SEEN = _measured()
 def _unmeasured() -> tuple[sa.ColumnElement[bool], sa.ColumnElement[bool]]:
     u, r, s = tables.units.c, tables.recordings.c, tables.sensor_versions.c
     has_none = ~sa.exists().where(r.serial == u.serial)
-    importing = u.serial.in_(sa.select(r.serial).where(r.importing.is_not(None)))
+    importing = u.serial.in_(sa.select(r.serial).where(r.importing > ""))  # not null; this SQLite finds by the index
     return sa.and_(has_none, ~sa.exists().where(s.serial == u.serial)), sa.and_(importing, ~SEEN)
 
 
@@ -107,6 +108,17 @@ class BatchRow:
     units: int
 
 
+def unit_rows() -> sa.Select[*tuple[Any, ...]]:
+    """Return the query for units, whose rows are of `Unit`."""
+    return sa.select(*(tables.units.c[field.name] for field in fields(Unit)))
+
+
+def search_units(request: PageRequest[str]) -> sa.ColumnElement[bool]:
+    """Return the condition that a unit holds the text that is searched for."""
+    c = tables.units.c
+    return request.matching((c.serial, c.model, c.technology, c.batch, c.supplier))
+
+
 def _count(connection: sa.Connection, condition: sa.ColumnElement[bool]) -> int:
     """Return how many measured units meet a condition: all that do without those that are not measured."""
     counted = sa.select(sa.func.count()).select_from(tables.units).where(condition)
@@ -123,7 +135,7 @@ class Units:
     def get(self, serial: str) -> Unit:
         """Return a unit; raises NotFound, which says how a unit is added."""
         with self._database.reading() as connection:
-            wanted = sa.select(tables.units).where(tables.units.c.serial == serial, SEEN)
+            wanted = unit_rows().where(tables.units.c.serial == serial, SEEN)
             row = connection.execute(wanted).mappings().first()
         if row is None:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
@@ -155,19 +167,22 @@ class Units:
             return _count(connection, sa.true())
 
     def all(self) -> list[Unit]:
-        """Return every unit, by serial number."""
+        """Return every unit, by serial number in natural order."""
         with self._database.reading() as connection:
-            rows = connection.execute(sa.select(tables.units).where(SEEN).order_by(tables.units.c.serial))
+            rows = connection.execute(unit_rows().where(SEEN).order_by(tables.units.c.serial_key))
             return records_of(Unit, rows)
 
     def page(self, request: PageRequest[str], wanted: UnitFilter | None = None) -> Page[Unit, str]:
-        """Return units by serial number; searched are serial number, model, technology, batch and supplier."""
+        """Return units by serial number in natural order.
+
+        Searched are serial number, model, technology, batch and supplier.
+        """
         c = tables.units.c
         filtered = sa.true() if wanted is None else wanted.condition
-        found = request.matching((c.serial, c.model, c.technology, c.batch, c.supplier))
-        query = sa.select(tables.units).where(found, filtered, SEEN).order_by(c.serial).limit(rows_to_read(request))
+        found = search_units(request)
+        query = unit_rows().where(found, filtered, SEEN).order_by(c.serial_key).limit(rows_to_read(request))
         if request.after is not None:
-            query = query.where(c.serial > request.after)
+            query = query.where(c.serial_key > natural_key(request.after))
         with self._database.reading() as connection:
             units = records_of(Unit, connection.execute(query))
             is_whole = request.after is None and (request.limit is None or len(units) <= request.limit)
@@ -212,12 +227,15 @@ class Units:
         r, v = tables.recordings.c, tables.calibrations.c
         held = {serial: UnitHoldings([], []) for serial in serials}
         some_of: sa.BindParameter[Sequence[str]] = sa.bindparam("serials", expanding=True)
-        recordings = sa.select(r.serial, r.id).where(r.serial.in_(some_of), r.importing.is_(None)).order_by(r.id.desc())
+        # sorted and without imports under way: here, because SQLite would read all recordings by another index for it
+        recordings = sa.select(r.serial, r.id, r.importing).where(r.serial.in_(some_of))
         versions = sa.select(v.serial, v.version).where(v.serial.in_(some_of)).order_by(v.version)
         with self._database.reading() as connection:
             for some in parts_of(serials):
-                for serial, recording in connection.execute(recordings, {"serials": some}):
-                    held[serial].recordings.append(recording)
+                rows = connection.execute(recordings, {"serials": some}).all()
+                for serial, recording, importing in sorted(rows, key=lambda row: -row.id):
+                    if importing is None:
+                        held[serial].recordings.append(recording)
                 for serial, version in connection.execute(versions, {"serials": some}):
                     held[serial].versions.append(version)
         return held
@@ -329,11 +347,15 @@ class Certifications:
         return {row.serial: _act(row.serial, row) for row in rows}
 
     def newest_versions(self, model: str | None = None) -> list[tuple[str, int]]:
-        """Return serial number and version of each unit's newest act, also a revocation; of one model, or of all."""
-        last = sa.select(sa.func.max(_X.id)).group_by(_X.serial)
-        query = sa.select(_X.serial, _X.version).where(_X.id.in_(last)).order_by(_X.serial)
+        """Return serial number and version of each unit's newest act, also a revocation; of one model, or of all.
+
+        They are in natural order.
+        """
+        u, last = tables.units.c, sa.select(sa.func.max(_X.id)).group_by(_X.serial)
+        newest = sa.select(_X.serial, _X.version).where(_X.id.in_(last))
+        query = newest.join(tables.units, u.serial == _X.serial).order_by(u.serial_key)
         if model is not None:
-            query = query.join(tables.units, tables.units.c.serial == _X.serial).where(tables.units.c.model == model)
+            query = query.where(u.model == model)
         with self._database.reading() as connection:
             return [(row.serial, row.version) for row in connection.execute(query)]
 

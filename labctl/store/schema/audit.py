@@ -17,6 +17,7 @@ audit = sa.Table(
     sa.Column("detail", sa.JSON, nullable=False),
     sa.Column("previous_hash", sa.String(64), nullable=False),
     sa.Column("hash", sa.String(64), nullable=False),
+    sa.Index(None, "action", "subject"),  #: by which lists find what made each of their rows
 )
 
 #: One row: how long the trail is and the hash of its last row, so that cutting rows off its end shows.

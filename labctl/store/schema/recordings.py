@@ -22,6 +22,7 @@ recordings = sa.Table(
     sa.Column("import_sign_at", sa.DateTime(timezone=True)),  #: its last sign, by the clock of the database server
     sa.Index(None, "serial", "id"),
     sa.Index(None, "importing"),
+    sa.Index(None, "campaign_id"),
 )
 
 data_sets = sa.Table(

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import sqlalchemy as sa
 
-from labctl.store.schema.types import Instant, metadata
+from labctl.natural_order import natural_key
+from labctl.store.schema.types import ByBytes, Instant, metadata
+
+if TYPE_CHECKING:
+    from sqlalchemy.engine.default import DefaultExecutionContext
+
+
+def _key_of_serial(context: DefaultExecutionContext) -> str:
+    """Return the sort key of the unit that is being added."""
+    return natural_key(str(context.get_current_parameters()["serial"]))
+
 
 units = sa.Table(
     "units",
@@ -15,5 +27,8 @@ units = sa.Table(
     sa.Column("first_seen_at", Instant, nullable=False),
     sa.Column("batch", sa.String(100), nullable=False, default="", server_default=""),
     sa.Column("supplier", sa.String(200), nullable=False, default="", server_default=""),
+    #: `natural_key` of the serial number, by which units are listed; compared by its bytes in every database
+    sa.Column("serial_key", ByBytes, nullable=False, default=_key_of_serial, server_default=""),
     sa.Index(None, "batch"),
+    sa.Index(None, "serial_key"),
 )

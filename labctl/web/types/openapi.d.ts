@@ -548,8 +548,8 @@ export interface paths {
         };
         /**
          * All units
-         * @description Every unit that was measured or imported, by serial number; `search` in serial number, model, technology,
-         *     batch and supplier.
+         * @description Every unit that was measured or imported, by serial number in natural order (A-2 before A-10); `search` in serial
+         *     number, model, technology, batch and supplier.
          *
          *     With `due_within`, which takes none of `calibration`, `verdict` and `batch`, those whose certification ends within
          *     that span or has ended, the earliest date first.
@@ -1418,7 +1418,7 @@ export interface paths {
         };
         /**
          * Units of a fleet job
-         * @description What came of each unit, by serial number; of one that could not be computed, the reason.
+         * @description What came of each unit, by serial number in natural order; of one that could not be computed, the reason.
          */
         get: operations["units_api_fleet_jobs__job__units_get"];
         put?: never;
@@ -19711,6 +19711,8 @@ export interface operations {
             query?: {
                 /** @description Only recordings of the unit of this number. */
                 unit?: string | null;
+                /** @description Only recordings that hold every reading (samples), or only means (points, coefficients). */
+                kind?: ("samples" | "points" | "coefficients") | null;
                 /** @description Only rows that hold this text, in any case; empty: all rows. */
                 search?: string;
                 /** @description Largest number of rows; default: all. The header Link names the next part. */

@@ -23,7 +23,7 @@ from labctl.store.schema import tables
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 STEP = {"kind": "acquire", "expected_s": 60.0, "rate_dps": 10.0}
 UNITS = 23
-#: Serial numbers in the order of the database: % and _ are no wildcards in a search.
+#: Serial numbers in natural order: % and _ are no wildcards in a search.
 SERIALS = sorted([f"G{k:03d}" for k in range(UNITS - 3)] + ["5.0", "a_b", "axb"])
 
 
@@ -42,6 +42,9 @@ def client(database: Database) -> Iterator[TestClient]:
         connection.execute(sa.update(tables.campaigns).values(state="done"))
         connection.execute(
             sa.update(tables.recordings).where(tables.recordings.c.serial == "axb").values(campaign_id=3)
+        )
+        connection.execute(
+            sa.update(tables.recordings).where(tables.recordings.c.serial == "G005").values(kind="samples")
         )
     with TestClient(create_app(LabService(store, VirtualClock()))) as opened:
         yield opened
@@ -80,12 +83,15 @@ def parts(client: TestClient, address: str) -> Iterator[list[dict[str, Any]]]:
         ("/api/units", "serial", SERIALS),
         ("/api/recordings", "id", list(range(UNITS, 0, -1))),
         ("/api/campaigns", "id", list(range(7, 0, -1))),
+        ("/api/units?search=g0", "serial", [serial for serial in SERIALS if serial.startswith("G")]),
+        ("/api/recordings?search=bought", "id", list(range(UNITS, 0, -1))),
+        ("/api/campaigns?search=bench%201", "id", [6, 4, 2]),
     ],
 )
 def test_the_parts_of_a_list_are_the_list(
     client: TestClient, address: str, key: str, rows: list[object], limit: int
 ) -> None:
-    read = list(parts(client, f"{address}?limit={limit}"))
+    read = list(parts(client, f"{address}{'&' if '?' in address else '?'}limit={limit}"))
     assert [row[key] for part in read for row in part] == rows
     assert all(len(part) == limit for part in read[:-1])
     whole = client.get(address)
@@ -116,6 +122,9 @@ def test_what_is_added_between_two_parts_neither_hides_a_row_nor_shows_one_twice
         ("/api/recordings?search=with%20g003", ["G003"]),
         ("/api/recordings?unit=axb", ["axb"]),
         ("/api/recordings?unit=ax", []),
+        ("/api/recordings?kind=samples", ["G005"]),
+        ("/api/recordings?kind=points&search=with%20g005", []),
+        ("/api/recordings?kind=samples&search=with%20g005", ["G005"]),
     ],
 )
 def test_a_search_is_of_the_whole_list_and_takes_every_character_as_it_is(

@@ -31,7 +31,7 @@ from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.served import calibration_file
 from labctl.services.lab_service import LabService
 from labctl.services.recordings.transfer import import_folder
-from labctl.services.units import list_units, units_due
+from labctl.services.units import count_due, list_units, units_due
 from labctl.store import Store, copy_database, open_store
 from labctl.store.paging import PageRequest
 from labctl.store.schema import tables
@@ -135,6 +135,28 @@ def test_units_are_chosen_by_the_verdict_on_the_version_in_force(three_units: St
     put_in_force(three_units, 2)  # without a verdict, here
     assert chosen(three_units, START, verdict="missing") == []
     assert list_units(three_units, START, PageRequest(), calibration="in_force").rows[0].certified_verdict is None
+
+
+def test_units_that_are_due_are_listed_by_date_in_parts(three_units: Store) -> None:
+    days = {"A-10": 20, "A-2": 20, "A-9": 10, "A-3": 40}
+    with three_units._database.writing() as connection:
+        for serial, due_days in days.items():
+            connection.execute(sa.insert(tables.units).values(serial=serial, model="VG", first_seen_at=START))
+            recording = {"serial": serial, "kind": "points", "info": {}, "channels": [], "created_at": START}
+            connection.execute(sa.insert(tables.recordings).values(**recording))
+            made = {"serial": serial, "version": 1, "model": "cubic", "hash": serial, "document": b"{}", "answer": {}}
+            connection.execute(sa.insert(tables.calibrations).values(**made, created_at=START))
+            act = {"serial": serial, "version": 1, "act": "certify", "by": "A", "reason": "", "at": START}
+            connection.execute(sa.insert(tables.certifications).values(**act, due_at=START + due_days * DAY))
+    whole = units_due(three_units, START, 30 * DAY)
+    assert ([unit.serial for unit in whole.rows], whole.total) == (["A-9", "A-2", "A-10"], 3)
+    first = units_due(three_units, START, 30 * DAY, PageRequest(limit=2))
+    assert ([unit.serial for unit in first.rows], first.total, first.next_after) == (["A-9", "A-2"], 3, "A-2")
+    rest = units_due(three_units, START, 30 * DAY, PageRequest(limit=2, after="A-2"))
+    assert ([unit.serial for unit in rest.rows], rest.total, rest.next_after) == (["A-10"], 3, None)
+    assert [unit.serial for unit in units_due(three_units, START, 50 * DAY, PageRequest("a-3")).rows] == ["A-3"]
+    assert count_due(three_units, START + 15 * DAY, 15 * DAY) == (1, 3)
+    assert [row.serial for row in units_due(three_units, START, 9 * DAY).rows] == []
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from labctl.answers.json_object import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CAMPAIGN
+from labctl.store.paging import parts_of
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
@@ -63,11 +64,12 @@ class Drafts:
             drafts.setdefault(row.campaign, []).append(row)
         return drafts
 
-    def newest_of_unit(self, serial: str) -> DraftRow | None:
-        """Return the draft that was made, or failed, last for a unit; None for none."""
+    def newest_of_units(self, serials: Sequence[str]) -> list[DraftRow]:
+        """Return the draft that was made, or failed, last for each of some units; one without any is left out."""
         d = tables.drafts.c
-        newest = sa.select(sa.func.max(d.recording_id)).where(d.serial == serial, d.state.not_in(OPEN))
-        return next(iter(self._rows(d.recording_id == newest.scalar_subquery())), None)
+        newest = sa.select(sa.func.max(d.recording_id)).where(d.state.not_in(OPEN)).group_by(d.serial)
+        parts = (self._rows(d.recording_id.in_(newest.where(d.serial.in_(some)))) for some in parts_of(serials))
+        return [row for part in parts for row in part]
 
     def outstanding(self, bench: str | None = None) -> list[int]:
         """Return the campaigns, of one bench or of all, that are done and whose drafts have to be made; the oldest

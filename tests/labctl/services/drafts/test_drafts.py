@@ -22,7 +22,7 @@ from labctl.services.campaigns.execution import run_here
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.foreground_control import ForegroundControl
 from labctl.services.drafts import make, report
-from labctl.services.drafts.answers import drafts_of, newest_draft, with_drafts
+from labctl.services.drafts.answers import drafts_of, newest_drafts, with_drafts
 from labctl.services.drafts.make import make_drafts
 from labctl.services.drafts.watch import TRIES, DraftWatch
 from labctl.services.lab_service import LabService
@@ -243,8 +243,7 @@ def test_a_service_makes_what_the_last_one_left(location: str) -> None:
         try:
             eventually(lambda: not store.drafts.is_awaited(1))
             assert service.status(1).drafts[0].state == "made"
-            draft = newest_draft(store, UNIT)
-            assert draft is not None
+            draft = newest_drafts(store, [UNIT])[UNIT]
             assert draft.version == 1
             row = next(row for row in store.audit.rows() if row.action == "draft")
             assert row.who == "labctl"

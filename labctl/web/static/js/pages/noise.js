@@ -1,19 +1,21 @@
 // The page of noise at rest: the Allan deviations of several recordings over each other, with the data sheet's line.
 
-import { get } from "../core/http/api.js";
+import { get, getPart } from "../core/http/api.js";
 import { Problem } from "../core/http/errors.js";
-import { setChildren, h } from "../core/elements.js";
+import { h, setChildren } from "../core/elements.js";
 import { figure } from "../core/figure.js";
 import { duration, number } from "../core/format.js";
 import { card, emptyState, loadInto, notice, pageHeader, table } from "../core/components.js";
 import { pointPlace, selectPoints } from "../core/figure_point.js";
+import { longList } from "../core/long_list.js";
 import { updateQuery } from "../core/router.js";
 import { allanPoint, askedAllan } from "../recordings/allan.js";
 
 /** @import { Allan, NoiseFigure, RecordingRow } from "../../../types/api.js" */
 /** @import { PageContext } from "../../../types/pages.js" */
 
-/** @typedef {{ row: RecordingRow, found: Allan | null, why: string }} Record */
+/** @typedef {Pick<RecordingRow, "id" | "serial">} Row */
+/** @typedef {{ row: Row, found: Allan | null, why: string }} Record */
 
 const MOST = 8;
 const COLOURS = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#888888", "#222255"];
@@ -21,53 +23,85 @@ const DASHES = ["solid", "dash", "dot"];
 
 /** @param {PageContext} context */
 export async function page({ query, signal }) {
-  const rows = (await get("/api/recordings", { signal })).filter((row) => row.kind === "samples");
-  const known = new Set(rows.map((row) => row.id));
-  const asked = (query.recordings ?? "").split(",").map(Number);
-  let chosen = asked.filter((id) => known.has(id)).slice(0, MOST);
+  /** @type {Map<number, Row>} */
+  const known = new Map();
+  /** @type {Map<number, HTMLInputElement>} */
+  const boxes = new Map();
+  const asked = (query.recordings ?? "").split(",").filter(Boolean).map(Number).slice(0, MOST);
+  const first = (await Promise.all(asked.map((id) => rowOf(id, signal)))).filter((row) => row !== null);
+  for (const row of first) known.set(row.id, row);
+  let chosen = first.map((row) => row.id);
   const place = h("div", { class: "stack" });
   const show = () =>
     loadInto(place, "Working out the Allan deviations", async () => {
-      const records = await Promise.all(
-        rows.filter((row) => chosen.includes(row.id)).map((row) => recordOf(row, signal)),
-      );
+      const rows = [...chosen].sort((a, b) => b - a).flatMap((id) => known.get(id) ?? []);
+      const records = await Promise.all(rows.map((row) => recordOf(row, signal)));
       return records.length ? overlay(records) : emptyState("Choose one recording or more.");
     });
   /** @param {number} id */
   const toggle = (id) => {
     chosen = chosen.includes(id) ? chosen.filter((each) => each !== id) : [...chosen, id].slice(-MOST);
+    for (const [each, box] of boxes) box.checked = chosen.includes(each);
     updateQuery({ recordings: chosen.join(",") });
-    setChildren(list, choices());
     show();
   };
-  const choices = () =>
-    rows.map((row) =>
-      h(
-        "label",
-        { class: "row" },
-        h("input", { type: "checkbox", checked: chosen.includes(row.id), onchange: () => toggle(row.id) }),
-        `Recording ${row.id}, ${row.serial}`,
-      ),
+  /** @param {readonly Row[]} rows */
+  const choices = (rows) => {
+    boxes.clear();
+    const listed = new Set(rows.map((row) => row.id));
+    for (const row of rows) known.set(row.id, row);
+    const others = chosen.filter((id) => !listed.has(id)).flatMap((id) => known.get(id) ?? []); // that are not in the part
+    return h(
+      "div",
+      { class: "stack" },
+      [...others, ...rows].map((row) => {
+        const box = h("input", { type: "checkbox", checked: chosen.includes(row.id), onchange: () => toggle(row.id) });
+        boxes.set(row.id, box);
+        return h("label", { class: "row" }, box, `Recording ${row.id}, ${row.serial}`);
+      }),
     );
-  const list = h("div", { class: "stack" }, choices());
+  };
+  const list = await longList({
+    what: "recordings",
+    hint: "Serial number or notes.",
+    search: query.search,
+    read: (part) => getPart("/api/recordings", { query: { ...part, kind: "samples" }, signal }),
+    draw: choices,
+    empty: emptyState(
+      "An Allan deviation needs every reading, but all recordings hold only means. Import a recording with all readings.",
+    ),
+  });
   if (chosen.length) show();
   else setChildren(place, emptyState("Choose one recording or more."));
   return h(
     "div",
     { class: "page" },
     pageHeader("Noise at rest", "Allan deviations of the longest section at rest of each recording, in one picture."),
-    rows.length
-      ? card("Recordings", h("p", { class: "muted" }, `At most ${MOST} at once.`), list)
-      : emptyState(
-          "An Allan deviation needs every reading, but all recordings hold only means. Import a recording with all readings.",
-        ),
+    card("Recordings", h("p", { class: "muted" }, `At most ${MOST} at once.`), list.element),
     card("Allan deviation", place),
   );
 }
 
 /**
+ * A recording that the address of the page names; null for one that is not there, or holds no readings.
+ * @param {number} id
+ * @param {AbortSignal} signal
+ * @returns {Promise<Row | null>}
+ */
+async function rowOf(id, signal) {
+  try {
+    const path = { recording: id };
+    const found = await get("/api/recordings/{recording}", { path, query: { points: false }, signal });
+    return found.kind === "samples" ? { id, serial: found.serial } : null;
+  } catch (error) {
+    if (error instanceof Problem && error.status < 500) return null;
+    throw error;
+  }
+}
+
+/**
  * A recording with its Allan deviation, or with the reason why it has none.
- * @param {RecordingRow} row
+ * @param {Row} row
  * @param {AbortSignal} signal
  * @returns {Promise<Record>}
  */
@@ -153,7 +187,7 @@ function overlay(records) {
 
 /**
  * The lines of a data sheet: angle random walk falls with the root of the averaging time, bias stability is level.
- * @param {RecordingRow} row
+ * @param {Row} row
  * @param {Allan | null} found
  * @param {string} colour
  */

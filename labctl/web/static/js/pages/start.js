@@ -1,6 +1,6 @@
 // The start page: an overview, or, with an empty database, the ways to begin.
 
-import { get, post } from "../core/http/api.js";
+import { get, getPart, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { actButton, card, pageHeader } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
@@ -10,8 +10,9 @@ import { errorSparkline } from "../core/sparkline.js";
 import { isRunning } from "../campaigns/states.js";
 import { NEWEST, newsCard } from "../start/news_card.js";
 import { realGyroPicture } from "../start/real_gyro.js";
-import { DUE_WITHIN, dueNotice } from "../unit/due.js";
+import { DUE_SHOWN, DUE_WITHIN, dueNotice } from "../unit/due.js";
 
+/** @import { Part } from "../core/long_list.js" */
 /** @import { Unit } from "../../../types/api.js" */
 
 /** @import { PageContext } from "../../../types/pages.js" */
@@ -23,7 +24,7 @@ const SHOWN = 6;
 export async function page({ signal }) {
   const [units, due, campaigns, benches, schedule] = await Promise.all([
     get("/api/units", { query: { limit: SHOWN }, signal }),
-    get("/api/units", { query: { due_within: DUE_WITHIN }, signal }),
+    getPart("/api/units", { query: { due_within: DUE_WITHIN, limit: DUE_SHOWN }, signal }),
     get("/api/campaigns", { query: { limit: NEWEST }, signal }),
     get("/api/benches", { signal }),
     get("/api/schedule", { signal }),
@@ -108,7 +109,7 @@ async function openExplore(serial, recording, model, tour = null) {
 
 /**
  * @param {readonly Unit[]} units
- * @param {Parameters<typeof newsCard>[0] & { due: readonly Unit[] }} found
+ * @param {Parameters<typeof newsCard>[0] & { due: Part<Unit> }} found
  */
 function overview(units, found) {
   const { due, campaigns, benches } = found;

@@ -2,15 +2,18 @@
 
 import { post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { day, instant } from "../core/format.js";
+import { count, day, instant } from "../core/format.js";
 import { actButton, notice, toast } from "../core/components.js";
 import { navigate } from "../core/router.js";
 import { askBenchClear } from "../bench/actions.js";
 
+/** @import { Part } from "../core/long_list.js" */
 /** @import { Bench, Unit } from "../../../types/api.js" */
 
 /** How far ahead a unit that is due is shown; the service's own metric has the same. */
 export const DUE_WITHIN = "30d";
+/** Units that are listed, those first that were due first. */
+export const DUE_SHOWN = 10;
 
 /**
  * Enter the campaign that the version in force is from into the schedule: it begins as soon as the bench is free.
@@ -35,12 +38,13 @@ export function recalibrateButton(unit, benches) {
 }
 
 /**
- * A line for each unit that is due or overdue; null without one.
- * @param {readonly Unit[]} due
+ * A line for each of the first units that are due or overdue, and how many more there are; null without one.
+ * @param {Part<Unit>} due
  * @param {readonly Bench[]} benches
  */
-export function dueNotice(due, benches) {
+export function dueNotice({ rows: due, total }, benches) {
   if (!due.length) return null;
+  const more = total - due.length;
   return notice(
     due.some((unit) => unit.overdue) ? "bad" : "warn",
     h(
@@ -59,6 +63,14 @@ export function dueNotice(due, benches) {
           recalibrateButton(unit, benches),
         ),
       ),
+      more > 0
+        ? h(
+            "li",
+            {},
+            `${count(more)} more ${more === 1 ? "unit is" : "units are"} due or overdue. `,
+            h("a", { href: "/units?calibration=overdue" }, "All that are overdue"),
+          )
+        : null,
     ),
   );
 }
