@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import ARRAY
 
 RowT = TypeVar("RowT")
 KeyT = TypeVar("KeyT", str, int)
@@ -61,7 +62,11 @@ def parts_of(keys: Sequence[KeyT]) -> Iterator[Sequence[KeyT]]:
         yield keys[first : first + MAX_PARAMETERS]
 
 
-def padded(keys: Sequence[str]) -> list[str]:
-    """Return keys with the last one repeated until their number is a power of two: so few statements are prepared."""
-    repeats = (1 << (len(keys) - 1).bit_length()) - len(keys) if keys else 0
-    return list(keys) + list(keys[-1:]) * repeats
+def one_of(column: sa.ColumnElement[str], name: str, *, is_shared: bool) -> sa.ColumnElement[bool]:
+    """Return the condition that a column is one of the texts of the parameter `name`.
+
+    On a server (`is_shared`) they are one array, so the statement is the same, and planned once, for any number.
+    """
+    if is_shared:
+        return column == sa.any_(sa.bindparam(name, type_=ARRAY(sa.Text)))
+    return column.in_(sa.bindparam(name, expanding=True))

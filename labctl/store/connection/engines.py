@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 from urllib.parse import quote
 
@@ -83,16 +83,35 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float, rea
     transaction for longer than `idle_timeout_s`. A connection is tried before it is used, and one whose other end is
     gone is noticed within 20 s.
     """
-    advice = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
     limits = {"lock_timeout": lock_timeout_s, "idle_in_transaction_session_timeout": idle_timeout_s}
-    options = " ".join(f"-c {name}={round(1000 * limit_s)}" for name, limit_s in limits.items())
-    options += " -c jit=off"  # compiling a statement over many units takes 0.35 s, more than it saves
+    settings = {name: str(round(1000 * limit_s)) for name, limit_s in limits.items()}
+    return _server_engine(url, settings, read_only=read_only, pool_pre_ping=True, max_overflow=15)
+
+
+def lookup_engine(url: str, *, lock_timeout_s: float, read_only: bool = False) -> sa.Engine:
+    """Return an engine for statements that find a few rows by indexes, each a transaction of its own.
+
+    Such a statement is planned once for each connection, whatever its parameters are (PostgreSQL 15 documentation,
+    20.7.4): planning takes ten times as long as reading the rows. A connection is not tried before it is used.
+    """
+    settings = {"plan_cache_mode": "force_generic_plan", "lock_timeout": str(round(1000 * lock_timeout_s))}
+    options = {"isolation_level": "AUTOCOMMIT", "pool_reset_on_return": None, "max_overflow": 15}
+    return _server_engine(url, settings, read_only=read_only, prepare_threshold=0, **options)
+
+
+def _server_engine(
+    url: str, settings: Mapping[str, str], *, read_only: bool, prepare_threshold: int = 5, **options: Any
+) -> sa.Engine:
+    """Return an engine whose connections have these settings of the server; `options` are SQLAlchemy's."""
+    advice = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
+    whole = {**settings, "jit": "off"}  # compiling a statement over many units takes 0.35 s, more than it saves
     if read_only:
-        options += " -c default_transaction_read_only=on"
-    arguments = {**CONNECTION, "options": options}
+        whole["default_transaction_read_only"] = "on"
+    words = " ".join(f"-c {name}={value}" for name, value in whole.items())
+    arguments = {**CONNECTION, "options": words, "prepare_threshold": prepare_threshold}
     try:
         if sa.make_url(url).get_backend_name() == "postgresql":
-            return sa.create_engine(url, pool_pre_ping=True, max_overflow=15, connect_args=arguments)
+            return sa.create_engine(url, connect_args=arguments, **options)
     except (exc.ArgumentError, ValueError):  # ValueError: a port that is no number
         pass
     except ModuleNotFoundError as error:

@@ -15,7 +15,7 @@ from labctl.acting_user import acting_key
 from labctl.errors import NotFound
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
-from labctl.store.paging import Page, PageRequest, padded, parts_of, rows_to_read
+from labctl.store.paging import Page, PageRequest, one_of, parts_of, rows_to_read
 from labctl.store.records import CertificationRow, ServedCalibration, Unit, UnitHoldings, Withdrawal
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.records_by_name import record_of, records_of
@@ -257,11 +257,10 @@ def _served_in_force() -> sa.Select[*tuple[Any, ...]]:
     )
 
 
-def _served_together() -> sa.Select[*tuple[Any, ...]]:
+def _served_together(*, is_shared: bool) -> sa.Select[*tuple[Any, ...]]:
     of = sa.and_(_X.serial == _C.serial, _X.version == _C.version)
     inner = tables.certifications.alias()
-    some_of = inner.c.serial.in_(sa.bindparam("serials", expanding=True))
-    last = sa.select(sa.func.max(inner.c.id)).where(some_of).group_by(inner.c.serial)
+    last = sa.select(sa.func.max(inner.c.id)).where(one_of(inner.c.serial, "serials", is_shared=is_shared)).group_by(inner.c.serial)
     return (
         sa.select(_C.serial, _C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_ACT, *_CERTIFICATE)
         .select_from(_with_certificate(tables.calibrations.join(tables.certifications, of)))
@@ -284,7 +283,8 @@ def _served_version() -> sa.Select[*tuple[Any, ...]]:
 
 
 #: Built once: the queries behind every GET of a calibration.
-_IN_FORCE, _VERSION, _TOGETHER = _served_in_force(), _served_version(), _served_together()
+_IN_FORCE, _VERSION = _served_in_force(), _served_version()
+_TOGETHER = {is_shared: _served_together(is_shared=is_shared) for is_shared in (False, True)}
 
 
 class Certifications:
@@ -307,8 +307,7 @@ class Certifications:
 
         `serials` are as many as one statement takes (`MAX_PARAMETERS`).
         """
-        with self._database.reading() as connection:
-            rows = connection.execute(_TOGETHER, {"serials": padded(serials)}).all()
+        rows = self._database.look_up(_TOGETHER[self._database.is_shared], {"serials": list(serials)})
         return {row.serial: _served(row.serial, row) for row in rows}
 
     def in_force(self, serials: Sequence[str] | None = None) -> dict[str, CertificationRow]:
