@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import sqlalchemy as sa
-from sqlalchemy.dialects.postgresql import ARRAY
 
 RowT = TypeVar("RowT")
 KeyT = TypeVar("KeyT", str, int)
@@ -60,13 +59,3 @@ def parts_of(keys: Sequence[KeyT]) -> Iterator[Sequence[KeyT]]:
     """Yield keys in parts that fit into one statement: databases bound the number of its parameters."""
     for first in range(0, len(keys), MAX_PARAMETERS):
         yield keys[first : first + MAX_PARAMETERS]
-
-
-def one_of(column: sa.ColumnElement[str], name: str, *, is_shared: bool) -> sa.ColumnElement[bool]:
-    """Return the condition that a column is one of the texts of the parameter `name`.
-
-    On a server (`is_shared`) they are one array, so the statement is the same, and planned once, for any number.
-    """
-    if is_shared:
-        return column == sa.any_(sa.bindparam(name, type_=ARRAY(sa.Text)))
-    return column.in_(sa.bindparam(name, expanding=True))

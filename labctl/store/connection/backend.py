@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
+from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy import exc
@@ -22,8 +23,8 @@ class Backend:
         """Return the engine that writes and the engine that reads."""
         raise NotImplementedError
 
-    def lookup_engine(self) -> sa.Engine | None:
-        """Return an engine for reads of one statement without a transaction; None: they are read as all others are."""
+    def lookup_connection(self) -> dict[str, Any] | None:
+        """Return psycopg's arguments for a connection of lookups; None: they are read as all else is."""
         return None
 
     def before_opening(self, connection: sa.Connection) -> None:

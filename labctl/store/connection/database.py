@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol, TypeVar, TypeVarTuple
+from typing import Any, Protocol, TypeVar
 
 import sqlalchemy as sa
 from sqlalchemy import exc
@@ -16,6 +16,7 @@ from labctl.errors import DatabaseUnreachable, DiskFull, OldSchema, ReadOnly, St
 from labctl.store import migrate
 from labctl.store.connection.backend import Backend
 from labctl.store.connection.location import is_url, shown
+from labctl.store.connection.lookup import FileLookup, Lookup, ServerLookup
 from labctl.store.connection.postgresql_server import PostgresqlServer
 from labctl.store.connection.sqlite_file import SqliteFile
 from labctl.store.connection.sqlite_reader import SqliteReader
@@ -24,9 +25,7 @@ from labctl.store.connection.writer_turn import WriterTurn
 from labctl.store.manifests import chain
 from labctl.store.manifests.chain import ChainHead
 
-
 ResultT = TypeVar("ResultT")
-ColumnTs = TypeVarTuple("ColumnTs")
 
 #: A server that does not answer is asked again after so long, s.
 RETRY_S = 0.5
@@ -74,7 +73,6 @@ class Database:
         self.on_growth: Callable[[ChainHead], None] | None = None  #: called when manifests were added and committed
         self._backend = self._open_backend(address, as_it_is=as_it_is)
         self._engine, self._reader = self._backend.engines()
-        self._lookups = self._backend.lookup_engine()
         try:
             if not as_it_is:
                 self._refuse_old()
@@ -242,36 +240,29 @@ class Database:
         """Yield a connection to read with. Raises StoreError."""
         self._backend.refuse_other()  # a new connection would make an empty file, or read another one's rows
         try:
-            with self._backend.unchanged(), self.outlast(lambda: self._connected(self._reader)) as connection:
+            with self._backend.unchanged(), self.outlast(self._connect_reader) as connection:
                 yield connection
         except exc.DatabaseError as error:
             raise self._unread(error) from error
 
-    def look_up(self, statement: sa.Select[*ColumnTs], parameters: Mapping[str, object]) -> Sequence[sa.Row[*ColumnTs]]:
-        """Return the rows of one statement that only reads. Raises StoreError.
+    def lookup(self, statement: sa.Select[Any]) -> Lookup:
+        """Return the reads of one statement by keys (`lookup.KEYS`), for requests in an event loop.
 
-        A server is asked once there and back, without a transaction: one statement sees one state of the database. Its
-        plan is the same whatever the parameters are, so it has to be one that finds its rows by indexes.
+        It has to be a statement that finds its rows by indexes, whatever the keys are.
         """
-        if (engine := self._lookups) is None:
-            with self.reading() as connection:
-                return connection.execute(statement, parameters).all()
-        return self.outlast(lambda: self._looked_up(engine, statement, parameters))
+        connection = self._backend.lookup_connection()
+        if connection is None:
+            return FileLookup(self.reading, statement)
+        return ServerLookup(connection, statement, self._unread_by_driver, self._backend.patience_s)
 
-    def _looked_up(
-        self, engine: sa.Engine, statement: sa.Select[*ColumnTs], parameters: Mapping[str, object], *, again: bool = True
-    ) -> Sequence[sa.Row[*ColumnTs]]:
-        try:
-            with self._connected(engine) as connection:
-                return connection.execute(statement, parameters).all()
-        except exc.DatabaseError as error:
-            if again and error.connection_invalidated:  # it was open since the server was last asked, and is lost
-                return self._looked_up(engine, statement, parameters, again=False)
-            raise self._unread(error) from error
+    def _unread_by_driver(self, error: Exception) -> StoreError:
+        """Return what is raised in place of an error of psycopg."""
+        kind = exc.OperationalError if type(error).__name__ == "OperationalError" else exc.DatabaseError
+        return self._unread(kind("", None, error))
 
-    def _connected(self, engine: sa.Engine) -> sa.Connection:
+    def _connect_reader(self) -> sa.Connection:
         try:
-            return engine.connect()
+            return self._reader.connect()
         except exc.DatabaseError as error:
             raise self._unread(error) from error
         except exc.TimeoutError as error:
@@ -295,14 +286,9 @@ class Database:
         if self._turn.end(CLOSED_WITHIN_S):
             self._dispose()
         else:
-            self._dispose_readers()
+            self._reader.dispose()
 
     def _dispose(self) -> None:
-        self._dispose_readers()
+        self._reader.dispose()
         self._engine.dispose()
         self._backend.close()
-
-    def _dispose_readers(self) -> None:
-        self._reader.dispose()
-        if self._lookups is not None:
-            self._lookups.dispose()

@@ -83,35 +83,13 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float, rea
     transaction for longer than `idle_timeout_s`. A connection is tried before it is used, and one whose other end is
     gone is noticed within 20 s.
     """
+    advice = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
     limits = {"lock_timeout": lock_timeout_s, "idle_in_transaction_session_timeout": idle_timeout_s}
     settings = {name: str(round(1000 * limit_s)) for name, limit_s in limits.items()}
-    return _server_engine(url, settings, read_only=read_only, pool_pre_ping=True, max_overflow=15)
-
-
-def lookup_engine(url: str, *, lock_timeout_s: float, read_only: bool = False) -> sa.Engine:
-    """Return an engine for statements that find a few rows by indexes, each a transaction of its own.
-
-    Such a statement is planned once for each connection, whatever its parameters are (PostgreSQL 15 documentation,
-    20.7.4): planning takes ten times as long as reading the rows. A connection is not tried before it is used.
-    """
-    settings = {"plan_cache_mode": "force_generic_plan", "lock_timeout": str(round(1000 * lock_timeout_s))}
-    options = {"isolation_level": "AUTOCOMMIT", "pool_reset_on_return": None, "max_overflow": 15}
-    return _server_engine(url, settings, read_only=read_only, prepare_threshold=0, **options)
-
-
-def _server_engine(
-    url: str, settings: Mapping[str, str], *, read_only: bool, prepare_threshold: int = 5, **options: Any
-) -> sa.Engine:
-    """Return an engine whose connections have these settings of the server; `options` are SQLAlchemy's."""
-    advice = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
-    whole = {**settings, "jit": "off"}  # compiling a statement over many units takes 0.35 s, more than it saves
-    if read_only:
-        whole["default_transaction_read_only"] = "on"
-    words = " ".join(f"-c {name}={value}" for name, value in whole.items())
-    arguments = {**CONNECTION, "options": words, "prepare_threshold": prepare_threshold}
+    arguments = {**CONNECTION, "options": _options(settings, read_only=read_only)}
     try:
         if sa.make_url(url).get_backend_name() == "postgresql":
-            return sa.create_engine(url, connect_args=arguments, **options)
+            return sa.create_engine(url, pool_pre_ping=True, max_overflow=15, connect_args=arguments)
     except (exc.ArgumentError, ValueError):  # ValueError: a port that is no number
         pass
     except ModuleNotFoundError as error:
@@ -120,3 +98,24 @@ def _server_engine(
             f"`pip install 'labctl[postgresql]'`; {advice}"
         ) from error
     raise BadInput(f"--database {shown(url)}: this kind of database is not known; {advice}")
+
+
+def lookup_connection(url: str, *, lock_timeout_s: float, read_only: bool = False) -> dict[str, Any]:
+    """Return psycopg's arguments for a connection whose statements find a few rows by indexes.
+
+    Their plan is made once, for whatever parameters. Parts of the URL that are no argument are refused by the server's
+    client library, as they are by the engine.
+    """
+    address = sa.make_url(url)
+    settings = {"plan_cache_mode": "force_generic_plan", "lock_timeout": str(round(1000 * lock_timeout_s))}
+    named = {"host": address.host, "port": address.port, "user": address.username, "password": address.password}
+    given = {name: value for name, value in {**named, "dbname": address.database}.items() if value is not None}
+    return {**given, **address.query, **CONNECTION, "options": _options(settings, read_only=read_only)}
+
+
+def _options(settings: Mapping[str, str], *, read_only: bool) -> str:
+    """Return settings of the server as libpq takes them."""
+    whole = {**settings, "jit": "off"}  # compiling a statement over many units takes 0.35 s, more than it saves
+    if read_only:
+        whole["default_transaction_read_only"] = "on"
+    return " ".join(f"-c {name}={value}" for name, value in whole.items())

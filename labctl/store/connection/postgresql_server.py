@@ -9,11 +9,13 @@ PostgreSQL 15 documentation: 9.27.10 (advisory locks), 9.27.8 (pg_xact_status), 
 
 from __future__ import annotations
 
+from typing import Any
+
 import sqlalchemy as sa
 from sqlalchemy import exc
 
 from labctl.store.connection.backend import Backend
-from labctl.store.connection.engines import lookup_engine, server_engine
+from labctl.store.connection.engines import lookup_connection, server_engine
 
 #: "labctl" in ASCII: the lock that a writing transaction has.
 WRITER_KEY = int.from_bytes(b"labctl", "big")
@@ -51,9 +53,9 @@ class PostgresqlServer(Backend):
         reader = self._engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
         return self._engine, reader
 
-    def lookup_engine(self) -> sa.Engine:
-        """Return an engine whose statements are planned once: a statement by itself sees one state of the database."""
-        return lookup_engine(self._url, lock_timeout_s=LOCK_TIMEOUT_S, read_only=self._read_only)
+    def lookup_connection(self) -> dict[str, Any]:
+        """Return psycopg's arguments for a connection whose statements are planned once."""
+        return lookup_connection(self._url, lock_timeout_s=LOCK_TIMEOUT_S, read_only=self._read_only)
 
     def before_migration(self, connection: sa.Connection) -> None:
         """Wait for another process that migrates."""
