@@ -87,7 +87,7 @@ class ServerLookup:
         self._sql = str(compiled).encode()
         self._given = [None if name == KEYS else compiled.params[name] for name in compiled.positiontup or ()]
         columns = list(statement.selected_columns)
-        self._row = namedtuple("Row", [column.key for column in columns])  # type: ignore[misc]
+        self._row: Callable[..., Any] = namedtuple("Row", [column.key for column in columns])  # type: ignore[misc]
         self._processors = [column.type.result_processor(dialect, None) for column in columns]
         self._connection, self._unread, self._patience_s = connection, unread, patience_s
         self._is_away = False
