@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import json
 import sys
+import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -83,7 +84,7 @@ async def load(port: int, rate_per_s: float, seconds: float, units: int, seed: i
     for _ in range(CONNECTIONS):
         _, link = await loop.create_connection(lambda: Link(answered), "127.0.0.1", port)
         free.append(link)
-    begin_s, next_ = loop.time() + 0.2, 0
+    begin_s, next_, begun_s = loop.time() + 0.2, 0, time.process_time()
 
     def due() -> None:
         nonlocal next_
@@ -110,6 +111,7 @@ async def load(port: int, rate_per_s: float, seconds: float, units: int, seed: i
     return {
         "p50_ms": p50, "p99_ms": p99, "max_ms": most, "answered": float(answered_n),
         "answered_per_s": answered_n / (ended_s - begin_s), "late_share": late,
+        "processor_s": time.process_time() - begun_s,
     }  # fmt: skip
 
 

@@ -1,7 +1,8 @@
 """GET of a calibration in force by serial number: 1,000,000 units on PostgreSQL, two read-only processes, open loop.
 
 The load is that of `benchmarks.open_load`, in a process of its own. Generator, both processes of the service and the
-server share the cores of this machine, so the processor time of each request in the service stands beside the times.
+server share the cores of this machine, so the processor time of each request in each of the three stands beside the
+times.
 Smaller by LABCTL_BENCH_UNITS and LABCTL_BENCH_SECONDS; a database that was filled before is taken from
 LABCTL_BENCH_DATABASE.
 """
@@ -14,7 +15,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from benchmarks import many_units
 from benchmarks.machine import describe
@@ -55,11 +57,15 @@ def run() -> dict[str, float | str]:
             assert client.calibration(serial).calibration.serial == serial
         _load(service.port, RATES[0])  # warms up
         for rate in RATES:
-            before_s = _processor_s(service.web)
+            before_s = _processor_s(service.web), _processor_s(_backends())
             found = _load(service.port, rate)
-            spent_s = _processor_s(service.web) - before_s
+            spent_s = {
+                "service": _processor_s(service.web) - before_s[0],
+                "server": _processor_s(_backends()) - before_s[1],
+                "generator": found.pop("processor_s"),
+            }
             figures |= {f"at_{rate}_per_s_{name}": value for name, value in found.items()}
-            figures[f"at_{rate}_per_s_processor_ms"] = 1e3 * spent_s / found["answered"]
+            figures |= {f"at_{rate}_per_s_{name}_ms": 1e3 * s / found["answered"] for name, s in spent_s.items()}
         with open_store(url, write=False, read_only=True) as store:
             figures |= _lists(store)
     return {**describe("fastapi", "uvicorn", "uvloop", "psycopg", "sqlalchemy"), **figures}
@@ -71,8 +77,18 @@ def _load(port: int, rate: float) -> dict[str, float]:
     return found
 
 
+def _backends() -> tuple[int, ...]:
+    """Return the processes of PostgreSQL servers that answer labctl; each lasts as long as its connection."""
+    found = []
+    for each in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):
+            if each.read_text().startswith(f"postgres: {postgresql_cluster.USER}"):
+                found.append(int(each.parent.name))
+    return tuple(found)
+
+
 def _processor_s(processes: tuple[int, ...]) -> float:
-    fields = [open(f"/proc/{pid}/stat").read().rsplit(")", 1)[1].split() for pid in processes]  # noqa: PTH123, SIM115
+    fields = [Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split() for pid in processes]
     return sum(int(each[11]) + int(each[12]) for each in fields) / TICKS_PER_S
 
 

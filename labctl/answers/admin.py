@@ -30,8 +30,10 @@ class Role(StrEnum):
 
     def may(self, needed: Role) -> bool:
         """Return whether this role reaches as far as another."""
-        order = list(Role)
-        return order.index(self) >= order.index(needed)
+        return _RANKS[self] >= _RANKS[needed]
+
+
+_RANKS = {role: rank for rank, role in enumerate(Role)}
 
 
 @dataclass(frozen=True)

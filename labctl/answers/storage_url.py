@@ -15,6 +15,8 @@ URL = r"^[a-z][a-z0-9+.-]*://[^?#]+$"
 REFUSED = "storage_url"
 #: Schemes in which `container@account` names a place.
 _WITH_ACCOUNT = frozenset({"abfs", "abfss", "az"})
+#: Schemes whose files only the process that wrote them can read.
+_OF_ONE_PROCESS = frozenset({"data", "memory"})
 
 
 def refused_because(url: str) -> str:
@@ -31,6 +33,8 @@ def refused_because(url: str) -> str:
         )
     if not re.fullmatch(URL, url) or "::" in url or not place.strip("/"):
         return "it is not of the form scheme://place/folder"
+    if scheme in _OF_ONE_PROCESS:
+        return f"what is under {scheme}:// is in the memory of one process, and those that fit the units cannot read it"
     if scheme in {"file", "local"} and not place.startswith("/"):
         return "a path of this computer begins with a slash, as in file:///data/lab"
     return ""

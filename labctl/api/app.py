@@ -13,6 +13,7 @@ from starlette.routing import BaseRoute
 from labctl import web
 from labctl.api import problems
 from labctl.api.access_policy import DECLARES_KEY, AccessPolicy
+from labctl.api.calibration_answer import InForceMiddleware
 from labctl.api.compression import CompressionMiddleware
 from labctl.api.dependencies import ControlPool
 from labctl.api.descriptions import DescribedAPI
@@ -109,6 +110,7 @@ def create_app(service: LabService, access: AccessPolicy | None = None, keys: Ke
         lifespan=lifespan,
         docs_url=None,  # the framework's own pages load their scripts from outside
         redoc_url=None,
+        telemetry={"tracing": False, "metrics": False, "logs": False},  # labctl has its own: /metrics and the log
         form_limits={"max_files": MAX_FILES, "max_fields": MAX_FILES},
     )
     app.state.service = service
@@ -116,6 +118,7 @@ def create_app(service: LabService, access: AccessPolicy | None = None, keys: Ke
     app.router.routes.extend(api_routes())
     web.install(app)
     app.add_middleware(CompressionMiddleware)
+    app.add_middleware(InForceMiddleware, service=service)
     app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy(), keys=keys)
     app.state.request_figures = RequestFigures()
     app.add_middleware(RequestLogMiddleware, figures=app.state.request_figures)

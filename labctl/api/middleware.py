@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from urllib.parse import unquote
 
-from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -100,7 +100,7 @@ class AccessMiddleware:
         return caller
 
     async def _caller(self, scope: Scope) -> Caller:
-        headers = Headers(scope=scope)
+        headers = _headers_of(scope)
         if (authorization := headers.get("authorization")) is not None:
             if self._keys is not None and scope["method"] == "POST" and STOPS.fullmatch(scope["path"]):
                 return await self._keys.caller_of(authorization)
@@ -110,10 +110,10 @@ class AccessMiddleware:
                 "this service requires an API key: send `Authorization: Bearer KEY`; `labctl key create` makes one"
             )
         self._refuse_foreign(scope, headers)
-        claimed = unquote(headers.get(USER_HEADER, ""))[:100]
+        claimed = unquote(headers.get(USER_HEADER.lower(), ""))[:100]
         return Caller(claimed if claimed.isprintable() and claimed else "local", Role.APPROVER, "loopback")
 
-    def _refuse_foreign(self, scope: Scope, headers: Headers) -> None:
+    def _refuse_foreign(self, scope: Scope, headers: Mapping[str, str]) -> None:
         """Raise NotAllowed for a request that another site or machine sent through this one.
 
         Reading the API is refused to another site too: it cannot see the answer, but the service is kept busy.
@@ -154,8 +154,13 @@ def _name_of(host: str) -> str:
     return (name if colon and port.isdigit() else host).lower()
 
 
+def _headers_of(scope: Scope) -> dict[str, str]:
+    """Return the headers of a request by their names in small letters; of one that is sent twice, the first."""
+    return {name.decode("latin-1"): value.decode("latin-1") for name, value in reversed(scope["headers"])}
+
+
 def _declared(scope: Scope) -> int:
-    text = Headers(scope=scope).get("content-length", "0")
+    text = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"content-length"), "0")
     return int(text) if text.isascii() and text.isdigit() else 0
 
 

@@ -11,7 +11,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from instruments.clock import Clock, SystemClock
@@ -24,6 +23,7 @@ from labctl.log.repetition import RepetitionLimit
 log = get_logger()
 
 REQUEST_ID = "X-Request-ID"
+_REQUEST_ID = REQUEST_ID.lower().encode()
 #: Records in ten minutes: of requests that were done, and of those that were refused, by status.
 MAX_DONE, MAX_REFUSED = 300, 30
 LONGEST_PATH = 200
@@ -53,7 +53,8 @@ class RequestLogMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        number = new_request_id(Headers(scope=scope).get(REQUEST_ID, ""))
+        given = next((value for name, value in scope["headers"] if name == _REQUEST_ID), b"")
+        number = new_request_id(given.decode("latin-1"))
         begin_request(number)
         status, begun_s = 0, self._clock.now_s()
 
@@ -61,7 +62,7 @@ class RequestLogMiddleware:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                MutableHeaders(scope=message)[REQUEST_ID] = number
+                message["headers"] = [*message.get("headers", ()), (_REQUEST_ID, number.encode())]
             await send(message)
 
         try:
@@ -81,6 +82,8 @@ class RequestLogMiddleware:
             return
         if limit is not None and (before := limit.take_count(key)):
             fields["held_back"] = before
+        if not log.is_enabled_for(level):
+            return
         caller = scope.get("state", {}).get("caller")
         if caller is not None:
             fields = {"by": caller.name, "via": caller.via, **fields}

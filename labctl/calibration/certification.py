@@ -20,6 +20,7 @@ from labctl.canonical_json import canonical, with_own_hash
 State = Literal["in-force", "superseded", "revoked"]
 #: The member of a calibration file.
 CERTIFICATION = "certification"
+_DECODER = json.JSONDecoder()
 
 
 class CalibrationWarning(UserWarning):
@@ -127,13 +128,13 @@ def _inserted(content: bytes, known: Certification) -> tuple[bytes, str] | None:
 
 def _place_of(name: str, text: str) -> int | None:
     """Return where a new member of a canonical JSON object begins; None where it is there, or would be the last."""
-    decoder, place = json.JSONDecoder(), 1
+    place = 1
     try:
         while text[place] == '"':
-            member, end = decoder.raw_decode(text, place)
+            member, end = _DECODER.raw_decode(text, place)
             if member >= name:
                 return None if member == name else place
-            _, end = decoder.raw_decode(text, end + 1)
+            _, end = _DECODER.raw_decode(text, end + 1)
             place = end + 1
     except (ValueError, IndexError):
         pass

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import re
-import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
+from random import Random
 
 from structlog.contextvars import bind_contextvars, bound_contextvars, clear_contextvars, get_contextvars
 
 #: A number that a client gives its request is taken over if it is one word.
 _GIVEN = re.compile(r"[A-Za-z0-9._-]{1,64}")
+#: Numbers of requests: they name, and keep no secret, so the system is asked for randomness once for each process.
+_numbers = Random()  # noqa: S311
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_numbers.seed)
 
 
 def new_request_id(requested: str = "") -> str:
     """Return the number of a request: the one that it came with, else a new one."""
-    return requested if _GIVEN.fullmatch(requested) else secrets.token_hex(8)
+    return requested if _GIVEN.fullmatch(requested) else f"{_numbers.getrandbits(64):016x}"
 
 
 def request_id() -> str:

@@ -2,14 +2,13 @@
 answered by the next one.
 
 A statement begins after each request that it answers, so none gets what was true before it asked. One request alone
-waits for nothing; the more there are, the fewer statements, transactions and switches of threads each of them costs.
+waits for nothing; the more there are, the fewer statements each of them costs.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from itertools import islice
 from typing import Any, Generic, TypeVar
 
@@ -22,16 +21,11 @@ MAX_JOINED = 64
 class JointReads(Generic[KeyT, ValueT]):
     """Reads of one kind, for the requests of one event loop."""
 
-    def __init__(self, read: Callable[[Sequence[KeyT]], Mapping[KeyT, ValueT]]) -> None:
-        """`read` returns what it finds of some keys; it is called in a thread, once at a time."""
+    def __init__(self, read: Callable[[Sequence[KeyT]], Awaitable[Mapping[KeyT, ValueT]]]) -> None:
+        """`read` returns what it finds of some keys; it is called once at a time."""
         self._read = read
         self._waiting: dict[KeyT, asyncio.Future[ValueT | None]] = {}
         self._reading: asyncio.Task[None] | None = None
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="joint reads")
-
-    def close(self) -> None:
-        """End the thread; a statement that is under way is not waited for."""
-        self._thread.shutdown(wait=False, cancel_futures=True)
 
     async def get(self, key: KeyT) -> ValueT | None:
         """Return what is read of a key from now on, None where there is nothing. Raises what `read` raises."""
@@ -60,7 +54,7 @@ class JointReads(Generic[KeyT, ValueT]):
 
     async def _answer(self, joined: Mapping[KeyT, asyncio.Future[ValueT | None]]) -> None:
         try:
-            found = await asyncio.get_running_loop().run_in_executor(self._thread, self._read, list(joined))
+            found = await self._read(list(joined))
         except Exception as error:  # noqa: BLE001  it is raised in the requests
             for waiting in joined.values():
                 if not waiting.done():

@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -48,7 +49,7 @@ from labctl.services.recordings.staging import remove_abandoned
 from labctl.services.standards.register import count_by_state
 from labctl.services.sufficiency.answers import with_target
 from labctl.services.units import count_due
-from labctl.store import Store
+from labctl.store import Store, keys_by_digests, served_together
 from labctl.store.paging import Page, PageRequest
 from procedures.contracts.campaign_state import ENDED
 from procedures.execution.signals import shutdown_hook
@@ -94,8 +95,10 @@ class LabService:
         self.clock = clock
         self.acts_at = acts_at
         self.fetches = FetchLog(store)
-        self.in_force = JointReads(store.certifications.served_together)
-        self.keys = JointReads(store.keys.by_digests)
+        self._lookups = store.certifications.lookup(), store.keys.lookup()
+        in_force, keys = self._lookups
+        self.in_force = JointReads(partial(served_together, in_force))
+        self.keys = JointReads(partial(keys_by_digests, keys))
         self.bench_access: BenchAccess = access or LocalBench(store, clock, runner)
         self._executor = LocalExecutor(CommandContext(lambda: store, clock, self.bench_access.control))
         self._event_stream = CampaignEventStream(store, self.status, self.bench_access.listen)
@@ -166,8 +169,8 @@ class LabService:
             for background in self._backgrounds:
                 background.close()
             self.fetches.write()
-            self.in_force.close()
-            self.keys.close()
+            for lookup in self._lookups:
+                lookup.close()
             self.store.close()
 
     def execute(self, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:

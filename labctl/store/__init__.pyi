@@ -82,7 +82,7 @@ from labctl.store.repositories.fleet_reports import (
     FleetVersion as FleetVersion,
     TypeFigures as TypeFigures,
 )
-from labctl.store.repositories.keys import Keys as Keys
+from labctl.store.repositories.keys import Keys as Keys, keys_by_digests as keys_by_digests
 from labctl.store.repositories.leases import LeaseRow as LeaseRow, Leases as Leases
 from labctl.store.repositories.manifests import ManifestRow as ManifestRow, Manifests as Manifests
 from labctl.store.repositories.imports import ImportTicket as ImportTicket, Imports as Imports
@@ -124,7 +124,7 @@ from labctl.store.repositories.standards import (
     StandardRow as StandardRow,
     Standards as Standards,
 )
-from labctl.store.repositories.units import Units as Units
+from labctl.store.repositories.units import Units as Units, served_together as served_together
 from labctl.store.sealing.signers import (
     SEAL_KEY as SEAL_KEY,
     Signer as Signer,

@@ -78,9 +78,3 @@ def parts_of(keys: Sequence[KeyT]) -> Iterator[Sequence[KeyT]]:
     """Yield keys in parts that fit into one statement: databases bound the number of its parameters."""
     for first in range(0, len(keys), MAX_PARAMETERS):
         yield keys[first : first + MAX_PARAMETERS]
-
-
-def padded(keys: Sequence[str]) -> list[str]:
-    """Return keys with the last one repeated until their number is a power of two: so few statements are prepared."""
-    repeats = (1 << (len(keys) - 1).bit_length()) - len(keys) if keys else 0
-    return list(keys) + list(keys[-1:]) * repeats

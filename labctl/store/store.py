@@ -100,7 +100,7 @@ class Store:
     @property
     def is_shared(self) -> bool:
         """Whether several processes may write to the database at the same time, each with a bench of its own."""
-        return is_url(self.location)
+        return self._database.is_shared
 
     def reading_from(self, read_blocks: ReadBlocks) -> Store:
         """Return this store with the readings of recordings from elsewhere; it is open for as long as this one."""

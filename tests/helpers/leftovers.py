@@ -14,7 +14,7 @@ END_S = 10.0
 #: Threads of pools that a library keeps for the next call, by the beginning of their name.
 POOLS = (
     "AnyIO worker thread",  # of a service that several tests share: ends with its event loop
-    "joint reads",  # of such a service too: ends when the service is closed
+    "lookup",  # of such a service too: ends when the service is closed
 )
 
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Request, Response
-from starlette.background import BackgroundTask
-from starlette.concurrency import run_in_threadpool
 
-from labctl.answers.admin import Caller
 from labctl.answers.calibrations import (
     CalibrationRow,
     FitRequest,
@@ -27,14 +24,14 @@ from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.uncertainty import SurfaceResponse, UncertaintyResponse
 from labctl.answers.verification import VerificationResponse
 from labctl.answers.views import PictureResponse
+from labctl.api.calibration_answer import CalibrationAsked, calibration_answer
 from labctl.api.computation import execute, follow, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
 from labctl.fitting.effects import read_formulas
 from labctl.services.calibrations import fitting as services
-from labctl.services.calibrations.fetch_log import ANONYMOUS, fetched_by
+from labctl.services.calibrations.fetch_log import fetched_by
 from labctl.services.calibrations.revision import preview_unit
-from labctl.services.calibrations.served import calibration_file, own_file
 from labctl.services.calibrations.served import calibration_state as state_of
 from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
@@ -54,8 +51,6 @@ RecordingNumber = Annotated[
 RecordingNumbers = Annotated[
     list[int] | None, Query(description="Several recordings of the unit, used together; instead of `recording`.")
 ]
-#: Header of what an exported file does not carry.
-LOST = "X-Labctl-Lost"
 Formulas = Annotated[
     list[str] | None, Query(description="Your own effects to include in the comparison: 'name: expr'.")
 ]
@@ -87,27 +82,10 @@ async def calibration(
     recorded, by the name of the key.
     What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each.
     """
-    # JSON from a file is a point read of tens of microseconds: it runs in the event loop, without a switch to a thread
-    file = None
-    if format == "json" and not option and not service.store.is_shared:
-        file = calibration_file(service.store, serial, version, format)
-    elif format == "json" and not option and version is None:
-        served = await service.in_force.get(serial)
-        if served is not None and served.act is not None:
-            file = own_file(serial, served.act.version, served)
-    if file is None:  # it computes, or says why there is none
-        file = await run_in_threadpool(calibration_file, service.store, serial, version, format, option or [])
-    headers = file.headers(service.clock.utc())
-    is_known = if_none_match and f'"{file.etag}"' in if_none_match
-    response = Response(status_code=304) if is_known else Response(file.content, media_type=file.media_type)
-    response.headers.update(headers)
-    for loss in file.losses:
-        response.headers.append(LOST, loss.text)
-    caller: Caller = request.state.caller
-    who = caller.name if caller.via == "key" else ANONYMOUS
-    if request.method == "GET" and service.fetches.note(file.serial, file.version, who, service.clock.utc()):
-        response.background = BackgroundTask(service.fetches.write)
-    return response
+    asked = CalibrationAsked(
+        serial, request.method, request.state.caller, if_none_match, version, format, tuple(option or ())
+    )
+    return await calibration_answer(service, asked)
 
 
 @router.get("/calibration/state", summary="State of a calibration that was fetched")

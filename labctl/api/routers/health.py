@@ -22,13 +22,14 @@ def health(service: ServiceDep, request: Request) -> HealthResponse | PulseRespo
 
 
 @router.get("/health/heartbeat", summary="Whether the service answers")
-async def heartbeat(service: ServiceDep) -> HeartbeatResponse:
+async def heartbeat(service: ServiceDep, request: Request) -> HeartbeatResponse:
     """Whether the service answers: what every open page asks once a second.
 
     No key is asked for and no database is read. `heard_s`, where present: seconds since the last answer of the
-    bench process.
+    bench process. `acts_at` is there for callers who may read only: it is an address of the laboratory.
     """
-    return service.heartbeat()
+    answer = service.heartbeat()
+    return answer if request.state.caller is not None else answer.model_copy(update={"acts_at": None})
 
 
 @router.get("/metrics", summary="Metrics for monitoring", response_class=PlainTextResponse, dependencies=[DECLARES_KEY])

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.option_groups import with_options
 from labctl.cli.options import AcceptWarnings, Database, Json, Limit, names_in
 from labctl.cli.output import print_json
 
@@ -78,8 +80,36 @@ Again = Annotated[
 JobId = Annotated[int, typer.Argument(metavar="JOB", help="Number of the job.")]
 
 
+@dataclass(frozen=True)
+class JobOptions:
+    """The options of every job: which units, what computes, and where the readings are."""
+
+    type_: UnitType = ""
+    batch: Batch = ""
+    supplier: Supplier = ""
+    search: Search = ""
+    engine: EngineName = "local"
+    source: SourceUrl = ""
+    again: Again = False
+    as_json: Json = False
+    database: Database = None
+
+    def carry_out(self, kind: Literal["fit", "criticise"], **asked: Any) -> None:
+        """Begin a job and follow it to its end. Exits with status 1 where a unit failed, 2 for bad input."""
+        from labctl.answers.fleet import FleetJobRequest
+
+        with one_clear_line():
+            request = FleetJobRequest(
+                kind=kind, type=self.type_, batch=self.batch, supplier=self.supplier, search=self.search,
+                engine=self.engine, source=self.source, again=self.again, **asked,
+            )  # fmt: skip
+            _carry_out(self.database, request, as_json=self.as_json)
+
+
 @app.command()
+@with_options(JobOptions)
 def fit(
+    options: JobOptions,
     model: FitModel = "",
     effects: Annotated[
         str | None,
@@ -90,54 +120,21 @@ def fit(
             "polynomial order to 2.",
         ),
     ] = None,
-    type_: UnitType = "",
-    batch: Batch = "",
-    supplier: Supplier = "",
-    search: Search = "",
-    engine: EngineName = "local",
-    source: SourceUrl = "",
-    again: Again = False,
     accept_warnings: AcceptWarnings = False,
-    as_json: Json = False,
-    database: Database = None,
 ) -> None:
     """Fit a model to the newest recording of each unit; it becomes the unit's next version and is not put in force.
 
     Ctrl-C ends the job; what was written stays, and the same command goes on there. Exit status 1 where a unit could
     not be fitted.
     """
-    from labctl.answers.fleet import FleetJobRequest
-
-    with one_clear_line():
-        request = FleetJobRequest(
-            kind="fit", model=model, effects=names_in(effects), type=type_, batch=batch, supplier=supplier,
-            search=search, engine=engine, source=source, again=again, accept_warnings=accept_warnings,
-        )  # fmt: skip
-        _carry_out(database, request, as_json=as_json)
+    options.carry_out("fit", model=model, effects=names_in(effects), accept_warnings=accept_warnings)
 
 
 @app.command()
-def criticise(
-    model: NewestModel = "",
-    type_: UnitType = "",
-    batch: Batch = "",
-    supplier: Supplier = "",
-    search: Search = "",
-    engine: EngineName = "local",
-    source: SourceUrl = "",
-    again: Again = False,
-    as_json: Json = False,
-    database: Database = None,
-) -> None:
+@with_options(JobOptions)
+def criticise(options: JobOptions, model: NewestModel = "") -> None:
     """Compare the newest version of each unit with its newest recording; exit status 1 where a unit could not be."""
-    from labctl.answers.fleet import FleetJobRequest
-
-    with one_clear_line():
-        request = FleetJobRequest(
-            kind="criticise", model=model, type=type_, batch=batch, supplier=supplier, search=search, engine=engine,
-            source=source, again=again,
-        )  # fmt: skip
-        _carry_out(database, request, as_json=as_json)
+    options.carry_out("criticise", model=model)
 
 
 @app.command()

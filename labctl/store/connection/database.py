@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import sqlalchemy as sa
 from sqlalchemy import exc
@@ -14,98 +14,16 @@ from sqlalchemy.exc import DatabaseError
 from instruments.clock import Clock, WallClock
 from labctl.errors import DatabaseUnreachable, DiskFull, OldSchema, ReadOnly, StoreError
 from labctl.store import migrate
+from labctl.store.connection.backend import Backend
 from labctl.store.connection.location import is_url, shown
+from labctl.store.connection.lookup import FileLookup, Lookup, ServerLookup
 from labctl.store.connection.postgresql_server import PostgresqlServer
 from labctl.store.connection.sqlite_file import SqliteFile
-from labctl.store.connection.sqlite_reader import FileState, SqliteReader
+from labctl.store.connection.sqlite_reader import SqliteReader
 from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress
 from labctl.store.connection.writer_turn import WriterTurn
 from labctl.store.manifests import chain
 from labctl.store.manifests.chain import ChainHead
-
-
-class Backend(Protocol):
-    """The hooks of `Database`, in the order in which it calls them."""
-
-    patience_s: float  #: for how long a database that does not answer is asked again, s
-
-    def engines(self) -> tuple[sa.Engine, sa.Engine]:
-        """Return the engine that writes and the engine that reads."""
-        ...
-
-    def before_opening(self, connection: sa.Connection) -> None:
-        """Refuse a database that must not be written to. Raises StoreError."""
-        ...
-
-    def before_migration(self, connection: sa.Connection) -> None:
-        """Wait for another process that migrates. Raises DatabaseError."""
-        ...
-
-    def opened(self, engine: sa.Engine) -> None:
-        """Take note that the database is there, at its newest revision."""
-        ...
-
-    def refuse_other(self) -> None:
-        """Raise StoreError when the database is no longer the one that was opened."""
-        ...
-
-    def state_read(self) -> FileState | None:
-        """Return the state of the database that is read now; None where every reading sees one state anyway."""
-        ...
-
-    def refuse_changed(self, before: FileState | None) -> None:
-        """Raise StoreError when the database is no longer in the state that was read."""
-        ...
-
-    def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
-        """Prepare the writing connection for a transaction that has to outlive a power cut, or need not."""
-        ...
-
-    def begun(self, connection: sa.Connection, *, synced: bool) -> int:
-        """Begin a transaction; returns its number, 0 where it has none. Raises DatabaseError."""
-        ...
-
-    def before_commit(self, connection: sa.Connection, *, synced: bool) -> int:
-        """Return how many commits the database counts with this one, 0 where it counts none."""
-        ...
-
-    def committed(self, commits: int) -> None:
-        """Note the count that `before_commit` returned, once the transaction is committed."""
-        ...
-
-    @property
-    def anchor_fits(self) -> bool:
-        """Whether the chain of manifests goes on from what was noted outside the database."""
-        ...
-
-    def grown(self, head: ChainHead) -> None:
-        """Note the end of the chain of manifests, once the transaction that added to it is committed."""
-        ...
-
-    def is_unreachable(self, error: exc.DatabaseError) -> bool:
-        """Return whether an error says that the database cannot be reached, and nothing of the statement."""
-        ...
-
-    def is_disk_full(self, error: exc.DatabaseError) -> bool:
-        """Return whether an error says that there is no room."""
-        ...
-
-    def words_for(self, error: exc.DatabaseError) -> str:
-        """Return labctl's own message for an error; empty where the database's own message is enough."""
-        ...
-
-    def was_committed(self, number: int) -> bool:
-        """Return whether a transaction was committed whose commit was not answered. Raises DatabaseError."""
-        ...
-
-    def note_address(self, address: ServiceAddress) -> None:
-        """Write down at which address the service that holds this database is reached."""
-        ...
-
-    def close(self) -> None:
-        """Release the writer's lock. Safe to call twice."""
-        ...
-
 
 ResultT = TypeVar("ResultT")
 
@@ -175,6 +93,11 @@ class Database:
                 raise StoreError(f"{self.location}: there is no such file; name the database with --database")
             Database(self.location, write=True).close()
         return SqliteFile(self.location, address if self.writes else None)
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether it is on a server, where several processes may write to it."""
+        return is_url(self.location)
 
     @property
     def anchor_fits(self) -> bool:
@@ -316,13 +239,26 @@ class Database:
     def reading(self) -> Iterator[sa.Connection]:
         """Yield a connection to read with. Raises StoreError."""
         self._backend.refuse_other()  # a new connection would make an empty file, or read another one's rows
-        state = self._backend.state_read()
         try:
-            with self.outlast(self._connect_reader) as connection:
+            with self._backend.unchanged(), self.outlast(self._connect_reader) as connection:
                 yield connection
-            self._backend.refuse_changed(state)
         except exc.DatabaseError as error:
             raise self._unread(error) from error
+
+    def lookup(self, statement: sa.Select[Any]) -> Lookup:
+        """Return the reads of one statement by keys (`lookup.KEYS`), for requests in an event loop.
+
+        It has to be a statement that finds its rows by indexes, whatever the keys are.
+        """
+        connection = self._backend.lookup_connection()
+        if connection is None:
+            return FileLookup(self.reading, statement)
+        return ServerLookup(connection, statement, self._unread_by_driver, self._backend.patience_s)
+
+    def _unread_by_driver(self, error: Exception) -> StoreError:
+        """Return what is raised in place of an error of psycopg."""
+        kind = exc.OperationalError if type(error).__name__ == "OperationalError" else exc.DatabaseError
+        return self._unread(kind("", None, error))
 
     def _connect_reader(self) -> sa.Connection:
         try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 from urllib.parse import quote
 
@@ -85,11 +85,8 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float, rea
     """
     advice = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
     limits = {"lock_timeout": lock_timeout_s, "idle_in_transaction_session_timeout": idle_timeout_s}
-    options = " ".join(f"-c {name}={round(1000 * limit_s)}" for name, limit_s in limits.items())
-    options += " -c jit=off"  # compiling a statement over many units takes 0.35 s, more than it saves
-    if read_only:
-        options += " -c default_transaction_read_only=on"
-    arguments = {**CONNECTION, "options": options}
+    settings = {name: str(round(1000 * limit_s)) for name, limit_s in limits.items()}
+    arguments = {**CONNECTION, "options": _options(settings, read_only=read_only)}
     try:
         if sa.make_url(url).get_backend_name() == "postgresql":
             return sa.create_engine(url, pool_pre_ping=True, max_overflow=15, connect_args=arguments)
@@ -101,3 +98,24 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float, rea
             f"`pip install 'labctl[postgresql]'`; {advice}"
         ) from error
     raise BadInput(f"--database {shown(url)}: this kind of database is not known; {advice}")
+
+
+def lookup_connection(url: str, *, lock_timeout_s: float, read_only: bool = False) -> dict[str, Any]:
+    """Return psycopg's arguments for a connection whose statements find a few rows by indexes.
+
+    Their plan is made once, for whatever parameters. Parts of the URL that are no argument are refused by the server's
+    client library, as they are by the engine.
+    """
+    address = sa.make_url(url)
+    settings = {"plan_cache_mode": "force_generic_plan", "lock_timeout": str(round(1000 * lock_timeout_s))}
+    named = {"host": address.host, "port": address.port, "user": address.username, "password": address.password}
+    given = {name: value for name, value in {**named, "dbname": address.database}.items() if value is not None}
+    return {**given, **address.query, **CONNECTION, "options": _options(settings, read_only=read_only)}
+
+
+def _options(settings: Mapping[str, str], *, read_only: bool) -> str:
+    """Return settings of the server as libpq takes them."""
+    whole = {**settings, "jit": "off"}  # compiling a statement over many units takes 0.35 s, more than it saves
+    if read_only:
+        whole["default_transaction_read_only"] = "on"
+    return " ".join(f"-c {name}={value}" for name, value in whole.items())

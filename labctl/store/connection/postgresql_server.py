@@ -9,12 +9,13 @@ PostgreSQL 15 documentation: 9.27.10 (advisory locks), 9.27.8 (pg_xact_status), 
 
 from __future__ import annotations
 
+from typing import Any
+
 import sqlalchemy as sa
 from sqlalchemy import exc
 
-from labctl.store.connection.engines import server_engine
-from labctl.store.connection.writer_lock import ServiceAddress
-from labctl.store.manifests.chain import ChainHead
+from labctl.store.connection.backend import Backend
+from labctl.store.connection.engines import lookup_connection, server_engine
 
 #: "labctl" in ASCII: the lock that a writing transaction has.
 WRITER_KEY = int.from_bytes(b"labctl", "big")
@@ -36,12 +37,13 @@ _BEGIN = sa.text("SELECT pg_current_xact_id()::text FROM (SELECT pg_advisory_xac
 _STATUS = sa.text("SELECT pg_xact_status(CAST(:number AS xid8))")
 
 
-class PostgresqlServer:
+class PostgresqlServer(Backend):
     """The backend of a database by URL. No process holds it; with `write` an absent server is waited for longer."""
 
     def __init__(self, url: str, *, write: bool, read_only: bool = False) -> None:
         """With `read_only` the server refuses every change. Raises BadInput for a URL that is not known here."""
         self.patience_s = WRITER_PATIENCE_S if write else READER_PATIENCE_S
+        self._url, self._read_only = url, read_only
         self._engine = server_engine(
             url, lock_timeout_s=LOCK_TIMEOUT_S, idle_timeout_s=IDLE_TIMEOUT_S, read_only=read_only
         )
@@ -51,48 +53,19 @@ class PostgresqlServer:
         reader = self._engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
         return self._engine, reader
 
-    def before_opening(self, connection: sa.Connection) -> None:
-        """Do nothing: the server looks after its files."""
+    def lookup_connection(self) -> dict[str, Any]:
+        """Return psycopg's arguments for a connection whose statements are planned once."""
+        return lookup_connection(self._url, lock_timeout_s=LOCK_TIMEOUT_S, read_only=self._read_only)
 
     def before_migration(self, connection: sa.Connection) -> None:
         """Wait for another process that migrates."""
         self.begun(connection, synced=True)
-
-    def opened(self, engine: sa.Engine) -> None:
-        """Do nothing: other processes have it open too."""
-
-    def refuse_other(self) -> None:
-        """Do nothing: a connection is to one database."""
-
-    def state_read(self) -> None:
-        """Return None: a reader sees one state of the database."""
-
-    def refuse_changed(self, before: object) -> None:
-        """Do nothing."""
-
-    def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
-        """Do nothing: a transaction announces itself."""
 
     def begun(self, connection: sa.Connection, *, synced: bool) -> int:
         """Wait for the turn to write; returns the number of the transaction."""
         if not synced:
             connection.exec_driver_sql("SET LOCAL synchronous_commit = off")
         return int(connection.scalar(_BEGIN, {"key": WRITER_KEY}))
-
-    def before_commit(self, connection: sa.Connection, *, synced: bool) -> int:  # noqa: ARG002
-        """Return 0: no commits are counted."""
-        return 0
-
-    def committed(self, commits: int) -> None:
-        """Do nothing."""
-
-    @property
-    def anchor_fits(self) -> bool:
-        """Return True: nothing is noted outside."""
-        return True
-
-    def grown(self, head: ChainHead) -> None:
-        """Do nothing: a server has no folder beside it; `labctl check --anchor` takes a head that was noted down."""
 
     def is_unreachable(self, error: exc.DatabaseError) -> bool:
         """Return whether the connection is lost, or the server shuts down, starts, or is not there."""
@@ -123,12 +96,6 @@ class PostgresqlServer:
         with self._engine.connect() as connection:
             self.begun(connection, synced=True)
             return connection.scalar(_STATUS, {"number": str(number)}) == "committed"
-
-    def note_address(self, address: ServiceAddress) -> None:
-        """Do nothing: a service is found by the lease on its bench."""
-
-    def close(self) -> None:
-        """Do nothing: nothing is held beside the connections."""
 
 
 def _is_refusal(error: exc.DatabaseError) -> bool:

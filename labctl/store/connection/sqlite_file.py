@@ -19,7 +19,7 @@ from labctl.store.connection.anchor_file import anchor_fits, write_anchor
 from labctl.store.connection.commit_seal import count_commit, missing, seal
 from labctl.store.connection.engines import sqlite_engine
 from labctl.store.connection.private_files import close_to_others, make_private
-from labctl.store.connection.sqlite_errors import SqliteErrors
+from labctl.store.connection.sqlite_backend import SqliteBackend
 from labctl.store.connection.writer_lock import ServiceAddress, WriterLock
 from labctl.store.manifests.chain import ChainHead
 
@@ -100,10 +100,8 @@ def _damage(connection: sa.Connection, check: str) -> str:
     return "" if text == "ok" else " ".join(text.split())
 
 
-class SqliteFile(SqliteErrors):
+class SqliteFile(SqliteBackend):
     """The backend of a database by path. With `address` it is held for writing, by a process that is reached there."""
-
-    patience_s = 0.0  #: a file is there, or it is not
 
     def __init__(self, location: str, address: ServiceAddress | None) -> None:
         """Take the lock where it is held for writing. Raises Conflict, OSError, and StoreError for a lost file."""
@@ -139,9 +137,6 @@ class SqliteFile(SqliteErrors):
                 "`sqlite3 FILE .recover`"
             )
 
-    def before_migration(self, connection: sa.Connection) -> None:
-        """Do nothing: who holds the file is the only one."""
-
     def opened(self, engine: sa.Engine) -> None:
         """Remember the files; from now on others that take their place are not written to."""
         if self._lock is None:
@@ -169,12 +164,6 @@ class SqliteFile(SqliteErrors):
         if self._identity is not None and (text := self._identity.changed()):
             raise StoreError(f"{text}. Nothing was stored; try again", cause=text)
 
-    def state_read(self) -> None:
-        """Return None: a reader sees one state of the database."""
-
-    def refuse_changed(self, before: object) -> None:
-        """Do nothing."""
-
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
         """Make the next commits reach the disk before they return, or with a later one: the log is written in order."""
         if synced == self._synced:
@@ -185,10 +174,6 @@ class SqliteFile(SqliteErrors):
         finally:
             driver.close()
         self._synced = synced
-
-    def begun(self, connection: sa.Connection, *, synced: bool) -> int:  # noqa: ARG002
-        """Do nothing: the one writing connection began it with BEGIN IMMEDIATE."""
-        return 0
 
     def before_commit(self, connection: sa.Connection, *, synced: bool) -> int:
         """Count a synced commit, in the file that was opened and no other."""
@@ -204,10 +189,6 @@ class SqliteFile(SqliteErrors):
         """Note it in the anchor file, which is outside the database."""
         if self.anchor_fits:
             write_anchor(self._location, head)
-
-    def was_committed(self, number: int) -> bool:  # noqa: ARG002
-        """Return False: a commit that failed was not made."""
-        return False
 
     def note_address(self, address: ServiceAddress) -> None:
         """Write the address into the note beside the file."""

@@ -8,6 +8,8 @@ a file is compared before and after each reading: what was changed meanwhile is 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
@@ -16,9 +18,7 @@ import sqlalchemy as sa
 
 from labctl.errors import StoreError
 from labctl.store.connection.engines import sqlite_reading_engine
-from labctl.store.connection.sqlite_errors import SqliteErrors
-from labctl.store.connection.writer_lock import ServiceAddress
-from labctl.store.manifests.chain import ChainHead
+from labctl.store.connection.sqlite_backend import SqliteBackend
 
 
 class FileState(NamedTuple):
@@ -31,10 +31,8 @@ class FileState(NamedTuple):
     is_immutable: bool  #: whether SQLite is made to take the file for one that does not change
 
 
-class SqliteReader(SqliteErrors):
+class SqliteReader(SqliteBackend):
     """The backend of a database by path that is only read: no lock, no note and no file is made beside it."""
-
-    patience_s = 0.0  #: a file is there, or it is not
 
     def __init__(self, location: str) -> None:
         """Raise StoreError for a file that is not there."""
@@ -71,15 +69,6 @@ class SqliteReader(SqliteErrors):
         """Return the engine that reads, twice."""
         return self._engine, self._engine
 
-    def before_opening(self, connection: sa.Connection) -> None:
-        """Do nothing: a damaged file is not damaged further by reading it."""
-
-    def before_migration(self, connection: sa.Connection) -> None:
-        """Do nothing: nothing is migrated."""
-
-    def opened(self, engine: sa.Engine) -> None:
-        """Do nothing: nothing is written."""
-
     def refuse_other(self) -> None:
         """Open the file anew where another one has taken its place, or where its log has come or gone.
 
@@ -91,43 +80,10 @@ class SqliteReader(SqliteErrors):
             self._state = state
             self._engine.dispose()
 
-    def state_read(self) -> FileState:
-        """Return the state of the file now."""
-        return self._file_state()
-
-    def refuse_changed(self, before: FileState | None) -> None:
-        """Raise StoreError where a file that was taken for immutable has changed since."""
-        if before is not None and before.is_immutable and self._file_state()[:4] != before[:4]:
+    @contextmanager
+    def unchanged(self) -> Iterator[None]:
+        """Raise StoreError at the end of the block where a file that is taken for immutable has changed meanwhile."""
+        before = self._file_state()
+        yield
+        if before.is_immutable and self._file_state()[:4] != before[:4]:
             raise StoreError(f"{self._location}: the database was changed while it was read; ask again")
-
-    def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
-        """Do nothing: nothing is written."""
-
-    def begun(self, connection: sa.Connection, *, synced: bool) -> int:  # noqa: ARG002
-        """Do nothing."""
-        return 0
-
-    def before_commit(self, connection: sa.Connection, *, synced: bool) -> int:  # noqa: ARG002
-        """Do nothing."""
-        return 0
-
-    def committed(self, commits: int) -> None:
-        """Do nothing."""
-
-    @property
-    def anchor_fits(self) -> bool:
-        """Return True: nothing is added to the chain."""
-        return True
-
-    def grown(self, head: ChainHead) -> None:
-        """Do nothing."""
-
-    def was_committed(self, number: int) -> bool:  # noqa: ARG002
-        """Return False: nothing is committed."""
-        return False
-
-    def note_address(self, address: ServiceAddress) -> None:
-        """Do nothing: a reader does not hold the file."""
-
-    def close(self) -> None:
-        """Do nothing: no lock is held."""

@@ -9,9 +9,9 @@ import sqlalchemy as sa
 
 from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
+from labctl.store.connection.lookup import Lookup, one_of_keys
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import KEY
-from labctl.store.paging import padded
 from labctl.store.records import KeyRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.records_by_name import records_of
@@ -21,7 +21,7 @@ from labctl.store.sealing.seals import changing, seal
 _k = tables.api_keys.c
 _ALL = sa.select(_k.name, _k.role, _k.digest, _k.created_at, _k.revoked_at)
 #: Built once: the query behind every request that carries a key.
-_BY_DIGEST = _ALL.where(_k.digest.in_(sa.bindparam("digests", expanding=True)))
+_BY_DIGEST = {shared: _ALL.where(one_of_keys(_k.digest, is_shared=shared)) for shared in (False, True)}
 
 
 class Keys:
@@ -66,8 +66,12 @@ class Keys:
         with self._database.reading() as connection:
             return records_of(KeyRow, connection.execute(_ALL.order_by(_k.name)))
 
-    def by_digests(self, digests: Sequence[str]) -> dict[str, KeyRow]:
-        """Return digest -> key, in force or not, where there is one."""
-        with self._database.reading() as connection:
-            rows = records_of(KeyRow, connection.execute(_BY_DIGEST, {"digests": padded(digests)}))
-        return {row.digest: row for row in rows}
+    def lookup(self) -> Lookup:
+        """Return the reads of keys by their digests, for `keys_by_digests`."""
+        return self._database.lookup(_BY_DIGEST[self._database.is_shared])
+
+
+async def keys_by_digests(lookup: Lookup, digests: Sequence[str]) -> dict[str, KeyRow]:
+    """Return digest -> key, in force or not, where there is one. Raises StoreError."""
+    rows = await lookup.rows(digests)
+    return {row.digest: KeyRow(row.name, row.role, row.digest, row.created_at, row.revoked_at) for row in rows}

@@ -15,8 +15,9 @@ from labctl.acting_user import acting_key
 from labctl.errors import NotFound
 from labctl.natural_order import natural_key
 from labctl.store.connection.database import Database
+from labctl.store.connection.lookup import Lookup, one_of_keys
 from labctl.store.connection.transactions import transaction
-from labctl.store.paging import Page, PageRequest, padded, parts_of, rows_to_read
+from labctl.store.paging import Page, PageRequest, parts_of, rows_to_read
 from labctl.store.records import CertificationRow, ServedCalibration, Unit, UnitHoldings, Withdrawal
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.records_by_name import record_of, records_of
@@ -275,11 +276,14 @@ def _served_in_force() -> sa.Select[*tuple[Any, ...]]:
     )
 
 
-def _served_together() -> sa.Select[*tuple[Any, ...]]:
+def _served_together(*, is_shared: bool) -> sa.Select[*tuple[Any, ...]]:
     of = sa.and_(_X.serial == _C.serial, _X.version == _C.version)
     inner = tables.certifications.alias()
-    some_of = inner.c.serial.in_(sa.bindparam("serials", expanding=True))
-    last = sa.select(sa.func.max(inner.c.id)).where(some_of).group_by(inner.c.serial)
+    last = (
+        sa.select(sa.func.max(inner.c.id))
+        .where(one_of_keys(inner.c.serial, is_shared=is_shared))
+        .group_by(inner.c.serial)
+    )
     return (
         sa.select(_C.serial, _C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_ACT, *_CERTIFICATE)
         .select_from(_with_certificate(tables.calibrations.join(tables.certifications, of)))
@@ -302,7 +306,8 @@ def _served_version() -> sa.Select[*tuple[Any, ...]]:
 
 
 #: Built once: the queries behind every GET of a calibration.
-_IN_FORCE, _VERSION, _TOGETHER = _served_in_force(), _served_version(), _served_together()
+_IN_FORCE, _VERSION = _served_in_force(), _served_version()
+_TOGETHER = {is_shared: _served_together(is_shared=is_shared) for is_shared in (False, True)}
 
 
 class Certifications:
@@ -320,14 +325,9 @@ class Certifications:
                 row = connection.execute(_VERSION, {"serial": serial, "version": version}).first()
         return None if row is None else _served(serial, row)
 
-    def served_together(self, serials: Sequence[str]) -> dict[str, ServedCalibration]:
-        """Return serial number -> the version in force, with the newest act on it, where there is one: one query.
-
-        `serials` are as many as one statement takes (`MAX_PARAMETERS`).
-        """
-        with self._database.reading() as connection:
-            rows = connection.execute(_TOGETHER, {"serials": padded(serials)}).all()
-        return {row.serial: _served(row.serial, row) for row in rows}
+    def lookup(self) -> Lookup:
+        """Return the reads of versions in force by serial numbers, for `served_together`."""
+        return self._database.lookup(_TOGETHER[self._database.is_shared])
 
     def in_force(self, serials: Sequence[str] | None = None) -> dict[str, CertificationRow]:
         """Return serial number -> the act that put its version in force, for every unit that has a version in force.
@@ -369,6 +369,14 @@ class Certifications:
                 for some in parts_of(serials)
                 for row in connection.execute(query, {"serials": some})
             }
+
+
+async def served_together(lookup: Lookup, serials: Sequence[str]) -> dict[str, ServedCalibration]:
+    """Return serial number -> the version in force, with the newest act on it, where there is one: one statement.
+
+    `serials` are as many as one statement takes (`MAX_PARAMETERS`). Raises StoreError.
+    """
+    return {row.serial: _served(row.serial, row) for row in await lookup.rows(serials)}
 
 
 def _served(serial: str, row: sa.Row[*tuple[Any, ...]]) -> ServedCalibration:

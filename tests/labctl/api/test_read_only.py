@@ -20,7 +20,7 @@ from labctl.services.admin.api_keys import create_key
 from labctl.services.commands.registry import COMMANDS, FIT
 from labctl.services.commands.requests import ToUnit
 from labctl.services.lab_service import LabService
-from labctl.store import Store
+from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.openapi import operations
 from tests.helpers.service import add_recording, service_of
@@ -118,6 +118,17 @@ def test_what_is_read_equals_what_the_service_that_writes_answers(
     assert (health["status"], health["read_only"], health["acts_at"], health["replica"]) == ("ok", True, LAB, None)
     heartbeat = reader.get("/health/heartbeat").json()
     assert (heartbeat["read_only"], heartbeat["acts_at"]) == (True, LAB)
+
+
+def test_who_shows_no_key_does_not_learn_where_to_act(tmp_path: Path) -> None:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        key = create_key(store, KeyRequest(name="Vera", role=Role.VIEWER), SystemClock().utc()).key
+    with reader_of(tmp_path / "lab.sqlite", AccessPolicy(keys=True, read_only=ReadOnlyAccess(LAB))) as client:
+        said = [
+            client.get("/health/heartbeat", headers=sent).json() for sent in ({}, {"Authorization": f"Bearer {key}"})
+        ]
+        assert [(each["read_only"], each["acts_at"]) for each in said] == [(True, None), (True, LAB)]
+        assert "acts_at" not in client.get("/health").json()
 
 
 def test_a_fetch_is_answered_and_leaves_no_row(client: TestClient, reader: TestClient, serial: str) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import httpx
 import pytest
+import sqlalchemy as sa
 from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock
@@ -23,7 +25,7 @@ from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.served import calibration_file
 from labctl.services.certificates.issue import issue, withdraw
 from labctl.services.lab_service import LabService
-from labctl.store import Store, open_store
+from labctl.store import ServedCalibration, Store, open_store, served_together
 from labctl.store.connection.database import Database
 from studies.postgresql_cluster import Cluster
 from tests.helpers.certificates import ORDER, SERIAL, add_version
@@ -110,9 +112,44 @@ def test_a_key_that_was_revoked_elsewhere_is_refused_at_once(elsewhere: Store) -
         assert guarded.get(ADDRESS, headers=sent).status_code == 401
 
 
+def test_a_connection_that_the_server_ended_costs_no_request(client: TestClient, elsewhere: Store) -> None:
+    expected = client.get(ADDRESS).raise_for_status().content
+    end = "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE query LIKE '%%calibrations.document%%'"
+    engine = sa.create_engine(elsewhere.location)
+    with engine.connect() as connection:
+        assert connection.exec_driver_sql(f"{end} AND pid <> pg_backend_pid()").scalar_one() >= 1
+    engine.dispose()
+    assert client.get(ADDRESS).content == expected
+
+
+def test_the_short_way_and_the_described_route_answer_the_same(client: TestClient) -> None:
+    short, described = client.get(ADDRESS), client.get(f"{ADDRESS}?format=json")
+    assert short.content == described.content
+    known = {"If-None-Match": short.headers["etag"]}
+    for method, headers in (("GET", {}), ("HEAD", {}), ("GET", known)):
+        answers = [client.request(method, f"{ADDRESS}{query}", headers=headers) for query in ("", "?format=json")]
+        ours, theirs = ({**answer.headers, "x-request-id": ""} for answer in answers)
+        assert (ours, answers[0].status_code) == (theirs, answers[1].status_code)
+    refusals = [client.get(f"/api/units/absent/calibration{query}").json() for query in ("", "?format=json")]
+    assert refusals[0] == refusals[1]
+
+
 def test_units_read_together_are_as_read_one_by_one(elsewhere: Store) -> None:
-    certifications = elsewhere.certifications
-    assert certifications.served_together([SERIAL, "absent", SERIAL]) == {SERIAL: certifications.served(SERIAL, None)}
-    assert certifications.served_together([]) == {}
+    def together(*serials: str) -> dict[str, ServedCalibration]:
+        lookup = elsewhere.certifications.lookup()
+        try:
+            return asyncio.run(served_together(lookup, serials))
+        finally:
+            lookup.close()
+
+    one = elsewhere.certifications.served(SERIAL, None)
+    odd = ('quo"te', "back\\slash", "{brace", "", "\ud800")
+    assert together(SERIAL, "absent", SERIAL, *odd) == {SERIAL: one}
+    number = issue(elsewhere, SERIAL, 1, CertificateRequest(by="Ida", order=ORDER), NOW()).number
+    withdraw(elsewhere, WithdrawRequest(number=number, by="Ida", reason="wrong address"), NOW())
+    withdrawn = together(SERIAL)
+    assert withdrawn == {SERIAL: elsewhere.certifications.served(SERIAL, None)}
+    assert withdrawn[SERIAL].withdrawal is not None
+    assert together() == {}
     revoke(elsewhere, SERIAL, 1, RevokeRequest(by="Rita", reason="was dropped"), NOW())
-    assert certifications.served_together([SERIAL]) == {}
+    assert together(SERIAL) == {}

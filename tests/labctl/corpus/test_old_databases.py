@@ -10,6 +10,7 @@ import signal
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from pyarrow import parquet
 from labctl.recording.recording import Recording
 from labctl.services.admin.api_keys import identify
 from labctl.services.joint_reads import JointReads
-from labctl.store import migrate, open_store
+from labctl.store import keys_by_digests, migrate, open_store
 from tests.helpers.corpus import ENTRIES, SAME, SERIAL, Entry, migrated, wrongly_named
 from tests.helpers.lab import Lab
 from tests.helpers.shared_criticisms import criticised_once
@@ -257,5 +258,8 @@ def test_it_verifies_the_calibration_as_it_did(labs: Callable[[Entry], Lab], ent
 @pytest.mark.parametrize("entry", [entry for entry in ENTRIES if "key" in entry.answers], ids=lambda each: each.name)
 def test_its_api_key_is_still_known(labs: Callable[[Entry], Lab], entry: Entry) -> None:
     with open_store(str(labs(entry).database), write=False) as store:
-        caller = asyncio.run(identify(JointReads(store.keys.by_digests), f"Bearer {entry.answers['key']}"))
+        lookup = store.keys.lookup()
+        keys = JointReads(partial(keys_by_digests, lookup))
+        caller = asyncio.run(identify(keys, f"Bearer {entry.answers['key']}"))
+        lookup.close()
     assert (caller.name, caller.role.value) == ("ada", "approver")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Coroutine, Iterator, Sequence
-from contextlib import ExitStack, closing
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from typing import Any
 
 import pytest
@@ -14,7 +13,7 @@ from labctl.errors import StoreError
 from labctl.services.joint_reads import MAX_JOINED, JointReads
 
 InLoop = Callable[[Coroutine[Any, Any, Any]], Any]
-Open = Callable[[Callable[[Sequence[str]], dict[str, int]]], JointReads[str, int]]
+Open = Callable[[Callable[[Sequence[str]], Awaitable[dict[str, int]]]], JointReads[str, int]]
 
 
 class Source:
@@ -25,11 +24,11 @@ class Source:
         self.asked: list[list[str]] = []
         self.begun, self.go = threading.Event(), threading.Event()
 
-    def read(self, keys: Sequence[str]) -> dict[str, int]:
+    async def read(self, keys: Sequence[str]) -> dict[str, int]:
         self.asked.append(list(keys))
         found = {key: self.values[key] for key in keys if key in self.values}
         self.begun.set()
-        assert self.go.wait(30)
+        assert await asyncio.to_thread(self.go.wait, 30)
         return found
 
 
@@ -39,10 +38,9 @@ def source() -> Source:
 
 
 @pytest.fixture
-def open_reads() -> Iterator[Open]:
-    """Return what makes joint reads, which are closed at the end of the test."""
-    with ExitStack() as opened:
-        yield lambda read: opened.enter_context(closing(JointReads(read)))
+def open_reads() -> Open:
+    """Return what makes joint reads."""
+    return JointReads
 
 
 async def begun(source: Source) -> None:
@@ -83,10 +81,10 @@ def test_an_error_reaches_every_request_and_the_next_statement_is_tried(
     source.go.set()
     fails = [True]
 
-    def read(keys: Sequence[str]) -> dict[str, int]:
+    async def read(keys: Sequence[str]) -> dict[str, int]:
         if fails[0]:
             raise StoreError("away; try again")
-        return source.read(keys)
+        return await source.read(keys)
 
     async def ask() -> list[object]:
         reads = open_reads(read)

@@ -106,11 +106,10 @@ def test_a_newer_copy_in_its_place_is_read(at_rest: Path, tmp_path: Path) -> Non
 
 def test_what_changes_while_it_is_read_is_not_believed(at_rest: Path) -> None:
     reader = SqliteReader(str(at_rest))
-    state = reader.state_read()
-    reader.refuse_changed(state)
-    os.utime(at_rest, ns=(0, 0))
-    with pytest.raises(StoreError, match="was changed while it was read; ask again"):
-        reader.refuse_changed(state)
+    with reader.unchanged():
+        pass
+    with pytest.raises(StoreError, match="was changed while it was read; ask again"), reader.unchanged():
+        os.utime(at_rest, ns=(0, 0))
 
 
 def test_the_server_refuses_what_labctl_would_not(url: str) -> None:

@@ -2,6 +2,7 @@
 // State of the document: data-stale="yes" once nothing was heard for STALE_MS, "paused" while the tab was hidden.
 
 import { h, setChildren } from "../elements.js";
+import { accessKey, get } from "../http/api.js";
 import { reportStop } from "../stop/overlay.js";
 import { setAlarm } from "../tab_mark.js";
 import { freshnessWords, readOnlyWords, stalenessOf } from "./state.js";
@@ -26,6 +27,10 @@ let answered = null;
 let [asking, askedAt, paused, trouble, notStopped] = [false, -ASK_MS, false, "", false];
 /** @type {Staleness | null} */
 let state = null;
+/** @type {string | null} */
+let actsAt = null;
+/** @type {string | null} */
+let askedWith = null;
 /** @type {{ text: HTMLElement, announcement: HTMLElement, reading: HTMLElement } | null} */
 let line = null;
 
@@ -71,10 +76,22 @@ function known() {
 function showReadOnly(answer) {
   document.documentElement.toggleAttribute("data-read-only", Boolean(answer.read_only));
   const words = readOnlyWords(answer);
-  if (!line || line.reading.dataset.words === words) return;
-  line.reading.dataset.words = words;
-  const there = words && answer.acts_at ? h("a", { href: answer.acts_at }, answer.acts_at) : null;
+  if (answer.read_only && !answer.acts_at) learnAddress();
+  const address = answer.acts_at ?? actsAt;
+  const shown = `${words} ${address ?? ""}`;
+  if (!line || line.reading.dataset.words === shown) return;
+  line.reading.dataset.words = shown;
+  const there = words && address ? h("a", { href: address }, address) : null;
   setChildren(line.reading, words, there ? [" To change something: ", there, "."] : null);
+}
+
+/** Ask once with each key where to act: the sign of life does not say it to those who show no key. */
+async function learnAddress() {
+  const key = accessKey();
+  if (!key || key === askedWith) return;
+  askedWith = key;
+  const answer = await get("/health").catch(() => null);
+  if (answer && "acts_at" in answer) actsAt = answer.acts_at ?? null;
 }
 
 /** The service answers, but not with what this page shows: stale, until it is called with nothing. */
