@@ -201,14 +201,15 @@ def _named_alone(
     for j, rival in enumerate(question.candidates):
         if question.nodes[j] == question.nodes[h]:
             continue
-        if log_bf[j] > log_bf[h] - LEAD:
-            return None
         if log_bf[j] <= 0 or size <= 0:
             continue
         parts = [axes[axis].reproduced(each, rival.id, outcomes[axis], k) for axis, each in fitted.items() if each]
         share, directions = sum(part for part, _ in parts) / size, sum(more for _, more in parts)
-        if share > ALIKE and directions <= 0 and not are_exact(leader, rival):
-            return None
-        if log_bf[j] > log_bf[h] - FAR and (1.0 - share) * size < INDISTINGUISHABLE_CHI2:
+        contained = (1.0 - share) * size < INDISTINGUISHABLE_CHI2
+        same = share > ALIKE and directions <= 0 and not are_exact(leader, rival)
+        if not (log_bf[j] > log_bf[h] - LEAD or same or (log_bf[j] > log_bf[h] - FAR and contained)):
+            continue
+        further = (axes[axis].further_nats(each, rival.id, outcomes[axis], k) for axis, each in fitted.items() if each)
+        if directions <= 0 or not contained or sum(further) < LEAD:
             return None
     return int(question.nodes[h])

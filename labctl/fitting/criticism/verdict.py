@@ -15,6 +15,7 @@ import numpy as np
 from labctl.answers.criticism import Remainder
 from labctl.answers.fitted_model import Coefficient
 from labctl.fitting.criticism.channel_functions import TIMES
+from labctl.fitting.criticism.evidence.further_coefficients import further_nats
 from labctl.fitting.criticism.evidence.gains import reproduced_and_size, solve_option
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate, are_exact
@@ -197,7 +198,30 @@ def _alike(comparison: Comparison, leader: Candidate, *, physical: bool) -> list
             rival.log_bf > leader.log_bf - LEAD
             or (rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival))
         )
+        and not _is_wider_in_vain(comparison, leader, rival)
     ]
+
+
+def _is_wider_in_vain(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
+    """Return whether a rival is the leader with more coefficients, which are known to be next to nothing.
+
+    By the same odds as any other: `LEAD`. A rival with more evidence than the leader is not refuted by them.
+    """
+    if rival.log_bf > leader.log_bf or _directions(comparison, rival) <= _directions(comparison, leader):
+        return False
+    if (1.0 - overlap(comparison, leader, rival)) * leader.gain >= INDISTINGUISHABLE_CHI2:
+        return False
+    nats = (_further_nats(comparison, axis, i, rival.option[axis]) for axis, i in leader.option.items())
+    return sum(nats) >= LEAD
+
+
+def _further_nats(comparison: Comparison, axis: str, simple: int, wider: int) -> float:
+    """Return the evidence on an axis against the further coefficients of a wider option, nats."""
+    eliminated, slices = comparison.axes[axis].best, comparison.axes[axis].slices
+    values, covariance = solve_option(eliminated, slices[wider])
+    through = covariance @ eliminated.gram[slices[wider], slices[simple]]
+    size = np.sqrt(np.mean(comparison.designs[axis].options[wider].rows[0] ** 2, axis=0))
+    return further_nats(values, covariance, through, solve_option(eliminated, slices[simple])[0], size)
 
 
 def axes_of(comparison: Comparison, candidate: Candidate) -> tuple[str, ...]:
