@@ -160,9 +160,9 @@ def standard(unit: Unit) -> Known:
 
 
 def followed(known: Known, policy: Policy) -> Known:
-    """Return what is known after a policy was followed while the verdict is ambiguous."""
+    """Return what is known after a policy was followed while the verdict leaves something open."""
     rng = np.random.default_rng([known.unit.seed, 7])
-    while known.found.verdict.form == "ambiguous" and known.rounds < MAX_ROUNDS:
+    while _is_open(known.found) and known.rounds < MAX_ROUNDS:
         chosen = policy(known, rng)
         if chosen is None:
             break
@@ -172,6 +172,11 @@ def followed(known: Known, policy: Policy) -> Known:
             known.done.append(f"refused: {error}")
             break
     return known
+
+
+def _is_open(found: Criticism) -> bool:
+    """Return whether a diagnosis goes on: one of several effects is missing, or one may be."""
+    return found.verdict.form == "ambiguous" or open_question(found) is not None
 
 
 def outcome(known: Known, policy: str) -> Outcome:

@@ -11,7 +11,7 @@ from labctl.answers.criticism import CriticismResponse, Experiment
 from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.verification import VerificationResponse
 from labctl.errors import BadInput, LabctlError
-from labctl.fitting.criticism import Criticism, criticise, fit_means
+from labctl.fitting.criticism import Criticism, criticise, fit_means, open_question
 from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.inversion import NotConverged
@@ -97,7 +97,7 @@ def evaluate(
 
 
 def _experiments(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism) -> list[Experiment]:
-    if not criticism.verdict.indistinguishable:
+    if open_question(criticism) is None:
         return []
     report_stage("checking experiments")
     from labctl.services.criticism.next_experiment import experiments_for  # noqa: PLC0415  it loads the drivers

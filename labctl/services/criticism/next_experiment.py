@@ -155,7 +155,7 @@ def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
 def _described(foreseen: Foreseen, question: OpenQuestion, recipe: Recipe, of: int) -> Experiment:
     document = recipe_document(foreseen.plan.recipe) | {"name": f"{recipe.name}-next"}
     expected = foreseen.forecast
-    leader = question.ids[0]
+    leader = question.effects[0]
     return {
         "separates": [leader, *(name for name in expected.distinguished if name != leader)],
         "do": foreseen.text,
@@ -181,11 +181,11 @@ _ORDER = {True: "the probability per hour that one cause is then named alone", F
 
 def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     """Return the sentence that explains a choice."""
-    expected, leader = foreseen.forecast, question.ids[0]
+    expected, leader = foreseen.forecast, question.effects[0]
     told = [name for name in expected.distinguished if name != leader]
     first = (
         f"{foreseen.hours:.1f} h on the bench are expected to give {expected.information_bit:.2f} of the "
-        f"{question.entropy_bit:.2f} bit that are missing to know which of {len(question.ids)} effects it is: "
+        f"{question.entropy_bit:.2f} bit that are missing to know {_asked(question)}: "
         f"{foreseen.bit_per_h:.2g} bit/h with set-up and a person's time"
     )
     order = _ORDER[foreseen.rank[0] > 0]
@@ -193,6 +193,14 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
     pair = f"; if it is {leader}, this distinguishes it from {listed}" if told else ""
     return f"{first}{rank}{pair}; the probability that one cause is then named alone is {expected.names_one:.2f}."
+
+
+def _asked(question: OpenQuestion) -> str:
+    """Return what is to be known, in words."""
+    effects = question.effects
+    if len(effects) == len(question.ids):
+        return f"which of {len(effects)} effects it is"
+    return f"whether {effects[0]} is missing" if len(effects) == 1 else f"whether one of {len(effects)} effects is"
 
 
 def _recipe_of(
