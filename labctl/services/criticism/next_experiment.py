@@ -12,6 +12,7 @@ from instruments.bench_config import BenchFile
 from labctl.answers.criticism import Experiment
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import Criticism, Forecast, OpenQuestion, forecast, open_question, reduce_recording
+from labctl.fitting.criticism.planned_addition import may_be_joined
 from labctl.services.planning.attendance import visits_s
 from labctl.services.planning.loading import bench_for, limits_of, load_bench
 from labctl.services.simulation.walks import walked
@@ -112,7 +113,8 @@ def ranked_experiments(
     foreseen, known = [], [_what(each) for each in done]
     for each in plans_of(recipe, bench):
         plan = each.plan
-        if _what(plan.recipe) in known:
+        motion = "profile" if plan.recipe.profiles else "rates"
+        if _what(plan.recipe) in known or not may_be_joined(question.comparison.data.info.motion, motion):
             continue
         try:
             expected = forecast(question, reduce_recording(walked(plan, bench), outliers=False))
@@ -137,13 +139,15 @@ def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
 
     An experiment looks for an effect, so it does not end where U of a model without that effect is small enough.
     """
-    limits, recipe = limits_of(bench), recipe.model_copy(update={"stop": None})
+    limits, recipe = limits_of(bench, driven=True), recipe.model_copy(update={"stop": None})
     for block in all_blocks():
         try:
             changed = block.changed(recipe)
             if changed is None:
                 continue
             plan = make_plan(changed, limits, clip=True)
+            if changed.profiles and not plan.recipe.profiles:
+                continue
             yield Planned(block, plan, block.text)
             if plan.expected_s < 3600 * LONGEST_TO_REPEAT_H:
                 longer = plan.recipe.model_copy(update={"repeats": LONGER * plan.recipe.repeats})
