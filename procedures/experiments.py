@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -74,6 +75,8 @@ NEAR_REST = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 CYCLE_DEG, LONGEST_S = 1.8, 600.0
 #: What a tilted fixture brings up in an experiment: all three axes turn at 1/sqrt(3) of the table's rate.
 DIAGONAL = "x+y+z"
+#: Fewer rates than these have no shape between which others would lie.
+MIN_RATES = 5
 #: Shares of the largest rate that are close to each other in its top third.
 TOP = (0.3, 0.5, *np.arange(0.66, 1.001, 0.04).tolist())
 
@@ -279,6 +282,15 @@ def _top(recipe: Recipe) -> Changes:
     return _of_shares(recipe, TOP)
 
 
+def _between(recipe: Recipe) -> Changes:
+    """Rates half-way between those of the recipe: what the error does there was not measured."""
+    rates = sorted({*recipe.rates_dps})
+    if len(rates) < MIN_RATES:
+        return None
+    halfway = [float(f"{(low + high) / 2:.6g}") for low, high in pairwise(rates)]
+    return {"temperatures_c": spread_c(recipe, SEVERAL_C), "rates_dps": halfway, **_short(recipe)}
+
+
 def _near_rest(recipe: Recipe) -> Changes:
     """Rates that turn the table by whole cycles of its motor in a data set: of a part of one, the mean rate is wrong.
 
@@ -333,6 +345,7 @@ BLOCKS: tuple[Block, ...] = (
     Block("slow_ramp", "a few rates while the temperature rises and falls slowly", _ramp(rates=few_rates, slow=True)),
     Block("first_again", "the lowest temperature, the highest, and the lowest again, at a few rates", _first_again),
     Block("top_rates", "more rates in the top third, at one temperature", _top),
+    Block("between_rates", "rates half-way between those of the recipe, at a few temperatures", _between),
     Block("near_rest", "small rates of both signs, at one temperature", _near_rest),
     Block(
         "sine", "sines of the rate from 0.2 Hz up, as fast as the table follows, at one temperature", _sine,
