@@ -20,7 +20,7 @@ from scipy.special import logsumexp
 from labctl.fitting.criticism.criticism import Criticism
 from labctl.fitting.criticism.joint_evidence import AxisForecast, Outcomes, forecast_axis
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
-from labctl.fitting.criticism.planned_addition import with_planned
+from labctl.fitting.criticism.planned_addition import may_be_joined, with_planned
 from labctl.fitting.criticism.ranking import Candidate, are_exact
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.verdict import ALIKE, ENOUGH, FAR, INDISTINGUISHABLE_CHI2, LEAD, refines_base
@@ -63,6 +63,10 @@ class OpenQuestion:
     def effects(self) -> tuple[str, ...]:
         """The ids of the effects that may be missing, likeliest first."""
         return tuple(name for name in self.ids if name != NOTHING)
+
+    def may_join(self, motion: str) -> bool:
+        """Return whether a recording of a motion can be fitted together with those that were criticised."""
+        return may_be_joined(self.comparison.data.info.motion, motion)
 
     @property
     def probabilities(self) -> Array:

@@ -151,7 +151,6 @@ class AxisForecast:
         inner = self.gram[best.columns, fitted.shape.columns] @ fitted.coefficients
         return float(np.sum((best.after.T @ inner) ** 2)), best.after.shape[1] - fitted.shape.after.shape[1]
 
-
     def further_nats(self, fitted: Fitted, rival: str, outcomes: Outcomes, k: int) -> float:
         """Return the evidence against the coefficients that a rival has beyond a fitted signal, nats."""
         best = outcomes.best(rival, k)

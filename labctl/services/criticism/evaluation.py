@@ -82,6 +82,8 @@ def evaluate(
     experiments = _experiments(store, recordings, criticised)
     criticism = answer_of(serial, version, measured.recordings, criticised, experiments)
     laws, law_test = proposed_laws(criticised)
+    if law_test is not None:
+        law_test = {**law_test, "toml": _recipe_for_laws(store, recordings, criticised)}
     said = [*criticism.text, *held_sentences(model)]
     criticism = criticism.model_copy(update={"text": said, "laws": laws, "law_test": law_test})
     return (
@@ -103,6 +105,12 @@ def _experiments(store: Store, rows: tuple[RecordingRow, ...], criticism: Critic
     from labctl.services.criticism.next_experiment import experiments_for  # noqa: PLC0415  it loads the drivers
 
     return experiments_for(store, rows, criticism)
+
+
+def _recipe_for_laws(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism) -> str:
+    from labctl.services.criticism.next_experiment import recipe_for_laws  # noqa: PLC0415  it loads the drivers
+
+    return recipe_for_laws(store, rows, criticism)
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:

@@ -12,7 +12,6 @@ from instruments.bench_config import BenchFile
 from labctl.answers.criticism import Experiment
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import Criticism, Forecast, OpenQuestion, forecast, open_question, reduce_recording
-from labctl.fitting.criticism.planned_addition import may_be_joined
 from labctl.services.planning.attendance import visits_s
 from labctl.services.planning.loading import bench_for, limits_of, load_bench
 from labctl.services.simulation.walks import walked
@@ -37,6 +36,8 @@ MIN_OPEN_BIT = 0.01
 #: An experiment is also planned with its rates run so many times as often, where it is shorter than this, h: the soaks
 #: and mountings are the same, and a weak effect needs the readings.
 LONGER, LONGEST_TO_REPEAT_H = 4, 6.0
+#: The block that tests laws: where between the rates they differ.
+BETWEEN = "between_rates"
 #: Effects named in the sentence that explains a choice; the rest is counted.
 NAMED = 3
 
@@ -100,6 +101,21 @@ def experiments_for(store: Store, rows: Sequence[RecordingRow], criticism: Criti
     return [_described(each, question, recipe, len(foreseen)) for each in foreseen[:SHOWN]]
 
 
+def recipe_for_laws(store: Store, rows: Sequence[RecordingRow], criticism: Criticism) -> str:
+    """Return a recipe, TOML, that measures half-way between the rates of recordings; empty where there is none.
+
+    Laws that agree at the rates of the recordings differ there. `rows` are the recordings that were criticised.
+    """
+    base = _recipe_of(store, rows, criticism)
+    if base is None or criticism.data.info.motion != "rates":
+        return ""
+    recipe, bench, done = base
+    for each in plans_of(recipe, bench):
+        if each.block.id == BETWEEN and _what(each.plan.recipe) not in map(_what, done):
+            return tomli_w.dumps(recipe_document(each.plan.recipe) | {"name": f"{recipe.name}-next"})
+    return ""
+
+
 def ranked_experiments(
     question: OpenQuestion, recipe: Recipe, bench: BenchFile, done: Sequence[Recipe] = ()
 ) -> list[Foreseen]:
@@ -114,7 +130,7 @@ def ranked_experiments(
     for each in plans_of(recipe, bench):
         plan = each.plan
         motion = "profile" if plan.recipe.profiles else "rates"
-        if _what(plan.recipe) in known or not may_be_joined(question.comparison.data.info.motion, motion):
+        if _what(plan.recipe) in known or not question.may_join(motion):
             continue
         try:
             expected = forecast(question, reduce_recording(walked(plan, bench), outliers=False))
