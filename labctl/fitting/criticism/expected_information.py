@@ -237,18 +237,25 @@ def _named_alone(
     leader = question.candidates[h]
     fitted = {axis: outcomes[axis].fitted(leader.id, k) for axis in axes}
     size = sum(each.size for each in fitted.values() if each is not None)
+    if size <= 0:
+        return None
+    of_leader = {axis: each for axis, each in fitted.items() if each is not None}
     for j, rival in enumerate(question.candidates):
-        if question.nodes[j] == question.nodes[h]:
+        if question.nodes[j] == question.nodes[h] or rival.id == NOTHING:
             continue
-        if log_bf[j] <= 0 or size <= 0:
-            continue
-        parts = [axes[axis].reproduced(each, rival.id, outcomes[axis], k) for axis, each in fitted.items() if each]
+        parts = [axes[axis].reproduced(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items()]
         share, directions = sum(part for part, _ in parts) / size, sum(more for _, more in parts)
         contained = (1.0 - share) * size < INDISTINGUISHABLE_CHI2
         same = share > ALIKE and directions <= 0 and not are_exact(leader, rival)
-        if not (log_bf[j] > log_bf[h] - LEAD or same or (log_bf[j] > log_bf[h] - FAR and contained)):
-            continue
-        further = (axes[axis].further_nats(each, rival.id, outcomes[axis], k) for axis, each in fitted.items() if each)
-        if directions <= 0 or not contained or sum(further) < LEAD:
+        alike = same or (log_bf[j] > log_bf[h] - FAR and contained)
+        known = log_bf[j] > log_bf[h] - LEAD or (log_bf[j] > 0 and bool(alike))
+        if contained and directions > 0:
+            nats = sum(axes[axis].further_nats(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items())
+            known = (known and nats < LEAD) or (_is_random(rival) and nats <= -LEAD)
+        if known:
             return None
     return int(question.nodes[h])
+
+
+def _is_random(candidate: Candidate) -> bool:
+    return candidate.id in CATALOGUE and CATALOGUE[candidate.id].is_random

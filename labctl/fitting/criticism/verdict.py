@@ -19,7 +19,7 @@ from labctl.fitting.criticism.evidence.further_coefficients import further_nats
 from labctl.fitting.criticism.evidence.gains import reproduced_and_size, solve_option
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate, are_exact
-from labctl.fitting.effects import Term
+from labctl.fitting.effects import CATALOGUE, Term
 from labctl.fitting.effects.derived import with_derived
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
@@ -194,25 +194,30 @@ def _alike(comparison: Comparison, leader: Candidate, *, physical: bool) -> list
         if not rival.smooth
         and rival.physical == physical
         and rival.id != leader.id
-        and (
-            rival.log_bf > leader.log_bf - LEAD
-            or (rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival))
-        )
-        and not _is_wider_in_vain(comparison, leader, rival)
+        and _cannot_be_distinguished(comparison, leader, rival)
     ]
 
 
-def _is_wider_in_vain(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
-    """Return whether a rival is the leader with more coefficients, which are known to be next to nothing.
+def _cannot_be_distinguished(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
+    """Return whether the data leave a rival beside the leader.
 
-    By the same odds as any other: `LEAD`. A rival with more evidence than the leader is not refuted by them.
+    A rival that is the leader with more coefficients is judged by what is known of these: it is out where they are
+    next to nothing, by the same odds as any other, `LEAD`. One with a coefficient for each run or mounting is in where
+    they are not, whatever its evidence: the price of so many coefficients hides shifts of some noise units.
     """
-    if rival.log_bf > leader.log_bf or _directions(comparison, rival) <= _directions(comparison, leader):
-        return False
+    known = rival.log_bf > leader.log_bf - LEAD or (
+        rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival)
+    )
+    kind = CATALOGUE.get(rival.id)
+    is_random = kind is not None and kind.is_random
+    if not (known or is_random) or _directions(comparison, rival) <= _directions(comparison, leader):
+        return known
     if (1.0 - overlap(comparison, leader, rival)) * leader.gain >= INDISTINGUISHABLE_CHI2:
+        return known
+    nats = sum(_further_nats(comparison, axis, i, rival.option[axis]) for axis, i in leader.option.items())
+    if nats >= LEAD and rival.log_bf <= leader.log_bf:
         return False
-    nats = (_further_nats(comparison, axis, i, rival.option[axis]) for axis, i in leader.option.items())
-    return sum(nats) >= LEAD
+    return known or nats <= -LEAD
 
 
 def _further_nats(comparison: Comparison, axis: str, simple: int, wider: int) -> float:
