@@ -1,10 +1,11 @@
 """Experiments that settle it: one cause named alone after the standard campaign and at most 24 h of experiments.
 
 Simulated units with one effect of the catalogue hidden at z noise units (of the standard campaign), or with none. The
-standard campaign is criticised; while its verdict is ambiguous, a policy chooses what is measured next, and all
+standard campaign is criticised; while its verdict leaves something open, a policy chooses what is measured next, and all
 recordings are criticised together. Policies: the experiment that labctl proposes first; a random one
 of the same experiments; the standard campaign again. Named alone: one cause, exact aliases as one.
 
+Beside an adequate model it goes on where an effect has some evidence. `LABCTL_STUDY_SEED` is the first seed,
 `LABCTL_STUDY_UNITS` units a cell, `LABCTL_STUDY_PROTOCOLS`, `LABCTL_STUDY_Z`, `LABCTL_STUDY_POLICIES` (names with
 commas) choose a part of it.
 """
@@ -38,6 +39,7 @@ from studies.scores import names
 UNITS = int(os.environ.get("LABCTL_STUDY_UNITS", "100"))
 PROTOCOLS = os.environ.get("LABCTL_STUDY_PROTOCOLS", "O,Y").split(",")
 Z_LEVELS = tuple(os.environ.get("LABCTL_STUDY_Z", "5,10,30,100,0").split(","))
+FIRST_SEED = int(os.environ.get("LABCTL_STUDY_SEED", "60000"))
 CHOSEN = os.environ.get("LABCTL_STUDY_POLICIES", "information,random,again").split(",")
 #: Hours beyond the standard campaign.
 MAX_HOURS = 24.0
@@ -149,7 +151,7 @@ def units(name: str, z: str) -> Iterator[Unit]:
     order = np.random.default_rng(60_000).permutation(len(effects))
     for k in range(UNITS):
         effect = effects[int(order[k % len(effects)])]
-        yield Unit(p, 60_000 + k, {} if z == "0" else {effect: sized[effect][z]})
+        yield Unit(p, FIRST_SEED + k, {} if z == "0" else {effect: sized[effect][z]})
 
 
 def standard(unit: Unit) -> Known:
