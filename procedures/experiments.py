@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -66,10 +67,16 @@ SHORT_SOAK_S = 1200.0
 LOOP_C, SEVERAL_C = 7, 4
 #: A slow ramp, K/min, and the least span of a ramp, K.
 SLOW_C_PER_MIN, MIN_RAMP_K = 0.25, 5.0
+#: From and to which frequency sines are swept, Hz, and how long a sweep takes, s.
+SWEEPS_HZ, SWEEP_S = ((0.2, 1.0), (1.0, 5.0), (5.0, 20.0)), 30.0
 #: Rates near rest, over the largest.
 NEAR_REST = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+#: A stepper turns by this in a cycle of its motor, deg, and a data set near rest takes at most so long, s.
+CYCLE_DEG, LONGEST_S = 1.8, 600.0
 #: What a tilted fixture brings up in an experiment: all three axes turn at 1/sqrt(3) of the table's rate.
 DIAGONAL = "x+y+z"
+#: Fewer rates than these have no shape between which others would lie.
+MIN_RATES = 5
 #: Shares of the largest rate that are close to each other in its top third.
 TOP = (0.3, 0.5, *np.arange(0.66, 1.001, 0.04).tolist())
 
@@ -244,6 +251,23 @@ def _ramp(*, rates: Callable[[Recipe], list[float]], slow: bool) -> Callable[[Re
     return change
 
 
+def _sine(recipe: Recipe) -> Changes:
+    """Sweeps to higher and higher frequencies, each as fast and a quarter as fast as a table may be able to.
+
+    A bench leaves out those that its table cannot follow.
+    """
+    if not recipe.profiles:
+        return None
+    largest_dps = max(profile.course.largest_dps for profile in recipe.profiles)
+    sweeps = [
+        {"kind": "sine_sweep", "amplitude_dps": float(f"{share * largest_dps / to_hz:.3g}"), "from_hz": from_hz,
+         "to_hz": to_hz, "duration_s": SWEEP_S}
+        for from_hz, to_hz in SWEEPS_HZ
+        for share in (1.0, 0.25)
+    ]  # fmt: skip
+    return _at_one(recipe, [0.0], positions=[recipe.positions[0]], profiles=sweeps)
+
+
 def _first_again(recipe: Recipe) -> Changes:
     ends = spread_c(recipe, 2)
     if len(ends) < 2:
@@ -258,8 +282,31 @@ def _top(recipe: Recipe) -> Changes:
     return _of_shares(recipe, TOP)
 
 
+def _between(recipe: Recipe) -> Changes:
+    """Rates half-way between those of the recipe: what the error does there was not measured."""
+    rates = sorted({*recipe.rates_dps})
+    if len(rates) < MIN_RATES:
+        return None
+    halfway = [float(f"{(low + high) / 2:.6g}") for low, high in pairwise(rates)]
+    return {"temperatures_c": spread_c(recipe, SEVERAL_C), "rates_dps": halfway, **_short(recipe)}
+
+
 def _near_rest(recipe: Recipe) -> Changes:
-    return _of_shares(recipe, (*NEAR_REST, 0.1, 1.0))
+    """Rates that turn the table by whole cycles of its motor in a data set: of a part of one, the mean rate is wrong.
+
+    A stepper at some hundredths of a degree per second makes a few steps in a data set; one more or less, as the
+    readings begin, would look like a dead band.
+    """
+    largest_dps = max(abs(rate) for rate in recipe.rates_dps)
+    if not largest_dps:
+        return None
+    least_dps = max(float(f"{NEAR_REST[0] * largest_dps:.2g}"), CYCLE_DEG / LONGEST_S)
+    cycle_s = CYCLE_DEG / least_dps
+    duration_s = cycle_s * max(round(recipe.acquire.duration_s / cycle_s), 1)
+    sizes = {round(share * largest_dps / least_dps) for share in (*NEAR_REST, 0.1, 1.0)} - {0}
+    rates_dps = [float(f"{sign * size * least_dps:.6g}") for size in sorted(sizes) for sign in (1, -1)]
+    acquire = {**recipe.acquire.model_dump(), "duration_s": duration_s, "whole_turns_above_dps": None}
+    return _at_one(recipe, [0.0, *rates_dps], acquire=acquire)
 
 
 def _of_shares(recipe: Recipe, shares: tuple[float, ...]) -> Changes:
@@ -298,5 +345,10 @@ BLOCKS: tuple[Block, ...] = (
     Block("slow_ramp", "a few rates while the temperature rises and falls slowly", _ramp(rates=few_rates, slow=True)),
     Block("first_again", "the lowest temperature, the highest, and the lowest again, at a few rates", _first_again),
     Block("top_rates", "more rates in the top third, at one temperature", _top),
+    Block("between_rates", "rates half-way between those of the recipe, at a few temperatures", _between),
     Block("near_rest", "small rates of both signs, at one temperature", _near_rest),
+    Block(
+        "sine", "sines of the rate from 0.2 Hz up, as fast as the table follows, at one temperature", _sine,
+        needs=("a table that follows a course of the rate (driver acutrol-3000)",),
+    ),
 )  # fmt: skip

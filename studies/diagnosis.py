@@ -1,10 +1,11 @@
 """Experiments that settle it: one cause named alone after the standard campaign and at most 24 h of experiments.
 
 Simulated units with one effect of the catalogue hidden at z noise units (of the standard campaign), or with none. The
-standard campaign is criticised; while its verdict is ambiguous, a policy chooses what is measured next, and all
+standard campaign is criticised; while its verdict leaves something open, a policy chooses what is measured next, and all
 recordings are criticised together. Policies: the experiment that labctl proposes first; a random one
 of the same experiments; the standard campaign again. Named alone: one cause, exact aliases as one.
 
+Beside an adequate model it goes on where an effect has some evidence. `LABCTL_STUDY_SEED` is the first seed,
 `LABCTL_STUDY_UNITS` units a cell, `LABCTL_STUDY_PROTOCOLS`, `LABCTL_STUDY_Z`, `LABCTL_STUDY_POLICIES` (names with
 commas) choose a part of it.
 """
@@ -38,6 +39,7 @@ from studies.scores import names
 UNITS = int(os.environ.get("LABCTL_STUDY_UNITS", "100"))
 PROTOCOLS = os.environ.get("LABCTL_STUDY_PROTOCOLS", "O,Y").split(",")
 Z_LEVELS = tuple(os.environ.get("LABCTL_STUDY_Z", "5,10,30,100,0").split(","))
+FIRST_SEED = int(os.environ.get("LABCTL_STUDY_SEED", "60000"))
 CHOSEN = os.environ.get("LABCTL_STUDY_POLICIES", "information,random,again").split(",")
 #: Hours beyond the standard campaign.
 MAX_HOURS = 24.0
@@ -149,7 +151,7 @@ def units(name: str, z: str) -> Iterator[Unit]:
     order = np.random.default_rng(60_000).permutation(len(effects))
     for k in range(UNITS):
         effect = effects[int(order[k % len(effects)])]
-        yield Unit(p, 60_000 + k, {} if z == "0" else {effect: sized[effect][z]})
+        yield Unit(p, FIRST_SEED + k, {} if z == "0" else {effect: sized[effect][z]})
 
 
 def standard(unit: Unit) -> Known:
@@ -160,9 +162,9 @@ def standard(unit: Unit) -> Known:
 
 
 def followed(known: Known, policy: Policy) -> Known:
-    """Return what is known after a policy was followed while the verdict is ambiguous."""
+    """Return what is known after a policy was followed while the verdict leaves something open."""
     rng = np.random.default_rng([known.unit.seed, 7])
-    while known.found.verdict.form == "ambiguous" and known.rounds < MAX_ROUNDS:
+    while _is_open(known.found) and known.rounds < MAX_ROUNDS:
         chosen = policy(known, rng)
         if chosen is None:
             break
@@ -172,6 +174,11 @@ def followed(known: Known, policy: Policy) -> Known:
             known.done.append(f"refused: {error}")
             break
     return known
+
+
+def _is_open(found: Criticism) -> bool:
+    """Return whether a diagnosis goes on: one of several effects is missing, or one may be."""
+    return found.verdict.form == "ambiguous" or open_question(found) is not None
 
 
 def outcome(known: Known, policy: str) -> Outcome:

@@ -12,6 +12,9 @@ channel is outside the range of the first. A proposal is good where both are at 
 error where the form of the law is known and only its size is fitted. *Worse* compares the root mean square of what is
 left of the other recording with the law and without it.
 
+In the last schedule an experiment is measured as well, at rates half-way between those of the recipe (2.2 h), and both
+recordings are criticised together.
+
 `LABCTL_STUDY_SEEDS` is how many units each law and size has, `LABCTL_STUDY_NULLS` how many recordings of each schedule
 have nothing hidden, `LABCTL_STUDY_SEED` the first seed, `LABCTL_STUDY_WORKERS` the number of processes, and
 `LABCTL_STUDY_SCHEDULES` the schedules, with semicolons between them. A case takes 2 to 30 s of one core.
@@ -22,7 +25,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -32,12 +35,14 @@ from instruments.bench_config import SimulationSettings
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import Criticism, criticise, laws_of
 from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.joined import joined_recording
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel, expand
 from labctl.fitting.models.presets import usual_model
 from labctl.recording import Recording
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.simulation.plan_simulation import hidden_recording
+from procedures.experiments import BLOCKS
 from procedures.planning.plan import make_plan
 from studies.foreign_laws import SHAPES, kind_of_law
 from studies.report_tables import markdown, share
@@ -70,6 +75,7 @@ class Schedule:
     bench: str
     changes: Mapping[str, object]
     other: Mapping[str, object]
+    then: str = ""  #: the experiment that is measured as well, and criticised together with the first
 
 
 def _both_ways(*rates_dps: float) -> tuple[float, ...]:
@@ -88,15 +94,23 @@ SCHEDULES: dict[str, Schedule] = {
         "quick-triaxial", "triaxial-sim", {**SHUFFLED, "rates_dps": _both_ways(40, 100, 180, 280, 400)},
         {**SHUFFLED, "temperatures_c": (5.0, 12.0, 22.0, 38.0), "rates_dps": _both_ways(70, 140, 220, 340)},
     ),
+    "single-axis, and between its rates": Schedule("ojeda2000-121", "single-axis-sim", {}, BETWEEN, "between_rates"),
 }  # fmt: skip
 
 
 @lru_cache(maxsize=8)
 def recorded(schedule: str, seed: int, day: int) -> Recording:
-    """Return a recording of a unit with nothing hidden: day 0 the one that is criticised, day 1 the other."""
+    """Return a recording of a unit with nothing hidden: day 0 the one that is criticised, day 1 the other.
+
+    Day 2 is the experiment of the schedule.
+    """
     chosen = SCHEDULES[schedule]
     bench = load_bench(chosen.bench)
-    recipe = load_recipe(chosen.recipe).model_copy(update=dict(chosen.other if day else chosen.changes))
+    recipe = load_recipe(chosen.recipe).model_copy(update=dict(chosen.other if day == 1 else chosen.changes))
+    if day == 2:
+        changed = next(block for block in BLOCKS if block.id == chosen.then).changed(recipe)
+        assert changed is not None
+        recipe = changed
     gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": READINGS_HZ})
     settings = (bench.simulation or SimulationSettings()).model_copy(update={"noise_seed": day})
     plan = make_plan(recipe, limits_of(bench))
@@ -240,11 +254,17 @@ def with_law(case: Case, day: int) -> Recording:
     return kind_of_law(case.law, fastest_dps).added(plain, case.seed, size_dps)
 
 
+def criticised(case: Case) -> Recording:
+    """Return what is criticised of a case: its first recording, and that of its experiment where it has one."""
+    days = (0, 2) if SCHEDULES[case.schedule].then else (0,)
+    return joined_recording({day + 1: with_law(case, day) for day in days})
+
+
 def outcome(case: Case) -> Outcome | None:
     """Hide a law, criticise, and compare what is proposed with the truth; None where the model absorbs the law."""
     if case.law and unit_size(case.schedule, case.seed, case.law)[1] < MIN_VISIBLE:
         return None
-    recording = with_law(case, 0)
+    recording = criticised(case)
     try:
         found = criticise(recording, usual_model(fit_data_of(recording)))
         return _scored(case, found)
@@ -256,7 +276,7 @@ def _scored(case: Case, found: Criticism) -> Outcome:
     verdict, base = found.verdict, found.base
     assert base is not None
     first, second = found.fit_data, fit_data_of(with_law(case, 1))
-    own = Witness.of(first, fit_data_of(recorded(case.schedule, case.seed, 0)))
+    own = Witness.of(first, fit_data_of(criticised(replace(case, law=""))))
     other = Witness.of(second, fit_data_of(recorded(case.schedule, case.seed, 1)), _inside(first, second))
     model, left_dps = base.fitted.model, other.left_dps(base)
     proposals = tuple(

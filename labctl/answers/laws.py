@@ -42,3 +42,5 @@ class LawTest(TypedDict):
     """Difference of the errors that the two fits expect there, deg/s."""
     do: str
     """What to measure, in words."""
+    toml: str
+    """Recipe that measures half-way between the rates of the recordings, TOML; empty where the bench has none."""

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from instruments.plugins import PluginError
+from instruments import plugins
+from instruments.plugins import PluginError, PluginGroup
 from labctl.services.criticism.next_experiment import plans_of
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
+from procedures import experiments
 from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Acquire, MoveChamber
 from procedures.experiments import BLOCKS, NOT_TAKEN, Block, _checked, all_blocks
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import make_plan
 from procedures.recipe.recipe import Recipe, parse_recipe, recipe_document
+from tests.helpers.distributions import distribution
+from tests.helpers.paths import ROOT
 
 
 def test_labctls_own_blocks_are_found_by_their_entry_point() -> None:
@@ -29,7 +35,7 @@ def test_each_block_makes_a_plan_within_the_limits_that_differs_from_the_recipe(
     whole = load_recipe(recipe)
     limits = replace(limits_of(load_bench(bench or "triaxial-sim")), tilted_positions=("x+y+z",))
     made = {block.id: block.changed(whole) for block in BLOCKS}
-    assert sum(changed is None for changed in made.values()) <= 2
+    assert sum(changed is None for changed in made.values()) <= 3
     for name, changed in made.items():
         if changed is None:
             continue
@@ -86,3 +92,53 @@ def test_what_is_no_block_is_refused() -> None:
     assert _checked(own) == (own,)
     with pytest.raises((TypeError, PluginError), match="is not a Block"):
         _checked([own, "mine"])
+
+
+def test_near_rest_a_stepper_turns_by_whole_cycles_of_its_motor() -> None:
+    """A part of a cycle, and one step more or less, would look like a dead band."""
+    near_rest = next(block for block in BLOCKS if block.id == "near_rest")
+    for name in ("ojeda2000", "ojeda2000-121", "table1-x-table2", "quick-triaxial", "informative"):
+        whole = load_recipe(name)
+        changed = near_rest.changed(whole)
+        assert changed is not None
+        cycles = [abs(rate) * changed.acquire.duration_s / 1.8 for rate in changed.rates_dps if rate]
+        assert cycles == pytest.approx([round(each) for each in cycles], abs=1e-3), name
+        assert min(cycles) >= 1.0
+        assert changed.acquire.duration_s <= 600.0
+        assert max(changed.rates_dps) == pytest.approx(max(whole.rates_dps), rel=1e-3)
+
+
+def test_sines_are_swept_where_the_recipe_and_the_table_change_the_rate() -> None:
+    sine = next(block for block in BLOCKS if block.id == "sine")
+    assert sine.changed(load_recipe("ojeda2000-121")) is None
+    recipe, servo = load_recipe("servo-sweeps"), load_bench("servo-sim")
+    planned = [each for each in plans_of(recipe, servo) if each.block.id == "sine"]
+    limit_dps2 = limits_of(servo).max_acceleration_dps2
+    assert planned
+    for each in planned:
+        courses = [profile.course for profile in each.plan.recipe.profiles]
+        assert {course.kind for course in courses} == {"sine_sweep"}
+        assert max(course.largest_dps2 for course in courses) <= limit_dps2
+        assert len(courses) == 3
+    assert "sine" not in {each.block.id for each in plans_of(recipe, load_bench("single-axis-sim"))}
+
+
+def test_a_block_of_another_package_is_planned_on_the_bench_as_the_page_on_extending_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (ROOT / "docs/how-to/extending.md").read_text(encoding="utf-8")
+    code = page.split("## An experiment")[1].split("```python\n")[1].split("```")[0]
+    distribution(tmp_path, "acme-bench", "[labctl.experiments]\nacme = acme_bench:BLOCK\n", code)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    plugins.installed.cache_clear()
+    monkeypatch.setattr(experiments, "GROUP", PluginGroup("labctl.experiments", "experiment", _checked))
+    try:
+        recipe, bench = load_recipe("quick-triaxial"), load_bench("triaxial-sim")
+        planned = [each for each in plans_of(recipe, bench) if each.block.id == "acme_slow_rise"]
+        assert planned
+        moves = [step for step in planned[0].plan.steps if isinstance(step, MoveChamber) and not step.wait]
+        assert moves[-1].temperature_c == max(recipe.temperatures_c)
+        assert [each.id for each in all_blocks()] == [*(block.id for block in BLOCKS), "acme_slow_rise"]
+    finally:
+        plugins.installed.cache_clear()
+        sys.modules.pop("acme_bench", None)

@@ -20,10 +20,10 @@ from scipy.special import logsumexp
 from labctl.fitting.criticism.criticism import Criticism
 from labctl.fitting.criticism.joint_evidence import AxisForecast, Outcomes, forecast_axis
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
-from labctl.fitting.criticism.planned_addition import with_planned
+from labctl.fitting.criticism.planned_addition import may_be_joined, with_planned
 from labctl.fitting.criticism.ranking import Candidate, are_exact
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.criticism.verdict import ALIKE, ENOUGH, FAR, INDISTINGUISHABLE_CHI2, LEAD
+from labctl.fitting.criticism.verdict import ALIKE, ENOUGH, FAR, INDISTINGUISHABLE_CHI2, LEAD, refines_base
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
@@ -36,6 +36,10 @@ MAX_HYPOTHESES = 8
 DRAWS, MIN_DRAWS = 120, 12
 #: No outcome counts as stronger than this against the truth, nats: beyond it the forecast is not good enough.
 MAX_LOSS = 7.0
+#: An effect with at least this evidence, nats, beside a model that is adequate is a question: it may be missing.
+WEAK = 2.0
+#: The hypothesis that nothing is missing, among the ids of a question.
+NOTHING = "nothing"
 #: Two effects are distinguished where the rival falls behind in at least this share of outcomes.
 USUALLY = 0.5
 
@@ -54,6 +58,15 @@ class OpenQuestion:
     def ids(self) -> tuple[str, ...]:
         """The ids of the hypotheses."""
         return tuple(candidate.id for candidate in self.candidates)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The ids of the effects that may be missing, likeliest first."""
+        return tuple(name for name in self.ids if name != NOTHING)
+
+    def may_join(self, motion: str) -> bool:
+        """Return whether a recording of a motion can be fitted together with those that were criticised."""
+        return may_be_joined(self.comparison.data.info.motion, motion)
 
     @property
     def probabilities(self) -> Array:
@@ -79,9 +92,16 @@ class Forecast:
 
 
 def open_question(found: Criticism) -> OpenQuestion | None:
-    """Return what a criticism leaves open: its first group of effects that cannot be distinguished; None for none."""
+    """Return what a criticism leaves open: its first group of effects that cannot be distinguished; None for none.
+
+    Beside an adequate model: whether effects are missing for which there is some evidence, but not enough to say so.
+    """
     group = found.verdict.indistinguishable
-    if found.beside_missing is None or not group:
+    if found.beside_missing is None:
+        return None
+    if found.verdict.form == "adequate":
+        return _whether_any(found.beside_missing)
+    if not group:
         return None
     comparison = found.beside_missing
     others = [names[0] for names in found.verdict.groups if names != group]
@@ -101,6 +121,25 @@ def open_question(found: Criticism) -> OpenQuestion | None:
     # shapes are compared on a grid, so that the verdict does not let small differences of the evidence decide
     odds = {c.id: max(c.log_bf, lead - LEAD) for c in of_group} | {c.id: c.log_bf for c in near}
     chosen = sorted((*of_group, *near), key=lambda c: -odds[c.id])[:MAX_HYPOTHESES]
+    ids = [c.id for c in chosen]
+    return OpenQuestion(
+        _restricted(comparison, ids), {name: CATALOGUE[name] for name in ids if name in CATALOGUE},
+        tuple(chosen), np.array([odds[name] for name in ids]), _nodes(ids),
+    )  # fmt: skip
+
+
+def _whether_any(comparison: Comparison) -> OpenQuestion | None:
+    """Return the question whether one of the effects with some evidence is missing; None where none has any.
+
+    That nothing is missing is as probable beforehand as that one of all effects is, as `verdict.probabilities` has it.
+    """
+    effects = [c for c in comparison.candidates if not c.smooth and c.physical and np.isfinite(c.log_bf)]
+    near = [c for c in effects if c.log_bf > effects[0].log_bf + np.log(MIN_PROBABILITY)][: MAX_HYPOTHESES - 1]
+    if not near or near[0].log_bf < WEAK or refines_base(comparison, near[0]):
+        return None
+    nothing = Candidate(NOTHING, smooth=False, log_bf=0.0, option={}, term=None, gain=0.0)
+    odds = {c.id: c.log_bf for c in near} | {NOTHING: float(np.log(len(effects)))}
+    chosen = sorted((*near, nothing), key=lambda c: -odds[c.id])
     ids = [c.id for c in chosen]
     return OpenQuestion(
         _restricted(comparison, ids), {name: CATALOGUE[name] for name in ids if name in CATALOGUE},
@@ -156,7 +195,7 @@ def forecast(question: OpenQuestion, planned: ReducedRecording, seed: int = 1) -
             }
     means = np.array([float(each.mean()) for each in gained])
     variance = sum(w**2 * float(each.var(ddof=1)) / len(each) for w, each in zip(weights, gained, strict=True))
-    distinguished = tuple(name for name, share in behind.items() if share >= USUALLY)
+    distinguished = tuple(name for name, share in behind.items() if share >= USUALLY and name != NOTHING)
     nat = float(np.log(2.0))
     return Forecast(float(p @ means) / nat, float(np.sqrt(variance)) / nat, one, wrong, distinguished)
 
@@ -198,17 +237,25 @@ def _named_alone(
     leader = question.candidates[h]
     fitted = {axis: outcomes[axis].fitted(leader.id, k) for axis in axes}
     size = sum(each.size for each in fitted.values() if each is not None)
+    if size <= 0:
+        return None
+    of_leader = {axis: each for axis, each in fitted.items() if each is not None}
     for j, rival in enumerate(question.candidates):
-        if question.nodes[j] == question.nodes[h]:
+        if question.nodes[j] == question.nodes[h] or rival.id == NOTHING:
             continue
-        if log_bf[j] > log_bf[h] - LEAD:
-            return None
-        if log_bf[j] <= 0 or size <= 0:
-            continue
-        parts = [axes[axis].reproduced(each, rival.id, outcomes[axis], k) for axis, each in fitted.items() if each]
+        parts = [axes[axis].reproduced(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items()]
         share, directions = sum(part for part, _ in parts) / size, sum(more for _, more in parts)
-        if share > ALIKE and directions <= 0 and not are_exact(leader, rival):
-            return None
-        if log_bf[j] > log_bf[h] - FAR and (1.0 - share) * size < INDISTINGUISHABLE_CHI2:
+        contained = (1.0 - share) * size < INDISTINGUISHABLE_CHI2
+        same = share > ALIKE and directions <= 0 and not are_exact(leader, rival)
+        alike = same or (log_bf[j] > log_bf[h] - FAR and contained)
+        known = log_bf[j] > log_bf[h] - LEAD or (log_bf[j] > 0 and bool(alike))
+        if contained and directions > 0:
+            nats = sum(axes[axis].further_nats(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items())
+            known = (known and nats < LEAD) or (_is_random(rival) and nats <= -LEAD)
+        if known:
             return None
     return int(question.nodes[h])
+
+
+def _is_random(candidate: Candidate) -> bool:
+    return candidate.id in CATALOGUE and CATALOGUE[candidate.id].is_random

@@ -18,6 +18,7 @@ from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.elimination import stack
+from labctl.fitting.criticism.evidence.further_coefficients import further_nats
 from labctl.fitting.criticism.evidence.gains import MIN_REMAINING
 from labctl.fitting.criticism.evidence.noise_grid import factors, whiten
 from labctl.fitting.criticism.model_comparison import Comparison, design_of
@@ -40,6 +41,7 @@ class Shape:
     now: NDArray[np.float64]
     before: NDArray[np.float64]  #: the same beside the base of both recordings, in which each run's bias is free
     after: NDArray[np.float64]  #: the same by both recordings
+    new: NDArray[np.bool_]  #: (w,) columns that the first recording does not show, as another mounting
 
     def log_bf(self, gain: Array, factor: NDArray[np.float64], g: float) -> Array:
         """Return the log Bayes factor of gains in chi2 with the unit-information prior, as `evidence` has it."""
@@ -82,6 +84,7 @@ class AxisForecast:
                 _factor(gram_now, norms_now, place),
                 _factor(left_now.T @ columns[first], norms_now, place),
                 _factor(self.gram, norms, place),
+                _new_columns(option, np.diag(gram_now)[place], norms[place]),
             )
             for option, place in zip(design.options, slices_of(design.options), strict=True)
         ]
@@ -92,6 +95,8 @@ class AxisForecast:
         self._response = remaining[second].T @ columns[second] - through @ (of_base @ columns[first])
         self._root = _root(remaining[second].T @ remaining[second] + through @ through.T)
         self._b_now, self._b_before = b_now, left_now.T @ y
+        rows = [option.rows[0] for option in design.options]
+        self._size = np.sqrt(np.mean(np.concatenate(rows, axis=1) ** 2, axis=0)) if rows else np.zeros(0)
         self._of: dict[str, list[Shape]] = {}
         for shape in self.shapes:
             self._of.setdefault(shape.effect, []).append(shape)
@@ -130,7 +135,11 @@ class AxisForecast:
                 rows = np.flatnonzero(chosen == i)
                 mean = shrunk * shape.now @ (shape.now.T @ self._b_now[shape.columns])
                 free = rng.standard_normal((len(rows), shape.now.shape[1])) @ (np.sqrt(shrunk) * shape.now.T)
-                products[rows] += (mean + free) @ self._response[:, shape.columns].T
+                coefficients = mean + free
+                if np.any(shape.new) and not np.all(shape.new):  # the next mounting is another draw of the same kind
+                    size = np.sqrt(np.mean(coefficients[:, ~shape.new] ** 2, axis=1, keepdims=True))
+                    coefficients[:, shape.new] = size * rng.standard_normal((len(rows), int(shape.new.sum())))
+                products[rows] += coefficients @ self._response[:, shape.columns].T
         return Outcomes(self, products)
 
     def reproduced(self, fitted: Fitted, rival: str, outcomes: Outcomes, k: int) -> tuple[float, int]:
@@ -141,6 +150,16 @@ class AxisForecast:
             return 0.0, -fitted.shape.after.shape[1]
         inner = self.gram[best.columns, fitted.shape.columns] @ fitted.coefficients
         return float(np.sum((best.after.T @ inner) ** 2)), best.after.shape[1] - fitted.shape.after.shape[1]
+
+    def further_nats(self, fitted: Fitted, rival: str, outcomes: Outcomes, k: int) -> float:
+        """Return the evidence against the coefficients that a rival has beyond a fitted signal, nats."""
+        best = outcomes.best(rival, k)
+        if best is None:
+            return 0.0
+        covariance = best.after @ best.after.T
+        through = covariance @ self.gram[best.columns, fitted.shape.columns]
+        values = outcomes.coefficients(best, k)
+        return further_nats(values, covariance, through, fitted.coefficients, self._size[best.columns])
 
 
 class Outcomes:
@@ -176,6 +195,10 @@ class Outcomes:
             return None
         inner = best.after.T @ self._products[k, best.columns]
         return Fitted(best, best.after @ inner, float(inner @ inner))
+
+    def coefficients(self, shape: Shape, k: int) -> Array:
+        """Return the coefficients, (w,), with which a shape is fitted in outcome `k`."""
+        return np.asarray(shape.after @ (shape.after.T @ self._products[k, shape.columns]))
 
 
 @dataclass(frozen=True)
@@ -290,6 +313,11 @@ def _factor(gram: NDArray[np.float64], squared_norms: Array, place: slice) -> ND
     values, vectors = np.linalg.eigh(gram[place, place] / np.outer(size, size))
     kept = values > MIN_REMAINING
     return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / size[:, None])
+
+
+def _new_columns(option: CandidateShape, seen_now: Array, norms: Array) -> NDArray[np.bool_]:
+    """Return of which columns of a shape the first recording shows nothing, (w,); none where their units differ."""
+    return np.full(len(norms), len(set(option.units)) == 1) & (seen_now <= UNSEEN * norms)
 
 
 def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -17,12 +17,16 @@ from labctl.fitting.criticism.candidates import base_rows
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.joined import APART_S, COUNTED, WITH_TABLE_RATE
+from labctl.fitting.data.rate_profile import profiles_in_turn
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import RECORDING, WITHIN_S
+
+#: The motion of a recording whose rate changes within data sets.
+CHANGING = "profile"
 
 Columns = Mapping[str, NDArray[np.generic]]
 
@@ -33,11 +37,12 @@ def with_planned(measured: ReducedRecording, planned: ReducedRecording, model: E
     The output of the planned ones is what the model, fitted to the measured ones, gives there, and their noise that of
     the measured ones over as long a time. Raises BadInput where the two cannot be fitted together.
     """
-    if not {measured.info.motion, planned.info.motion} <= WITH_TABLE_RATE:
+    if not may_be_joined(measured.info.motion, planned.info.motion):
         raise BadInput(
             f"a recording of {measured.info.motion} and a planned one of {planned.info.motion} cannot be fitted "
             "together; plan one of the same kind"
         )
+    planned = planned.through(measured.nodes.response)
     coordinates = max(len(measured.weights), len(planned.weights))
     nodes = max(measured.weights.shape[2], planned.weights.shape[2])
     one, two = (_padded(each, coordinates, nodes) for each in (measured, planned))
@@ -59,6 +64,11 @@ def with_planned(measured: ReducedRecording, planned: ReducedRecording, model: E
     )
     _refuse_between_nodes(together, model)
     return _with_predicted(together, len(measured), model)
+
+
+def may_be_joined(measured: str, planned: str) -> bool:
+    """Return whether a recording and a planned one can be fitted together, by their motions."""
+    return {measured, planned} <= WITH_TABLE_RATE or {measured, planned} == {CHANGING}
 
 
 def _refuse_between_nodes(together: ReducedRecording, model: ErrorModel) -> None:
@@ -121,7 +131,11 @@ def _joined_channels(one: ReducedRecording, two: ReducedRecording) -> Channels:
         after[name] = np.asarray(after[name]) + counted[name]
     columns = {name: np.concatenate([before[name], after[name]]) for name in sorted(names)}
     rates = {axis: np.concatenate([first.rates[axis], second.rates[axis]]) for axis in first.rates}
-    return Channels(columns, rates, _joined_history(first.history, second.history, counted, shift_s))
+    history = _joined_history(first.history, second.history, counted, shift_s)
+    if first.profile is None or second.profile is None:
+        return Channels(columns, rates, history)
+    profile = profiles_in_turn(first.profile, second.profile, shift_s)
+    return Channels(columns, rates, history, profile=profile, response=first.response)
 
 
 def _joined_history(

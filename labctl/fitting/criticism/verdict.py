@@ -15,10 +15,11 @@ import numpy as np
 from labctl.answers.criticism import Remainder
 from labctl.answers.fitted_model import Coefficient
 from labctl.fitting.criticism.channel_functions import TIMES
+from labctl.fitting.criticism.evidence.further_coefficients import further_nats
 from labctl.fitting.criticism.evidence.gains import reproduced_and_size, solve_option
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate, are_exact
-from labctl.fitting.effects import Term
+from labctl.fitting.effects import CATALOGUE, Term
 from labctl.fitting.effects.derived import with_derived
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
@@ -193,11 +194,39 @@ def _alike(comparison: Comparison, leader: Candidate, *, physical: bool) -> list
         if not rival.smooth
         and rival.physical == physical
         and rival.id != leader.id
-        and (
-            rival.log_bf > leader.log_bf - LEAD
-            or (rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival))
-        )
+        and _cannot_be_distinguished(comparison, leader, rival)
     ]
+
+
+def _cannot_be_distinguished(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
+    """Return whether the data leave a rival beside the leader.
+
+    A rival that is the leader with more coefficients is judged by what is known of these: it is out where they are
+    next to nothing, by the same odds as any other, `LEAD`. One with a coefficient for each run or mounting is in where
+    they are not, whatever its evidence: the price of so many coefficients hides shifts of some noise units.
+    """
+    known = rival.log_bf > leader.log_bf - LEAD or (
+        rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival)
+    )
+    kind = CATALOGUE.get(rival.id)
+    is_random = kind is not None and kind.is_random
+    if not (known or is_random) or _directions(comparison, rival) <= _directions(comparison, leader):
+        return known
+    if (1.0 - overlap(comparison, leader, rival)) * leader.gain >= INDISTINGUISHABLE_CHI2:
+        return known
+    nats = sum(_further_nats(comparison, axis, i, rival.option[axis]) for axis, i in leader.option.items())
+    if nats >= LEAD and rival.log_bf <= leader.log_bf:
+        return False
+    return known or nats <= -LEAD
+
+
+def _further_nats(comparison: Comparison, axis: str, simple: int, wider: int) -> float:
+    """Return the evidence on an axis against the further coefficients of a wider option, nats."""
+    eliminated, slices = comparison.axes[axis].best, comparison.axes[axis].slices
+    values, covariance = solve_option(eliminated, slices[wider])
+    through = covariance @ eliminated.gram[slices[wider], slices[simple]]
+    size = np.sqrt(np.mean(comparison.designs[axis].options[wider].rows[0] ** 2, axis=0))
+    return further_nats(values, covariance, through, solve_option(eliminated, slices[simple])[0], size)
 
 
 def axes_of(comparison: Comparison, candidate: Candidate) -> tuple[str, ...]:

@@ -112,6 +112,18 @@ class RateProfile:
         return self.motion.means(name, response, lambda rad_s: response.slope(name, rad_s))[self.rows]
 
 
+def profiles_in_turn(first: RateProfile, second: RateProfile, later_s: float) -> RateProfile:
+    """Return two profiles as one, the times of the second moved by `later_s`: the rows of the first, then its rows."""
+    one, two = first.motion, second.motion
+    motion = _Motion(
+        np.concatenate([one.t_s, two.t_s + later_s]),
+        np.concatenate([one.rate_dps, two.rate_dps]),
+        np.concatenate([one.stretches, two.stretches + len(one.t_s)]),
+        np.concatenate([one.windows, two.windows + len(one.t_s)]),
+    )
+    return RateProfile(motion, np.concatenate([first.rows, second.rows + len(one.windows)]))
+
+
 def rate_profile(columns: Columns, *, windows: bool) -> RateProfile:
     """Return the rates of valid readings, (n,) each of `t_s`, `dataset` and `table_rate_dps`.
 

@@ -41,6 +41,7 @@ class BiasDrift(Effect):
 
 class _Shift(Effect):
     counted: ClassVar[str]
+    is_random = True
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
 

@@ -121,10 +121,14 @@ def _cached_criticism(
 
 
 def write_next(answer: CriticismResponse, path: Path) -> None:
-    """Write the best next experiment as a recipe that a campaign can be started from. Raises BadInput without one."""
-    if not answer.experiments:
+    """Write the best next experiment as a recipe that a campaign can be started from. Raises BadInput without one.
+
+    Where laws are proposed it is the one that tests them.
+    """
+    tests_laws = answer.law_test["toml"] if answer.law_test else ""
+    if not answer.experiments and not tests_laws:
         raise BadInput(
             f"{path}: the verdict is {answer.verdict!r}, so no further experiment is needed and no recipe was "
             "written; leave --next out"
         )
-    path.write_text(answer.experiments[0]["toml"], encoding="utf-8")
+    path.write_text(answer.experiments[0]["toml"] if answer.experiments else tests_laws, encoding="utf-8")

@@ -11,7 +11,7 @@ from labctl.answers.criticism import CriticismResponse, Experiment
 from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.verification import VerificationResponse
 from labctl.errors import BadInput, LabctlError
-from labctl.fitting.criticism import Criticism, criticise, fit_means
+from labctl.fitting.criticism import Criticism, criticise, fit_means, open_question
 from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.inversion import NotConverged
@@ -82,6 +82,8 @@ def evaluate(
     experiments = _experiments(store, recordings, criticised)
     criticism = answer_of(serial, version, measured.recordings, criticised, experiments)
     laws, law_test = proposed_laws(criticised)
+    if law_test is not None:
+        law_test = {**law_test, "toml": _recipe_for_laws(store, recordings, criticised)}
     said = [*criticism.text, *held_sentences(model)]
     criticism = criticism.model_copy(update={"text": said, "laws": laws, "law_test": law_test})
     return (
@@ -97,12 +99,18 @@ def evaluate(
 
 
 def _experiments(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism) -> list[Experiment]:
-    if not criticism.verdict.indistinguishable:
+    if open_question(criticism) is None:
         return []
     report_stage("checking experiments")
     from labctl.services.criticism.next_experiment import experiments_for  # noqa: PLC0415  it loads the drivers
 
     return experiments_for(store, rows, criticism)
+
+
+def _recipe_for_laws(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism) -> str:
+    from labctl.services.criticism.next_experiment import recipe_for_laws  # noqa: PLC0415  it loads the drivers
+
+    return recipe_for_laws(store, rows, criticism)
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:

@@ -55,4 +55,5 @@ def _test(place: Breaking | None, found: Criticism) -> LawTest | None:
         "temperature_c": place.temperature_c,
         "difference_dps": place.difference_dps,
         "do": f"measure at {at}: there the two likeliest laws differ most, by {place.difference_dps:.3g} deg/s{times}",
+        "toml": "",
     }

@@ -36,6 +36,8 @@ MIN_OPEN_BIT = 0.01
 #: An experiment is also planned with its rates run so many times as often, where it is shorter than this, h: the soaks
 #: and mountings are the same, and a weak effect needs the readings.
 LONGER, LONGEST_TO_REPEAT_H = 4, 6.0
+#: The block that tests laws: where between the rates they differ.
+BETWEEN = "between_rates"
 #: Effects named in the sentence that explains a choice; the rest is counted.
 NAMED = 3
 
@@ -99,6 +101,21 @@ def experiments_for(store: Store, rows: Sequence[RecordingRow], criticism: Criti
     return [_described(each, question, recipe, len(foreseen)) for each in foreseen[:SHOWN]]
 
 
+def recipe_for_laws(store: Store, rows: Sequence[RecordingRow], criticism: Criticism) -> str:
+    """Return a recipe, TOML, that measures half-way between the rates of recordings; empty where there is none.
+
+    Laws that agree at the rates of the recordings differ there. `rows` are the recordings that were criticised.
+    """
+    base = _recipe_of(store, rows, criticism)
+    if base is None or criticism.data.info.motion != "rates":
+        return ""
+    recipe, bench, done = base
+    for each in plans_of(recipe, bench):
+        if each.block.id == BETWEEN and _what(each.plan.recipe) not in map(_what, done):
+            return tomli_w.dumps(recipe_document(each.plan.recipe) | {"name": f"{recipe.name}-next"})
+    return ""
+
+
 def ranked_experiments(
     question: OpenQuestion, recipe: Recipe, bench: BenchFile, done: Sequence[Recipe] = ()
 ) -> list[Foreseen]:
@@ -112,7 +129,8 @@ def ranked_experiments(
     foreseen, known = [], [_what(each) for each in done]
     for each in plans_of(recipe, bench):
         plan = each.plan
-        if _what(plan.recipe) in known:
+        motion = "profile" if plan.recipe.profiles else "rates"
+        if _what(plan.recipe) in known or not question.may_join(motion):
             continue
         try:
             expected = forecast(question, reduce_recording(walked(plan, bench), outliers=False))
@@ -137,13 +155,15 @@ def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
 
     An experiment looks for an effect, so it does not end where U of a model without that effect is small enough.
     """
-    limits, recipe = limits_of(bench), recipe.model_copy(update={"stop": None})
+    limits, recipe = limits_of(bench, driven=True), recipe.model_copy(update={"stop": None})
     for block in all_blocks():
         try:
             changed = block.changed(recipe)
             if changed is None:
                 continue
             plan = make_plan(changed, limits, clip=True)
+            if changed.profiles and not plan.recipe.profiles:
+                continue
             yield Planned(block, plan, block.text)
             if plan.expected_s < 3600 * LONGEST_TO_REPEAT_H:
                 longer = plan.recipe.model_copy(update={"repeats": LONGER * plan.recipe.repeats})
@@ -155,7 +175,7 @@ def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
 def _described(foreseen: Foreseen, question: OpenQuestion, recipe: Recipe, of: int) -> Experiment:
     document = recipe_document(foreseen.plan.recipe) | {"name": f"{recipe.name}-next"}
     expected = foreseen.forecast
-    leader = question.ids[0]
+    leader = question.effects[0]
     return {
         "separates": [leader, *(name for name in expected.distinguished if name != leader)],
         "do": foreseen.text,
@@ -181,11 +201,11 @@ _ORDER = {True: "the probability per hour that one cause is then named alone", F
 
 def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     """Return the sentence that explains a choice."""
-    expected, leader = foreseen.forecast, question.ids[0]
+    expected, leader = foreseen.forecast, question.effects[0]
     told = [name for name in expected.distinguished if name != leader]
     first = (
         f"{foreseen.hours:.1f} h on the bench are expected to give {expected.information_bit:.2f} of the "
-        f"{question.entropy_bit:.2f} bit that are missing to know which of {len(question.ids)} effects it is: "
+        f"{question.entropy_bit:.2f} bit that are missing to know {_asked(question)}: "
         f"{foreseen.bit_per_h:.2g} bit/h with set-up and a person's time"
     )
     order = _ORDER[foreseen.rank[0] > 0]
@@ -193,6 +213,14 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
     pair = f"; if it is {leader}, this distinguishes it from {listed}" if told else ""
     return f"{first}{rank}{pair}; the probability that one cause is then named alone is {expected.names_one:.2f}."
+
+
+def _asked(question: OpenQuestion) -> str:
+    """Return what is to be known, in words."""
+    effects = question.effects
+    if len(effects) == len(question.ids):
+        return f"which of {len(effects)} effects it is"
+    return f"whether {effects[0]} is missing" if len(effects) == 1 else f"whether one of {len(effects)} effects is"
 
 
 def _recipe_of(

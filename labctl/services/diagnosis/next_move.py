@@ -68,7 +68,8 @@ def next_move(progress: Progress, criticism: CriticismResponse) -> Measure | End
     named = criticism.named
     match criticism.verdict:
         case "adequate":
-            return End("adequate", sentences.adequate(progress.spent_hours))
+            move = _experiment(progress, criticism) if criticism.experiments else None
+            return move if isinstance(move, Measure) else _adequate(progress, criticism)
         case "missing":
             outcome: DiagnosisOutcome = "one_cause" if len(named) == 1 else "several_causes"
             return End(outcome, sentences.found(named, progress.spent_hours))
@@ -78,6 +79,12 @@ def next_move(progress: Progress, criticism: CriticismResponse) -> Measure | End
             return End("insufficient_data", sentences.insufficient(criticism.text))
         case _:
             return _experiment(progress, criticism)
+
+
+def _adequate(progress: Progress, criticism: CriticismResponse) -> End:
+    """Return the end of a diagnosis of an adequate model, with what might still be missing."""
+    doubtful = list(dict.fromkeys(name for each in criticism.experiments for name in each["separates"]))
+    return End("adequate", sentences.adequate(progress.spent_hours, doubtful))
 
 
 def _experiment(progress: Progress, criticism: CriticismResponse) -> Measure | End:

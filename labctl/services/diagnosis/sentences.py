@@ -36,9 +36,10 @@ def not_judged(recording: int, reason: str) -> str:
     return f"recording {recording} cannot be judged with the others, and is left out: {reason}"
 
 
-def adequate(spent_hours: float) -> str:
-    """Return that nothing is missing."""
-    return f"The model is adequate: noise explains the residual of all recordings together{_after(spent_hours)}."
+def adequate(spent_hours: float, doubtful: Sequence[str] = ()) -> str:
+    """Return that nothing is missing, and for which effects there is some evidence, not enough to name one."""
+    but = f"; there is some evidence for {_either(doubtful)}, too little to name one of them" if doubtful else ""
+    return f"The model is adequate: noise explains the residual of all recordings together{_after(spent_hours)}{but}."
 
 
 def found(named: Sequence[str], spent_hours: float) -> str:

@@ -28,17 +28,20 @@ READINGS, ENVIRONMENT = "readings/", "environment/"
 def walked(plan: Plan, bench: BenchFile) -> Recording:
     """Return what the first gyro of a bench gives on a plan in the simulated world. Raises BadInput."""
     steps = hashlib.sha256(plan.model_dump_json().encode()).hexdigest()
-    on, hz = bench.model_dump(mode="json"), _walk_hz(plan)
+    on, hz = bench.model_dump(mode="json"), _walk_hz(plan, bench)
     question = {"kind": "walk", "plan": steps, "bench": on, "hz": hz, "seed": SEED}
     return WALKS.get(question, _decoded, lambda: _encoded(_walk(plan, bench)))
 
 
 def _walk(plan: Plan, bench: BenchFile) -> Recording:
-    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": _walk_hz(plan)})
+    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": _walk_hz(plan, bench)})
     return hidden_recording(plan, bench, gyro, SEED, {})
 
 
-def _walk_hz(plan: Plan) -> float:
+def _walk_hz(plan: Plan, bench: BenchFile) -> float | None:
+    """Return the readings per second of a walk: those of the unit where the rate changes within a data set."""
+    if plan.recipe.profiles:
+        return bench.gyros[0].sample_rate_hz
     shortest_s = min((step.duration_s for step in plan.steps if step.kind == "acquire"), default=np.inf)
     return max(WALK_HZ, MIN_READINGS / shortest_s)
 

@@ -10528,6 +10528,11 @@ export interface components {
              * @description What to measure, in words.
              */
             do: string;
+            /**
+             * Toml
+             * @description Recipe that measures half-way between the rates of the recordings, TOML; empty where the bench has none.
+             */
+            toml: string;
         };
         /**
          * Leaving

@@ -22,7 +22,7 @@ def test_laws_are_printed_with_their_errors_and_the_command_that_takes_the_first
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     laws = [law(0.75, "law_1: sin(9*rate_dps)", "law_2: abs(rate_dps)"), law(0.25, "law_1: rate_dps**3")]
-    test = {"rate_dps": 96.0, "temperature_c": None, "difference_dps": 0.002, "do": "measure at 96 deg/s"}
+    test = {"rate_dps": 96.0, "temperature_c": None, "difference_dps": 0.002, "do": "measure at 96 deg/s", "toml": ""}
     print_criticism(criticism("unexplained").model_copy(update={"laws": laws, "law_test": test}))
     lines = capsys.readouterr().out.splitlines()
     first = lines.index("75 %: law_1: sin(9*rate_dps); law_2: abs(rate_dps): 0.0012 deg/s, held-out 0.0017")

@@ -25,7 +25,7 @@ from labctl.services.planning.loading import limits_of, load_bench
 from labctl.services.simulation.walks import walked
 from procedures.experiments import all_blocks
 from procedures.planning.plan import make_plan
-from tests.helpers.simulated_recordings import plan_on, single_axis
+from tests.helpers.simulated_recordings import plan_on, single_axis, three_axes
 
 #: Under the published schedule like a cubic, and like missed steps.
 SATURATION = {"saturation": -7e-4}
@@ -85,6 +85,41 @@ def test_the_experiment_that_shows_the_difference_has_the_information() -> None:
 
 def test_a_forecast_is_the_same_again() -> None:
     assert forecast(_question(), _planned("top_rates")) == forecast(_question(), _planned("top_rates"))
+
+
+def test_whether_a_weak_effect_is_missing_is_a_question_beside_an_adequate_model() -> None:
+    recording = single_axis(61002, supply_sensitivity=0.0233)
+    model, _ = preset_for("ojeda2000", []).build(fit_data_of(recording))
+    found = criticise(recording, model, full=False)
+    assert found.verdict.form == "adequate"
+    question = open_question(found)
+    assert question is not None
+    assert question.effects[0] == "supply_sensitivity"
+    assert "nothing" in question.ids
+    nothing = question.probabilities[question.ids.index("nothing")]
+    assert 0.2 < nothing < 0.9  # a lead of some nats of one of some thirty effects
+    long, short = forecast(question, _planned("loop")), forecast(question, _planned("few_rates"))
+    assert long.information_bit > short.information_bit
+    assert long.names_wrong < 0.1
+
+
+@pytest.mark.slow
+def test_a_mounting_that_is_still_to_come_is_foreseen_to_shift_as_those_before() -> None:
+    recording = three_axes(5, mounting_shift=0.03)
+    model, _ = preset_for("yang2018", []).build(fit_data_of(recording))
+    question = open_question(criticise(recording, model, full=False))
+    assert question is not None
+    assert {"mounting_shift", "run_shift"} <= set(question.ids)
+    plan, bench = plan_on("table1-x-table2", "triaxial-sim")
+    foreseen = {}
+    for name in ("upside_down", "power_cycles"):
+        changed = next(block for block in all_blocks() if block.id == name).changed(plan.recipe)
+        assert changed is not None
+        walk = walked(make_plan(changed, limits_of(bench)), bench)
+        foreseen[name] = forecast(question, reduce_recording(walk, outliers=False))
+    assert foreseen["upside_down"].information_bit > 0.8 * question.entropy_bit
+    assert foreseen["upside_down"].names_one > 0.5
+    assert foreseen["power_cycles"].information_bit < 0.1
 
 
 def test_nothing_is_open_where_one_effect_is_named() -> None:

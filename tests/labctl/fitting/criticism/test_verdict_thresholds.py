@@ -63,6 +63,7 @@ def overlaps(monkeypatch: pytest.MonkeyPatch) -> Overlaps:
     """Say which share of one candidate's signal another reproduces; none where nothing is said."""
     shares: dict[tuple[str, str], float] = {}
     monkeypatch.setattr(module, "overlap", lambda _comparison, of, by: shares.get((of.id, by.id), 0.0))
+    monkeypatch.setattr(module, "_further_nats", lambda *_: 0.0)
     return shares.update
 
 
@@ -219,6 +220,27 @@ def test_a_rival_that_leaves_little_of_the_signal_stays_unless_the_evidence_is_f
     leader, rival = effect("bias", 30.0, gain=112.0), effect("scale_factor", 30.0 - behind, z=1)
     overlaps({("bias", "scale_factor"): share})
     assert alias_group(compared(leader, rival), leader) == (("bias", "scale_factor") if together else ("bias",))
+
+
+@pytest.mark.parametrize(
+    ("rival_id", "behind", "nats", "together"),
+    [
+        ("scale_factor", 1.0, LEAD - STEP, True),  # the further coefficients are not known to be 0
+        ("scale_factor", 1.0, LEAD, False),
+        ("scale_factor", 0.0, LEAD, False),
+        ("scale_factor", -1.0, LEAD, True),  # it has more evidence than the leader
+        ("scale_factor", 29.0, -LEAD, False),
+        ("run_shift", 29.0, -LEAD, True),  # each run has a shift of its own, and they are not 0
+        ("run_shift", 29.0, STEP - LEAD, False),
+    ],
+)
+def test_a_rival_that_contains_the_leader_is_judged_by_its_further_coefficients(
+    overlaps: Overlaps, monkeypatch: pytest.MonkeyPatch, rival_id: str, behind: float, nats: float, together: bool
+) -> None:
+    leader, rival = effect("bias", 30.0, gain=112.0), effect(rival_id, 30.0 - behind, z=1)
+    overlaps({("bias", rival_id): 1.0})
+    monkeypatch.setattr(module, "_further_nats", lambda *_: nats)
+    assert (rival_id in alias_group(compared(leader, rival), leader)) == together
 
 
 @pytest.mark.parametrize(

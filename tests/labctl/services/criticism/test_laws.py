@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from labctl.answers.calibrations import FitRequest, ImproveRequest
+from labctl.errors import BadInput
+from labctl.fitting.criticism import criticise
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.models.presets import preset_for
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.revision import improve_unit
-from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.criticism.criticise import criticise_unit, write_next
+from labctl.services.criticism.next_experiment import recipe_for_laws
 from labctl.store import Store, open_store
+from procedures.recipe.recipe import parse_recipe
+from tests.helpers.diagnoses import criticism
 from tests.helpers.simulated_recordings import single_axis
 from tests.helpers.unnamed_error import SIZE_DPS, with_wave
 
@@ -43,3 +52,18 @@ def test_an_unexplained_residual_has_a_law_that_the_model_can_take(store: Store)
     after = criticise_unit(store, unit.serial, improved.version, None)
     assert after.verdict == "adequate"
     assert after.laws == []
+
+
+def test_the_recipe_that_tests_laws_measures_half_way_between_the_rates(store: Store, tmp_path: Path) -> None:
+    recording = single_axis(3)
+    model, _ = preset_for("ojeda2000", []).build(fit_data_of(recording))
+    toml = recipe_for_laws(store, store.recordings.of_unit("FOG-0001"), criticise(recording, model, full=False))
+    rates = np.unique(np.round(np.asarray(recording.columns["table_rate_dps"], dtype=np.float64), 1)).tolist()
+    halfway = [(low + high) / 2 for low, high in pairwise(rates)]
+    assert sorted(parse_recipe(toml).rates_dps) == pytest.approx(halfway, abs=0.05)
+    test = {"rate_dps": 96.0, "temperature_c": None, "difference_dps": 0.002, "do": "measure", "toml": toml}
+    unexplained = criticism("unexplained")
+    write_next(unexplained.model_copy(update={"law_test": test}), tmp_path / "next.toml")
+    assert (tmp_path / "next.toml").read_text(encoding="utf-8") == toml
+    with pytest.raises(BadInput, match="no recipe was written"):
+        write_next(unexplained, tmp_path / "none.toml")

@@ -89,3 +89,14 @@ def test_experiments_that_took_longer_than_expected_make_the_next_ones_longer() 
     move = next_move(progress(late, hours=16.0, spent_hours=12.0), ambiguous(RANDOM))
     assert isinstance(move, End)
     assert (move.outcome, "takes 4.2 h" in move.why) == ("hours_spent", True), move.why
+
+
+def test_an_adequate_model_beside_which_an_effect_may_be_missing_is_measured_on() -> None:
+    doubtful = criticism("adequate", experiments=(RANDOM,))
+    move = next_move(progress(), doubtful)
+    assert isinstance(move, Measure)
+    assert move.experiment.do == RANDOM["do"]
+    for end in (next_move(progress(done(RANDOM), spent_hours=2.1), doubtful), next_move(progress(hours=1.0), doubtful)):
+        assert isinstance(end, End)
+        assert end.outcome == "adequate"
+        assert "some evidence for thermal_lag and warm_up, too little to name one of them" in end.why
