@@ -17,7 +17,7 @@ pytestmark = pytest.mark.timeout(300)
 LAB = "http://lab.example:8420"
 #: What no visible button of a page says.
 ACTS = re.compile(
-    "^(State batch|Certify|Revoke|Issue certificate|Diagnose|Choose files|Open the real gyro|Simulate the recording)$"
+    "^(Set batch|Certify|Revoke|Issue certificate|Diagnose|Choose files|Open the real gyro|Simulate the recording)$"
 )
 
 

@@ -93,7 +93,7 @@ function ladder(serial, signal) {
   loadInto(place, "RMS error by version", async () =>
     ladderFigure(await get("/api/units/{serial}/ladder", { path: { serial }, signal })),
   );
-  return cardWithHeader("How the error fell", null, place);
+  return cardWithHeader("Error of the versions", null, place);
 }
 
 /**
