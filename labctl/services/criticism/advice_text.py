@@ -106,7 +106,7 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
         return [f"To distinguish them: {first['do']}."]
     return [
         f"No experiment that this bench can run is expected to name the cause; most is learned from this one, "
-        f"{first['information_bit'] / first['open_bit']:.0%} of the missing information: {first['do']}."
+        f"{100 * first['information_bit'] / first['open_bit']:.0f} % of the missing information: {first['do']}."
     ]
 
 

@@ -168,7 +168,7 @@ function overview(units, found) {
           { class: "row" },
           h("a", { class: "button primary", href: "/bench" }, "To the bench"),
           h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"),
-          h("a", { class: "button", href: "/live" }, "Calibrate live"),
+          h("a", { class: "button act", href: "/live" }, "Calibrate live"),
         ),
       ),
       card(
@@ -196,7 +196,8 @@ function overview(units, found) {
         h(
           "div",
           { class: "row" },
-          h("a", { class: "button", href: "/recordings" }, "Import a recording"),
+          h("a", { class: "button act", href: "/recordings" }, "Import a recording"),
+          h("a", { class: "button", href: "/recordings" }, "All recordings"),
           actButton("Simulate a hidden effect", openSimulated),
           actButton("Open the real gyro", () => openExample()),
           actButton("Tour", () => openExample("1")),

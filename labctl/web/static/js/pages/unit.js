@@ -44,7 +44,7 @@ export async function page({ params, signal }) {
       unit.serial,
       unitLine(unit),
       h("a", { class: "button primary", href: explore }, "Explore"),
-      h("a", { class: "button", href: `/live?unit=${encodeURIComponent(unit.serial)}` }, "Calibrate live"),
+      h("a", { class: "button act", href: `/live?unit=${encodeURIComponent(unit.serial)}` }, "Calibrate live"),
       batchButton(unit),
     ),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
