@@ -13,6 +13,9 @@ from labctl.plots.registry import Picture
 from labctl.plots.theme import ACCENT, GAP_PX, TEMPLATE, WARM, colour_of, grid_of, place, translucent
 
 ROW_PX = 170
+HEADING_PX = 12
+#: Units of the axis of time: name, seconds, and the shortest span that is drawn in it, s.
+TIME_UNITS = (("h", 3600.0, 10_800.0), ("min", 60.0, 600.0), ("s", 1.0, 0.0))
 #: Colours of the kinds of findings, in the order in which they appear.
 COLOURS = ("#b3242f", WARM, ACCENT, "#7b5ea7", "#3a9d6e", "#a88b1f")
 TITLE = "All readings, and where something was found"
@@ -30,16 +33,20 @@ def inspection_picture(courses: Sequence[CourseJson], marks: Sequence[MarkJson])
     kinds = list(dict.fromkeys(mark["what"] for mark in marks))
     colours = {kind: COLOURS[k % len(COLOURS)] for k, kind in enumerate(kinds)}
     figure = grid_of([_heading(course, _marks_of(course, marks)) for course in courses], 1, shared_xaxes=True)
+    figure.update_annotations(x=0, xanchor="left", font={"size": HEADING_PX})  # on a phone its begin is not cut off
+    unit, unit_s = _time_unit(courses)
     height = ROW_PX * len(courses) + GAP_PX
     figure.update_layout(template=TEMPLATE, height=height)
     bands: list[dict[str, object]] = []
     for panel, course in enumerate(courses):
         placement = place(panel, 1)
-        figure.add_trace(_envelope(course), **placement)
+        figure.add_trace(_envelope(course, unit_s), **placement)
         figure.update_yaxes(title=course["unit"], **placement)
-        bands += [band for mark in _marks_of(course, marks) for band in _bands(mark, colours[mark["what"]], panel)]
+        bands += [
+            band for mark in _marks_of(course, marks) for band in _bands(mark, colours[mark["what"]], panel, unit_s)
+        ]
     figure.update_layout(shapes=bands)  # all at once: plotly copies its figure for each that is added by itself
-    figure.update_xaxes(title="t_s, s", row=len(courses), col=1)
+    figure.update_xaxes(title=f"time, {unit}", row=len(courses), col=1)
     return Picture("inspection", TITLE, CAPTION, figure)
 
 
@@ -59,21 +66,29 @@ def _marks_of(course: CourseJson, marks: Sequence[MarkJson]) -> list[MarkJson]:
     return [mark for mark in marks if mark["channel"] in ("", course["channel"])]
 
 
-def _bands(mark: MarkJson, colour: str, panel: int) -> list[dict[str, object]]:
+def _bands(mark: MarkJson, colour: str, panel: int, unit_s: float) -> list[dict[str, object]]:
     """Return the coloured bands of a finding in the panel of a channel, from 0, as plotly's shapes."""
     number = str(panel + 1) if panel else ""
     return [
         {
-            "type": "rect", "xref": f"x{number}", "yref": f"y{number} domain", "x0": begin, "x1": end, "y0": 0, "y1": 1,
+            "type": "rect", "xref": f"x{number}", "yref": f"y{number} domain", "x0": begin / unit_s,
+            "x1": end / unit_s, "y0": 0, "y1": 1,
             "fillcolor": translucent(colour), "layer": "below", "line": {"color": colour, "width": 1},
         }
         for begin, end in zip(mark["from_s"], mark["until_s"], strict=True)
     ]  # fmt: skip
 
 
+def _time_unit(courses: Sequence[CourseJson]) -> tuple[str, float]:
+    """Return the unit of the axis of time, and its seconds: hours from 3 h on, minutes from 10 min on, else seconds."""
+    spans_s = [course["t_s"][-1] - course["t_s"][0] for course in courses if len(course["t_s"])]
+    span_s = max(spans_s, default=0.0)
+    return next(unit for unit in TIME_UNITS if span_s >= unit[2])[:2]
+
+
 def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:
-    drawn = "reading by reading" if course["bins"] >= course["readings"] else f"in {course['bins']} bins"
-    parts = [f"{course['channel']}: all {course['readings']} readings, {drawn}"]
+    drawn = "each drawn" if course["bins"] >= course["readings"] else f"in {course['bins']:,} bins"
+    parts = [f"<b>{course['channel']}</b>: {course['readings']:,} readings, {drawn}"]
     for mark in marks:
         if mark["whole"]:
             parts.append(f"{mark['what']} (all of it)")
@@ -81,14 +96,14 @@ def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:
             parts.append(f"{mark['what']} ({len(mark['from_s'])} of {mark['places']} places drawn)")
         else:
             parts.append(f"{mark['what']} ({mark['places']} places)")
-    return "; ".join(parts)
+    return "<br>".join([parts[0], *(["; ".join(parts[1:])] if parts[1:] else [])])
 
 
-def _envelope(course: CourseJson) -> go.Scatter:
+def _envelope(course: CourseJson, unit_s: float) -> go.Scatter:
     x: list[float | None] = []
     y: list[float | None] = []
     for t_s, low, high in zip(course["t_s"], course["low"], course["high"], strict=True):
-        x += [t_s] if low == high else [t_s, t_s]
+        x += [t_s / unit_s] if low == high else [t_s / unit_s] * 2
         y += [low] if low == high else [low, high]
     axis = course["channel"].removeprefix("gyro_").removeprefix("accel_")[:1]
     return go.Scatter(

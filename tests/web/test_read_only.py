@@ -54,7 +54,7 @@ def test_pages_say_that_the_service_only_reads_and_show_no_act(
         expect(page.get_by_label("Target U", exact=True)).to_be_hidden()
         expect(page.get_by_text("labctl serve --simulate")).to_be_hidden()
         expect(page.get_by_role("link", name="Calibrate live")).to_have_count(0)
-        expect(page.locator("header")).not_to_contain_text("bench")  # there is none that could answer
+        expect(page.get_by_role("banner")).not_to_contain_text("bench")  # there is none that could answer
     answer = page.evaluate("""async () => {
       const { post } = await import("/static/js/core/http/api.js");
       return post("/api/batches", { body: { batch: "B", serials: ["G"] } }).catch((error) => error.message);

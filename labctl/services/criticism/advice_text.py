@@ -94,7 +94,7 @@ def _doubt(name: str, suspect: Suspect | None, criticism: Criticism, technology:
 
 
 def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) -> list[str]:
-    """Return what distinguishes effects: the first experiment, or that none is expected to; without any, the usual ones.
+    """Return what distinguishes effects: the first experiment, or that none is expected to; without any the usual ones.
 
     An experiment that is not expected to name the cause (`next_experiment.MIN_NAMING`) is not recommended as if it did.
     """
@@ -104,10 +104,12 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
     first = experiments[0]
     if naming_probability(first) >= MIN_NAMING:
         return [f"To distinguish them: {first['do']}."]
-    return [
-        f"No experiment that this bench can run is expected to name the cause; most is learned from this one, "
-        f"{100 * first['information_bit'] / first['open_bit']:.0f} % of the missing information: {first['do']}."
-    ]
+    share = first["information_bit"] / first["open_bit"]
+    text = (
+        "No experiment that this bench can run is expected to name the cause; most is learned from this one, "
+        f"{100 * share:.0f} % of the missing information: {first['do']}."
+    )
+    return [text]
 
 
 def advice_sentences(advice: Sequence[Advice]) -> list[str]:
