@@ -81,8 +81,8 @@ def _bands(mark: MarkJson, colour: str, panel: int, unit_s: float) -> list[dict[
 
 def _time_unit(courses: Sequence[CourseJson]) -> tuple[str, float]:
     """Return the unit of the axis of time, and its seconds: hours from 3 h on, minutes from 10 min on, else seconds."""
-    spans_s = [course["t_s"][-1] - course["t_s"][0] for course in courses if len(course["t_s"])]
-    span_s = max(spans_s, default=0.0)
+    times_s = [t_s for course in courses for t_s in course["t_s"] if t_s is not None]
+    span_s = max(times_s, default=0.0) - min(times_s, default=0.0)
     return next(unit for unit in TIME_UNITS if span_s >= unit[2])[:2]
 
 
@@ -95,7 +95,7 @@ def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:
         elif len(mark["from_s"]) < mark["places"]:
             parts.append(f"{mark['what']} ({len(mark['from_s'])} of {mark['places']} places drawn)")
         else:
-            parts.append(f"{mark['what']} ({mark['places']} places)")
+            parts.append(f"{mark['what']} ({mark['places']} {'place' if mark['places'] == 1 else 'places'})")
     return "<br>".join([parts[0], *(["; ".join(parts[1:])] if parts[1:] else [])])
 
 
@@ -103,7 +103,8 @@ def _envelope(course: CourseJson, unit_s: float) -> go.Scatter:
     x: list[float | None] = []
     y: list[float | None] = []
     for t_s, low, high in zip(course["t_s"], course["low"], course["high"], strict=True):
-        x += [t_s / unit_s] if low == high else [t_s / unit_s] * 2
+        at = None if t_s is None else t_s / unit_s
+        x += [at] if low == high else [at, at]
         y += [low] if low == high else [low, high]
     axis = course["channel"].removeprefix("gyro_").removeprefix("accel_")[:1]
     return go.Scatter(
