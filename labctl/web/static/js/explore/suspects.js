@@ -254,10 +254,10 @@ function coefficientText(suspect, axis) {
 }
 
 /**
- * A value with no line break before its uncertainty and its power of ten; only the unit may wrap.
+ * A value with no line break before its uncertainty, nor within its power of ten.
  * @param {string} text
  */
-const unbroken = (text) => text.replaceAll(/ ([±×]) /g, "\u00a0$1\u00a0");
+const unbroken = (text) => text.replaceAll(" ± ", "\u00a0±\u00a0").replaceAll("× ", "×\u00a0");
 
 /** @param {Criticism} criticism */
 function aliasNotice(criticism) {

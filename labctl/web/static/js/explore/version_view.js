@@ -27,8 +27,8 @@ import { suspectList, verdictCard } from "./suspects.js";
 /** Sections of the page in order: anchor, name, which is a part of the section's heading. */
 const SECTIONS = [
   ["compare", "Compare"],
-  ["fails", "Where it fails"],
-  ["learn", "Missing effects"],
+  ["fails", "Fails"],
+  ["learn", "Missing"],
   ["add", "Add"],
   ["watch", "Versions"],
 ];
