@@ -17,6 +17,8 @@ from labctl.texts import counted
 ROW_PX, GAP_PX, LINE_PX = 170, 45, 17
 #: Left of the panels, where their headings begin too: on a phone there is no room for one in the middle.
 LEFT_PX = 60
+#: Units of the axis of time: name, seconds, and the shortest span that is drawn in it, s.
+TIME_UNITS = (("h", 3600.0, 10_800.0), ("min", 60.0, 600.0), ("s", 1.0, 0.0))
 #: Colours of the kinds of findings, in the order in which they appear.
 COLOURS = ("#b3242f", WARM, ACCENT, "#7b5ea7", "#3a9d6e", "#a88b1f")
 TITLE = "All readings, and where something was found"
@@ -38,14 +40,17 @@ def inspection_picture(courses: Sequence[CourseJson], marks: Sequence[MarkJson])
     figure = grid_of(headings, 1, row_px=ROW_PX + further_px, gap_px=GAP_PX + further_px, shared_xaxes=True)
     figure.update_layout(margin={"t": 30 + LINE_PX * headings[0].count("<br>"), "l": LEFT_PX})
     figure.update_annotations(x=0.0, xanchor="left", xshift=8 - LEFT_PX, yshift=4, align="left", font={"size": 12})
+    unit, unit_s = _time_unit(courses)
     bands: list[dict[str, object]] = []
     for panel, course in enumerate(courses):
         placement = place(panel, 1)
-        figure.add_trace(_envelope(course), **placement)
+        figure.add_trace(_envelope(course, unit_s), **placement)
         figure.update_yaxes(title=course["unit"], **placement)
-        bands += [band for mark in _marks_of(course, marks) for band in _bands(mark, colours[mark["what"]], panel)]
+        bands += [
+            band for mark in _marks_of(course, marks) for band in _bands(mark, colours[mark["what"]], panel, unit_s)
+        ]
     figure.update_layout(shapes=bands)  # all at once: plotly copies its figure for each that is added by itself
-    figure.update_xaxes(title="t_s, s", row=len(courses), col=1)
+    figure.update_xaxes(title=f"time, {unit}", row=len(courses), col=1)
     return Picture("inspection", TITLE, CAPTION, figure)
 
 
@@ -65,21 +70,29 @@ def _marks_of(course: CourseJson, marks: Sequence[MarkJson]) -> list[MarkJson]:
     return [mark for mark in marks if mark["channel"] in ("", course["channel"])]
 
 
-def _bands(mark: MarkJson, colour: str, panel: int) -> list[dict[str, object]]:
+def _bands(mark: MarkJson, colour: str, panel: int, unit_s: float) -> list[dict[str, object]]:
     """Return the coloured bands of a finding in the panel of a channel, from 0, as plotly's shapes."""
     number = str(panel + 1) if panel else ""
     return [
         {
-            "type": "rect", "xref": f"x{number}", "yref": f"y{number} domain", "x0": begin, "x1": end, "y0": 0, "y1": 1,
+            "type": "rect", "xref": f"x{number}", "yref": f"y{number} domain", "x0": begin / unit_s,
+            "x1": end / unit_s, "y0": 0, "y1": 1,
             "fillcolor": translucent(colour), "layer": "below", "line": {"color": colour, "width": 1},
         }
         for begin, end in zip(mark["from_s"], mark["until_s"], strict=True)
     ]  # fmt: skip
 
 
+def _time_unit(courses: Sequence[CourseJson]) -> tuple[str, float]:
+    """Return the unit of the axis of time, and its seconds: hours from 3 h on, minutes from 10 min on, else seconds."""
+    times_s = [t_s for course in courses for t_s in course["t_s"] if t_s is not None]
+    span_s = max(times_s, default=0.0) - min(times_s, default=0.0)
+    return next(unit for unit in TIME_UNITS if span_s >= unit[2])[:2]
+
+
 def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:
-    drawn = "reading by reading" if course["bins"] >= course["readings"] else f"in {course['bins']} bins"
-    lines = [f"{course['channel']}: all {course['readings']} readings, {drawn}"]
+    drawn = "each drawn" if course["bins"] >= course["readings"] else f"in {course['bins']:,} bins"
+    lines = [f"<b>{course['channel']}</b>: {course['readings']:,} readings, {drawn}"]
     for mark in marks:
         if mark["whole"]:
             lines.append(f"{mark['what']} (all of it)")
@@ -90,11 +103,12 @@ def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:
     return "<br>".join(lines)
 
 
-def _envelope(course: CourseJson) -> go.Scatter:
+def _envelope(course: CourseJson, unit_s: float) -> go.Scatter:
     x: list[float | None] = []
     y: list[float | None] = []
     for t_s, low, high in zip(course["t_s"], course["low"], course["high"], strict=True):
-        x += [t_s] if low == high else [t_s, t_s]
+        at = None if t_s is None else t_s / unit_s
+        x += [at] if low == high else [at, at]
         y += [low] if low == high else [low, high]
     axis = course["channel"].removeprefix("gyro_").removeprefix("accel_")[:1]
     return go.Scatter(

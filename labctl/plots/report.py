@@ -25,7 +25,6 @@ def report_html(
         *(f"<p>{line}</p>" for line in others),
         _errors(criticism.error),
         _suspects(criticism.suspects),
-        *(f"<p>To distinguish them:  {escape(str(e['do']))}.</p>" for e in criticism.experiments[:1]),
         *(figure_part(picture) for picture in pictures),
         _worst(criticism.worst),
         _not_testable(criticism.not_testable),

@@ -29,8 +29,19 @@ test("a suspect that is not listed has no probability, one far below 1 % has 0",
 });
 
 test("what waits for a person is marked, and so is an end without a cause", () => {
-  assert.equal(diagnosisState({ state: "awaiting_confirmation", outcome: null }).kind, "warn");
-  assert.equal(diagnosisState({ state: "measuring", outcome: null }).kind, "");
-  assert.equal(diagnosisState({ state: "done", outcome: "one_cause" }).kind, "good");
-  assert.deepEqual(diagnosisState({ state: "done", outcome: "hours_spent" }), { text: "hours spent", kind: "warn" });
+  assert.equal(diagnosisState({ state: "awaiting_confirmation", outcome: null, begins_at: null }).kind, "warn");
+  assert.equal(diagnosisState({ state: "measuring", outcome: null, begins_at: null }).kind, "");
+  assert.equal(diagnosisState({ state: "done", outcome: "one_cause", begins_at: null }).kind, "good");
+  assert.deepEqual(diagnosisState({ state: "done", outcome: "hours_spent", begins_at: null }), {
+    text: "hours spent",
+    kind: "warn",
+  });
+});
+
+test("before the time that it begins at nothing is said to be measured", () => {
+  const begins_at = "2026-11-29T22:00:00Z";
+  const waits = { state: /** @type {const} */ ("measuring"), outcome: null, begins_at };
+  assert.match(diagnosisState(waits, Date.parse(begins_at) - 1000).text, /^begins \w{3},? \d+ Nov/);
+  assert.equal(diagnosisState(waits, Date.parse(begins_at) + 1000).text, "measuring");
+  assert.equal(diagnosisState({ ...waits, outcome: "one_cause" }, 0).text, "one cause");
 });

@@ -81,6 +81,7 @@ test("a result and its uncertainty end at the same place", () => {
 test("the uncertainty has two significant digits, and the value its place", () => {
   assert.deepEqual(roundedToUncertainty(1.23456, 0.0999), { value: "1.23", u: "0.10", exponent: 0 });
   assert.deepEqual(roundedToUncertainty(1234.5, 120), { value: "1230", u: "120", exponent: 0 });
+  assert.equal(roundedToUncertainty(-0.00002, 0.0019).value, "0.0000"); // a zero has no sign
   assert.deepEqual(roundedToUncertainty(0, null), { value: "0", u: null, exponent: 0 });
 });
 

@@ -21,6 +21,9 @@ READ = """math => ({
   width: math.getBoundingClientRect().width,
 })"""
 
+#: Of each symbol with an index: where the symbol ends, and where its index ends, px.
+SCRIPTS = "all => all.map(each => [...each.children].map(child => child.getBoundingClientRect().bottom))"
+
 
 def same(drawn: str, mathml: str) -> bool:
     """Return whether two documents are the same, however their characters are written."""
@@ -49,6 +52,8 @@ def check_equation(place: Locator, effect: dict[str, Any]) -> None:
     assert found["width"] > 40
     rows = place.get_by_role("group", name=f"Symbols of {effect['id']}").get_by_role("row")
     assert rows.count() == 1 + len(effect["equation"]["symbols"])
+    for base, index in place.locator(".equation msub").evaluate_all(SCRIPTS):
+        assert index > base + 2, "a subscript stands on the line, as a factor would"
     for k, symbol in enumerate(effect["equation"]["symbols"], 1):
         assert symbol["meaning"] in rows.nth(k).inner_text()
     for source in effect["sources"]:

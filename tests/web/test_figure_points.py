@@ -128,7 +128,7 @@ def test_the_cell_of_a_figure_gives_exactly_that_figure(
 ) -> None:
     page, failing = opened(visit, f"unit={recording.info.serial}")
     drawn = figure(page, "Residual against a channel")
-    made = ran(copied(page, failing, re.compile("^Cell: copy a notebook cell that gives Residual")))["figure"]
+    made = ran(copied(page, failing, re.compile("^Notebook: copy a notebook cell that gives Residual")))["figure"]
     (trace,) = made.data
     for own, shown in ((trace.x, drawn["data"][0]["x"]), (trace.y, drawn["data"][0]["y"])):
         assert [float(f"{value:.5g}") for value in own] == shown  # the page takes five digits of each

@@ -60,6 +60,45 @@ def shown(value: float) -> float:
     return float(f"{value:.3g}")
 
 
+def test_explore_says_what_its_buttons_do_and_what_an_experiment_can_decide(
+    service: Service, visit: Callable[..., Page], unit: str
+) -> None:
+    from playwright.sync_api import expect
+
+    criticism = service.get(f"/api/units/{unit}/calibrations/1/criticism")
+    best = criticism["experiments"][0]
+    assert best["power"] - best["names_wrong"] < 0.05, (
+        "this recording needs an experiment that is not expected to decide"
+    )
+    page = visit(f"/explore?unit={unit}&version=1")
+    settled(page)
+    expect(page.get_by_role("region", name="Verdict")).to_contain_text(
+        "No experiment that this bench can run is expected to name the cause"
+    )
+    expect(page.locator("main")).not_to_contain_text("To distinguish them")
+    for link in page.get_by_role("navigation", name="On this page").get_by_role("link").all():
+        heading = page.locator(f"{link.get_attribute('href')} h2").inner_text()
+        assert set(link.inner_text().lower().split()) <= set(re.findall("[a-z]+", heading.lower())), heading
+
+    learn = page.get_by_role("region", name="Which effects are missing")
+    expect(learn).to_contain_text(f"names the cause with a probability of {100 * best['power']:.0f} %")
+    sine = learn.get_by_role("listitem").filter(has_text="sine response")
+    sine.get_by_role("button", name="What if").click()
+    expect(page.get_by_role("heading", name="What if: sine response")).to_be_in_viewport()
+    sine.get_by_role("button", name="Add").click()
+    adding = page.get_by_role("region", name="Add it")
+    expect(adding).to_contain_text("nothing is stored yet")
+    expect(adding).to_contain_text("(usual: 0 (rad/(rad/s))² to 2.3 (rad/(rad/s))²)")
+    assert [row["version"] for row in service.get(f"/api/units/{unit}/calibrations")] == [1]
+    assert adding.locator(".button.primary").all_inner_texts() == ["Make version 2"]  # the one next step
+
+    learn.get_by_role("link", name="Plan it").first.click()
+    expect(page.get_by_text(f"This experiment is for {unit}, which is not on single-axis-sim.")).to_be_visible()
+    own = page.get_by_role("radiogroup", name="Recipe").get_by_role("radio").first
+    expect(own).to_be_checked()
+    assert own.get_attribute("value") == "own"
+
+
 def residual_of(service: Service, serial: str, version: int) -> dict[str, Any]:
     answer: dict[str, Any] = service.get(f"/api/units/{serial}/calibrations/{version}/criticism")
     return answer

@@ -160,11 +160,11 @@ def test_the_batch_of_a_unit_is_stated_on_its_page_and_filters_the_list(
 
     service.post("/api/batches", {"batch": "26-W12", "serials": ["G001", "G002"], "by": "Q"})
     page = visit("/units/G003")
-    page.get_by_role("button", name="State batch").click()
+    page.get_by_role("button", name="Set batch").click()
     page.get_by_label("Batch", exact=True).fill("26-W12")
     page.get_by_label("Supplier").fill("ACME")
     page.get_by_label("Who").fill("Q")
-    page.get_by_role("button", name="State", exact=True).click()
+    page.get_by_role("dialog").get_by_role("button", name="Set batch").click()
     expect(page.get_by_text("VG-35 · FOG · batch 26-W12 · ACME")).to_be_visible()
     page = visit("/units")
     page.get_by_label("Batch", exact=True).select_option("26-W12")

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.timeout(300)
 LAB = "http://lab.example:8420"
 #: What no visible button of a page says.
 ACTS = re.compile(
-    "^(State batch|Certify|Revoke|Issue certificate|Diagnose|Choose files|Open the real gyro|Simulate the recording)$"
+    "^(Set batch|Certify|Revoke|Issue certificate|Diagnose|Choose files|Open the real gyro|Simulate the recording)$"
 )
 
 
@@ -43,6 +43,18 @@ def test_pages_say_that_the_service_only_reads_and_show_no_act(
         acts.first.wait_for(state="attached")
         assert not [act for act in acts.all() if act.is_visible()], path
         expect(page.get_by_role("button").filter(has_text=ACTS.split("|", maxsplit=1)[0])).to_have_count(0)
+    for path, said in (
+        ("/live", "A live calibration is not begun here"),
+        ("/campaigns/new", "A campaign is planned here and begun elsewhere"),
+        ("/recordings", "Nothing is imported here"),
+        ("/bench", "No bench is driven from here"),
+    ):
+        page = visit(path)
+        expect(page.locator(".read-only-note")).to_contain_text(f"{said}: this service only reads.")
+        expect(page.get_by_label("Target U", exact=True)).to_be_hidden()
+        expect(page.get_by_text("labctl serve --simulate")).to_be_hidden()
+        expect(page.get_by_role("link", name="Calibrate live")).to_have_count(0)
+        expect(page.get_by_role("banner")).not_to_contain_text("bench")  # there is none that could answer
     answer = page.evaluate("""async () => {
       const { post } = await import("/static/js/core/http/api.js");
       return post("/api/batches", { body: { batch: "B", serials: ["G"] } }).catch((error) => error.message);

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from labctl.answers.criticism import Advice
+from labctl.answers.criticism import Advice, Experiment
 from labctl.fitting.criticism import Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
+from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
 
 #: From this share of the variance of several axes on, their slow courses are one.
 COMMON = 0.8
@@ -92,6 +93,25 @@ def _doubt(name: str, suspect: Suspect | None, criticism: Criticism, technology:
     return f"{name}{change} {size}{limit}"
 
 
+def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) -> list[str]:
+    """Return what distinguishes effects: the first experiment, or that none is expected to; without any the usual ones.
+
+    An experiment that is not expected to name the cause (`next_experiment.MIN_NAMING`) is not recommended as if it did.
+    """
+    if not experiments:
+        usual = dict.fromkeys(CATALOGUE[each].experiment for each in effects[:3] if each in CATALOGUE)
+        return [f"To distinguish them: {experiment}." for experiment in usual]
+    first = experiments[0]
+    if naming_probability(first) >= MIN_NAMING:
+        return [f"To distinguish them: {first['do']}."]
+    share = first["information_bit"] / first["open_bit"]
+    text = (
+        "No experiment that this bench can run is expected to name the cause; most is learned from this one, "
+        f"{100 * share:.0f} % of the missing information: {first['do']}."
+    )
+    return [text]
+
+
 def advice_sentences(advice: Sequence[Advice]) -> list[str]:
     """Return what to add and what not, one sentence for each effect that was named."""
     return [_advised(each) if each["add"] else f"Do not add {each['effect']}: {each['why']}." for each in advice]
@@ -99,6 +119,6 @@ def advice_sentences(advice: Sequence[Advice]) -> list[str]:
 
 def _advised(advice: Advice) -> str:
     return (
-        f"Adding {advice['effect']} is advised: on parts left out of the fit, what would be exported then leaves "
-        f"{advice['after_dps']:.3g} deg/s in place of {advice['before_dps']:.3g} deg/s."
+        f"Adding {advice['effect']} is advised: on the parts left out of the fit, the exported calibration then "
+        f"leaves an error of {advice['after_dps']:.3g} deg/s, now {advice['before_dps']:.3g} deg/s."
     )

@@ -26,6 +26,7 @@ from labctl.services.criticism.advice_text import (
     doubtful,
     drifts,
     not_logged,
+    to_distinguish,
     what_to_log,
 )
 
@@ -171,12 +172,7 @@ def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[
             "distinguished from one that grows with temperature."
         )
     if verdict.form == "ambiguous" and verdict.indistinguishable:
-        wanted = [str(experiment["do"]) for experiment in experiments[:1]]
-        if not wanted:
-            wanted = list(
-                dict.fromkeys(CATALOGUE[e].experiment for e in verdict.indistinguishable[:3] if e in CATALOGUE)
-            )
-        said += [f"To distinguish them: {experiment}." for experiment in wanted]
+        said += to_distinguish(verdict.indistinguishable, experiments)
     said += advice_sentences(found.advice)
     if verdict.not_physical and verdict.groups:
         technology = found.data.info.technology or "this technology"

@@ -73,7 +73,7 @@ class Foreseen(Planned):
     @property
     def naming(self) -> float:
         """The probability that the verdict then names the cause alone, and rightly."""
-        return max(self.forecast.names_one - self.forecast.names_wrong, 0.0)
+        return _naming(self.forecast.names_one, self.forecast.names_wrong)
 
     @property
     def rank(self) -> tuple[float, float]:
@@ -84,6 +84,15 @@ class Foreseen(Planned):
         the probabilities; where none is expected to decide, information is what leads on.
         """
         return (self.naming / self.cost_h if self.naming >= MIN_NAMING else 0.0, self.bit_per_h)
+
+
+def naming_probability(experiment: Experiment) -> float:
+    """Return the probability that the verdict names the cause alone, and rightly, after an experiment, 0 to 1."""
+    return _naming(experiment["power"], experiment["names_wrong"])
+
+
+def _naming(names_one: float, names_wrong: float) -> float:
+    return max(names_one - names_wrong, 0.0)
 
 
 def experiments_for(store: Store, rows: Sequence[RecordingRow], criticism: Criticism) -> list[Experiment]:
@@ -211,7 +220,7 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     order = _ORDER[foreseen.rank[0] > 0]
     rank = f"; {of} experiments that this bench can run are ordered by {order}" if of > 1 else ""
     listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
-    pair = f"; if it is {leader}, this distinguishes it from {listed}" if told else ""
+    pair = f"; if it is {leader}, this distinguishes it from {listed}" if told and foreseen.rank[0] > 0 else ""
     return f"{first}{rank}{pair}; the probability that one cause is then named alone is {expected.names_one:.2f}."
 
 

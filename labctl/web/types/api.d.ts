@@ -115,6 +115,7 @@ export type ResidualMap = Schema<"ResidualMap">;
 export type Suspect = Schema<"Suspect">;
 export type Verification = Schema<"VerificationResponse">;
 export type Version = Schema<"VersionResponse"> | Schema<"ImprovedVersionResponse">;
+export type TypePrior = NonNullable<Schema<"VersionResponse">["type_prior"]>;
 export type CoefficientTable = Schema<"CoefficientTable">;
 /** The unit of each output axis. */
 export type Outputs = Record<string, { unit?: string }>;

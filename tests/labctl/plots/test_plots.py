@@ -242,3 +242,26 @@ def test_the_command_writes_the_report(tmp_path: Path) -> None:
     assert 'data-figure="numbers-ladder"' in text
     refused = lab.run("criticise", "FOG-0001", "--report", str(tmp_path / "no" / "where.html"), status=2)
     assert "nothing was written" in refused.stderr
+
+
+def test_headings_of_an_inspection_begin_at_the_left_and_its_time_is_in_hours() -> None:
+    """In the middle a long heading is cut on both sides of a phone."""
+    from labctl.answers.inspection import CourseJson, MarkJson
+    from labctl.plots.inspection import inspection_picture
+
+    course: CourseJson = {
+        "channel": "gyro_x", "unit": "deg/s", "readings": 12_000, "bins": 3, "t_s": [0.0, None, 7200.0, 14_400.0],
+        "low": [0.0, None, 1.0, 2.0], "high": [0.0, None, 2.0, 2.0],
+    }  # fmt: skip
+    mark: MarkJson = {
+        "what": "spike", "channel": "gyro_x", "from_s": [3600.0], "until_s": [7200.0], "places": 1, "whole": False,
+    }  # fmt: skip
+    picture = inspection_picture([course], [mark])
+    assert picture is not None
+    layout = picture.figure.layout
+    (heading,) = layout.annotations
+    assert (heading.x, heading.xanchor) == (0, "left")
+    assert heading.text == "<b>gyro_x</b>: 12,000 readings, in 3 bins<br>spike (1 place)"
+    assert layout.xaxis.title.text == "time, h"
+    assert list(picture.figure.data[0].x) == [0.0, None, 2.0, 2.0, 4.0]
+    assert (layout.shapes[0].x0, layout.shapes[0].x1) == (1.0, 2.0)

@@ -179,10 +179,22 @@ def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
         None,
         found.comparison,
     )
-    said = sentences(reported, [{"do": "the rates in random order"}, {"do": "another"}])
-    assert [line for line in said if line.startswith("To distinguish")] == [
-        "To distinguish them: the rates in random order."
-    ]
+    asked = {
+        "do": "the rates in random order",
+        "power": 0.6,
+        "names_wrong": 0.01,
+        "information_bit": 0.2,
+        "open_bit": 0.8,
+    }
+    said = sentences(reported, [asked, {"do": "another"}])
+    assert "To distinguish them: the rates in random order." in said
+    assert not any("another" in line for line in said)
+    said = sentences(reported, [asked | {"power": 0.05}, {"do": "another"}])  # not expected to decide
+    assert not any(line.startswith("To distinguish") for line in said)
+    assert (
+        "No experiment that this bench can run is expected to name the cause; most is learned from this one, "
+        "25 % of the missing information: the rates in random order."
+    ) in said
 
 
 @pytest.mark.slow

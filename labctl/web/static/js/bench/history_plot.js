@@ -1,19 +1,17 @@
 // History plot: temperatures above, table rate below.
 
 import { colour, figure } from "../core/figure.js";
-import { timeUnit } from "../core/time_unit.js";
+import { campaignTimeUnit } from "../core/time_unit.js";
 
 /** @import { Columns } from "./campaign_history.js" */
 
 const MIN_INTERVAL_MS = 1000;
-const HOURS_FROM_S = 10_800;
 
 /** @param {Columns} history */
 export function historyPlot(history) {
   const draw = () => {
     const { t_s } = history;
-    const long = (t_s.at(-1) ?? 0) - (t_s[0] ?? 0);
-    const unit = timeUnit(long, HOURS_FROM_S);
+    const unit = campaignTimeUnit(t_s);
     const x = t_s.map((t) => t / unit.seconds);
     /**
      * @param {string} name
@@ -46,8 +44,8 @@ export function historyPlot(history) {
         margin: { l: 58, r: 12, t: 34, b: 42 },
         hovermode: "x unified",
         xaxis: { title: { text: `time of the campaign, ${unit.name}` }, anchor: "y2" },
-        yaxis: { title: { text: "deg C" }, domain: [0.42, 1] },
-        yaxis2: { title: { text: "deg/s" }, domain: [0, 0.34], anchor: "x" },
+        yaxis: { title: { text: "temperature, deg C" }, domain: [0.42, 1] },
+        yaxis2: { title: { text: "table rate, deg/s" }, domain: [0, 0.34], anchor: "x" },
       },
     };
   };

@@ -2,7 +2,7 @@
 
 import { h, uniqueId } from "../core/elements.js";
 import { percent } from "../core/format.js";
-import { card, factList, notice } from "../core/components.js";
+import { card, factList, notice, readOnlyNote } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
 import { adviceNotice } from "../campaigns/advice.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
@@ -18,18 +18,24 @@ import { linkButton, resumeControl } from "./actions.js";
 export function noBenchCard() {
   return card(
     "This service drives no bench",
+    readOnlyNote("No bench is driven from here"),
     h(
       "p",
-      {},
+      { class: "act" },
       "The service serves calibrations and imports recordings. To run a bench, start the service with one of these commands:",
     ),
-    h("pre", { class: "command" }, "labctl serve --simulate\nlabctl serve --bench FILE"),
+    h("pre", { class: "command act" }, "labctl serve --simulate\nlabctl serve --bench FILE"),
     h(
       "p",
-      { class: "muted" },
+      { class: "muted act" },
       "The first command runs a simulated tri-axial bench; --speed sets its speed. The second command drives the real instruments that the bench file names.",
     ),
-    h("div", { class: "row" }, linkButton("To the recordings", "/recordings"), linkButton("Calibrate live", "/live")),
+    h(
+      "div",
+      { class: "row" },
+      linkButton("To the recordings", "/recordings"),
+      linkButton("Calibrate live", "/live", "act"),
+    ),
   );
 }
 

@@ -3,6 +3,7 @@
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { mean, scatterText } from "../core/format.js";
+import { campaignTimeUnit } from "../core/time_unit.js";
 import { factList, cardWithHeader } from "../core/components.js";
 
 /** @import { Campaign, Output } from "../../../types/api.js" */
@@ -56,12 +57,13 @@ export function liveOutput(campaign) {
     () => {
       const drawn = [...courses.values()];
       const several = units().length > 1;
+      const unit = campaignTimeUnit(drawn[0]?.t_s ?? []);
       return {
         data: drawn.map((course) => ({
           type: "scatter",
           mode: course.t_s.length < MARKER_LIMIT ? "lines+markers" : "lines",
           name: seriesName(course, several),
-          x: course.t_s,
+          x: course.t_s.map((t) => t / unit.seconds),
           y: course.mean,
           marker: { size: 5 },
           line: {
@@ -75,8 +77,8 @@ export function liveOutput(campaign) {
           margin: { l: 62, r: 12, t: 30, b: 42 },
           hovermode: "x unified",
           showlegend: drawn.length > 1,
-          xaxis: { title: { text: "time of the campaign, s" } },
-          yaxis: { title: { text: drawn[0]?.unit ?? "" } },
+          xaxis: { title: { text: `time of the campaign, ${unit.name}` } },
+          yaxis: { title: { text: `output, ${drawn[0]?.unit ?? ""}` } },
         },
       };
     },

@@ -33,6 +33,14 @@ export const campaignInstant = (campaign, text) => marked(campaign, instant(text
 export const campaignDuration = (campaign, seconds) => marked(campaign, duration(seconds));
 
 /**
+ * A duration in a list of facts, as `instantFact`.
+ * @param {OnItsClock} campaign
+ * @param {Numeric} seconds
+ * @returns {[string, string]}
+ */
+export const durationFact = (campaign, seconds) => [duration(seconds), campaign.simulated_time ? `(${SIMULATED})` : ""];
+
+/**
  * How long an ended campaign took, null for others.
  * @param {OnItsClock & Pick<Campaign, "started_at" | "ended_at">} campaign
  */

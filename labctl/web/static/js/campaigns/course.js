@@ -77,8 +77,8 @@ export function courseCard(course, plan, datasets, moved) {
       layout: {
         margin: { l: 62, r: 12, t: 34, b: 42 },
         xaxis: { title: { text: `time of the campaign, ${unit.name}` }, anchor: datasets ? "y2" : "y" },
-        yaxis: { title: { text: "deg C" }, domain: datasets ? [0.42, 1] : [0, 1] },
-        ...(datasets ? { yaxis2: { title: { text: "output" }, domain: [0, 0.34], anchor: "x" } } : {}),
+        yaxis: { title: { text: "temperature, deg C" }, domain: datasets ? [0.42, 1] : [0, 1] },
+        ...(datasets ? { yaxis2: { title: { text: outputTitle(datasets) }, domain: [0, 0.34], anchor: "x" } } : {}),
         shapes: [
           {
             type: "line",
@@ -117,6 +117,15 @@ export function courseCard(course, plan, datasets, moved) {
     readings,
     twoSoaks(course, plan),
   );
+}
+
+/**
+ * The title of the axis of the outputs, with the unit that they share.
+ * @param {MeasuredSets} datasets
+ */
+function outputTitle(datasets) {
+  const names = Object.keys(datasets.channels).filter((name) => name.startsWith("gyro_"));
+  return ["output", ...new Set(names.map((name) => channelUnit(name, datasets.output)))].join(", ");
 }
 
 /**

@@ -1,6 +1,6 @@
 // What a campaign was doing at one time: the sample of its course, its step, its data set.
 
-import { duration, plainNumber } from "../core/format.js";
+import { duration, idText, plainNumber } from "../core/format.js";
 import { channelUnit } from "../recordings/channels.js";
 
 /** @import { CampaignPlan, Course, DataSets, Outputs } from "../../../types/api.js" */
@@ -62,7 +62,7 @@ export function readingsAt({ course, steps, datasets }, t_s) {
   /** @type {[string, string][]} */
   const rows = [
     ["Time", duration(t_s)],
-    ["Step", step === null ? "between two steps" : `${steps.number[step]}: ${steps.kind[step]}`],
+    ["Step", step === null ? "between two steps" : `${steps.number[step]}: ${idText(steps.kind[step])}`],
     ["Set point", warm(course.setpoint_c[k])],
     ["Chamber", warm(course.chamber_c[k])],
     ...Object.entries(course.units_c).map(

@@ -102,11 +102,14 @@ export function recipeChoice(all, choice, chosen) {
     setChildren(shippedText, all.find((each) => each.name === name)?.text ?? "");
   }
   show(choice.name);
+  const ownOption = option("own", "Your own recipe", "A recipe as text, below the list.");
+  const isOwn = choice.name === "own";
   return card(
     "Recipe",
     h(
       "div",
       { class: "options", role: "radiogroup", "aria-label": "Recipe" },
+      isOwn ? ownOption : null, // what is chosen is not at the end of a long list
       all.map((each) =>
         option(
           each.name,
@@ -130,7 +133,7 @@ export function recipeChoice(all, choice, chosen) {
               : null,
         ),
       ),
-      option("own", "Your own recipe", "A recipe as text."),
+      isOwn ? null : ownOption,
     ),
     shipped,
     own,

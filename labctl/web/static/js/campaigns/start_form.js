@@ -4,7 +4,7 @@ import { post } from "../core/http/api.js";
 import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { instant } from "../core/format.js";
-import { actButton, card, notice, toast } from "../core/components.js";
+import { actButton, card, notice, readOnlyNote, toast } from "../core/components.js";
 import { labelledField, toggleGroup } from "../core/fields.js";
 import { navigate } from "../core/router.js";
 import { askBenchClear } from "../bench/actions.js";
@@ -194,10 +194,15 @@ export function startForm(bench, order) {
   });
   const element = card(
     "Begin",
-    bench ? null : notice("", "This service drives no bench; a campaign that is planned here can be simulated."),
-    h("div", {}, group),
-    attended,
-    place,
+    readOnlyNote("A campaign is planned here and begun elsewhere"),
+    h(
+      "div",
+      { class: "stack act" },
+      bench ? null : notice("", "This service drives no bench; a campaign that is planned here can be simulated."),
+      h("div", {}, group),
+      attended,
+      place,
+    ),
   );
   return Object.assign(element, { id: "begin", look });
 }

@@ -76,6 +76,17 @@ export function factList(rows) {
  */
 export const chip = (text, kind = "") => h("span", { class: `chip ${kind}` }, text);
 /**
+ * What a service that only reads says in place of its acts; not shown by any other.
+ * @param {string} what that is not done here
+ */
+export const readOnlyNote = (what) =>
+  h(
+    "p",
+    { class: "muted read-only-note" },
+    `${what}: this service only reads. Use the service whose address is at the head of the page.`,
+  );
+
+/**
  * A model's name, which may break after each part: yang2018+ scale_factor_asymmetry.
  * @param {string | null | undefined} name
  * @returns {Child[]}

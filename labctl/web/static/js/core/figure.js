@@ -238,8 +238,8 @@ function cellButton(name, cell) {
     if (text) copyText(text, "Notebook cell");
     else toast("bad", "The Python client has no column of this channel; choose rate, temperature or time.");
   };
-  const label = `Cell: copy a notebook cell that gives ${name}`;
-  return h("button", { type: "button", class: "button quiet tiny", "aria-label": label, onclick: copy }, "Cell");
+  const label = `Notebook: copy a notebook cell that gives ${name}`;
+  return h("button", { type: "button", class: "button quiet tiny", "aria-label": label, onclick: copy }, "Notebook");
 }
 
 /**

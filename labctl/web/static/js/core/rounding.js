@@ -5,6 +5,12 @@ const MAX_DECIMALS = 12;
 const [MIN_POWER, MAX_POWER] = [-4, 5];
 
 /**
+ * A zero has no sign: -0.0000 -> 0.0000.
+ * @param {string} text
+ */
+const unsigned = (text) => (/^-[0.]*$/.test(text) ? text.slice(1) : text);
+
+/**
  * Round a value to its uncertainty: {value, u, exponent}, texts that both count in units of 10^exponent.
  * `u` is null where there is no uncertainty; the value then has four significant digits.
  * @param {number} value
@@ -23,6 +29,6 @@ export function roundedToUncertainty(value, uncertainty) {
   /** @param {number} number */
   const text = (number) => (Math.round(number / 10 ** exponent / unit) * unit).toFixed(0);
   /** @param {number} number */
-  const fixed = (number) => (place > 0 ? text(number) : (number / 10 ** exponent).toFixed(decimals));
+  const fixed = (number) => unsigned(place > 0 ? text(number) : (number / 10 ** exponent).toFixed(decimals));
   return { value: fixed(value), u: fixed(u), exponent };
 }

@@ -48,6 +48,13 @@ export function matchRoute(routes, path) {
 }
 
 /**
+ * The address of a plan of a recipe; with the serial number of the unit that it is for, which may be on no bench.
+ * @param {string} toml
+ * @param {string} [unit]
+ */
+export const planAddress = (toml, unit) => `/campaigns/new?${changedQuery("", { toml, unit })}`;
+
+/**
  * A query string with some values changed: "" , null and undefined remove one.
  * @param {string} search
  * @param {Record<string, string | number | null | undefined>} choice

@@ -105,7 +105,8 @@ export function extendModel(state, effects) {
     ...asked(state),
   });
   const isEmpty = () => !change.add.size && !change.remove.size && !change.formula;
-  const stale = () =>
+  const stale = () => {
+    previewing.classList.add("primary");
     setChildren(
       result,
       isEmpty()
@@ -116,6 +117,7 @@ export function extendModel(state, effects) {
           )
         : null,
     );
+  };
   const show = () => {
     setChildren(
       chosen,
@@ -130,7 +132,9 @@ export function extendModel(state, effects) {
   async function preview() {
     previewed = await post("/api/units/{serial}/calibrations/{version}/preview", { path, body: body() });
     setChildren(result, shown(previewed));
+    previewing.classList.remove("primary"); // now the next step is to make the version
   }
+  const previewing = button("Preview", preview, { kind: "primary" });
 
   /** @param {Preview} found */
   function shown(found) {
@@ -153,8 +157,7 @@ export function extendModel(state, effects) {
         { label: "Errors before and after" },
       ),
       fitWarnings(found),
-      residualFigure(state, found, floor),
-      plausibility(state, found, change),
+      plausibility(state, found, change, effects),
       found.left_out.length
         ? notice(
             "",
@@ -168,9 +171,10 @@ export function extendModel(state, effects) {
         h(
           "span",
           { class: "muted small" },
-          "Existing versions never change: this makes a new version and keeps the present one.",
+          "This is a preview; nothing is stored yet. Existing versions never change: Make version adds a version beside them.",
         ),
       ),
+      residualFigure(state, found, floor),
     ];
   }
 
@@ -209,7 +213,7 @@ export function extendModel(state, effects) {
       labelledField("A formula of your own", formula, "name: expression over channels, one in a line"),
     ),
     chosen,
-    h("div", { class: "row" }, button("Preview", preview, { kind: "primary" })),
+    h("div", { class: "row" }, previewing),
     result,
   );
   return {

@@ -137,7 +137,7 @@ export function finishLine(state, steps, title) {
   const end = h("div", { class: "stack", role: "status" });
   const element = card(
     title,
-    h("p", { class: "finish-error" }, counter, " deg/s ", h("span", { class: "muted" }, "RMS left, "), name),
+    h("p", { class: "finish-error" }, counter, " deg/s ", h("span", { class: "muted" }, "RMS error, "), name),
     bar.element,
     h("p", { class: "muted small" }, gainText(steps[0], last)),
     h("div", { class: "columns" }, dots.element, map),

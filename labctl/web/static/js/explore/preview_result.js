@@ -2,11 +2,11 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { number, idText } from "../core/format.js";
+import { idText, sizeText } from "../core/format.js";
 import { channelTitle, inDatasetOrder, scaled, setText, shownText } from "./dataset_rows.js";
 import { selectedRows } from "./residual_map.js";
 
-/** @import { Preview } from "../../../types/api.js" */
+/** @import { Effect, Preview } from "../../../types/api.js" */
 /** @import { ExploreState } from "./state.js" */
 
 /**
@@ -87,8 +87,11 @@ export function residualFigure(state, found, floor) {
  * @param {ExploreState} state
  * @param {Preview} found
  * @param {{ add: ReadonlySet<string> }} change
+ * @param {readonly Effect[]} effects
  */
-export function plausibility(state, found, change) {
+export function plausibility(state, found, change, effects) {
+  /** @param {string} id */
+  const unitOf = (id) => effects.find((each) => each.id === id)?.unit;
   const own = found.axes[state.axis]?.coefficients;
   const added = [...change.add].map((id) => id.split(":")[0]);
   if (!own || !added.length) return null;
@@ -110,7 +113,11 @@ export function plausibility(state, found, change) {
             range.inside
               ? h("span", { class: "good-text" }, "of a usual size")
               : h("span", { class: "bad-text" }, "larger than is usual"),
-            h("span", { class: "muted" }, ` (${number(range.from, 2)} to ${number(range.to, 2)})`),
+            h(
+              "span",
+              { class: "muted" },
+              ` (usual: ${sizeText(range.from, unitOf(id))} to ${sizeText(range.to, unitOf(id))})`,
+            ),
           ),
         ),
       )

@@ -77,7 +77,7 @@ export function residualDiagnostics(state) {
     h(
       "p",
       { class: "muted small" },
-      `The model of version ${state.version} was refitted to ${recordingsText(state)}, so the residual shows what this model cannot describe. The tab Compare shows the version without refitting.${piecesText(state)}`,
+      `The model of version ${state.version} was refitted to ${recordingsText(state)}, so the residual shows what this model cannot describe. Compare, above, shows the version without refitting.${piecesText(state)}`,
     ),
     picture,
     h("div", { class: "columns", style: "--column-min: 19rem" }, against),

@@ -157,7 +157,7 @@ function positionPanel(map, id, pick, cursor) {
       mark(under, { size: 20, symbol: "square-open", color: colour("accent"), line: { width: 4 } }, "keyboard"),
     ],
     x: { ...x, showgrid: false, title: { text: "table rate, deg/s" } },
-    y: { ...y, showgrid: false, title: id === "" ? { text: "deg C" } : undefined },
+    y: { ...y, showgrid: false, title: id === "" ? { text: "temperature, deg C" } : undefined },
     text: `${map.position} up: ${map.dataset.length} data sets${found.cells.length < map.dataset.length ? ` in ${found.cells.length} cells` : ""}`,
   };
 }

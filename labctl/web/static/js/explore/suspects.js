@@ -3,6 +3,7 @@
 import { scrollTo, setChildren, h } from "../core/elements.js";
 import { withUncertainty, number, oddsText, percent, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
+import { planAddress } from "../core/routes.js";
 import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
@@ -14,14 +15,17 @@ import { heldOutName } from "./first_models.js";
 
 /** @type {Record<Criticism["verdict"], [title: string, kind: string]>} */
 const VERDICTS = {
-  adequate: ["Nothing is missing", "good"],
-  missing: ["Missing", "warn"],
+  adequate: ["Adequate: nothing is missing", "good"],
+  missing: ["Effect missing", "warn"],
   ambiguous: ["Cause ambiguous", "warn"],
   unexplained: ["Unexplained", "warn"],
   insufficient_data: ["Too little data", "bad"],
 };
 /** Evidence at which the meter is full, nats; its length is the logarithm, so that 70 and 20 000 differ. */
 const FULL_NATS = 1e5;
+
+const DRAW =
+  "Draw shows the part of the residual that an effect would explain. Add previews a model with the effect; nothing is stored before you make a version.";
 
 /** @param {ExploreState} state */
 export function verdictCard(state) {
@@ -90,11 +94,7 @@ const chanceText = (p) =>
 export function suspectList(state, effects, { onadd, onlaw, explain }) {
   const { criticism } = state;
   const named = new Set(criticism.named);
-  const drawnNow = h(
-    "p",
-    { class: "muted small", "aria-live": "polite" },
-    "Select a suspected effect to draw the part of the residual that it would explain.",
-  );
+  const drawnNow = h("p", { class: "muted small", "aria-live": "polite" }, DRAW);
   /** @param {Suspect} suspect */
   const draw = (suspect) =>
     button(
@@ -105,7 +105,9 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
         state.setOverlay({ effect: suspect.effect, name: idText(suspect.effect), values });
         return setChildren(
           drawnNow,
-          `Diamonds in the pictures above: the part of the residual that ${idText(suspect.effect)} would explain.`,
+          `Diamonds in the figures of `,
+          h("a", { href: "#fails" }, "Where the model fails"),
+          `: the part of the residual that ${idText(suspect.effect)} would explain.`,
         );
       },
       { kind: "tiny" },
@@ -165,7 +167,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
             h("span", { class: "muted small" }, `${number(s.heldout_rms_after_dps)} ${heldOutName(state.motion)}`),
           ),
           evidenceItem(
-            `Coefficient, k = 2${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
+            `Coefficient ± U (95.45 %)${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
             coefficientText(s, state.axis),
           ),
         ),
@@ -175,12 +177,11 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
   state.onchange((what) => {
     fillList();
     if (what === "axis") setChildren(open); // its figures are of the axis that was shown
-    if (what === "overlay" && !state.overlay)
-      setChildren(drawnNow, "Select a suspected effect to draw the part of the residual that it would explain.");
+    if (what === "overlay" && !state.overlay) setChildren(drawnNow, DRAW);
   });
   const isAdequate = criticism.verdict === "adequate";
   return cardWithHeader(
-    isAdequate ? "Weak hints" : "Which effects are missing",
+    isAdequate ? "Missing effects: weak hints only" : "Which effects are missing",
     null,
     isAdequate && speaking.length
       ? h(
@@ -253,10 +254,10 @@ function coefficientText(suspect, axis) {
 }
 
 /**
- * A value with no line break before its uncertainty and its power of ten; only the unit may wrap.
+ * A value with no line break before its uncertainty, nor within its power of ten.
  * @param {string} text
  */
-const unbroken = (text) => text.replaceAll(/ ([±×]) /g, "\u00a0$1\u00a0");
+const unbroken = (text) => text.replaceAll(" ± ", "\u00a0±\u00a0").replaceAll("× ", "×\u00a0");
 
 /** @param {Criticism} criticism */
 function aliasNotice(criticism) {
@@ -324,17 +325,23 @@ function experimentList(criticism) {
   return h(
     "div",
     { class: "stack" },
-    h("h3", {}, "Experiment that would show which effect is real"),
+    h("h3", {}, "Experiments that show most of which effect is real"),
     criticism.experiments
       .slice(0, 3)
       .map((each) =>
         h(
           "div",
           { class: "notice" },
-          h("p", {}, each.do, each.hours ? ` (${number(each.hours, 2)} h)` : ""),
+          h(
+            "p",
+            {},
+            each.do,
+            each.hours ? ` (${number(each.hours, 2)} h)` : "",
+            `; names the cause with a probability of ${percent(Math.max(each.power - each.names_wrong, 0))}`,
+          ),
           h("p", { class: "muted small" }, each.why),
           each.toml
-            ? h("a", { class: "button tiny", href: `/campaigns/new?toml=${encodeURIComponent(each.toml)}` }, "Plan it")
+            ? h("a", { class: "button tiny", href: planAddress(each.toml, criticism.serial) }, "Plan it")
             : null,
         ),
       ),

@@ -7,6 +7,7 @@ import { actButton, busyIndicator, errorPage, notice } from "../core/components.
 import { option, toggleGroup } from "../core/fields.js";
 import { idText } from "../core/format.js";
 import { navigate } from "../core/router.js";
+import { planAddress } from "../core/routes.js";
 import { jointCard } from "../joint/card.js";
 import { asked as askedFor } from "./chosen_recordings.js";
 import { errorComparison } from "./compare/error_comparison.js";
@@ -23,13 +24,13 @@ import { suspectList, verdictCard } from "./suspects.js";
 /** @import { Query } from "../../../types/pages.js" */
 /** @import { Chosen } from "./chosen_recordings.js" */
 
-/** Sections of the page in order: anchor, name. */
+/** Sections of the page in order: anchor, name, which is a part of the section's heading. */
 const SECTIONS = [
   ["compare", "Compare"],
   ["fails", "Fails"],
-  ["learn", "Learn"],
+  ["learn", "Missing"],
   ["add", "Add"],
-  ["watch", "Watch"],
+  ["watch", "Versions"],
 ];
 
 /**
@@ -159,7 +160,7 @@ function nextSteps({ unit, calibration }, criticism) {
         "a",
         {
           class: `button ${isEnd ? "" : "primary"}`,
-          href: plan ? `/campaigns/new?toml=${encodeURIComponent(plan)}` : "/campaigns/new",
+          href: plan ? planAddress(plan, serial) : "/campaigns/new",
         },
         "Next experiment",
       ),
@@ -176,7 +177,7 @@ const unknownCauses = ({ undistinguished }) =>
     h(
       "p",
       {},
-      `The error is corrected; the cause is not known: ${[effect, ...others].map(idText).join(" or ")}. Another experiment distinguishes them.`,
+      `The error is corrected; the cause is not known: ${[effect, ...others].map(idText).join(" or ")}. These data cannot distinguish them.`,
     ),
   );
 

@@ -6,6 +6,7 @@ import { faded } from "../core/colour_scales.js";
 import { idText, isNumber, number, percent, withUncertainty } from "../core/format.js";
 import { notice } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
+import { planAddress } from "../core/routes.js";
 import { channelTitle, scaled, shownText } from "./dataset_rows.js";
 import { channelOf } from "./preview_result.js";
 import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
@@ -111,7 +112,13 @@ export function whatIf({ state, suspect, parameters, others, explained, explain 
   return h(
     "section",
     { class: "what-if stack", "aria-label": `What if: ${idText(suspect.effect)}` },
-    h("div", { class: "row" }, h("label", { class: "field what-if-slider" }, "Size", slider), words),
+    h("h3", {}, `What if: ${idText(suspect.effect)}`),
+    h(
+      "div",
+      { class: "row" },
+      h("label", { class: "field what-if-slider" }, `Size of ${idText(suspect.effect)}`, slider),
+      words,
+    ),
     shape,
     h("div", { class: "columns" }, figures),
     h("div", { class: "row" }, others.length ? beside : null),
@@ -355,8 +362,6 @@ function partingNotice(state, suspect, other, channel, parts) {
   return notice(
     "",
     h("p", {}, `${name} and ${other} part at ${channelTitle(channel)}: ${listed} (marked in the figure).`),
-    plan
-      ? h("a", { class: "button tiny", href: `/campaigns/new?toml=${encodeURIComponent(plan)}` }, "Plan these rates")
-      : null,
+    plan ? h("a", { class: "button tiny", href: planAddress(plan, state.serial) }, "Plan these rates") : null,
   );
 }

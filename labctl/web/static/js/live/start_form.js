@@ -3,7 +3,7 @@
 import { post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { labelledField, selectField, toggleGroup } from "../core/fields.js";
-import { actButton, card, notice } from "../core/components.js";
+import { actButton, card, notice, readOnlyNote } from "../core/components.js";
 import { show } from "../core/router.js";
 
 /** @import { Bench } from "../../../types/api.js" */
@@ -75,13 +75,9 @@ export function startForm(bench, serial) {
     });
     await show();
   }
-  return card(
-    "Begin",
-    h(
-      "p",
-      {},
-      "Turn a unit with gyros and accelerometers by hand, from pose to pose; its turns are compared with gravity. No table moves. Its readings become a recording however this ends, and a version when the target is reached.",
-    ),
+  const asked = h(
+    "div",
+    { class: "stack act" },
     bench
       ? toggleGroup(
           "Stream",
@@ -113,5 +109,15 @@ export function startForm(bench, serial) {
       "End it, and keep the recording, when no page has followed it for 30 s",
     ),
     h("div", { class: "row" }, actButton("Begin", begin, { kind: "primary large" })),
+  );
+  return card(
+    "Begin",
+    h(
+      "p",
+      {},
+      "Turn a unit with gyros and accelerometers by hand, from pose to pose; its turns are compared with gravity. No table moves. Its readings become a recording however this ends, and a version when the target is reached.",
+    ),
+    readOnlyNote("A live calibration is not begun here"),
+    asked,
   );
 }

@@ -102,7 +102,7 @@ function othersCard(states, own) {
     "Other benches of this database",
     h(
       "ul",
-      {},
+      { class: "plain" },
       lines.map(({ name, text, isFault }) =>
         h("li", {}, h("strong", {}, name), isFault ? [" ", chip("no service", "bad")] : null, `: ${text}`),
       ),

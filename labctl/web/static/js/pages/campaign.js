@@ -16,7 +16,14 @@ import { uncertaintyCard } from "../campaigns/uncertainty.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { draftsCard } from "../campaigns/drafts.js";
 import { adviceNotice } from "../campaigns/advice.js";
-import { campaignDuration, instantFact, durationTaken, hindrances, planNote } from "../campaigns/campaign_time.js";
+import {
+  campaignDuration,
+  durationFact,
+  instantFact,
+  durationTaken,
+  hindrances,
+  planNote,
+} from "../campaigns/campaign_time.js";
 import { hasEnded, isRunning, stateKind } from "../campaigns/states.js";
 import { stateChip } from "../campaigns/state_chip.js";
 
@@ -223,7 +230,7 @@ function summary(now, plan) {
             `${campaignDuration(now, remainingSeconds(now, plan.expected_s))} left`,
           ]
         : ["Ended", ...instantFact(now, now.ended_at), durationTaken(now)],
-      ["Planned", campaignDuration(now, plan.expected_s), "", planNote(now)],
+      ["Planned", ...durationFact(now, plan.expected_s), planNote(now)],
     ]),
   );
 }

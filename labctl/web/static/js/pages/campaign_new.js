@@ -25,6 +25,21 @@ import { visibilityReport } from "../campaigns/visibility.js";
 const TURNS_TELL =
   "Turns by hand determine bias, scale factor, misalignment and g-sensitivity, but no effect that depends on the rate or on the temperature.";
 
+/**
+ * A plan that was made for a unit measures the units that are on the bench, and not that one where it is not there.
+ * @param {string | undefined} unit
+ * @param {Bench | null} bench
+ */
+function absentNotice(unit, bench) {
+  if (!unit || !bench || bench.units.some(({ serial }) => serial === unit)) return null;
+  const there = bench.units.map(({ serial }) => serial).join(", ") || "no unit";
+  return notice(
+    "warn",
+    h("strong", {}, `This experiment is for ${unit}, which is not on ${bench.name}. `),
+    `A campaign started here measures ${there}; to measure ${unit}, write it into the bench file in place of a unit.`,
+  );
+}
+
 /** @param {PageContext} context */
 export async function page({ query, signal }) {
   const [all, benches, catalogue] = await Promise.all([
@@ -114,6 +129,7 @@ export async function page({ query, signal }) {
         : "Computed for the simulated bench that suits this recipe best.",
       h("a", { class: "button primary", href: "#begin" }, "Begin …"),
     ),
+    absentNotice(query.unit, bench),
     query.recipe && named.name !== query.recipe && !query.toml
       ? notice(
           "warn",

@@ -69,7 +69,7 @@ function recordingTable(rows) {
             : h("span", { class: "muted" }, row.origin),
       },
       {
-        title: "Since",
+        title: "Stored",
         cell: (row) => [
           h("span", { class: "nowrap" }, day(row.created_at)),
           row.simulated_time ? h("span", { class: "muted small secondary" }, SIMULATED) : null,

@@ -17,6 +17,8 @@ import { DUE_SHOWN, DUE_WITHIN, dueNotice } from "../unit/due.js";
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
+/** The example of a real gyro, and the model that it is fitted with first. */
+const EXAMPLE = { name: "osu-fog", serial: "OSU-FOG-2024", datasets: 695, model: "bias_scale" };
 /** Units that are listed. */
 const SHOWN = 6;
 
@@ -43,7 +45,7 @@ export async function page({ signal }) {
       h(
         "p",
         {},
-        "695 dwells on a heated rate table. The error after a usual fit is sixteen times the noise; find out why.",
+        "695 data sets (mean outputs, each at a constant rate and temperature) from a heated rate table, with a first model fitted. Its error is sixteen times the noise; find out why, mend the model, and certify it. Show me around leads through this in five steps.",
       ),
       h(
         "div",
@@ -67,13 +69,21 @@ export async function page({ signal }) {
       ),
       card(
         "Import your own data",
-        h("p", {}, "A folder in the interchange format: recording.toml and its data file, as CSV or Parquet."),
+        h(
+          "p",
+          {},
+          "A log of readings: CSV with any columns, Parquet, PX4 ULog or a ROS bag. Or a folder in the format of labctl: recording.toml and its data file.",
+        ),
         h("a", { class: "button", href: "/recordings" }, "Import a recording"),
       ),
       benches.length
         ? card(
             `Run a campaign on ${benches[0].name}`,
-            h("p", {}, "Choose a recipe, see which effects it can detect, and start."),
+            h(
+              "p",
+              {},
+              `${benches[0].simulated ? "A simulated bench: nothing real moves. " : ""}Choose a recipe, see which effects it can detect, and start.`,
+            ),
             h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"),
           )
         : null,
@@ -89,10 +99,23 @@ async function openSimulated() {
   await openExplore(made.serial, made.recording, "ojeda2000");
 }
 
-/** @param {string | null} [tour] the step of the tour that is shown */
+/**
+ * Open the example; it is imported and fitted once. The tour begins at the first model, otherwise the newest version is
+ * shown.
+ * @param {string | null} [tour] the step of the tour that is shown
+ */
 async function openExample(tour = null) {
-  const made = await post("/api/recordings/example", { body: { name: "osu-fog" } });
-  await openExplore(made.serial, made.recording, "bias_scale", tour);
+  const { name, serial, datasets, model } = EXAMPLE;
+  const recordings = await get("/api/recordings", { query: { unit: serial } });
+  const known = recordings.filter((each) => each.origin === "import" && each.datasets === datasets).at(-1)?.id;
+  if (known === undefined) {
+    const made = await post("/api/recordings/example", { body: { name } });
+    return openExplore(made.serial, made.recording, model, tour);
+  }
+  const versions = await get("/api/units/{serial}/calibrations", { path: { serial } });
+  const version = (tour ? versions.filter((each) => each.model === model).at(-1) : versions[0])?.version;
+  if (!version) return openExplore(serial, known, model, tour);
+  return navigate(`/explore?${changedQuery("", { unit: serial, version, recording: known, tour })}`);
 }
 
 /**
@@ -146,7 +169,7 @@ function overview(units, found) {
           { class: "row" },
           h("a", { class: "button primary", href: "/bench" }, "To the bench"),
           h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"),
-          h("a", { class: "button", href: "/live" }, "Calibrate live"),
+          h("a", { class: "button act", href: "/live" }, "Calibrate live"),
         ),
       ),
       card(
@@ -174,7 +197,8 @@ function overview(units, found) {
         h(
           "div",
           { class: "row" },
-          h("a", { class: "button", href: "/recordings" }, "Import a recording"),
+          h("a", { class: "button act", href: "/recordings" }, "Import a recording"),
+          h("a", { class: "button", href: "/recordings" }, "All recordings"),
           actButton("Simulate a hidden effect", openSimulated),
           actButton("Open the real gyro", () => openExample()),
           actButton("Tour", () => openExample("1")),

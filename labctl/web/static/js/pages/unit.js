@@ -44,7 +44,7 @@ export async function page({ params, signal }) {
       unit.serial,
       unitLine(unit),
       h("a", { class: "button primary", href: explore }, "Explore"),
-      h("a", { class: "button", href: `/live?unit=${encodeURIComponent(unit.serial)}` }, "Calibrate live"),
+      h("a", { class: "button act", href: `/live?unit=${encodeURIComponent(unit.serial)}` }, "Calibrate live"),
       batchButton(unit),
     ),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
@@ -93,7 +93,7 @@ function ladder(serial, signal) {
   loadInto(place, "RMS error by version", async () =>
     ladderFigure(await get("/api/units/{serial}/ladder", { path: { serial }, signal })),
   );
-  return cardWithHeader("How the error fell", null, place);
+  return cardWithHeader("Error of the versions", null, place);
 }
 
 /**

@@ -53,7 +53,7 @@ export async function page({ query, signal }) {
     pageHeader(
       "Units",
       "Gyros by serial number, and which calibration of each is in force.",
-      h("a", { class: "button", href: "/recordings" }, "Import a recording"),
+      h("a", { class: "button act", href: "/recordings" }, "Import a recording"),
     ),
     h("section", { class: "card", "aria-label": "Units" }, list.element),
   );

@@ -4,7 +4,7 @@ import { upload } from "../core/http/api.js";
 import { messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
-import { busyIndicator, notice } from "../core/components.js";
+import { busyIndicator, notice, readOnlyNote } from "../core/components.js";
 import { droppedFiles, isLog, recordingFiles } from "./file_input.js";
 import { leftOutText } from "./leave_out.js";
 import { logPreview } from "./log_preview.js";
@@ -117,6 +117,7 @@ export function importForm(taken) {
     "section",
     { class: "card stack", "aria-label": "Import" },
     h("h2", {}, "Import"),
+    readOnlyNote("Nothing is imported here"),
     zone,
     templates(),
     result,
@@ -127,8 +128,8 @@ export function importForm(taken) {
 const templates = () =>
   h(
     "p",
-    { class: "small" },
-    "Templates: ",
+    { class: "small act" },
+    "Templates of a log, with the columns for each way of moving the unit: ",
     KINDS.flatMap((kind, k) => [
       k ? ", " : null,
       h("a", { href: `/api/recordings/templates/${kind}`, download: `${kind}.csv` }, kind),

@@ -20,7 +20,7 @@ export const unitLine = (unit) =>
  * The button that asks for the batch.
  * @param {Unit} unit
  */
-export const batchButton = (unit) => actButton("State batch", () => askBatch(unit));
+export const batchButton = (unit) => actButton("Set batch", () => askBatch(unit));
 
 /** @param {Unit} unit */
 async function askBatch(unit) {
@@ -31,7 +31,7 @@ async function askBatch(unit) {
       { name: "supplier", label: "Supplier", value: unit.supplier, required: false },
       { name: "by", label: "Who" },
     ],
-    { text: "Lists of units are filtered by batch. The change is written to the audit trail.", confirm: "State" },
+    { text: "Lists of units are filtered by batch. The change is written to the audit trail.", confirm: "Set batch" },
   );
   if (!answers) return;
   const { batch, supplier, by } = answers;

@@ -75,7 +75,7 @@ function rounds(diagnosis) {
       { class: "plain small" },
       lines.map((line, place) => h("li", {}, `Round ${place + 1}: ${line.experiment}`)),
     ),
-    diagnosis.next ? h("p", { class: "small muted" }, diagnosis.next) : null,
+    diagnosis.next ? h("p", { class: "small muted" }, diagnosis.next.replaceAll("`", "")) : null,
   );
 }
 

@@ -1,5 +1,7 @@
 // What is shown of the rounds of a diagnosis; no DOM here.
 
+import { instant } from "../core/format.js";
+
 /** @import { Diagnosis, DiagnosisRound } from "../../../types/api.js" */
 
 /** Suspects that have a column, at most. */
@@ -28,12 +30,15 @@ const OUTCOMES = {
 const FOUND = ["one_cause", "several_causes", "adequate"];
 
 /**
- * The state in words, and the kind of its chip.
- * @param {Pick<Diagnosis, "state" | "outcome">} diagnosis
+ * The state in words, and the kind of its chip. Nothing is measured before the time that it begins at.
+ * @param {Pick<Diagnosis, "state" | "outcome" | "begins_at">} diagnosis
+ * @param {number} [now_ms] by the clock of the browser
  * @returns {{ text: string, kind: "good" | "warn" | "" }}
  */
-export function diagnosisState({ state, outcome }) {
+export function diagnosisState({ state, outcome, begins_at }, now_ms = Date.now()) {
   if (outcome) return { text: OUTCOMES[outcome] ?? outcome, kind: FOUND.includes(outcome) ? "good" : "warn" };
+  if (state === "measuring" && begins_at && Date.parse(begins_at) > now_ms)
+    return { text: `begins ${instant(begins_at)}`, kind: "" };
   return { text: STATES[state] ?? state, kind: state === "criticising" || state === "measuring" ? "" : "warn" };
 }
 

@@ -92,7 +92,7 @@ function over({ grid, coverage_factor }) {
     table(
       [
         several ? { title: "Axis", cell: (row) => row.axis } : null,
-        { title: "deg C", number: true, cell: (row) => row.warm.toFixed(1) },
+        { title: "Temperature, deg C", number: true, cell: (row) => row.warm.toFixed(1) },
         ...grid.rate_dps.map((rate, k) => ({
           title: `${number(rate, 3)} deg/s`,
           number: true,

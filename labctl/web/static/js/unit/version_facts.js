@@ -4,6 +4,7 @@ import { h } from "../core/elements.js";
 import { idText, number } from "../core/format.js";
 import { notice, table } from "../core/components.js";
 import { jointParts } from "../joint/card.js";
+import { priorText } from "./type_prior.js";
 
 /** @import { Version } from "../../../types/api.js" */
 
@@ -12,6 +13,7 @@ export function versionFacts(version) {
   return [
     version.notices?.length ? notice("bad", standardsFoundBad(version)) : null,
     version.rate_reference ? h("p", {}, `Rates of its recordings: ${version.rate_reference}.`) : null,
+    "type_prior" in version && version.type_prior ? h("p", {}, priorText(version.type_prior)) : null,
     heldOutByLeg(version),
     leftOut(version),
     remembered(version),

@@ -41,7 +41,7 @@ async function ask() {
     if (!response.ok) return;
     /** @type {Heartbeat} */
     const answer = await response.json();
-    answered = { at: now(), on: new Date(), bench_s: answer.heard_s ?? null };
+    answered = { at: now(), on: new Date(), bench_s: answer.read_only ? null : (answer.heard_s ?? null) };
     notStopped = Boolean(answer.not_stopped);
     reportStop(answer.not_stopped);
     showReadOnly(answer);
