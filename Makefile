@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: install demo test test-slow mutants lint types docs bench study attack lock clean
+.PHONY: install demo test test-slow mutants lint types generated docs bench study attack lock clean
 
 install: $(VENV)/.installed
 demo: install
@@ -35,6 +35,12 @@ types: $(VENV)/.tested
 	@scripts/install-page-tools
 	@$(BIN)/python scripts/openapi-document >node_modules/.openapi.json
 	@npm run --silent types -- node_modules/.openapi.json
+
+# All files that are made from the code and kept in the repository; tests hold each of them to it.
+generated: types
+	@$(BIN)/python -m tests.helpers.public_api
+	@$(BIN)/python -m typer labctl.cli.app utils docs --name labctl --output docs/reference/command-line.md
+	@$(BIN)/python scripts/effects-page
 
 # The documentation as a site in docs/_build, every warning an error: links, anchors, pictures and docstrings are checked.
 docs: $(VENV)/.documented

@@ -14,7 +14,7 @@ from procedures.contracts.steps import Acquire
 from procedures.execution import late_readings
 from procedures.execution.context import ExecutionContext, raise_violation
 from procedures.execution.course import take_course
-from procedures.execution.gate_readings import (
+from procedures.execution.record_readings import (
     count_missing,
     count_silence,
     demand_readings,

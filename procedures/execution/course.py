@@ -13,7 +13,7 @@ from procedures.contracts.journal import DataSetHeader, DataSetState, TableAngle
 from procedures.contracts.steps import Acquire
 from procedures.execution import late_readings
 from procedures.execution.context import ExecutionContext, raise_violation
-from procedures.execution.gate_readings import count_missing, count_silence, demand_readings, read_late, read_round
+from procedures.execution.record_readings import count_missing, count_silence, demand_readings, read_late, read_round
 from procedures.execution.waiting import checkpoint
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.course_reference import CourseLog, course_event

@@ -25,7 +25,6 @@ from labctl.services.benches.standards import overdue_events, standards_of
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
 from labctl.services.benches.wire_log import recording
 from labctl.services.campaigns.bench_lending import BenchLending, lending_journal
-from labctl.services.campaigns.foreground_stop import answering_stops, let_move, note_carried_out
 from labctl.services.campaigns.preparation import (
     Prepared,
     clock_for,
@@ -37,6 +36,7 @@ from labctl.services.campaigns.preparation import (
 from labctl.services.campaigns.readings_digest import readings_digest
 from labctl.services.campaigns.recorded_operator import RecordedOperator
 from labctl.services.campaigns.status import answer_of, describe_interrupted, from_rows
+from labctl.services.campaigns.stop_socket import answering_stops, let_move, note_carried_out
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe, own_text
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.services.standards.agreement import register_events

@@ -25,7 +25,6 @@ from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed
 from labctl.services.benches.wire_log import recording
 from labctl.services.campaigns.execution import Attend, Observe, run_attended
-from labctl.services.campaigns.foreground_stop import let_move
 from labctl.services.campaigns.preparation import (
     Prepared,
     clock_for,
@@ -34,6 +33,7 @@ from labctl.services.campaigns.preparation import (
     refuse_unconfirmed,
 )
 from labctl.services.campaigns.readings_digest import readings_digest
+from labctl.services.campaigns.stop_socket import let_move
 from labctl.services.planning.loading import load_bench, with_drivers
 from labctl.store import CampaignRow, ResumePoint, Resumption, Store, open_store
 from procedures.contracts.campaign_state import CampaignState

@@ -508,7 +508,7 @@ export interface paths {
          * @description Whether the service answers: what every open page asks once a second.
          *
          *     No key is asked for and no database is read. `heard_s`, where present: seconds since the last answer of the
-         *     bench process.
+         *     bench process. `acts_at` is there for callers who may read only: it is an address of the laboratory.
          */
         get: operations["heartbeat_health_heartbeat_get"];
         put?: never;

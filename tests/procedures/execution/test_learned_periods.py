@@ -8,7 +8,7 @@ import pytest
 from instruments.interfaces.self_checks import StreamPeriod
 from instruments.transport.sample_timing import StreamTime
 from procedures.contracts.campaign_state import CampaignState
-from procedures.execution.gate_readings import DOUBT_S, LEARN_S
+from procedures.execution.record_readings import DOUBT_S, LEARN_S
 from tests.helpers.engine_rig import Rig
 from tests.helpers.fake_instruments import FakeGyro
 
