@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 def _key_of_serial(context: DefaultExecutionContext) -> str:
     """Return the sort key of the unit that is being added."""
-    return natural_key(str(context.get_current_parameters()["serial"]))
+    given = context.get_current_parameters()  # type: ignore[no-untyped-call]
+    return natural_key(str(given["serial"]))
 
 
 units = sa.Table(
