@@ -38,7 +38,6 @@ VIEWS = {
     "campaign": ("/campaigns/1", "labctl:picture"),
     "units": ("/units", "labctl:page"),
     "unit": ("/units/{serial}", "labctl:picture"),
-    "unit_with_200_versions": ("/units/G00000", "labctl:page"),
     "explore": ("/explore?unit={serial}", "labctl:picture"),
     "recordings": ("/recordings", "labctl:page"),
     "recording": ("/recordings/{recording}", "labctl:picture"),
