@@ -47,7 +47,7 @@ REQUESTS = {
 
 
 def run() -> dict[str, float | str]:
-    """Fill a database, then ask for parts of its lists; returns the median of each request's wall and processor time.
+    """Fill a database, then ask for parts of its lists; returns the median of each request's real and processor time.
 
     On a busy machine the wall time is mostly that of other programs.
     """

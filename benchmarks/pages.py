@@ -28,6 +28,8 @@ LIMITS = {
     "first_view_s": 1.0, "redraw_after_pick_ms": 100.0, "trace_s": 1.0, "first_view_kb": 1500.0, "later_view_kb": 50.0,
 }  # fmt: skip
 RUNS = 5
+#: On a busy machine a fit of 4.7 million readings takes minutes.
+PATIENCE_S = 900.0
 #: Pages, and what they mark when they are seen: the page itself or, where it is about one, its first picture.
 VIEWS = {
     "start": ("/", "labctl:page"),
@@ -36,7 +38,6 @@ VIEWS = {
     "campaign": ("/campaigns/1", "labctl:picture"),
     "units": ("/units", "labctl:page"),
     "unit": ("/units/{serial}", "labctl:picture"),
-    "unit_with_200_versions": ("/units/G00000", "labctl:page"),
     "explore": ("/explore?unit={serial}", "labctl:picture"),
     "recordings": ("/recordings", "labctl:page"),
     "recording": ("/recordings/{recording}", "labctl:picture"),
@@ -66,8 +67,10 @@ def run() -> dict[str, float | str]:
             lists.fill(Store(database), database)
         with serve(location) as service, chromium() as browser:
             calibrations = f"{service.url}/api/units/{serial}/calibrations"
-            httpx.post(calibrations, json={"model": "yang2018"}, timeout=120).raise_for_status()
-            httpx.get(f"{calibrations}/1/criticism", timeout=120).raise_for_status()  # the criticism is in the cache
+            httpx.post(calibrations, json={"model": "yang2018"}, timeout=PATIENCE_S).raise_for_status()
+            httpx.get(
+                f"{calibrations}/1/criticism", timeout=PATIENCE_S
+            ).raise_for_status()  # the criticism is in the cache
             figures = {
                 **_trace(browser, f"{service.url}/recordings?unit={serial}", recording),
                 **_pick(browser, f"{service.url}/explore?unit={serial}"),

@@ -18,7 +18,7 @@ import { versionView } from "../explore/version_view.js";
 /** @import { Chosen } from "../explore/chosen_recordings.js" */
 
 /** Units that can be chosen from the list; every other one has its link on the page of all units. */
-const LISTED = 500;
+const LISTED = 100;
 
 /** @param {PageContext} context */
 export async function page({ query: asked, signal }) {
