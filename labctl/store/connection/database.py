@@ -130,10 +130,14 @@ class Database:
             return self.outlast(self._revision)
 
     def upgrade(self) -> None:
-        """Migrate the database to the present tables in one transaction: all of it, or nothing. Raises StoreError."""
+        """Migrate the database to the present tables in one transaction: all of it, or nothing. Raises StoreError.
+
+        A database at the present tables gets the indexes that a server can have and that are missing.
+        """
         with self._as_database(), self._engine.begin() as connection:
             self._backend.before_migration(connection)
             migrate.upgrade(connection)
+            self._backend.after_migration(connection)
 
     @contextmanager
     def _as_database(self) -> Iterator[None]:
