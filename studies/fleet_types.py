@@ -25,7 +25,7 @@ from labctl.fitting.fleet.unit_coefficients import UnitCoefficients
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import preset_for
 from labctl.fitting.numeric.arrays import block_diagonal
-from labctl.fitting.numeric.drift_noise import Drift
+from labctl.fitting.numeric.drift_noise import PRIOR_FACTOR, TAU_SPACINGS, Drift, Scatter
 
 Array = NDArray[np.float64]
 PRESET = preset_for("bias_scale", [])
@@ -110,13 +110,38 @@ class Campaign:
         return replace(self.data, outputs=outputs)
 
     def _noise(self, rng: np.random.Generator, axis: str) -> Array:
-        white = self.data.scatter(axis).white_var
-        assert white is not None
-        decay = np.exp(-np.diff(self.sets.middle_s) / DRIFT.tau_s)
-        drift = [float(rng.normal(0.0, DRIFT.drift_dps))]
+        return drawn_noise(rng, self.sets.middle_s, self.data.scatter(axis), DRIFT)
+
+
+def drawn_noise(rng: np.random.Generator, t_s: Array, scatter: Scatter, noise: Drift) -> Array:
+    """Return the errors of data sets: white noise, and a drift that is a sum of first-order processes."""
+    white = scatter.white_var
+    assert white is not None
+    whole, size_dps = np.zeros(len(t_s)), noise.drift_dps / np.sqrt(len(noise.taus_s))
+    for tau_s in noise.taus_s:
+        decay = np.exp(-np.diff(t_s) / tau_s)
+        drift = [float(rng.normal(0.0, size_dps))]
         for part, step in zip(decay.tolist(), rng.normal(size=len(decay)).tolist(), strict=True):
-            drift.append(part * drift[-1] + DRIFT.drift_dps * float(np.sqrt(1.0 - part**2)) * step)
-        return np.asarray(np.array(drift) + np.sqrt(white) * rng.normal(size=len(white)))
+            drift.append(part * drift[-1] + size_dps * float(np.sqrt(1.0 - part**2)) * step)
+        whole += drift
+    return np.asarray(whole + np.sqrt(white) * rng.normal(size=len(white)))
+
+
+def expected_drifts(rng: np.random.Generator, scatter: Scatter, n: int) -> list[Drift]:
+    """Return n drifts as a fit expects them: about half the bias stability, of any time constant that it tries.
+
+    Those are multiples of the spacing of data sets, the length of the run, and flicker between the two.
+    """
+    assert scatter.datasheet_drift_dps is not None
+    spacing_s, span_s = float(np.median(np.diff(np.sort(scatter.t_s)))), float(np.ptp(scatter.t_s))
+    shapes: list[tuple[float, float | None]] = [(ratio * spacing_s, None) for ratio in TAU_SPACINGS]
+    shapes += [(span_s, None), (span_s, spacing_s)]
+    sizes_dps = scatter.datasheet_drift_dps / 2 * PRIOR_FACTOR ** rng.normal(size=n)
+    chosen = [shapes[k] for k in rng.integers(len(shapes), size=n).tolist()]
+    return [
+        Drift(size_dps, tau_s, shortest_tau_s=shortest_s)
+        for size_dps, (tau_s, shortest_s) in zip(sizes_dps.tolist(), chosen, strict=True)
+    ]
 
 
 def truths(rng: np.random.Generator, kind: Mapping[str, tuple[float, float]], names: Sequence[str], n: int) -> Array:

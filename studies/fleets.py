@@ -27,15 +27,19 @@ from labctl.fitting.fleet.population import population_of
 from labctl.fitting.fleet.prior import fit_with_prior, prior_of
 from labctl.fitting.fleet.type_evidence import TypeCriticism, judged
 from labctl.fitting.fleet.type_sums import TypeSums
+from labctl.fitting.numeric.least_squares import solve
 from studies.fleet_types import (
     ALIKE_BUT_BIAS,
     ALIKE_IN_TEMPERATURE,
     DIFFERENT,
+    DRIFT,
     NOISE,
     PRESET,
     USE,
     Campaign,
     Fleet,
+    drawn_noise,
+    expected_drifts,
     truths,
 )
 from studies.fleet_units import HIDDEN, Algebra, criticised, recording
@@ -48,9 +52,11 @@ UNITS, Z = 200, 2.0
 WITHOUT_EFFECT, WITHOUT_GROUP = 25, 5
 #: Units of the fleets that go through the whole criticism.
 WHOLE_UNITS = 100
-#: Units that a prior is from, new units for each such fleet, and campaigns of a new unit: rates, temperatures.
-PRIOR_UNITS, NEW_UNITS = 50, 10
+#: Units that priors are from, new units for each such fleet, and campaigns of a new unit: rates, temperatures.
+PRIOR_UNITS, NEW_UNITS = (50, 10), 10
 FULL, SMALL = (11, 5), (5, 3)
+#: Fits for each fleet, of how the coverage of a fit alone depends on the drift.
+UNITS_OF_DRIFTS = 30
 SMALLER = tuple((rates, levels) for rates in (2, 3, 5, 7, 9, 11) for levels in (1, 2, 3, 4, 5))
 
 Array = NDArray[np.float64]
@@ -59,7 +65,17 @@ Array = NDArray[np.float64]
 def run(fleets: int = FLEETS, seed: int = SEED) -> str:
     """Return the tables."""
     return "\n".join(
-        [*_effects(fleets, seed), "", *_whole(seed), "", *_groups(fleets, seed), "", *_priors(fleets, seed)]
+        [
+            *_effects(fleets, seed),
+            "",
+            *_whole(seed),
+            "",
+            *_groups(fleets, seed),
+            "",
+            *_priors(fleets, seed),
+            "",
+            *_drifts(UNITS_OF_DRIFTS * fleets, seed),
+        ]
     )
 
 
@@ -140,32 +156,64 @@ def _groups(fleets: int, seed: int) -> Iterator[str]:
 def _priors(fleets: int, seed: int) -> Iterator[str]:
     """Yield how many data sets a new unit needs with a prior, for the U of a campaign without one."""
     yield (
-        f"| prior from {PRIOR_UNITS} units | data sets alone | U, mdeg/s | covered, % | data sets with it | ratio "
+        "| units of the type are | prior from | data sets alone | U, mdeg/s | covered, % | data sets with it | ratio "
         "| U, mdeg/s | covered, % | covered by the exact prior, % | prior refused, % |"
     )
-    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     kinds = {
         "alike in all but the bias": ALIKE_BUT_BIAS, "alike in temperature": ALIKE_IN_TEMPERATURE,
         "different in all": DIFFERENT,
     }  # fmt: skip
-    for row, ((title, kind), size) in enumerate(product(kinds.items(), (FULL, SMALL))):
+    for units, (row, ((title, kind), size)) in product(PRIOR_UNITS, enumerate(product(kinds.items(), (FULL, SMALL)))):
         full = Campaign.of(*size)
         alone = predicted_uncertainty(full.sets, BODY_AXES, PRESET, NOISE, USE).rms_dps
         populations = [
-            population_of(Fleet(kind, PRIOR_UNITS).drawn(full, np.random.default_rng([seed, 4, row, i])))
+            population_of(Fleet(kind, units).drawn(full, np.random.default_rng([seed, 4, row, i])))
             for i in range(fleets)
         ]
         campaign, u = smallest(prior_of(populations[0]), alone, full)
         inside, places, refused = covered([prior_of(each) for each in populations], kind, campaign, seed)
-        exact = [exact_prior(kind, full.names)] * fleets
+        exact = [exact_prior(kind, full.names, units)] * fleets
         inside_exact, _, _ = covered(exact, kind, campaign, seed)
         inside_alone, _, _ = covered([None] * fleets, kind, full, seed)
         n, few = len(full.sets), len(campaign.sets)
         yield (
-            f"| {title} | {n} | {1e3 * alone:.3g} | {share(inside_alone, places)} | {few} | {few / n:.2f} "
-            f"| {1e3 * u:.3g} | {share(inside, places)} | {share(inside_exact, places)} "
+            f"| {title} | {units} units | {n} | {1e3 * alone:.3g} | {share(inside_alone, places)} "
+            f"| {few} | {few / n:.2f} | {1e3 * u:.3g} | {share(inside, places)} | {share(inside_exact, places)} "
             f"| {share(refused, fleets * NEW_UNITS)} |"
         )
+
+
+def _drifts(units: int, seed: int) -> Iterator[str]:
+    """Yield how the coverage of a fit without a prior depends on what is known of the drift, and on what it is.
+
+    A fit does not know the drift: it is averaged over sizes and time constants. Where they are drawn as it expects them
+    the coverage is that of U; for one drift alone it may be more, or less.
+    """
+    yield "| data sets | noise of the fit | covered, % | rms of error over u | u over that with the noise known |"
+    yield "| --- | --- | --- | --- | --- |"
+    for row, size in enumerate((FULL, SMALL)):
+        campaign, rng = Campaign.of(*size), np.random.default_rng([seed, 6, row])
+        scatter, design = campaign.data.scatter("x"), campaign.designs["x"]
+        jacobian = derivative_at_points(campaign.model, USE, design, "x")
+        expected = expected_drifts(rng, scatter, units)
+        for title, drifts, is_known in (
+            ("known", [DRIFT] * units, True), ("of this study", [DRIFT] * units, False),
+            ("drawn as a fit expects it", expected, False),
+        ):  # fmt: skip
+            ratio, longer = np.zeros(units), np.zeros(units)
+            for i, drift in enumerate(drifts):
+                y = drawn_noise(rng, campaign.sets.middle_s, scatter, drift)
+                place = jacobian[rng.integers(len(jacobian))]
+                known = solve(design.columns, y, scatter, drift)
+                fit = known if is_known else solve(design.columns, y, scatter)
+                u, u_known = (float(np.sqrt(place @ each.covariance @ place)) for each in (fit, known))
+                ratio[i], longer[i] = float(place @ fit.values) / u, u / u_known
+            inside = int((np.abs(ratio) <= K).sum())
+            yield (
+                f"| {len(campaign.sets)} | {title} | {share(inside, units)} | {np.sqrt(np.mean(ratio**2)):.2f} "
+                f"| {np.median(longer):.2f} |"
+            )
 
 
 def smallest(prior: CoefficientPrior, u_dps: float, full: Campaign) -> tuple[Campaign, float]:
@@ -178,10 +226,10 @@ def smallest(prior: CoefficientPrior, u_dps: float, full: Campaign) -> tuple[Cam
     return full, u_dps
 
 
-def exact_prior(kind: Mapping[str, tuple[float, float]], names: Sequence[str]) -> CoefficientPrior:
+def exact_prior(kind: Mapping[str, tuple[float, float]], names: Sequence[str], units: int) -> CoefficientPrior:
     """Return the prior of a type whose mean and spread are known exactly."""
     mean, spread = np.array([kind[kind_of_coefficient(name)] for name in names]).T
-    return CoefficientPrior(tuple(names), mean, np.diag(spread**2), PRIOR_UNITS, 25.0)
+    return CoefficientPrior(tuple(names), mean, np.diag(spread**2), units, 25.0)
 
 
 def covered(

@@ -33,6 +33,9 @@ class Backend:
     def before_migration(self, connection: sa.Connection) -> None:
         """Wait for another process that migrates. Raises DatabaseError."""
 
+    def after_migration(self, connection: sa.Connection) -> None:
+        """Add what only this kind of database can have, in the transaction of the migration, and is not there yet."""
+
     def opened(self, engine: sa.Engine) -> None:
         """Take note that the database is there, at its newest revision."""
 

@@ -130,10 +130,14 @@ class Database:
             return self.outlast(self._revision)
 
     def upgrade(self) -> None:
-        """Migrate the database to the present tables in one transaction: all of it, or nothing. Raises StoreError."""
+        """Migrate the database to the present tables in one transaction: all of it, or nothing. Raises StoreError.
+
+        A database at the present tables gets the indexes that a server can have and that are missing.
+        """
         with self._as_database(), self._engine.begin() as connection:
             self._backend.before_migration(connection)
             migrate.upgrade(connection)
+            self._backend.after_migration(connection)
 
     @contextmanager
     def _as_database(self) -> Iterator[None]:
@@ -245,7 +249,7 @@ class Database:
         except exc.DatabaseError as error:
             raise self._unread(error) from error
 
-    def lookup(self, statement: sa.Select[Any]) -> Lookup:
+    def lookup(self, statement: sa.Select[*tuple[Any, ...]]) -> Lookup:
         """Return the reads of one statement by keys (`lookup.KEYS`), for requests in an event loop.
 
         It has to be a statement that finds its rows by indexes, whatever the keys are.

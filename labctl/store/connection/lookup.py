@@ -54,7 +54,7 @@ class Lookup(Protocol):
 class FileLookup:
     """Reads from a file, in a thread of their own."""
 
-    def __init__(self, reading: Callable[[], AbstractContextManager[sa.Connection]], statement: sa.Select[Any]) -> None:
+    def __init__(self, reading: Callable[[], AbstractContextManager[sa.Connection]], statement: sa.Select[*tuple[Any, ...]]) -> None:
         self._reading, self._statement = reading, statement
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="lookup")
 
@@ -75,7 +75,7 @@ class ServerLookup:
     """Reads from a server, over a connection of their own that opens with the first, and again after it was lost."""
 
     def __init__(
-        self, connection: Mapping[str, Any], statement: sa.Select[Any], unread: Callable[[psycopg.Error], StoreError],
+        self, connection: Mapping[str, Any], statement: sa.Select[*tuple[Any, ...]], unread: Callable[[psycopg.Error], StoreError],
         patience_s: float,
     ) -> None:  # fmt: skip
         """`connection` are psycopg's arguments. `unread` gives what is raised in place of an error of psycopg.

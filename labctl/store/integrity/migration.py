@@ -47,6 +47,8 @@ def migrate_database(location: str, *, copy: bool) -> Migrated:
         if revision is None:
             raise StoreError(f"{named}: this is not a labctl database: it has no tables; name another with --database")
         if revision == migrate.HEAD:
+            if is_url(location):
+                database.upgrade()  # an index that the server could not have when the tables were made
             return Migrated(revision, revision, None)
         backup_path = _copied(location, revision) if copy else None
         database.upgrade()

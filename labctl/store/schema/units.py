@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
 def _key_of_serial(context: DefaultExecutionContext) -> str:
     """Return the sort key of the unit that is being added."""
-    given = context.get_current_parameters()  # type: ignore[no-untyped-call]
-    return natural_key(str(given["serial"]))
+    parameters = context.current_parameters
+    assert parameters is not None, "the row of a unit is added with its serial number"
+    return natural_key(str(parameters["serial"]))
 
 
 units = sa.Table(

@@ -38,11 +38,14 @@ from labctl.store import (
 )
 from labctl.store.connection import postgresql_server
 from labctl.store.connection.database import Database
+from labctl.store.integrity.migration import migrate_database
+from labctl.store.paging import PageRequest
 from labctl.store.schema import tables
 from studies.postgresql_cluster import Cluster
 from tests.helpers import certificates, register
 from tests.helpers.certificates import simulated
 from tests.helpers.drifting_units import add_drifting_unit
+from tests.helpers.log_records import logged
 from tests.helpers.schedule_lab import Lab
 
 pytestmark = pytest.mark.timeout(300)
@@ -94,7 +97,43 @@ def test_the_migrated_tables_match_the_declared_ones(url: str) -> None:
     with database.reading() as connection:
         differences = compare_metadata(MigrationContext.configure(connection), tables.metadata)
     database.close()
-    assert differences == []
+    (kind, index), *others = differences
+    assert (kind, index.name, others) == ("remove_index", postgresql_server.SEARCH_INDEX, [])  # of servers alone
+
+
+def test_units_are_found_by_an_index_of_any_part_of_their_texts(url: str) -> None:
+    with open_store(url, write=True):
+        pass
+    found = PageRequest("g-0012", 50).matching((tables.units.c.serial, tables.units.c.model, tables.units.c.supplier))
+    engine = sa.create_engine(url)
+    with engine.connect() as connection:
+        connection.exec_driver_sql("SET enable_seqscan = off")
+        query = sa.select(tables.units).where(found).compile(engine, compile_kwargs={"literal_binds": True})
+        plan = "\n".join(connection.execute(sa.text(f"EXPLAIN {query}".replace(":", "\\:"))).scalars())
+    engine.dispose()
+    assert postgresql_server.SEARCH_INDEX in plan
+
+
+def test_a_server_without_the_extension_is_searched_without_the_index(
+    url: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as without, logged(tmp_path) as records:
+        without.setattr(postgresql_server, "SEARCH_EXTENSION", "no_such_extension")
+        with open_store(url, write=True) as store:
+            assert store.units.page(PageRequest("x", 5)).rows == []
+    (said,) = records.named("search.not_indexed")
+    assert "labctl migrate --without-copy" in said["text"]
+
+    def has_index() -> bool:
+        engine = sa.create_engine(url)
+        with engine.connect() as connection:
+            names = {index["name"] for index in sa.inspect(connection).get_indexes("units")}
+        engine.dispose()
+        return postgresql_server.SEARCH_INDEX in names
+
+    assert not has_index()
+    assert migrate_database(url, copy=False).copy is None
+    assert has_index()
 
 
 def test_two_that_make_the_tables_at_the_same_time_do_not_meet(url: str) -> None:
