@@ -1,9 +1,9 @@
 """Experiments that settle it: one cause named alone after the standard campaign and at most 24 h of experiments.
 
 Simulated units with one effect of the catalogue hidden at z noise units (of the standard campaign), or with none. The
-standard campaign is criticised; while its verdict leaves something open, a policy chooses what is measured next, and all
-recordings are criticised together. Policies: the experiment that labctl proposes first; a random one
-of the same experiments; the standard campaign again. Named alone: one cause, exact aliases as one.
+standard campaign is criticised; while its verdict leaves something open, a policy chooses what is measured next, and
+all recordings are criticised together. Policies: the experiment that labctl proposes first; a random one of the same
+experiments; the standard campaign again. Named alone: one cause, exact aliases as one.
 
 Beside an adequate model it goes on where an effect has some evidence. `LABCTL_STUDY_SEED` is the first seed,
 `LABCTL_STUDY_UNITS` units a cell, `LABCTL_STUDY_PROTOCOLS`, `LABCTL_STUDY_Z`, `LABCTL_STUDY_POLICIES` (names with
