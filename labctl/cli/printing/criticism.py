@@ -71,9 +71,10 @@ def print_criticism(answer: CriticismResponse) -> None:
                 ", ".join(others[:3]),
             )  # fmt: skip
         console.print(rows)
+    purpose = "to show whether one is missing of" if answer.verdict == "adequate" else "to distinguish"
     for experiment in answer.experiments[:SHOWN_EXPERIMENTS]:
         console.print(
-            f"to distinguish {', '.join(experiment['separates'])}: {experiment['do']} ({experiment['hours']:.1f} h, "
+            f"{purpose} {', '.join(experiment['separates'])}: {experiment['do']} ({experiment['hours']:.1f} h, "
             f"{experiment['information_bit']:.2f} of {experiment['open_bit']:.2f} bit expected, one cause named with a "
             f"probability of {100 * experiment['power']:.0f} %)",
         )

@@ -23,7 +23,16 @@ from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
 from labctl.fitting.criticism.planned_addition import may_be_joined, with_planned
 from labctl.fitting.criticism.ranking import Candidate, are_exact
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.criticism.verdict import ALIKE, ENOUGH, FAR, INDISTINGUISHABLE_CHI2, LEAD, refines_base
+from labctl.fitting.criticism.verdict import (
+    ALIKE,
+    ENOUGH,
+    FAR,
+    INDISTINGUISHABLE_CHI2,
+    LEAD,
+    MIN_CHANCE,
+    by_chance,
+    refines_base,
+)
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
@@ -251,11 +260,15 @@ def _named_alone(
         known = log_bf[j] > log_bf[h] - LEAD or (log_bf[j] > 0 and bool(alike))
         if contained and directions > 0:
             nats = sum(axes[axis].further_nats(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items())
-            known = (known and nats < LEAD) or (_is_random(rival) and nats <= -LEAD)
+            known = (known and nats < LEAD) or _has_shifts(rival, outcomes, k, size, directions)
         if known:
             return None
     return int(question.nodes[h])
 
 
-def _is_random(candidate: Candidate) -> bool:
-    return candidate.id in CATALOGUE and CATALOGUE[candidate.id].is_random
+def _has_shifts(rival: Candidate, outcomes: Mapping[str, Outcomes], k: int, size: float, more: int) -> bool:
+    """Return whether a rival has a coefficient for each run or mounting, and those beyond the leader are not 0."""
+    if rival.id not in CATALOGUE or not CATALOGUE[rival.id].is_random:
+        return False
+    fitted = (outcomes[axis].fitted(rival.id, k) for axis in outcomes)
+    return by_chance(sum(each.size for each in fitted if each is not None) - size, more) < MIN_CHANCE

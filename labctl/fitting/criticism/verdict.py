@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from scipy.special import chdtrc
 
 from labctl.answers.criticism import Remainder
 from labctl.answers.fitted_model import Coefficient
@@ -49,6 +50,8 @@ MIN_SHARE = 0.3
 NEAR_END = 0.9
 #: Columns that are the same up to rounding have the same evidence within this.
 SAME = 0.02
+#: Further coefficients that noise makes so large with less than this probability are not 0.
+MIN_CHANCE = 1e-3
 #: At most this many effects in a group of an ambiguous answer, beside exact aliases of the first and of the last.
 MOST = 4
 #: A channel of which another explains more than this share cannot be distinguished from it.
@@ -203,21 +206,27 @@ def _cannot_be_distinguished(comparison: Comparison, leader: Candidate, rival: C
 
     A rival that is the leader with more coefficients is judged by what is known of these: it is out where they are
     next to nothing, by the same odds as any other, `LEAD`. One with a coefficient for each run or mounting is in where
-    they are not, whatever its evidence: the price of so many coefficients hides shifts of some noise units.
+    noise hardly makes them so large, whatever its evidence: the price of so many coefficients hides small shifts.
     """
     known = rival.log_bf > leader.log_bf - LEAD or (
         rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival)
     )
     kind = CATALOGUE.get(rival.id)
     is_random = kind is not None and kind.is_random
-    if not (known or is_random) or _directions(comparison, rival) <= _directions(comparison, leader):
+    more = _directions(comparison, rival) - _directions(comparison, leader)
+    if not (known or is_random) or more <= 0:
         return known
     if (1.0 - overlap(comparison, leader, rival)) * leader.gain >= INDISTINGUISHABLE_CHI2:
         return known
+    if is_random and by_chance(rival.gain - leader.gain, more) < MIN_CHANCE:
+        return True
     nats = sum(_further_nats(comparison, axis, i, rival.option[axis]) for axis, i in leader.option.items())
-    if nats >= LEAD and rival.log_bf <= leader.log_bf:
-        return False
-    return known or nats <= -LEAD
+    return known and (nats < LEAD or rival.log_bf > leader.log_bf)
+
+
+def by_chance(gain: float, directions: int) -> float:
+    """Return the probability that noise removes so much chi2 in so many directions."""
+    return float(chdtrc(directions, max(gain, 0.0)))
 
 
 def _further_nats(comparison: Comparison, axis: str, simple: int, wider: int) -> float:

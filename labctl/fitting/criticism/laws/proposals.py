@@ -36,8 +36,8 @@ MAX_LAWS, MAX_TRIED = 5, 16
 MAX_CHANNELS = 2
 #: Two laws are one where what they take off the data sets is so alike.
 ALIKE = 0.9995
-#: A law is not proposed that has this much less evidence than the best, nats.
-FAR_BEHIND = 12.0
+#: A law is not proposed that has this much less evidence than the best, nats: a hundredth of its probability.
+FAR_BEHIND = 4.6
 #: Two channels moved together where the correlation of their ranks is beyond this.
 MOVED_TOGETHER = 0.9
 #: Between the rates of the data sets a law adds no more than this many times what it adds at them.
