@@ -68,8 +68,12 @@ def service(tmp_path: Path, laboratory: str, recipe: str) -> Iterator[Service]:
 
 def filled(page: Page, **changed: str) -> Locator:
     """Open the dialog, fill it in, and ask for the certificate; returns the dialog."""
+    from playwright.sync_api import expect
+
     page.get_by_role("button", name="Issue certificate").click()
     dialog = page.get_by_role("dialog")
+    expect(dialog.get_by_role("button", name="Issue")).to_be_in_viewport(ratio=1)  # before anything is scrolled
+    expect(dialog.get_by_label("Number of the order")).to_have_accessible_description("Optional.")
     for label, value in {**ANSWERS, **changed}.items():
         dialog.get_by_label(label, exact=True).fill(value)
     dialog.get_by_role("button", name="Issue").click()

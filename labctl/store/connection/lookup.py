@@ -54,7 +54,9 @@ class Lookup(Protocol):
 class FileLookup:
     """Reads from a file, in a thread of their own."""
 
-    def __init__(self, reading: Callable[[], AbstractContextManager[sa.Connection]], statement: sa.Select[*tuple[Any, ...]]) -> None:
+    def __init__(
+        self, reading: Callable[[], AbstractContextManager[sa.Connection]], statement: sa.Select[*tuple[Any, ...]]
+    ) -> None:
         self._reading, self._statement = reading, statement
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="lookup")
 

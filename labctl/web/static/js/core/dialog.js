@@ -5,6 +5,16 @@ import { uniqueId, h } from "./elements.js";
 
 /** @import { Answers, Child, Field } from "../../../types/pages.js" */
 
+/** A dialog of more fields than these has them in two columns, where the screen is wide enough. */
+const NARROW_FIELDS = 7;
+
+/**
+ * What stands below a field: its own hint, or that it may be left empty.
+ * @param {Field} field
+ */
+const hintOf = ({ hint, required, type }) =>
+  hint ?? (required === false && type !== "checkbox" ? "Optional." : undefined);
+
 /**
  * Modal dialog with a form: resolves to {name: value}, or null when cancelled. A checkbox resolves to "on" or "".
  * `body`: an element above the fields.
@@ -30,7 +40,7 @@ export function dialog(title, fields, { text, body, confirm = "Continue", kind =
     /** @type {HTMLDialogElement} */
     const box = h(
       "dialog",
-      { "aria-labelledby": name },
+      { "aria-labelledby": name, class: fields.length > NARROW_FIELDS ? "wide" : "" },
       h(
         "form",
         {
@@ -43,10 +53,14 @@ export function dialog(title, fields, { text, body, confirm = "Continue", kind =
         h("h2", { id: name }, title),
         text ? h("p", { class: "muted" }, text) : null,
         body ?? null,
-        fields.map((f, k) => labelledField(f.label, inputs[k], f.hint)),
         h(
           "div",
-          { class: "row", style: "justify-content: flex-end" },
+          { class: "dialog-fields" },
+          fields.map((f, k) => labelledField(f.label, inputs[k], hintOf(f))),
+        ),
+        h(
+          "div",
+          { class: "row dialog-actions" },
           h("button", { class: "button quiet", type: "button", onclick: () => box.close() }, "Cancel"),
           h("button", { class: `button ${kind}`, type: "submit" }, confirm),
         ),

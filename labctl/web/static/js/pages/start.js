@@ -45,7 +45,7 @@ export async function page({ signal }) {
       h(
         "p",
         {},
-        "695 data sets (mean outputs, each at a constant rate and temperature) from a heated rate table, with a first model fitted. Its error is sixteen times the noise; find out why, mend the model, and certify it. Show me around leads through this in five steps.",
+        "695 data sets (mean outputs, each at a constant rate and temperature) from a heated rate table, with a first model fitted. Its error is sixteen times the noise; find out why, correct the model, and certify it. Show me around leads through this in five steps.",
       ),
       h(
         "div",

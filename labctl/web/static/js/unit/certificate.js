@@ -34,7 +34,12 @@ const FIELDS = [
   { name: "received", label: "Received on", type: "date", required: false },
   { name: "deviations", label: "Deviations from the method", hint: "Empty: none.", required: false },
   { name: "specification", label: "Conformity to the specification", hint: "Empty: no statement.", required: false },
-  { name: "limit_dps", label: "Limit of the error in the specification, deg/s", required: false },
+  {
+    name: "limit_dps",
+    label: "Limit of the error in the specification, deg/s",
+    hint: "Needed where a specification is stated.",
+    required: false,
+  },
   {
     name: "own_axis",
     label: "The item turns about the axis of one output at a time",
