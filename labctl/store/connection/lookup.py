@@ -77,9 +77,12 @@ class ServerLookup:
     """Reads from a server, over a connection of their own that opens with the first, and again after it was lost."""
 
     def __init__(
-        self, connection: Mapping[str, Any], statement: sa.Select[*tuple[Any, ...]], unread: Callable[[psycopg.Error], StoreError],
+        self,
+        connection: Mapping[str, Any],
+        statement: sa.Select[*tuple[Any, ...]],
+        unread: Callable[[psycopg.Error], StoreError],
         patience_s: float,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """`connection` are psycopg's arguments. `unread` gives what is raised in place of an error of psycopg.
 
         A server that is away (DatabaseUnreachable) is asked again for `patience_s`, once it has answered before.
