@@ -49,7 +49,7 @@ REQUESTS = {
 def run() -> dict[str, float | str]:
     """Fill a database, then ask for parts of its lists; returns the median of each request's real and processor time.
 
-    On a busy machine the wall time is mostly that of other programs.
+    On a busy machine the real time is mostly that of other programs.
     """
     with tempfile.TemporaryDirectory() as folder:
         database = Database(str(Path(folder) / "lab.sqlite"), write=True)
