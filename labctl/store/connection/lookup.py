@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 KEYS = "keys"
 #: A server that does not answer is asked again after so long, s.
 RETRY_S = 0.2
+#: A socket that takes no more is tried again after so long, s.
+FLUSH_S = 0.001
 _PREPARED, _BINARY = b"lookup", 1
 
 
@@ -113,7 +115,7 @@ class ServerLookup:
                     self._is_away = isinstance(error, DatabaseUnreachable)
                     raise
                 if not was_open:  # else it was lost since the server was last asked, and may open at once
-                    await asyncio.sleep(RETRY_S)
+                    await asyncio.wait({loop.create_future()}, timeout=RETRY_S)
             except BaseException:  # the answer that is under way would be taken for that of the next read
                 self.close()
                 raise
@@ -186,9 +188,9 @@ async def _result(connection: PGconn) -> PGresult:
     """Return the result of what was sent. Raises psycopg.Error for one that is an error, or for a lost connection."""
     from psycopg import errors, pq  # noqa: PLC0415
 
-    while connection.flush():  # what is sent fits into the buffer of a socket
-        await asyncio.sleep(0)
     loop = asyncio.get_running_loop()
+    while connection.flush():  # seldom: what is sent fits into the buffer of a socket
+        await asyncio.wait({loop.create_future()}, timeout=FLUSH_S)
     done: asyncio.Future[PGresult] = loop.create_future()
     results: list[PGresult] = []
 
