@@ -13,6 +13,8 @@ PASSED_ON = "settings of a library's constructor, passed on as they are; the lib
 DIFFERENT = "objects of one generic class, each with types of its own, in a row"
 STRUCTLOG = "what structlog hands its processors: a record's fields may hold anything"
 KIND = "a type, of any kind that Python has for one: a class, a union, a generic with its arguments"
+DRIVER = "arguments of psycopg's connect, passed on as they are"
+ROWS = "a statement of any columns and its rows, whose fields its caller knows"
 BY_NAME = "the name of the call says which types its arguments and its answer have, which are checked at both ends"
 #: Module -> what says Any there, and why.
 ALLOWED = {
@@ -29,6 +31,8 @@ ALLOWED = {
     ),
     "instruments/simulators/links/serial_port.py": ({"SimulatedSerialPort.__init__"}, PASSED_ON),
     "labctl/api/descriptions.py": ({"DescribedAPI.openapi"}, "the document is FastAPI's, which types it so"),
+    "labctl/cli/commands/fleet.py": ({"JobOptions.carry_out"}, "options of one command; its request checks them"),
+    "labctl/cli/option_groups.py": ({"with_options"}, "commands of any signature, as typer takes them"),
     "labctl/log/redaction.py": ({"Redaction.fields"}, STRUCTLOG),
     "labctl/log/rendering.py": ({"Fields", "Rendering.__call__", "error_fields"}, STRUCTLOG),
     "labctl/processes/call_forms.py": ({"CallForm.__init__", "parameter"}, KIND),
@@ -41,6 +45,15 @@ ALLOWED = {
     "labctl/services/commands/acts/catalogue.py": ({"BENCH_ACTS", "CAMPAIGN_ACTS"}, DIFFERENT),
     "labctl/services/commands/registry.py": ({"COMMANDS"}, DIFFERENT),
     "labctl/services/recordings/importers.py": ({"IMPORTERS"}, DIFFERENT),
+    "labctl/store/connection/backend.py": ({"Backend.lookup_connection"}, DRIVER),
+    "labctl/store/connection/database.py": ({"Database.lookup"}, ROWS),
+    "labctl/store/connection/engines.py": ({"lookup_connection"}, DRIVER),
+    "labctl/store/connection/lookup.py": (
+        {"FileLookup.__init__", "FileLookup.rows", "Lookup.rows", "ServerLookup.__init__", "ServerLookup.rows"},
+        ROWS,
+    ),
+    "labctl/store/connection/postgresql_server.py": ({"PostgresqlServer.lookup_connection"}, DRIVER),
+    "labctl/store/repositories/units.py": ({"unit_rows"}, ROWS),
 }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -38,11 +37,11 @@ def test_a_page_that_arrives_late_takes_the_place_of_its_frame(service: Service,
     page = visit("/effects")
     settled(page)
     held: list[Route] = []
-    arrived = threading.Event()
-    page.route("**/api/units*", lambda route: (held.append(route), arrived.set()))
-    page.get_by_role("link", name="Units").click()
+    page.route("**/api/units*", held.append)
+    with page.expect_request("**/api/units*"):
+        page.get_by_role("link", name="Units").click()
     expect(page.locator("main")).to_contain_text("Waiting for the service")
-    assert arrived.is_set()
-    held[0].continue_()
+    (route,) = held
+    route.continue_()
     expect(page.get_by_role("link", name="FOG-0001")).to_be_visible()
     expect(page.locator("main")).not_to_contain_text("Waiting for the service")

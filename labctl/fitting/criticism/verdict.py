@@ -205,8 +205,9 @@ def _cannot_be_distinguished(comparison: Comparison, leader: Candidate, rival: C
     """Return whether the data leave a rival beside the leader.
 
     A rival that is the leader with more coefficients is judged by what is known of these: it is out where they are
-    next to nothing, by the same odds as any other, `LEAD`. One with a coefficient for each run or mounting is in where
-    noise hardly makes them so large, whatever its evidence: the price of so many coefficients hides small shifts.
+    next to nothing, by the same odds as any other, `LEAD`, unless it has a shape with no more coefficients than the
+    leader that is not far behind. One with a coefficient for each run or mounting is in where noise hardly makes them
+    so large, whatever its evidence: the price of so many coefficients hides small shifts.
     """
     known = rival.log_bf > leader.log_bf - LEAD or (
         rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival)
@@ -221,7 +222,22 @@ def _cannot_be_distinguished(comparison: Comparison, leader: Candidate, rival: C
     if is_random and by_chance(rival.gain - leader.gain, more) < MIN_CHANCE:
         return True
     nats = sum(_further_nats(comparison, axis, i, rival.option[axis]) for axis, i in leader.option.items())
-    return known and (nats < LEAD or rival.log_bf > leader.log_bf)
+    is_in = nats < LEAD or rival.log_bf > leader.log_bf or _has_as_simple_a_shape(comparison, leader, rival)
+    return known and is_in
+
+
+def _has_as_simple_a_shape(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
+    """Return whether a shape of the rival with no more coefficients than the leader is not far behind it.
+
+    A cubic is such a shape of a polynomial of fifth order, beside a sine.
+    """
+    behind = 0.0
+    for axis, best in leader.option.items():
+        evidence, options = comparison.axes[axis], comparison.designs[axis].options
+        is_rival = [option.candidate == rival.id and not option.smooth for option in options]
+        is_simple = evidence.dimensions <= evidence.dimensions[best]
+        behind += float(evidence.log_bf[best] - np.max(evidence.log_bf, initial=-np.inf, where=is_rival & is_simple))
+    return behind < FAR
 
 
 def by_chance(gain: float, directions: int) -> float:
