@@ -62,7 +62,7 @@ def test_at_rest_both_legs_are_drawn_and_the_map_is_not(service: Service, visit:
     assert fails.get_by_label("Residual against").first.input_value() == "temperature_c"
     page.get_by_role("region", name="Which effects are missing").get_by_role("button", name="Draw").first.click()
     drawn = figure(page, "Residual against a channel")
-    expect(page.get_by_text("Diamonds in the pictures above")).to_be_visible()
+    expect(page.get_by_text("Diamonds in the figures of")).to_be_visible()
     page.wait_for_function(
         """() => document.querySelector('.plot[aria-label^="Residual against a channel"]').data.length === 2"""
     )

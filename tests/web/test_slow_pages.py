@@ -37,7 +37,7 @@ def test_a_page_that_arrives_late_takes_the_place_of_its_frame(service: Service,
     page = visit("/effects")
     settled(page)
     held: list[Route] = []
-    page.route("**/api/units*", held.append)
+    page.route("**/api/units*", lambda route: held.append(route))  # noqa: PLW0108  playwright marks its handlers
     with page.expect_request("**/api/units*"):
         page.get_by_role("link", name="Units").click()
     expect(page.locator("main")).to_contain_text("Waiting for the service")

@@ -39,7 +39,7 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     expect(adding).to_contain_text("RMS residual")
     adding.get_by_role("button", name="Make version 2").click()
     page.wait_for_url("**version=2**")
-    expect(page.get_by_role("region", name="Verdict")).to_contain_text("Nothing is missing")
+    expect(page.get_by_role("region", name="Verdict")).to_contain_text("Adequate: nothing is missing")
     expect(page.get_by_role("region", name="Error of the versions")).to_contain_text("Version 1: residual before")
 
     ladder = service.get("/api/units/FOG-0001/ladder")["steps"]

@@ -31,6 +31,7 @@ from labctl.fitting.criticism.verdict import (
     LEAD,
     MIN_CHANCE,
     by_chance,
+    has_as_simple_a_shape,
     refines_base,
 )
 from labctl.fitting.effects import CATALOGUE, Effect
@@ -259,16 +260,24 @@ def _named_alone(
         alike = same or (log_bf[j] > log_bf[h] - FAR and contained)
         known = log_bf[j] > log_bf[h] - LEAD or (log_bf[j] > 0 and bool(alike))
         if contained and directions > 0:
-            nats = sum(axes[axis].further_nats(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items())
-            known = (known and nats < LEAD) or _has_shifts(rival, outcomes, k, size, directions)
+            if _is_random(rival):
+                known = known or _has_shifts(rival, outcomes, k, size, directions)
+            elif not has_as_simple_a_shape(question.comparison, leader, rival):
+                further = (
+                    axes[axis].further_nats(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items()
+                )
+                known = known and sum(further) < LEAD
         if known:
             return None
     return int(question.nodes[h])
 
 
+def _is_random(rival: Candidate) -> bool:
+    """Return whether a rival has a coefficient for each run or mounting."""
+    return rival.id in CATALOGUE and CATALOGUE[rival.id].is_random
+
+
 def _has_shifts(rival: Candidate, outcomes: Mapping[str, Outcomes], k: int, size: float, more: int) -> bool:
-    """Return whether a rival has a coefficient for each run or mounting, and those beyond the leader are not 0."""
-    if rival.id not in CATALOGUE or not CATALOGUE[rival.id].is_random:
-        return False
+    """Return whether the shifts of runs or mountings beyond the leader are not 0."""
     fitted = (outcomes[axis].fitted(rival.id, k) for axis in outcomes)
     return by_chance(sum(each.size for each in fitted if each is not None) - size, more) < MIN_CHANCE

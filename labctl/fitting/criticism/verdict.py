@@ -206,8 +206,8 @@ def _cannot_be_distinguished(comparison: Comparison, leader: Candidate, rival: C
 
     A rival that is the leader with more coefficients is judged by what is known of these: it is out where they are
     next to nothing, by the same odds as any other, `LEAD`, unless it has a shape with no more coefficients than the
-    leader that is not far behind. One with a coefficient for each run or mounting is in where noise hardly makes them
-    so large, whatever its evidence: the price of so many coefficients hides small shifts.
+    leader that is not far behind. One with a coefficient for each run or mounting stays in as well where noise hardly
+    makes them so large, whatever its evidence: the price of so many coefficients hides small shifts.
     """
     known = rival.log_bf > leader.log_bf - LEAD or (
         rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival)
@@ -219,14 +219,14 @@ def _cannot_be_distinguished(comparison: Comparison, leader: Candidate, rival: C
         return known
     if (1.0 - overlap(comparison, leader, rival)) * leader.gain >= INDISTINGUISHABLE_CHI2:
         return known
-    if is_random and by_chance(rival.gain - leader.gain, more) < MIN_CHANCE:
-        return True
+    if is_random:
+        return known or by_chance(rival.gain - leader.gain, more) < MIN_CHANCE
     nats = sum(_further_nats(comparison, axis, i, rival.option[axis]) for axis, i in leader.option.items())
-    is_in = nats < LEAD or rival.log_bf > leader.log_bf or _has_as_simple_a_shape(comparison, leader, rival)
+    is_in = nats < LEAD or rival.log_bf > leader.log_bf or has_as_simple_a_shape(comparison, leader, rival)
     return known and is_in
 
 
-def _has_as_simple_a_shape(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
+def has_as_simple_a_shape(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
     """Return whether a shape of the rival with no more coefficients than the leader is not far behind it.
 
     A cubic is such a shape of a polynomial of fifth order, beside a sine.

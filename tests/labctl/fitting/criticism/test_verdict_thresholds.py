@@ -223,20 +223,29 @@ def test_a_rival_that_leaves_little_of_the_signal_stays_unless_the_evidence_is_f
 
 
 @pytest.mark.parametrize(
-    ("rival_id", "behind", "nats", "together"),
+    ("rival_id", "behind", "nats", "simple", "together"),
     [
-        ("scale_factor", 1.0, LEAD - STEP, True),  # the further coefficients are not known to be 0
-        ("scale_factor", 1.0, LEAD, False),
-        ("scale_factor", 0.0, LEAD, False),
-        ("scale_factor", -1.0, LEAD, True),  # it has more evidence than the leader
+        ("scale_factor", 1.0, LEAD - STEP, False, True),  # the further coefficients are not known to be 0
+        ("scale_factor", 1.0, LEAD, False, False),
+        ("scale_factor", 1.0, LEAD, True, True),  # a shape of its own does without them
+        ("scale_factor", 0.0, LEAD, False, False),
+        ("scale_factor", -1.0, LEAD, False, True),  # it has more evidence than the leader
+        ("run_shift", 1.0, LEAD, False, True),  # shifts may be small
     ],
 )
 def test_a_rival_that_contains_the_leader_is_judged_by_its_further_coefficients(
-    overlaps: Overlaps, monkeypatch: pytest.MonkeyPatch, rival_id: str, behind: float, nats: float, together: bool
+    overlaps: Overlaps,
+    monkeypatch: pytest.MonkeyPatch,
+    rival_id: str,
+    behind: float,
+    nats: float,
+    simple: bool,
+    together: bool,
 ) -> None:
     leader, rival = effect("bias", 30.0, gain=112.0), effect(rival_id, 30.0 - behind, z=1)
     overlaps({("bias", rival_id): 1.0})
     monkeypatch.setattr(module, "_further_nats", lambda *_: nats)
+    monkeypatch.setattr(module, "has_as_simple_a_shape", lambda *_: simple)
     assert (rival_id in alias_group(compared(leader, rival), leader)) == together
 
 

@@ -59,7 +59,7 @@ def test_the_commands_print_the_findings(log: Path, tmp_path: Path) -> None:
     assert said.returncode == 0, said.stderr
     assert "-127 deg C" in said.stdout
     assert "labctl import" in said.stdout
-    assert "1,999 readings, each drawn" in picture.read_text()
+    assert "1,999 readings" in picture.read_text()
     refused = run_labctl(["import", str(log), "--accept-map", "--database", database])
     assert refused.returncode != 0
     options = [word for kind in ("time_back", "thermometer", "spikes") for word in ("--leave-out", kind)]
