@@ -63,6 +63,7 @@ class OpenQuestion:
     candidates: tuple[Candidate, ...]  #: the hypotheses, likeliest first
     log_odds: Array  #: (h,) posterior, nats, up to a constant
     nodes: NDArray[np.int64]  #: (h,) number of the cause: effects with the same columns on every schedule are one
+    simple: frozenset[tuple[str, str]]  #: leaders and rivals that have a shape with as few coefficients, not far behind
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -131,11 +132,7 @@ def open_question(found: Criticism) -> OpenQuestion | None:
     # shapes are compared on a grid, so that the verdict does not let small differences of the evidence decide
     odds = {c.id: max(c.log_bf, lead - LEAD) for c in of_group} | {c.id: c.log_bf for c in near}
     chosen = sorted((*of_group, *near), key=lambda c: -odds[c.id])[:MAX_HYPOTHESES]
-    ids = [c.id for c in chosen]
-    return OpenQuestion(
-        _restricted(comparison, ids), {name: CATALOGUE[name] for name in ids if name in CATALOGUE},
-        tuple(chosen), np.array([odds[name] for name in ids]), _nodes(ids),
-    )  # fmt: skip
+    return _question(comparison, chosen, odds)
 
 
 def _whether_any(comparison: Comparison) -> OpenQuestion | None:
@@ -150,10 +147,22 @@ def _whether_any(comparison: Comparison) -> OpenQuestion | None:
     nothing = Candidate(NOTHING, smooth=False, log_bf=0.0, option={}, term=None, gain=0.0)
     odds = {c.id: c.log_bf for c in near} | {NOTHING: float(np.log(len(effects)))}
     chosen = sorted((*near, nothing), key=lambda c: -odds[c.id])
+    return _question(comparison, chosen, odds)
+
+
+def _question(comparison: Comparison, chosen: Sequence[Candidate], odds: Mapping[str, float]) -> OpenQuestion:
+    """Return the question which of some hypotheses of a comparison is true; `odds` are their posterior, nats, by id."""
     ids = [c.id for c in chosen]
+    effects = [c for c in chosen if c.id != NOTHING]
+    simple = frozenset(
+        (leader.id, rival.id)
+        for leader in effects
+        for rival in effects
+        if rival is not leader and has_as_simple_a_shape(comparison, leader, rival)
+    )
     return OpenQuestion(
         _restricted(comparison, ids), {name: CATALOGUE[name] for name in ids if name in CATALOGUE},
-        tuple(chosen), np.array([odds[name] for name in ids]), _nodes(ids),
+        tuple(chosen), np.array([odds[name] for name in ids]), _nodes(ids), simple,
     )  # fmt: skip
 
 
@@ -262,7 +271,7 @@ def _named_alone(
         if contained and directions > 0:
             if _is_random(rival):
                 known = known or _has_shifts(rival, outcomes, k, size, directions)
-            elif not has_as_simple_a_shape(question.comparison, leader, rival):
+            elif (leader.id, rival.id) not in question.simple:
                 further = (
                     axes[axis].further_nats(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items()
                 )
