@@ -27,12 +27,16 @@ from studies.damaged_logs import (
 MIB = 1 << 20
 #: What a packed chunk unpacks to: more than an import may take.
 BOMB_MIB = 6144
-ZEROS = bytes(64 * MIB)
 NAMES = ("time [s]", "gyro_x [rad/s]", "gyro_y [rad/s]", "gyro_z [rad/s]", "temp [degC]")
 
 
+def _zeros() -> bytes:
+    """Return 64 MiB; made when asked for, as all that is large here: tests import this and use little of it."""
+    return bytes(64 * MIB)
+
+
 def _bz2_bomb(content: bytes) -> bytes:
-    return bz2.compress(content) + (BOMB_MIB // 64) * bz2.compress(ZEROS)
+    return bz2.compress(content) + (BOMB_MIB // 64) * bz2.compress(_zeros())
 
 
 def _lz4_bomb(content: bytes) -> bytes:
@@ -40,7 +44,8 @@ def _lz4_bomb(content: bytes) -> bytes:
 
     packer = LZ4FrameCompressor()
     parts = [packer.begin(), packer.compress(content)]
-    parts += [packer.compress(ZEROS) for _ in range(BOMB_MIB // 64)]
+    zeros = _zeros()
+    parts += [packer.compress(zeros) for _ in range(BOMB_MIB // 64)]
     return b"".join([*parts, packer.flush()])
 
 
@@ -48,7 +53,8 @@ def _zstd_bomb(content: bytes) -> bytes:
     from backports import zstd
 
     packer = zstd.ZstdCompressor()
-    parts = [packer.compress(content)] + [packer.compress(ZEROS) for _ in range(BOMB_MIB // 64)]
+    zeros = _zeros()
+    parts = [packer.compress(content)] + [packer.compress(zeros) for _ in range(BOMB_MIB // 64)]
     return b"".join([*parts, packer.flush()])
 
 
@@ -91,9 +97,9 @@ def _columns(**changed: object) -> dict[str, object]:
     return named | {NAMES["txyzw".index(name)]: values for name, values in changed.items()}
 
 
-def _table(values: object, **options: object) -> Callable[[Path], bytes]:
+def _table(values: Callable[[], object], **options: object) -> Callable[[Path], bytes]:
     """Return what writes a Parquet file whose column gyro_x holds other values."""
-    return lambda _: parquet_of(_columns(x=values), **options)
+    return lambda _: parquet_of(_columns(x=values()), **options)
 
 
 def _named_twice(_: Path) -> bytes:
@@ -105,22 +111,22 @@ def _named_twice(_: Path) -> bytes:
 
 N = len(rows())
 PARQUET: Mapping[str, Callable[[Path], bytes]] = {
-    "structs": _table(pa.array([{"a": 1.0, "b": {"c": 2}}] * N)),
-    "lists": _table(pa.array([[1.0, 2.0]] * N)),
-    "maps": _table(pa.array([[("a", 1.0)]] * N, pa.map_(pa.string(), pa.float64()))),
-    "true and false": _table(pa.array([True, False] * (N // 2))),
-    "a dictionary of words": _table(pa.array(["a", "b"] * (N // 2)).dictionary_encode()),
-    "a dictionary of numbers": _table(pa.array([1.0, 2.0] * (N // 2)).dictionary_encode()),
-    "nulls only": _table(pa.nulls(N, pa.float64())),
-    "nulls of no type": _table(pa.nulls(N)),
-    "nulls between": _table(pa.array([1.0, None] * (N // 2))),
-    "decimals": _table(pa.array(np.arange(N)).cast(pa.decimal128(38, 2))),
-    "times": _table(pa.array(np.arange(N)).cast(pa.timestamp("ns"))),
-    "bytes": _table(pa.array([b"\xff\x00"] * N)),
-    "half precision": _table(pa.array(np.arange(N).astype(np.float16))),
-    "largest unsigned": _table(pa.array(np.full(N, 2**64 - 1, dtype=np.uint64))),
-    "infinities": _table(np.where(np.arange(N) % 2, np.inf, np.nan)),
-    "long words": _table(pa.array(["x" * 200_000] * N), compression="zstd", use_dictionary=False),
+    "structs": _table(lambda: pa.array([{"a": 1.0, "b": {"c": 2}}] * N)),
+    "lists": _table(lambda: pa.array([[1.0, 2.0]] * N)),
+    "maps": _table(lambda: pa.array([[("a", 1.0)]] * N, pa.map_(pa.string(), pa.float64()))),
+    "true and false": _table(lambda: pa.array([True, False] * (N // 2))),
+    "a dictionary of words": _table(lambda: pa.array(["a", "b"] * (N // 2)).dictionary_encode()),
+    "a dictionary of numbers": _table(lambda: pa.array([1.0, 2.0] * (N // 2)).dictionary_encode()),
+    "nulls only": _table(lambda: pa.nulls(N, pa.float64())),
+    "nulls of no type": _table(lambda: pa.nulls(N)),
+    "nulls between": _table(lambda: pa.array([1.0, None] * (N // 2))),
+    "decimals": _table(lambda: pa.array(np.arange(N)).cast(pa.decimal128(38, 2))),
+    "times": _table(lambda: pa.array(np.arange(N)).cast(pa.timestamp("ns"))),
+    "bytes": _table(lambda: pa.array([b"\xff\x00"] * N)),
+    "half precision": _table(lambda: pa.array(np.arange(N).astype(np.float16))),
+    "largest unsigned": _table(lambda: pa.array(np.full(N, 2**64 - 1, dtype=np.uint64))),
+    "infinities": _table(lambda: np.where(np.arange(N) % 2, np.inf, np.nan)),
+    "long words": _table(lambda: pa.array(["x" * 200_000] * N), compression="zstd", use_dictionary=False),
     "one column twice": _named_twice,
     "no row": lambda _: parquet_of({name: pa.array([], pa.float64()) for name in NAMES}),
     "no column": lambda _: parquet_of({}),
@@ -128,16 +134,20 @@ PARQUET: Mapping[str, Callable[[Path], bytes]] = {
     "names of other scripts": lambda _: parquet_of({"\u202etime": [1.0], "\x00": [1.0], "a\nb": [1.0], "": [1.0]}),
     "100 million constant rows": lambda _: parquet_of({NAMES[0]: np.zeros(10**8), NAMES[1]: np.zeros(10**8)}),
 }
-TEXT: Mapping[str, bytes] = {
-    "nothing": b"", "one line": b"a", "a line of 8 MB": b"t;" + b"x" * 8_000_000 + b"\n1;2\n", "zeros": bytes(MIB),
-    "200000 columns": b";".join([b"t"] * 200_000) + b"\n" + b";".join([b"1"] * 200_000),
-    "a quote that never ends": b'time;x;y;z;temp\n"1;2;3;4;5\n' * 1000,
 
-    "names twice": b"unit\ntime;x;x;x;x\n1;2;3;4;5\n2;2;3;4;5\n",
-    "rows of other lengths": b"u\ntime;x;y;z;temp\n1;2\n1;2;3;4;5;6\n",
-    "UTF-16": "unit\ntime;x;y;z;temp\n1;2;3;4;5\n".encode("utf-16"),
-    "huge figures": b"u\ntime;x;y;z;temp\n1e308;1e999;nan;inf;-0\n" * 9,
-}  # fmt: skip
+
+def _texts() -> Mapping[str, bytes]:
+    return {
+        "nothing": b"", "one line": b"a", "a line of 8 MB": b"t;" + b"x" * 8_000_000 + b"\n1;2\n", "zeros": bytes(MIB),
+        "200000 columns": b";".join([b"t"] * 200_000) + b"\n" + b";".join([b"1"] * 200_000),
+        "a quote that never ends": b'time;x;y;z;temp\n"1;2;3;4;5\n' * 1000,
+        "names twice": b"unit\ntime;x;x;x;x\n1;2;3;4;5\n2;2;3;4;5\n",
+        "rows of other lengths": b"u\ntime;x;y;z;temp\n1;2\n1;2;3;4;5;6\n",
+        "UTF-16": "unit\ntime;x;y;z;temp\n1;2;3;4;5\n".encode("utf-16"),
+        "huge figures": b"u\ntime;x;y;z;temp\n1e308;1e999;nan;inf;-0\n" * 9,
+    }  # fmt: skip
+
+
 TOML: Mapping[str, bytes] = {
     "deep lists": b"axes = " + b"[" * 20_000, "deep names": b"a" + b".a" * 20_000 + b" = 1",
     "a long integer": b"latitude_deg = " + b"9" * 10_000, "1e999": b"sample_rate_hz = 1e999",
@@ -184,7 +194,7 @@ def _parquet(folder: Path) -> Iterator[DamagedLog]:
 
 
 def _csv(_: Path) -> Iterator[DamagedLog]:
-    for said, text in TEXT.items():
+    for said, text in _texts().items():
         yield DamagedLog("crafted CSV", "log.csv", said, text, CSV_MAP)
         yield DamagedLog("crafted CSV", "log.csv", f"{said}, without a map", text)
 
