@@ -11,7 +11,6 @@ import pytest
 
 from labctl.plots.temperature_scale import TEMPERATURE_SCALE
 from tests.helpers.browser import NARROW, Service, figure
-from tests.helpers.rounding_cases import CASES
 from tests.helpers.simulated_recordings import three_axes
 
 if TYPE_CHECKING:
@@ -212,15 +211,3 @@ def test_evidence_bars_differ_and_coefficients_are_all_shown(
     for first, second in zip(range(len(nats)), range(1, len(nats)), strict=False):
         if nats[first] > 2 * nats[second]:
             assert lengths[first] > lengths[second] + 5
-
-
-def test_pages_round_as_the_command_line_does(visit: Callable[..., Page]) -> None:
-    page = visit("/")
-    found = page.evaluate(
-        """async cases => {
-          const { roundedToUncertainty } = await import("/static/js/core/rounding.js");
-          return cases.map(([value, u]) => roundedToUncertainty(value, u));
-        }""",
-        [[value, None if u is None or not np.isfinite(u) else u] for value, u, _ in CASES],
-    )
-    assert [(each["value"], each["u"], each["exponent"]) for each in found] == [shown for *_, shown in CASES]
