@@ -89,6 +89,7 @@ def test_an_installed_labctl_creates_a_database_by_its_own_migrations(
     assert made >= set(tables.metadata.tables)
 
 
+@pytest.mark.slow
 def test_a_wheel_tells_type_checkers_that_it_has_types(built: dict[str, Path]) -> None:
     with ZipFile(built["wheel"]) as wheel:
         assert {f"{package}/py.typed" for package in ("instruments", "procedures", "labctl")} <= set(wheel.namelist())

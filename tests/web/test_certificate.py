@@ -80,6 +80,7 @@ def filled(page: Page, **changed: str) -> Locator:
     return dialog
 
 
+@pytest.mark.slow
 def test_the_dialog_asks_for_every_fact_names_what_is_missing_and_gives_the_certificate(
     service: Service, visit: Callable[..., Page], faults: Faults
 ) -> None:

@@ -60,6 +60,7 @@ def shown(value: float) -> float:
     return float(f"{value:.3g}")
 
 
+@pytest.mark.slow
 def test_explore_says_what_its_buttons_do_and_what_an_experiment_can_decide(
     service: Service, visit: Callable[..., Page], unit: str, faults: Faults
 ) -> None:

@@ -24,7 +24,11 @@ MAINS_SHARE = 2e-3
 
 
 def check_lines(series: Series) -> Iterator[Marked]:
-    """Yield the outputs with a line at one frequency in all data sets; lines that follow the table's rate are none."""
+    """Yield the outputs with a line at one frequency in all data sets; lines that follow the table's rate are none.
+
+    A stepper's ripple follows the rate, and as it is sampled it may yet be at one frequency: at whole multiples
+    of 25 deg/s, full steps of 1.8 deg are all at multiples of 125/9 Hz when sampled at 125 Hz. At rest it is not there.
+    """
     pieces = _pieces(series)
     if series.rate_dps is None:  # of turns by hand only what is between them can show a line
         pieces = [same for same in pieces if all(series.still[piece].all() for piece in same)]
@@ -34,6 +38,7 @@ def check_lines(series: Series) -> Iterator[Marked]:
     limit = _limit(len(pieces), float(np.median([len(same) for same in pieces])), readings // 2)
     hz = np.asarray(np.fft.rfftfreq(readings, series.step_s), dtype=np.float64)
     window = np.hanning(readings)
+    at_rest = [bool(series.still[same[0]].all()) for same in pieces]
     for name, values in series.residuals.items():
         noise = series.noises[name]
         middle = medians_of_five(values)
@@ -41,6 +46,8 @@ def check_lines(series: Series) -> Iterator[Marked]:
         sets = [np.mean([_power(smooth[piece], window) for piece in same], axis=0) for same in pieces]
         spectrum = np.median(sets, axis=0)  # a line that follows the table's rate is in few data sets at one frequency
         over = _over_background(spectrum)
+        if over.max() > limit:
+            over = _seen_at_rest(over, [own for own, rests in zip(sets, at_rest, strict=True) if rests])
         k = int(np.argmax(over))
         power = float(spectrum[max(k - 1, 0) : k + 2].sum()) * 4 / float(np.sum(window**2)) / readings
         size = float(np.sqrt(power))
@@ -48,6 +55,18 @@ def check_lines(series: Series) -> Iterator[Marked]:
             continue
         found_hz = _peak(spectrum, hz, k)
         yield Marked(_finding(name, found_hz, size, series.step_s, len(series)), np.ones(len(series), dtype=bool))
+
+
+def _seen_at_rest(over: Array, still: list[Array]) -> Array:
+    """Return heights of lines over the background (k,), 0 for those that the spectra (k,) at rest do not have.
+
+    A line is there where its height at rest is nearer to `over` than to none. In logarithms: a moving table has the
+    higher background. Where no data set is at rest, each line is taken as seen.
+    """
+    if not still:
+        return over
+    height = np.pad(_over_background(np.median(still, axis=0)), 1)
+    return np.where(np.maximum(np.maximum(height[:-2], height[1:-1]), height[2:]) >= np.sqrt(over), over, 0.0)
 
 
 def _power(values: Array, window: Array) -> Array:

@@ -133,3 +133,19 @@ def test_a_clock_that_was_set_back_says_what_to_add() -> None:
     assert not found.may_leave_out
     assert "from row 2001 on" in found.do
     assert found.value == pytest.approx(-12.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("of_the_room", "found"), [(0.0, []), (0.1, ["vibration"])])
+def test_steps_of_the_table_that_all_rates_sample_to_one_frequency_are_no_vibration(
+    of_the_room: float, found: list[str]
+) -> None:
+    """A motor with full steps of 1.8 deg at 125 Hz: 25 and 50 deg/s are seen at 13.9 and 27.8 Hz, and so on."""
+    rng, rates_dps, n = np.random.default_rng(5), np.repeat([0.0, 100.0, -100.0, 150.0, -150.0, 275.0, -275.0], 4), 1024
+    dataset = np.repeat(np.arange(1, len(rates_dps) + 1), n)
+    t_s, rate_dps = np.arange(len(dataset)) / 125, np.repeat(rates_dps, n)
+    ripple_dps = sum(np.sin(2 * np.pi * k * rate_dps * t_s / 1.8) for k in (1, 2, 3))
+    room_dps = np.sin(2 * np.pi * 31.0 * t_s)
+    gyro_dps = rate_dps + 0.15 * ripple_dps + of_the_room * room_dps + rng.normal(0, 0.1, len(t_s))
+    info = RecordingInfo(serial="U", axes=["z"], kind="samples", motion="rates", started_at=STARTED)
+    columns = {"t_s": t_s, "dataset": dataset, "table_rate_dps": rate_dps, "gyro_z": gyro_dps}
+    assert [finding.what for finding in inspect_recording(Recording(info, columns))] == found

@@ -84,7 +84,7 @@ function contributionOf(line) {
 export function contributionFigures(contributions) {
   return h(
     "div",
-    { class: "columns", style: "--column-min: 24rem" },
+    { class: "columns", style: "--column-min: 44rem" }, // as wide as the legend of twelve sources needs to be low
     Object.entries(contributions).flatMap(([axis, over]) => [
       one(
         `Contributions, axis ${axis}, over rate`,
@@ -129,6 +129,6 @@ function one(name, lines, along, at) {
     name,
     `Standard uncertainties that the budget combines, at ${at}. Dashed: the expanded uncertainty U. Uncertainties that the bench does not state have no line.`,
     draw,
-    { height: innerWidth < NARROW_PX ? "36rem" : "26rem" },
+    { height: innerWidth < NARROW_PX ? "36rem" : "23rem" },
   );
 }
