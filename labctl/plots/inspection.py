@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
+from itertools import pairwise
 
 import plotly.graph_objects as go
 
@@ -17,6 +18,8 @@ from labctl.texts import counted
 ROW_PX, GAP_PX, LINE_PX = 170, 45, 17
 #: Left of the panels, where their headings begin too: on a phone there is no room for one in the middle.
 LEFT_PX = 60
+#: A dot where stretches of readings take less than this share of the time.
+MARKER_PX, SPARSE = 3, 0.1
 #: Units of the axis of time: name, seconds, and the shortest span that is drawn in it, s.
 TIME_UNITS = (("h", 3600.0, 10_800.0), ("min", 60.0, 600.0), ("s", 1.0, 0.0))
 #: Colours of the kinds of findings, in the order in which they appear.
@@ -112,5 +115,15 @@ def _envelope(course: CourseJson, unit_s: float) -> go.Scatter:
         y += [low] if low == high else [low, high]
     axis = course["channel"].removeprefix("gyro_").removeprefix("accel_")[:1]
     return go.Scatter(
-        x=x, y=y, mode="lines", line={"color": colour_of(axis), "width": 1}, name=course["channel"], connectgaps=False
-    )
+        x=x, y=y, mode="lines+markers" if _is_sparse(course["t_s"]) else "lines", marker={"size": MARKER_PX},
+        line={"color": colour_of(axis), "width": 1}, name=course["channel"], connectgaps=False,
+    )  # fmt: skip
+
+
+def _is_sparse(t_s: Sequence[float | None]) -> bool:
+    """Return whether the readings, with None between two stretches, take so little of the time that lines are dots."""
+    known_s = [at for at in t_s if at is not None]
+    if len(known_s) < 2 or len(known_s) == len(t_s):
+        return False
+    within_s = sum(after - at for at, after in pairwise(t_s) if at is not None and after is not None)
+    return within_s < SPARSE * (max(known_s) - min(known_s))

@@ -265,3 +265,20 @@ def test_headings_of_an_inspection_begin_at_the_left_and_its_time_is_in_hours() 
     assert layout.xaxis.title.text == "time, h"
     assert list(picture.figure.data[0].x) == [0.0, None, 2.0, 2.0, 4.0]
     assert (layout.shapes[0].x0, layout.shapes[0].x1) == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(("between_s", "mode"), [(20.0, "lines"), (3600.0, "lines+markers")])
+def test_short_data_sets_far_apart_are_seen_in_an_inspection(between_s: float, mode: str) -> None:
+    """20 s in an hour are a fifth of a pixel wide as a line."""
+    from labctl.answers.inspection import CourseJson
+    from labctl.plots.inspection import inspection_picture
+
+    begins_s = [number * (20.0 + between_s) for number in range(3)]
+    course: CourseJson = {
+        "channel": "gyro_x", "unit": "deg/s", "readings": 9, "bins": 6,
+        "t_s": [t_s for begin_s in begins_s for t_s in (begin_s, begin_s + 20.0, None)],
+        "low": [1.0, 1.0, None] * 3, "high": [1.0, 2.0, None] * 3,
+    }  # fmt: skip
+    picture = inspection_picture([course], [])
+    assert picture is not None
+    assert picture.figure.data[0].mode == mode
