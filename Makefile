@@ -12,9 +12,12 @@ install: $(VENV)/.installed
 demo: install
 	@$(BIN)/labctl demo
 
+# Tests begin many threads, each of which would keep memory of its own.
+test test-slow: export MALLOC_ARENA_MAX = 2
+
 test: $(VENV)/.tested
 	@scripts/install-test-dependencies
-	@$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder -m "not slow"
+	@$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not slow"
 
 # The tests of seconds each: searches, coverage over many draws, campaigns in real time. `.ci/run` runs them after `make test`.
 test-slow: $(VENV)/.tested

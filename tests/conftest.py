@@ -21,6 +21,7 @@ from tests.helpers.built_command import build_once
 from tests.helpers.cortex_m import INSTALL_CORTEX_M, has_cortex_m
 from tests.helpers.leftovers import leftover_tasks, leftover_threads
 from tests.helpers.signal_defaults import default_signals
+from tests.helpers.worker_count import available_bytes, worker_count
 
 #: The same examples every time and on every machine; a busy machine is slow, not wrong.
 settings.register_profile("labctl", derandomize=True, deadline=None, database=None)
@@ -161,6 +162,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for item in items if not is_there else ():
             if item.get_closest_marker(marker):
                 item.add_marker(pytest.mark.skip(reason=reason))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return what `-n auto` is here."""
+    from labctl.services.computation.limits import usable_cores  # the workers, which need it not, begin sooner
+
+    return worker_count(usable_cores(), available_bytes())
 
 
 @pytest.hookimpl(wrapper=True)
