@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from labctl.answers.recording_head import Motion
 from labctl.fitting.criticism.criticism import Criticism
 from labctl.fitting.criticism.joint_evidence import AxisForecast, Outcomes, forecast_axis
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
@@ -75,7 +76,7 @@ class OpenQuestion:
         """The ids of the effects that may be missing, likeliest first."""
         return tuple(name for name in self.ids if name != NOTHING)
 
-    def may_join(self, motion: str) -> bool:
+    def may_join(self, motion: Motion) -> bool:
         """Return whether a recording of a motion can be fitted together with those that were criticised."""
         return may_be_joined(self.comparison.data.info.motion, motion)
 

@@ -253,13 +253,6 @@ def _units(
     )
 
 
-def _motion(recipe: Recipe) -> str:
-    """Return what moves the units in a recipe."""
-    if recipe.turns is not None:
-        return "turns"
-    return "profile" if recipe.profiles else "rates"
-
-
 def _conventions(identity: GyroIdentity, bench: BenchFile) -> dict[str, str]:
     """Return the conventions that the bench file states for the figures of a unit's data sheet."""
     stated = next((unit.datasheet_conventions for unit in bench.gyros if unit.serial == identity.serial), {})
@@ -283,7 +276,7 @@ def _unit(
             "model": identity.model,
             "axes": gyro.axes,
             "kind": "samples",
-            "motion": _motion(recipe),
+            "motion": recipe.motion,
             "rate_reference": None if table is None or recipe.turns is not None else table.limits.reference,
             "turn_common_u": None if recipe.turns is None else recipe.turns.common_u,
             "started_at": clock.utc(),
