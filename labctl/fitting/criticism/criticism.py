@@ -19,12 +19,13 @@ from labctl.fitting.criticism.model_comparison import Comparison, compare_models
 from labctl.fitting.criticism.output_lattice import steps_of
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.criticism.residuals import Residuals, residuals_of
+from labctl.fitting.criticism.rivals import FAR
 from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.slow_process import slow_process, with_hypothesis, without_harm
 from labctl.fitting.criticism.suspects import MIN_CAUSE, Suspect, is_only_shape, suspects_of, without_shapes
 from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, family_or_hint, with_family
-from labctl.fitting.criticism.verdict import FAR, Verdict
+from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import leaning_rates
