@@ -152,25 +152,27 @@ class Bundle(ClosedAtEnd):
                 "or export a bundle once the unit has a certified version"
             )
         content = _member(self._path, self._archive, entry.file, MAX_BYTES)
-        if (found := hashlib.sha256(content).hexdigest()) != entry.sha256:
+        if (sha256 := hashlib.sha256(content).hexdigest()) != entry.sha256:
             raise BadCalibrationFile(
-                f"{self._path}: {entry.file} of unit {serial} has the SHA-256 {found}, the manifest names "
+                f"{self._path}: {entry.file} of unit {serial} has the SHA-256 {sha256}, the manifest names "
                 f"{entry.sha256}: the file was changed; get the bundle again"
             )
         return content
 
     def calibration(self, serial: str) -> Calibration:
         """Return the calibration of a unit. Raises as `content`, and CalibrationOverdue past its due date."""
-        found = read_calibration(self.content(serial))
-        certification = found.certification
-        if found.serial != serial or certification is None:
+        calibration = read_calibration(self.content(serial))
+        certification = calibration.certification
+        if calibration.serial != serial or certification is None:
             raise BadCalibrationFile(
-                f"{self._path}: the calibration of unit {serial} is that of unit {found.serial}, or is not certified; "
-                "export the bundle again"
+                f"{self._path}: the calibration of unit {serial} is that of unit {calibration.serial}, or is not "
+                "certified; export the bundle again"
             )
         if certification.is_overdue(self._clock.utc()):
-            raise CalibrationOverdue(certification.warning(f"{serial} version {found.version}", self._clock.utc()))
-        return found
+            raise CalibrationOverdue(
+                certification.warning(f"{serial} version {calibration.version}", self._clock.utc())
+            )
+        return calibration
 
     def compensator(self, serial: str, outside: Outside = "clamp") -> Compensator:
         """Return what corrects the output of a unit. Raises as `calibration`."""
@@ -237,10 +239,10 @@ def _withdrawn(said: Mapping[str, Any]) -> WithdrawnEntry:
 
 
 def _instant(text: Any) -> datetime:
-    found = datetime.fromisoformat(text)
-    if found.tzinfo is None:
+    instant = datetime.fromisoformat(text)
+    if instant.tzinfo is None:
         raise ValueError(f"{text!r} has no time zone")
-    return found.astimezone(UTC)
+    return instant.astimezone(UTC)
 
 
 def _said(at: datetime) -> str:

@@ -45,8 +45,8 @@ class Block:
         return validated_recipe({**recipe.model_dump(), **NOT_TAKEN, **changes}, source=f"experiment {self.id}")
 
 
-def _checked(found: object) -> tuple[Block, ...]:
-    blocks = tuple(found) if isinstance(found, Iterable) else (found,)
+def _checked(loaded: object) -> tuple[Block, ...]:
+    blocks = tuple(loaded) if isinstance(loaded, Iterable) else (loaded,)
     for block in blocks:
         if not isinstance(block, Block):
             raise TypeError(f"{block!r} is not a Block; make one of procedures.experiments.Block")

@@ -68,15 +68,15 @@ class LineReference:
 
     def _raw(self, quantity: Quantity) -> int:
         request = quantity.ask.replace("{input}", str(self.settings.input))
-        found = self._lines.ask(request, quantity.pattern, f"read by {request!r}")
-        unit = found.groupdict().get("unit")
+        match = self._lines.ask(request, quantity.pattern, f"read by {request!r}")
+        unit = match.groupdict().get("unit")
         if unit is not None and unit != quantity.says_unit:
             raise MalformedReply(
                 self.name,
                 f"answers in {unit!r} instead of {quantity.says_unit!r}; set the unit of measurement "
                 "at the panel of the instrument",
             )
-        return round(float(found["value"]) / quantity.resolution)
+        return round(float(match["value"]) / quantity.resolution)
 
     def close(self) -> None:
         """Control the link: close it; safe to call twice."""

@@ -105,5 +105,5 @@ class InForceMiddleware:
         """Return the serial number of a request of this kind; None for another."""
         if scope["type"] != "http" or scope["query_string"] or scope["method"] not in self._METHODS:
             return None
-        found = self._PATH.fullmatch(scope["path"])
-        return None if found is None else found[1]
+        match = self._PATH.fullmatch(scope["path"])
+        return None if match is None else match[1]

@@ -139,9 +139,9 @@ async def _result(request: Request, service: LabService, call: Call, progress: P
             )
         try:
             with suppress(*(() if pending.same else (Exception,))):  # an error there may be of other work
-                found = await asyncio.wrap_future(pending.future)
+                result = await asyncio.wrap_future(pending.future)
                 if pending.same:
-                    return found
+                    return result
         finally:
             pending.leave()
 

@@ -95,10 +95,10 @@ def warn(text: str, category: type[Warning] = CalibrationWarning) -> None:
 def _instant(text: object) -> datetime:
     if not isinstance(text, str):
         raise TypeError(f"{text!r} is not a time; write it as 2027-03-01T08:00:00Z")
-    found = datetime.fromisoformat(text)
-    if found.tzinfo is None:
+    instant = datetime.fromisoformat(text)
+    if instant.tzinfo is None:
         raise ValueError(f"{text!r} has no time zone; end it with Z or an offset such as +01:00")
-    return found.astimezone(UTC)
+    return instant.astimezone(UTC)
 
 
 def _said(at: datetime) -> str:
@@ -107,8 +107,10 @@ def _said(at: datetime) -> str:
 
 def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:
     """Return the bytes of a calibration file with its certification, and their hash, which covers it."""
-    whole, found = _inserted(content, known) or with_own_hash({**json.loads(content), "certification": known.to_json()})
-    return whole + b"\n", found
+    whole, digest = _inserted(content, known) or with_own_hash(
+        {**json.loads(content), "certification": known.to_json()}
+    )
+    return whole + b"\n", digest
 
 
 def _inserted(content: bytes, known: Certification) -> tuple[bytes, str] | None:

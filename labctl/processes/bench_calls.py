@@ -80,8 +80,8 @@ class BenchCalls:
     def _supervise(self, call: Call, connection: Connection) -> Answer | None:
         wanted = call.arguments["wanted"]
         assert isinstance(wanted, BenchSettings)  # by the form of the call
-        found = answer_with(lambda: self._supervision.take_charge(wanted, connection))
-        return None if found.raised is None else found
+        answer = answer_with(lambda: self._supervision.take_charge(wanted, connection))
+        return None if answer.raised is None else answer
 
     def _value(self, call: Call) -> Any:
         area, _, name = call.name.partition(".")

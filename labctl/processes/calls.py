@@ -119,10 +119,10 @@ class CallServer:
             with contextlib.suppress(OSError), connection:
                 connection.send_bytes(refusal(error))
             return False
-        found = self._respond(call, connection)
-        if found is None:
+        result = self._respond(call, connection)
+        if result is None:
             return False
-        connection.send_bytes(_document(form, found))
+        connection.send_bytes(_document(form, result))
         return True
 
 
@@ -134,11 +134,11 @@ def answer_with(work: Callable[[], object]) -> Answer:
         return Answer(raised=error)
 
 
-def _document(form: CallForm, found: Answer) -> bytes:
-    if found.raised is not None:
-        return refusal(found.raised)
+def _document(form: CallForm, result: Answer) -> bytes:
+    if result.raised is not None:
+        return refusal(result.raised)
     try:
-        return answer(form.result, found.value)
+        return answer(form.result, result.value)
     except BadDocument as error:
         return refusal(error)
 
@@ -170,7 +170,7 @@ class Caller:
                 raise BenchSilent(
                     f"the bench process has not answered within {wait_s:g} s; inspect the bench if this continues"
                 )
-            found = receive(connection)
+            reply = receive(connection)
         except (EOFError, OSError) as error:
             connection.close()
             raise BenchSilent(
@@ -181,7 +181,7 @@ class Caller:
             raise
         with self._guard:
             self._idle.append(connection)
-        return value_of(form.result, found)
+        return value_of(form.result, reply)
 
     def _taken(self) -> Connection:
         with self._guard:

@@ -107,8 +107,8 @@ class RemoteControl:
         if self._place is None or not self._may_run(asked.campaign):
             return self._recorded(asked)
         attempt = self._attempt(asked.body.text, asked.campaign)
-        found = attempt.result(STANDS_S)
-        if found is None or not found.stands:
+        outcome = attempt.result(STANDS_S)
+        if outcome is None or not outcome.stands:
             raise NotStopped(not_stopped_text(attempt.text))
         try:
             return self._recorded(asked)
@@ -127,10 +127,10 @@ class RemoteControl:
         if self._place is None or self._bench is None:
             raise Conflict(NO_BENCH)
         attempt = self._attempt(reason, None)
-        found = attempt.result(STANDS_S)
-        if found is None or not found.stands:
+        outcome = attempt.result(STANDS_S)
+        if outcome is None or not outcome.stands:
             raise NotStopped(not_stopped_text(attempt.text))
-        return StopResponse(bench=self._bench.name, stands=True, text=found.text, campaign=found.campaign)
+        return StopResponse(bench=self._bench.name, stands=True, text=outcome.text, campaign=outcome.campaign)
 
     def _attempt(self, reason: str, campaign: int | None) -> StopAttempt:
         assert self._place is not None

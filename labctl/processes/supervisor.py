@@ -216,8 +216,8 @@ class Supervisor:
         """
         trying = Elapsed()
         while True:
-            if (found := self._find_bench()) is not None:
-                return found
+            if (bench := self._find_bench()) is not None:
+                return bench
             self._folder = Path(tempfile.mkdtemp(prefix="labctl-"))
             self._secure_orphan()
             try:

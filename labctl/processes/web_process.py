@@ -104,9 +104,9 @@ def _stop_for(settings: WebSettings) -> None:
     def say(text: str) -> None:
         log.critical("stop.not_stopped", text=text)
 
-    found = stop_bench(place, stop, say)
-    if not found.stands:
-        say(not_stopped_text(f"bench {found.bench}: {found.text}"))
+    outcome = stop_bench(place, stop, say)
+    if not outcome.stands:
+        say(not_stopped_text(f"bench {outcome.bench}: {outcome.text}"))
 
 
 def _keys_of(store: Store, settings: WebSettings) -> KeyMemory:

@@ -109,8 +109,10 @@ def _of_recording(path: Path, source: Source, serial: str | None) -> Magnetomete
         raise BadRecording(
             f"{path}: the field at t_s = {readings.t_s[row]:.6g} is not a number; mark such readings with valid = 0"
         )
-    found = calibrate_magnetometer(recording.info.serial, field, source.field_ut, _rests(readings))
-    return _with_alignment(_response(found, given=source.field_ut is not None), readings, field, found, source)
+    magnetometer = calibrate_magnetometer(recording.info.serial, field, source.field_ut, _rests(readings))
+    return _with_alignment(
+        _response(magnetometer, given=source.field_ut is not None), readings, field, magnetometer, source
+    )
 
 
 def _rests(readings: PoseReadings) -> NDArray[np.int64] | None:
@@ -122,12 +124,12 @@ def _rests(readings: PoseReadings) -> NDArray[np.int64] | None:
 
 
 def _with_alignment(
-    answer: MagnetometerResponse, readings: PoseReadings, field: NDArray[np.float64], found: Magnetometer,
+    answer: MagnetometerResponse, readings: PoseReadings, field: NDArray[np.float64], magnetometer: Magnetometer,
     source: Source,
 ) -> MagnetometerResponse:  # fmt: skip
     try:
         solved = solved_of(readings, source.earlier, over_temperature=source.temperature is not None)
-        aligned = align_field(readings, solved, field, found)
+        aligned = align_field(readings, solved, field, magnetometer)
     except NotEnoughData as error:
         said = f"Alignment of the magnetometer: unknown: {error}"
         return answer.model_copy(update={"text": [said, *answer.text]})
@@ -143,18 +145,23 @@ def _with_alignment(
     return answer.model_copy(update={"alignment": _alignment(aligned), "text": [said, *answer.text]})
 
 
-def _alignment(found: FieldAlignment) -> FieldAlignmentJson:
-    values = np.degrees(np.append(found.angles_rad, found.dip_rad))
-    u = np.degrees(found.u_rad)
+def _alignment(alignment: FieldAlignment) -> FieldAlignmentJson:
+    values = np.degrees(np.append(alignment.angles_rad, alignment.dip_rad))
+    u = np.degrees(alignment.u_rad)
     each: list[AccelerometerCoefficient] = [
-        {"value": float(values[i]), "u": float(u[i]), "unit": "deg", "degrees_of_freedom": float(found.u_freedom[i])}
+        {
+            "value": float(values[i]),
+            "u": float(u[i]),
+            "unit": "deg",
+            "degrees_of_freedom": float(alignment.u_freedom[i]),
+        }
         for i in range(len(values))
     ]
     return {
         "axes": dict(zip(AXES, each, strict=False)),
         "dip": each[-1],
-        "covariance_deg2": (found.covariance * np.degrees(1.0) ** 2).tolist(),
-        "place_deg": float(np.degrees(found.place_rad)), "rests": found.rests, "moves": found.moves,
+        "covariance_deg2": (alignment.covariance * np.degrees(1.0) ** 2).tolist(),
+        "place_deg": float(np.degrees(alignment.place_rad)), "rests": alignment.rests, "moves": alignment.moves,
         "definition": ALIGNMENT,
     }  # fmt: skip
 

@@ -13,8 +13,8 @@ from labctl.fitting.numeric.degrees_of_freedom import student_factor
 
 def coefficients_of(answer: AccelerometerResponse | MagnetometerResponse) -> list[SensorCoefficientResponse]:
     """Return every coefficient of a result with its standard uncertainty, those of the alignment last."""
-    found = _of_force(answer) if isinstance(answer, AccelerometerResponse) else _of_field(answer)
-    return list(found)
+    coefficients = _of_force(answer) if isinstance(answer, AccelerometerResponse) else _of_field(answer)
+    return list(coefficients)
 
 
 def _of_force(answer: AccelerometerResponse) -> Iterator[SensorCoefficientResponse]:

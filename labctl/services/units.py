@@ -132,15 +132,15 @@ def _over_floor(errors: Sequence[FitError]) -> VersionErrors:
 
 
 def _answer(
-    found: Unit, held: UnitHoldings, errors: VersionErrors, act: CertificationRow | None, now: datetime,
+    unit: Unit, held: UnitHoldings, errors: VersionErrors, act: CertificationRow | None, now: datetime,
     notices: list[str],
 ) -> UnitResponse:  # fmt: skip
     return UnitResponse(
-        serial=found.serial,
-        model=found.model,
-        technology=found.technology,
-        batch=found.batch,
-        supplier=found.supplier,
+        serial=unit.serial,
+        model=unit.model,
+        technology=unit.technology,
+        batch=unit.batch,
+        supplier=unit.supplier,
         recordings=held.recordings,
         calibrations=held.versions,
         newest_errors=errors,

@@ -82,14 +82,14 @@ class HostStalls:
     @contextmanager
     def lateness(self) -> Iterator[Lateness]:
         """Measure how late this computer runs while the block runs; 0 where the clock stands still in stalls."""
-        found, ended = Lateness(self._wall), threading.Event()
+        lateness, ended = Lateness(self._wall), threading.Event()
         if not self.speed:
-            yield found
+            yield lateness
             return
-        thread = threading.Thread(target=found.watch, args=(ended,), name="lateness", daemon=True)
+        thread = threading.Thread(target=lateness.watch, args=(ended,), name="lateness", daemon=True)
         thread.start()
         try:
-            yield found
+            yield lateness
         finally:
             ended.set()
             thread.join()

@@ -46,15 +46,15 @@ class Dialogue:
         Raises WrongInstrument for a reply that does not fit, and for one without the `serial` number of the bench file.
         """
         said = self.link.ask(self.request(ask.send), r".*\S.*", "say what it is")[0]
-        found = re.fullmatch(ask.pattern, said)
-        if found is None:
+        match = re.fullmatch(ask.pattern, said)
+        if match is None:
             raise WrongInstrument(
                 self.link.device,
                 f"{self.link.url} answered {said[:SHOWN]!r} to {self.request(ask.send)!r}, which does not fit the "
                 f"pattern {ask.pattern!r} of its description; check the address, or correct [identity]",
             )
         refuse_other_serial(self.link.device, said, serial, holds_serial=True)
-        return found["text"].strip()
+        return match["text"].strip()
 
     def text(self, ask: Ask, what: str) -> str:
         """Return a text."""
@@ -74,11 +74,11 @@ class Dialogue:
     def holds(self, ask: AskState, what: str) -> bool:
         """Return whether a state holds; raises MalformedReply where the answer is neither yes nor no."""
         said = self._answer(ask, what).strip()
-        found = ask.holds(said)
-        if found is None:
+        holds = ask.holds(said)
+        if holds is None:
             rule = f"yes = {ask.yes!r} or no = {ask.no!r}" if ask.yes is not None else "a number as its rule needs"
             raise self._malformed(said, what, rule)
-        return found
+        return holds
 
     def alarms(self, ask: AskAlarms) -> tuple[str, ...]:
         """Return the active alarms."""
@@ -118,8 +118,8 @@ class Dialogue:
         return filled(template, {**self._names, **values})
 
     def _answer(self, ask: Ask, what: str) -> str:
-        found = self.link.ask(self.request(ask.send), ask.pattern, what)
-        return str(next(value for value in found.groupdict().values() if value is not None))
+        match = self.link.ask(self.request(ask.send), ask.pattern, what)
+        return str(next(value for value in match.groupdict().values() if value is not None))
 
     def _check(self, request: str, what: str) -> None:
         """Raise RequestRejected where the instrument says that a command was an error."""

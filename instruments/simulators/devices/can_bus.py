@@ -169,9 +169,9 @@ class SimulatedCanUnit(SampledUnit):
         counter = self._settings.counter
         for path in self._counters:
             message, _, signal = path.partition(".")
-            found, step = self._signal(path), 1 if counter is None else counter.step
-            wrap = (counter.wrap if counter is not None else None) or 1 << found.bits
-            given.setdefault(message, {})[signal] = found.offset + found.scale * (index * step % wrap)
+            signal_law, step = self._signal(path), 1 if counter is None else counter.step
+            wrap = (counter.wrap if counter is not None else None) or 1 << signal_law.bits
+            given.setdefault(message, {})[signal] = signal_law.offset + signal_law.scale * (index * step % wrap)
         begins, *others = self._cyclic
         order = [begins, *(others[each] for each in self._rng.permutation(len(others)))]
         if index % max(1, round(RARE_S * self._rate_hz)) == 1:

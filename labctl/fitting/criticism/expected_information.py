@@ -95,21 +95,21 @@ class Forecast:
     distinguished: tuple[str, ...]  #: ids of the effects that fall behind the likeliest one, where that is the truth
 
 
-def open_question(found: Criticism) -> OpenQuestion | None:
+def open_question(criticism: Criticism) -> OpenQuestion | None:
     """Return what a criticism leaves open: its first group of effects that cannot be distinguished; None for none.
 
     Beside an adequate model: whether effects are missing for which there is some evidence, but not enough to say so.
     """
-    group = found.verdict.indistinguishable
-    if found.beside_missing is None:
+    group = criticism.verdict.indistinguishable
+    if criticism.beside_missing is None:
         return None
-    if found.verdict.form == "adequate":
-        return _whether_any(found.beside_missing)
+    if criticism.verdict.form == "adequate":
+        return _whether_any(criticism.beside_missing)
     if not group:
         return None
-    comparison = found.beside_missing
-    others = [names[0] for names in found.verdict.groups if names != group]
-    terms = [found.verdict.terms[name] for name in others if name in found.verdict.terms]
+    comparison = criticism.beside_missing
+    others = [names[0] for names in criticism.verdict.groups if names != group]
+    terms = [criticism.verdict.terms[name] for name in others if name in criticism.verdict.terms]
     if terms:
         model = comparison.model.with_added(terms)
         comparison = compare_beside(comparison, model)

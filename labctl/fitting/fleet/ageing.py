@@ -67,17 +67,17 @@ def ageing_of(units: Sequence[UnitCoefficients]) -> tuple[CoefficientAgeing, ...
     names = dict.fromkeys(name for own in several.values() for unit in own for name in unit.names)
     of_unit = {name: next((u.units[u.names.index(name)] for u in units if u.units and name in u.names), "")
                for name in names}  # fmt: skip
-    found = []
+    ageings = []
     for name in names:
         slopes = _slopes(several, name)
         if len(slopes.values) >= MIN_UNITS:
-            found.append(_ageing(name, of_unit[name], slopes))
-    if not found:
+            ageings.append(_ageing(name, of_unit[name], slopes))
+    if not ageings:
         raise NotEnoughData(
             f"{len(several)} units of the type were calibrated more than once on known days; at least {MIN_UNITS} are "
             "needed: calibrate units of the type again"
         )
-    return tuple(found)
+    return tuple(ageings)
 
 
 def _slopes(histories: dict[str, list[UnitCoefficients]], name: str) -> _Slopes:

@@ -253,7 +253,7 @@ class _Place:
                 for quantity in (of_fixture, "tilt", "mounting_repeatability"):
                     columns[quantity].append(each)
         none = np.zeros(len(self.outputs))
-        return {quantity: np.column_stack(found or [none]) for quantity, found in columns.items()}
+        return {quantity: np.column_stack(stacked or [none]) for quantity, stacked in columns.items()}
 
     def _shown_by(self, axis: str) -> Array:
         """Return how a rate about a body axis that nothing knows shows in the corrected rates, (n,)."""

@@ -131,8 +131,8 @@ def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: 
         for row in reversed(store.certificates.of_unit(known))
         if row.version == version and row.number not in before
     ]
-    found = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
-    return certification_response(row).model_copy(update=found)
+    changes = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
+    return certification_response(row).model_copy(update=changes)
 
 
 def refusal(known: AssessmentResponse) -> str:

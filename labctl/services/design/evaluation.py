@@ -39,10 +39,10 @@ def evaluated(store: Store | None, request: EvaluateRequest, bench: BenchFile | 
     problem = posed.problem
     moved = _moved(like, rates, temperatures)
     fitted = moved.model_copy(update={"fit": FitRules(model=problem.model, effects=problem.effects)})
-    found, why = None, ""
+    campaign, why = None, ""
     try:
         goal = Goal(request.u_dps, asked.hours)
-        found = designed_campaign(problem.of_recipe(fitted, None, problem.effects), goal, posed.bench.units_at_once)
+        campaign = designed_campaign(problem.of_recipe(fitted, None, problem.effects), goal, posed.bench.units_at_once)
     except (LabctlError, ProcedureError, ValueError) as error:
         why = str(error)
     return EvaluateResponse(
@@ -54,7 +54,7 @@ def evaluated(store: Store | None, request: EvaluateRequest, bench: BenchFile | 
         allowed_temperatures_c=allowed_temperatures(problem.limits),
         use_rates_dps=(-problem.span.rate_dps, problem.span.rate_dps),
         use_temperatures_c=(problem.span.low_c, problem.span.high_c),
-        evaluated=found,
+        evaluated=campaign,
         why=why,
         recipe_toml=tomli_w.dumps(recipe_document(moved)),
     )

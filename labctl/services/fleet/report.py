@@ -27,24 +27,24 @@ def fleet_report(store: Store, request: FleetReportRequest, now: datetime) -> Fl
     question = {
         "fleet": asked.model_dump(mode="json"), "state": store.fleet_reports.state(filter_of(asked), asked.model),
     }  # fmt: skip
-    found = cached(FleetReportResponse, question, lambda: _computed(store, asked, now))
+    report = cached(FleetReportResponse, question, lambda: _computed(store, asked, now))
     figures = next(iter(type_figures(store, asked, now)), None)  # they change with the date alone
-    return found if figures is None else found.model_copy(update={"figures": figures})
+    return report if figures is None else report.model_copy(update={"figures": figures})
 
 
 def _the_type(store: Store, request: FleetReportRequest, now: datetime) -> str:
     """Return the type that is asked for, or the only one that there is. Raises BadInput."""
-    found = [each.type for each in store.fleet_reports.types(filter_of(request), now)]
-    if request.type or len(found) == 1:
-        if request.type and request.type not in found:
+    types = [each.type for each in store.fleet_reports.types(filter_of(request), now)]
+    if request.type or len(types) == 1:
+        if request.type and request.type not in types:
             others = [each.type for each in store.fleet_reports.types(FleetFilter(), now)]
             raise BadInput(
                 f"no unit of type {request.type!r} matches; the units of this database are of "
                 f"{_listed(others) or 'no type: import them'}"
             )
-        return request.type or found[0]
+        return request.type or types[0]
     raise BadInput(
-        f"a report is on the units of one type, and these are of {len(found)} ({_listed(found)}); name one with --type"
+        f"a report is on the units of one type, and these are of {len(types)} ({_listed(types)}); name one with --type"
     )
 
 

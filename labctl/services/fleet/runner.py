@@ -136,11 +136,11 @@ class JobRun:
             page = self._store.fleet.units(self._job.id, request, "waiting")
             for row in page.rows:
                 task = self._task(row.serial)
-                found = skipped(self._store, task)
-                if found is None:
+                result = skipped(self._store, task)
+                if result is None:
                     yield task
                 else:
-                    self._store.fleet.keep(self._job.id, self._request.kind, found, task.at)
+                    self._store.fleet.keep(self._job.id, self._request.kind, result, task.at)
             after = page.next_after
             if after is None:
                 return

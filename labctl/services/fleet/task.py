@@ -174,8 +174,8 @@ def _criticised(store: Store, task: FleetTask) -> Outcome:
 
     calibration = _newest(store, task)
     rows = chosen_rows(store, task.serial, None)
-    found: list[Criticism] = []
-    answer = criticise_seen(store, calibration, rows, found.append)
+    criticisms: list[Criticism] = []
+    answer = criticise_seen(store, calibration, rows, criticisms.append)
     result = FleetResult(
         task.serial, "done", _criticism_question(store, calibration, rows), calibration.version,
         rms_dps=_finite(answer.error["rms_dps"]), noise_floor_dps=_finite(answer.error["noise_floor_dps"]),
@@ -185,7 +185,7 @@ def _criticised(store: Store, task: FleetTask) -> Outcome:
     estimates = UnitEstimates(
         store.units.get(task.serial).model, calibration.model,
         "" if campaign is None else store.campaigns.get(campaign).bench_name,
-        {axis: packed(each) for axis, each in candidate_estimates(found[0]).items()},
+        {axis: packed(each) for axis, each in candidate_estimates(criticisms[0]).items()},
     )  # fmt: skip
     return Outcome(result, estimates=estimates)
 

@@ -42,9 +42,9 @@ def points_of(
         return to_points(store.recordings.samples(row.id))
 
     def pieces_of(dataset: int) -> Recording:
-        found = None if pieces is None else pieces().get(dataset)
-        if found is not None:
-            return found
+        kept = None if pieces is None else pieces().get(dataset)
+        if kept is not None:
+            return kept
         compute(UNNAMED)
         info = points.info.model_copy(update={"kind": "samples"})
         return to_points(Recording(info, store.recordings.dataset(row.id, dataset)))

@@ -126,10 +126,10 @@ def list_standards(store: Store, on: date) -> list[StandardResponse]:
 
 def count_by_state(store: Store, on: date) -> dict[str, int]:
     """Return how many standards are in each state on a day; every state has a number."""
-    found: dict[str, int] = dict.fromkeys(get_args(StandardState), 0)
+    counts: dict[str, int] = dict.fromkeys(get_args(StandardState), 0)
     for each in store.standards.all():
-        found[answer_of(each, on).state] += 1
-    return found
+        counts[answer_of(each, on).state] += 1
+    return counts
 
 
 def one_standard(store: Store, label: str, on: date) -> StandardResponse:
@@ -140,12 +140,12 @@ def one_standard(store: Store, label: str, on: date) -> StandardResponse:
 def answer_of(standard: RegisteredStandard, on: date) -> StandardResponse:
     """Return a standard as an answer."""
     row = standard.row
-    found = dict(_states(standard, on))
-    state: StandardState = min(found, key=WORST_FIRST.index) if found else "valid"
+    states = dict(_states(standard, on))
+    state: StandardState = min(states, key=WORST_FIRST.index) if states else "valid"
     withdrawn = {each.finding: each for each in standard.findings if each.act == "withdraw"}
     return StandardResponse(
         label=row.label, serial=row.serial, quantity=row.quantity, unit=row.unit, description=row.description,
-        state=state, text=[text for texts in found.values() for text in texts],
+        state=state, text=[text for texts in states.values() for text in texts],
         due=due_of(standard),
         certificates=[_certificate(each) for each in standard.in_force],
         predictions=[prediction_answer(nominal, each) for nominal, each in predictions_of(standard, on)],

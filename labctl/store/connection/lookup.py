@@ -108,7 +108,7 @@ class ServerLookup:
         while True:
             was_open = self._opened is not None
             try:
-                found = await self._asked(keys)
+                rows = await self._asked(keys)
             except StoreError as error:
                 self.close()
                 if not isinstance(error, DatabaseUnreachable) or loop.time() >= end_s:
@@ -121,7 +121,7 @@ class ServerLookup:
                 raise
             else:
                 self._is_away = False
-                return found
+                return rows
 
     async def _asked(self, keys: Sequence[str]) -> Sequence[Any]:
         import psycopg  # noqa: PLC0415  it is an extra
@@ -157,11 +157,11 @@ class ServerLookup:
                 assert kind is not None, f"psycopg has no loader for column {column}"
                 self._loads.append(_processed(kind(result.ftype(column), connection).load, process))
         value_of, loads = result.get_value, tuple(enumerate(self._loads))
-        found = []
+        rows = []
         for n in range(result.ntuples):
             values = [value_of(n, column) for column, _ in loads]
-            found.append(self._row(*[None if values[k] is None else load(values[k]) for k, load in loads]))
-        return found
+            rows.append(self._row(*[None if values[k] is None else load(values[k]) for k, load in loads]))
+        return rows
 
     def close(self) -> None:
         """End the connection."""

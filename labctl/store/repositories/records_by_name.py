@@ -15,11 +15,11 @@ RecordT = TypeVar("RecordT", bound="DataclassInstance")
 ColumnTs = TypeVarTuple("ColumnTs")
 
 
-def records_of(kind: type[RecordT], found: sa.Result[*ColumnTs]) -> list[RecordT]:
+def records_of(kind: type[RecordT], result: sa.Result[*ColumnTs]) -> list[RecordT]:
     """Return the rows of a query as records. Raises TypeError where its columns are not the record's fields."""
-    _check_columns(kind, found.keys())
+    _check_columns(kind, result.keys())
     make: Callable[..., RecordT] = kind
-    return [make(**row) for row in found.mappings()]
+    return [make(**row) for row in result.mappings()]
 
 
 def record_of(kind: type[RecordT], row: sa.RowMapping) -> RecordT:

@@ -21,9 +21,9 @@ FASTER, BEYOND_K = 0.25, 10.0
 SAME_C = 0.5
 
 
-def consequences(law: Law, found: Criticism) -> list[str]:
+def consequences(law: Law, criticism: Criticism) -> list[str]:
     """Return what else would follow from a law, one sentence each, on the axis on which it adds most."""
-    data, base = found.fit_data, found.base
+    data, base = criticism.fit_data, criticism.base
     if base is None:
         return []
     channels = data.channels

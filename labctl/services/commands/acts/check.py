@@ -22,9 +22,9 @@ def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) ->
             f"this service drives bench {runner.bench.name}, not {asked.bench!r}, and can check only its own bench; "
             f"{advice}"
         )
-    found = runner.check()
-    context.store.audit.record(context.now(), "bench check", f"bench {found.bench}", {"ok": found.ok})
-    return found
+    checked = runner.check()
+    context.store.audit.record(context.now(), "bench check", f"bench {checked.bench}", {"ok": checked.ok})
+    return checked
 
 
 def _in_foreground(control: Foreground, _: CommandContext, asked: Asked) -> BenchCheckResponse:
