@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from typer._click.core import Command, Context
 
     from labctl.answers.campaigns import CampaignResponse
-    from labctl.services.commands.acts.campaign_act import AskedT, CampaignAct
+    from labctl.services.commands.acts.campaign_act import AddressedT, CampaignAct
     from labctl.services.commands.acts.campaign_command import CampaignCommand, CommandOption, DefaultCampaign
 
 Id = Annotated[int, typer.Argument(metavar="ID", help="Number of the campaign.")]
@@ -73,7 +73,7 @@ def _declared() -> list[tuple[CampaignAct[Any], CampaignCommand]]:
 
 
 @cache
-def command_of(act: CampaignAct[AskedT], line: CampaignCommand) -> TyperCommand:
+def command_of(act: CampaignAct[AddressedT], line: CampaignCommand) -> TyperCommand:
     """Return the command of an act: the campaign, the options that it states, --json and --database."""
 
     def perform(campaign: int | None, as_json: bool, database: str | None, **given: object) -> None:
@@ -110,7 +110,7 @@ def _campaign(default: DefaultCampaign, database: str | None, given: int | None)
 
 
 def _send(
-    act: CampaignAct[AskedT],
+    act: CampaignAct[AddressedT],
     line: CampaignCommand,
     campaign: int | None,
     given: Mapping[str, object],
@@ -130,10 +130,10 @@ def _send(
         from labctl.cli.campaign_terminal import campaign_terminal
 
         terminal = campaign_terminal(quiet=quiet)
-    return execute(database, act.command, act.asked(campaign, body, **address), terminal)
+    return execute(database, act.command, act.request_type(campaign, body, **address), terminal)
 
 
-def _options(act: CampaignAct[AskedT], line: CampaignCommand) -> list[inspect.Parameter]:
+def _options(act: CampaignAct[AddressedT], line: CampaignCommand) -> list[inspect.Parameter]:
     """Return the parameters of a command for its campaign and its options, in the order of the help."""
     fields = act.body.model_fields
     options = [

@@ -93,27 +93,27 @@ class RemoteControl:
             raise Conflict(NO_BENCH)
         return self._bench
 
-    def perform(self, act: BenchAct[RequestT, ResponseT], _: CommandContext, asked: RequestT) -> ResponseT:
+    def perform(self, act: BenchAct[RequestT, ResponseT], _: CommandContext, request: RequestT) -> ResponseT:
         """Have the bench process carry out an act; an abort stops the bench by a way of its own first."""
         if act.name == ABORT.name:
-            return cast(ResponseT, self._abort(cast(ToCampaign[ReasonRequest], asked)))
-        return self._ask(act, asked, act.wait_s)
+            return cast(ResponseT, self._abort(cast(ToCampaign[ReasonRequest], request)))
+        return self._ask(act, request, act.wait_s)
 
-    def _abort(self, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+    def _abort(self, request: ToCampaign[ReasonRequest]) -> CampaignResponse:
         """End a campaign now, in the safe state: first the stop, by a way of its own; then it is written down.
 
         Raises NotStopped where it is not confirmed within some seconds that the table stands.
         """
-        if self._place is None or not self._may_run(asked.campaign):
-            return self._recorded(asked)
-        attempt = self._attempt(asked.body.text, asked.campaign)
+        if self._place is None or not self._may_run(request.campaign):
+            return self._recorded(request)
+        attempt = self._attempt(request.body.text, request.campaign)
         outcome = attempt.result(STANDS_S)
         if outcome is None or not outcome.stands:
             raise NotStopped(not_stopped_text(attempt.text))
         try:
-            return self._recorded(asked)
+            return self._recorded(request)
         except BenchSilent as silent:
-            last = self._last_live(asked.campaign)
+            last = self._last_live(request.campaign)
             if last is None:
                 raise BenchSilent(
                     f"the table stands ({attempt.text}), but that is not recorded yet; try again once the bench "
@@ -137,11 +137,11 @@ class RemoteControl:
         stop = StopRequest.new(actor().name, actor().via, reason, campaign)
         return StopAttempt(self._place, _asked_before(stop, self._place.latch.state()) or stop)
 
-    def _recorded(self, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-        return self._ask(ABORT, asked, ANSWER_S)
+    def _recorded(self, request: ToCampaign[ReasonRequest]) -> CampaignResponse:
+        return self._ask(ABORT, request, ANSWER_S)
 
-    def _ask(self, act: BenchAct[RequestT, ResponseT], asked: RequestT, timeout_s: float) -> ResponseT:
-        return self._calls.call(f"control.{act.name}", asked, timeout_s=timeout_s)
+    def _ask(self, act: BenchAct[RequestT, ResponseT], request: RequestT, timeout_s: float) -> ResponseT:
+        return self._calls.call(f"control.{act.name}", request, timeout_s=timeout_s)
 
     def close(self) -> None:
         """Close the connections."""

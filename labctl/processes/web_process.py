@@ -74,12 +74,12 @@ def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:
     upload, read_only = request.max_upload_mib * MIB, ReadOnlyAccess(request.acts_at) if request.read_only else None
     if not request.asks_for_keys:
         return AccessPolicy(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload, read_only=read_only)
-    asked = (
+    policy = (
         "--require-keys"
         if is_loopback(request.host)
         else f"--host {request.host}: this address can be reached from other computers"
     )
-    require_an_api_key(store, asked)
+    require_an_api_key(store, policy)
     return AccessPolicy(keys=True, upload_bytes=upload, read_only=read_only)
 
 

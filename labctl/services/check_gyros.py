@@ -40,12 +40,12 @@ class _Found:
     values: dict[tuple[str, Result], tuple[float, float | None]]
 
 
-def set_check_gyro(store: Store, serial: str, asked: CheckGyroRequest, at: datetime) -> CheckGyroResponse:
+def set_check_gyro(store: Store, serial: str, request: CheckGyroRequest, at: datetime) -> CheckGyroResponse:
     """Make a unit a check gyro, or end that. Raises NotFound, NotEnoughData for a unit without a version."""
     unit = store.units.get(serial).serial
-    temperature_c = _temperature(store, unit, asked.temperature_c) if asked.marked else None
-    act: Literal["mark", "unmark"] = "mark" if asked.marked else "unmark"
-    store.check_gyros.add(CheckGyroRow(unit, act, temperature_c, asked.chart_from, asked.reason, asked.by, at))
+    temperature_c = _temperature(store, unit, request.temperature_c) if request.marked else None
+    act: Literal["mark", "unmark"] = "mark" if request.marked else "unmark"
+    store.check_gyros.add(CheckGyroRow(unit, act, temperature_c, request.chart_from, request.reason, request.by, at))
     return check_gyro(store, unit)
 
 

@@ -44,18 +44,18 @@ QUANTITIES: Mapping[str, RoomQuantity] = {
 }  # fmt: skip
 
 
-def add_readings(store: Store, asked: RoomEnvironmentRequest, at: datetime) -> RoomEnvironmentResponse:
+def add_readings(store: Store, request: RoomEnvironmentRequest, at: datetime) -> RoomEnvironmentResponse:
     """Enter readings; all or none. Raises BadInput for a unit or a value that cannot be, and for a time to come."""
     rows = []
-    for record in asked.readings:
+    for record in request.readings:
         measured_at = record.measured_at or at
         if measured_at > at + AHEAD:
             raise BadInput(f"measured_at {measured_at.isoformat()} is a time to come; correct the clock of the logger")
         for value in record.values:
             unit, converted = _converted(value)
-            rows.append(RoomReading(measured_at, asked.bench, value.quantity, unit, converted, asked.source))
-    store.room_environment.add(rows, at, asked.by)
-    return environment(store, min(row.measured_at for row in rows), max(row.measured_at for row in rows), asked.bench)
+            rows.append(RoomReading(measured_at, request.bench, value.quantity, unit, converted, request.source))
+    store.room_environment.add(rows, at, request.by)
+    return environment(store, min(row.measured_at for row in rows), max(row.measured_at for row in rows), request.bench)
 
 
 def _converted(given: RoomValue) -> tuple[str, float]:

@@ -93,12 +93,12 @@ def batches(store: Store) -> list[BatchResponse]:
     return [BatchResponse(batch=row.batch, units=row.units) for row in store.units.batches()]
 
 
-def set_batch(store: Store, asked: BatchRequest, at: datetime) -> BatchResponse:
+def set_batch(store: Store, request: BatchRequest, at: datetime) -> BatchResponse:
     """State the batch of some units, all or none. Raises NotFound for a unit that is absent."""
-    store.units.set_batch(list(dict.fromkeys(asked.serials)), asked.batch, asked.supplier, asked.by, at)
+    store.units.set_batch(list(dict.fromkeys(request.serials)), request.batch, request.supplier, request.by, at)
     of_batch = PageRequest("", 1, None)
-    total = store.units.page(of_batch, UnitFilter(at, batch=asked.batch)).total
-    return BatchResponse(batch=asked.batch, units=total)
+    total = store.units.page(of_batch, UnitFilter(at, batch=request.batch)).total
+    return BatchResponse(batch=request.batch, units=total)
 
 
 def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]:

@@ -261,11 +261,11 @@ async def allan(
 
 @router.get("/{recording}/orientation", summary="Static bias and angle of a recording", tags=["calibrations"])
 async def orientation(
-    request: Request, recording: int, service: ServiceDep, asked: Annotated[OrientationQuery, Query()]
+    request: Request, recording: int, service: ServiceDep, query: Annotated[OrientationQuery, Query()]
 ) -> OrientationResponse:
     """The angle of one axis from its rate: static bias taken off (Ojeda et al. 2000, eqs. 15 and 16), offset renewed
     at standstill; of a record at rest, the drift between declared stops (Weiss)."""
-    return await while_connected(request, service, orientation_of_recording, recording, asked.version, asked)
+    return await while_connected(request, service, orientation_of_recording, recording, query.version, query)
 
 
 @router.get("/{recording}/file", summary="Download the recording", response_class=StreamingResponse)

@@ -75,10 +75,10 @@ def release(store: Store, serial: str, version: int, request: ReleaseRequest, at
     Raises NotFound where nothing waits, ReleaseRefused for the first person and without a key, CertificationRefused.
     """
     key = key_of_person(f"releasing {serial} version {version}")
-    asked = waiting_request(store, store.units.get(serial).serial, version, key)
-    first = CertifyRequest(by=asked.by, reason=asked.reason, due_days=asked.due_days, override=asked.override)
-    second = Release(request.by, key, request.reason, asked.id)
-    return put_in_force(store, serial, version, first, at, asked.by_key, second)
+    waiting = waiting_request(store, store.units.get(serial).serial, version, key)
+    first = CertifyRequest(by=waiting.by, reason=waiting.reason, due_days=waiting.due_days, override=waiting.override)
+    second = Release(request.by, key, request.reason, waiting.id)
+    return put_in_force(store, serial, version, first, at, waiting.by_key, second)
 
 
 def put_in_force(

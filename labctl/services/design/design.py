@@ -196,9 +196,9 @@ def _base_and_span(
 def _refuse_beyond(base: Recipe, span: Span, limits: BenchLimits) -> None:
     """Raise PlanRefused for a range that the bench or a unit cannot have."""
     allowed = base.guards.max_rate_error_fraction
-    asked = [(f"rates {span.rate_dps:g} deg/s", limits.rate_complaint(span.rate_dps, allowed))]
-    asked += [(f"temperatures {c:g} deg C", limits.temperature_complaint(c)) for c in (span.low_c, span.high_c)]
-    if beyond := [f"{name}: {text}" for name, text in asked if text]:
+    complaints = [(f"rates {span.rate_dps:g} deg/s", limits.rate_complaint(span.rate_dps, allowed))]
+    complaints += [(f"temperatures {c:g} deg C", limits.temperature_complaint(c)) for c in (span.low_c, span.high_c)]
+    if beyond := [f"{name}: {text}" for name, text in complaints if text]:
         raise PlanRefused(base.name, beyond, "Give --rates LOW,HIGH or --temperatures LOW,HIGH within the limits.")
 
 

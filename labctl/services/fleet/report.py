@@ -23,12 +23,12 @@ MAX_VERSIONS = 20_000
 def fleet_report(store: Store, request: FleetReportRequest, now: datetime) -> FleetReportResponse:
     """Return the report on the units of a type, computed when something of it changed. Raises BadInput."""
     type_ = _the_type(store, request, now)
-    asked = request.model_copy(update={"type": type_})
+    of_type = request.model_copy(update={"type": type_})
     question = {
-        "fleet": asked.model_dump(mode="json"), "state": store.fleet_reports.state(filter_of(asked), asked.model),
+        "fleet": of_type.model_dump(mode="json"), "state": store.fleet_reports.state(filter_of(of_type), of_type.model),
     }  # fmt: skip
-    report = cached(FleetReportResponse, question, lambda: _computed(store, asked, now))
-    figures = next(iter(type_figures(store, asked, now)), None)  # they change with the date alone
+    report = cached(FleetReportResponse, question, lambda: _computed(store, of_type, now))
+    figures = next(iter(type_figures(store, of_type, now)), None)  # they change with the date alone
     return report if figures is None else report.model_copy(update={"figures": figures})
 
 

@@ -38,73 +38,75 @@ from labctl.store import (
 WORST_FIRST: tuple[StandardState, ...] = ("bad", "check it", "overdue", "no certificate")
 
 
-def add_standard(store: Store, asked: StandardRequest, at: datetime) -> StandardResponse:
+def add_standard(store: Store, request: StandardRequest, at: datetime) -> StandardResponse:
     """Enter a standard. Raises BadInput for a unit that its quantity has not, Conflict for a label that is taken."""
-    units = next((units for quantity, units in UNITS.items() if quantity == asked.quantity), None)
-    unit = asked.unit or (units[0] if units else None)
+    units = next((units for quantity, units in UNITS.items() if quantity == request.quantity), None)
+    unit = request.unit or (units[0] if units else None)
     if unit is None:
-        raise BadInput(f"standard {asked.label}: no usual unit of {asked.quantity!r} is known; give its unit")
+        raise BadInput(f"standard {request.label}: no usual unit of {request.quantity!r} is known; give its unit")
     if units and unit not in units:
         raise BadInput(
-            f"standard {asked.label}: unit {unit!r} is not accepted for {asked.quantity}; give {' or '.join(units)}"
+            f"standard {request.label}: unit {unit!r} is not accepted for {request.quantity}; give {' or '.join(units)}"
         )
     store.standards.add(
-        StandardRow(asked.label, asked.serial, asked.quantity, unit, asked.description, asked.by, at)
+        StandardRow(request.label, request.serial, request.quantity, unit, request.description, request.by, at)
     )  # fmt: skip
-    return one_standard(store, asked.label, at.date())
+    return one_standard(store, request.label, at.date())
 
 
-def add_certificate(store: Store, label: str, asked: StandardCertificateRequest, at: datetime) -> StandardResponse:
+def add_certificate(store: Store, label: str, request: StandardCertificateRequest, at: datetime) -> StandardResponse:
     """Enter a certificate.
 
     Raises NotFound; BadInput for a day to come; Conflict for a number of the same laboratory that is there.
     """
     standard = store.standards.get(label)
-    if asked.calibrated > at.date():
-        raise BadInput(f"certificate {asked.number}: calibrated {asked.calibrated} is a day to come; correct the date")
-    alike = [each for each in standard.certificates if each.number == asked.number]
-    if any(same_issuer(each.laboratory, asked.laboratory) for each in alike) and not asked.reason:
+    if request.calibrated > at.date():
+        raise BadInput(
+            f"certificate {request.number}: calibrated {request.calibrated} is a day to come; correct the date"
+        )
+    alike = [each for each in standard.certificates if each.number == request.number]
+    if any(same_issuer(each.laboratory, request.laboratory) for each in alike) and not request.reason:
         raise Conflict(
-            f"certificate {asked.number} of standard {standard.row.label} is in the register; to correct it, send it "
+            f"certificate {request.number} of standard {standard.row.label} is in the register; to correct it, send it "
             "again with the reason (--reason TEXT)"
         )
-    points = tuple(_point(each) for each in asked.points)
+    points = tuple(_point(each) for each in request.points)
     new = StandardCertificate(
-        asked.number, asked.laboratory, asked.calibrated, asked.due, asked.adjusted, asked.traceability, points,
-        asked.reason, asked.by, at,
+        request.number, request.laboratory, request.calibrated, request.due, request.adjusted, request.traceability,
+        points, request.reason, request.by, at,
     )  # fmt: skip
     store.standards.add_certificate(label, new)
     return one_standard(store, label, at.date())
 
 
-def _point(asked: CertifiedPointRequest) -> CertifiedPoint:
-    value = asked.value if asked.correction is None else -asked.correction
-    if asked.u is not None:
-        return CertifiedPoint(asked.nominal, value, asked.u, 1.0)
-    return CertifiedPoint(asked.nominal, value, (asked.expanded or 0.0) / asked.k, asked.k)
+def _point(request: CertifiedPointRequest) -> CertifiedPoint:
+    value = request.value if request.correction is None else -request.correction
+    if request.u is not None:
+        return CertifiedPoint(request.nominal, value, request.u, 1.0)
+    return CertifiedPoint(request.nominal, value, (request.expanded or 0.0) / request.k, request.k)
 
 
-def add_check(store: Store, label: str, asked: StandardCheckRequest, at: datetime) -> StandardResponse:
+def add_check(store: Store, label: str, request: StandardCheckRequest, at: datetime) -> StandardResponse:
     """Enter an intermediate check. Raises NotFound, BadInput for a time to come."""
-    checked_at = asked.checked_at or at
+    checked_at = request.checked_at or at
     if checked_at > at:
         raise BadInput(f"checked_at {checked_at:%Y-%m-%d %H:%M} is a time to come; correct it")
-    new = StandardCheck(checked_at, asked.nominal, asked.value, asked.u, asked.note, asked.by, at)
+    new = StandardCheck(checked_at, request.nominal, request.value, request.u, request.note, request.by, at)
     store.standards.add_check(label, new)
     return one_standard(store, label, at.date())
 
 
-def mark_bad(store: Store, label: str, asked: StandardBadRequest, at: datetime) -> StandardResponse:
+def mark_bad(store: Store, label: str, request: StandardBadRequest, at: datetime) -> StandardResponse:
     """Enter that a standard was found bad. Raises NotFound, BadInput for a first day to come."""
-    if asked.bad_from > at.date():
-        raise BadInput(f"bad_from {asked.bad_from} is a day to come; give the first day on which it was bad")
-    new = StandardFinding(0, "bad", None, asked.bad_from, asked.bad_until, asked.reason, asked.by, at)
+    if request.bad_from > at.date():
+        raise BadInput(f"bad_from {request.bad_from} is a day to come; give the first day on which it was bad")
+    new = StandardFinding(0, "bad", None, request.bad_from, request.bad_until, request.reason, request.by, at)
     store.standards.add_finding(label, new)
     return one_standard(store, label, at.date())
 
 
 def withdraw_finding(
-    store: Store, label: str, number: int, asked: WithdrawFindingRequest, at: datetime
+    store: Store, label: str, number: int, request: WithdrawFindingRequest, at: datetime
 ) -> StandardResponse:
     """Withdraw a finding. Raises NotFound for one that is not there, or is withdrawn."""
     standard = store.standards.get(label)
@@ -114,7 +116,7 @@ def withdraw_finding(
             f"{standard.row.label}` lists its findings"
         )
     store.standards.add_finding(
-        label, StandardFinding(0, "withdraw", number, None, None, asked.reason, asked.by, at)
+        label, StandardFinding(0, "withdraw", number, None, None, request.reason, request.by, at)
     )  # fmt: skip
     return one_standard(store, label, at.date())
 

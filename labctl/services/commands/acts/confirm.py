@@ -10,22 +10,22 @@ from labctl.services.commands.acts.campaign_command import CampaignCommand, Comm
 from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
 
-Asked = ToCampaign[ConfirmRequest]
+AddressedRequest = ToCampaign[ConfirmRequest]
 
 
-def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
-    body = asked.body
+def _in_service(control: ServiceBench, context: CommandContext, request: AddressedRequest) -> CampaignResponse:
+    body = request.body
     if control.runner is None:
-        raise not_running(context.store, asked.campaign, f"answer question {body.prompt}")
-    answer = control.runner.confirm(asked.campaign, body)
+        raise not_running(context.store, request.campaign, f"answer question {body.prompt}")
+    answer = control.runner.confirm(request.campaign, body)
     said = f"{body.prompt}: {'done' if body.confirmed else 'cannot be done'}; {body.by}; {body.reason}"
-    control.record(context, CONFIRM.name, asked.campaign, said)
+    control.record(context, CONFIRM.name, request.campaign, said)
     return answer
 
 
-def _in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_foreground(_: Foreground, context: CommandContext, request: AddressedRequest) -> CampaignResponse:
     """Raise Conflict: no campaign asks anything here."""
-    raise not_running(context.store, asked.campaign, f"answer question {asked.body.prompt}")
+    raise not_running(context.store, request.campaign, f"answer question {request.body.prompt}")
 
 
 def _request(given: Values) -> Values:
@@ -68,7 +68,7 @@ AGAIN = CommandOption(
 CONFIRM = CampaignAct(
     name="confirm",
     body=ConfirmRequest,
-    asked=Asked,
+    request_type=AddressedRequest,
     summary="Answer a campaign's question",
     description="Answer the question with this id; an answer to an older one is refused.",
     in_service=_in_service,
