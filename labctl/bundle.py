@@ -203,8 +203,8 @@ def _refuse_unsigned(path: Path, archive: zipfile.ZipFile, manifest: bytes, key:
             "the seal key"
         )
     try:
-        said = json.loads(_member(path, archive, SIGNATURE, MAX_BYTES))
-        signature, by = bytes.fromhex(said["signature"]), str(said["fingerprint"])
+        signature_document = json.loads(_member(path, archive, SIGNATURE, MAX_BYTES))
+        signature, by = bytes.fromhex(signature_document["signature"]), str(signature_document["fingerprint"])
     except (ValueError, LookupError, TypeError) as error:
         raise BadCalibrationFile(f"{path}: {SIGNATURE} is not whole; get the bundle again") from error
     if not key.fits(signature, signed_digest(manifest)):
@@ -216,26 +216,28 @@ def _refuse_unsigned(path: Path, archive: zipfile.ZipFile, manifest: bytes, key:
 
 def _manifest(path: Path, content: bytes) -> BundleManifest:
     try:
-        said = json.loads(content)
-        if said["format"] != FORMAT:
-            raise ValueError(f"the format is {str(said['format'])[:80]!r}, but must be {FORMAT!r}")
-        due = said["expires_at"]
+        document = json.loads(content)
+        if document["format"] != FORMAT:
+            raise ValueError(f"the format is {str(document['format'])[:80]!r}, but must be {FORMAT!r}")
+        due = document["expires_at"]
         return BundleManifest(
-            None if said["model"] is None else str(said["model"]), _instant(said["made_at"]),
+            None if document["model"] is None else str(document["model"]), _instant(document["made_at"]),
             None if due is None else _instant(due),
             tuple(
                 BundleEntry(str(each["serial"]), int(each["version"]), str(each["file"]), str(each["sha256"]))
-                for each in said["calibrations"]
+                for each in document["calibrations"]
             ),
-            tuple(_withdrawn(each) for each in said["withdrawn"]),
+            tuple(_withdrawn(each) for each in document["withdrawn"]),
         )  # fmt: skip
     except (ValueError, LookupError, TypeError, RecursionError) as error:
         raise BadCalibrationFile(f"{path}: {MANIFEST} is not whole ({error}); get the bundle again") from error
 
 
-def _withdrawn(said: Mapping[str, Any]) -> WithdrawnEntry:
-    notice = Withdrawn(_instant(said["at"]), str(said["by"]), str(said["reason"]), str(said["certificate"]))
-    return WithdrawnEntry(str(said["serial"]), int(said["version"]), notice)
+def _withdrawn(document: Mapping[str, Any]) -> WithdrawnEntry:
+    notice = Withdrawn(
+        _instant(document["at"]), str(document["by"]), str(document["reason"]), str(document["certificate"])
+    )
+    return WithdrawnEntry(str(document["serial"]), int(document["version"]), notice)
 
 
 def _instant(text: Any) -> datetime:

@@ -23,10 +23,10 @@ LONGEST_REPLY_BYTES = 4096
 USUAL_IDENTITIES = ("id", "identity", "idn", "get_identity")
 
 
-def _in_one_line(said: object) -> str:
-    if said is None:
+def _in_one_line(text: object) -> str:
+    if text is None:
         return ""
-    return one_line(", ".join(str(part) for part in said) if isinstance(said, list | tuple) else str(said))
+    return one_line(", ".join(str(part) for part in text) if isinstance(text, list | tuple) else str(text))
 
 
 class LibraryInstrument:

@@ -50,13 +50,13 @@ class LineReference:
 
         Raises WrongInstrument for another serial number than the bench file's, MalformedReply, NoReply, LinkError.
         """
-        said = ""
+        identity = ""
         if self._model.identity:
-            said = self._lines.ask(self._model.identity, r".*\S.*", "say what it is")[0]
-            refuse_other_serial(self.name, said, self.settings.serial, holds_serial=True)
+            identity = self._lines.ask(self._model.identity, r".*\S.*", "say what it is")[0]
+            refuse_other_serial(self.name, identity, self.settings.serial, holds_serial=True)
         self.read()
         certificate = f"; certificate {self.settings.certificate}" if self.settings.certificate else ""
-        return f"{said or self._model.title}{certificate}"
+        return f"{identity or self._model.title}{certificate}"
 
     def read(self) -> ReferenceState:
         """Get one reading of every quantity; raises MalformedReply for another unit, NoReply, LinkError."""

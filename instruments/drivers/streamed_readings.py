@@ -140,8 +140,10 @@ class StreamedReadings:
         return max(SILENCE_S, 5 / self._law.rate_hz)
 
     def _new_counter(self) -> SampleCounter | None:
-        given = self._law.counter
-        return None if given is None else SampleCounter(self._device, self._port, step=given.step, wrap=given.wrap)
+        counter = self._law.counter
+        return (
+            None if counter is None else SampleCounter(self._device, self._port, step=counter.step, wrap=counter.wrap)
+        )
 
     def _new_device_time(self) -> DeviceClock | None:
         """Return the unit's own time: by pulses, by its time stamps, or by its counter; None without any."""
@@ -155,8 +157,8 @@ class StreamedReadings:
     def _new_own_time(self) -> DeviceTime | None:
         if (ticks := self._law.stamps) is not None:
             return DeviceTime(ticks.tick_s, ticks.wrap)
-        if (given := self._law.counter) is not None:
-            return DeviceTime(1.0 / (self._law.rate_hz * given.step), given.wrap)
+        if (counter := self._law.counter) is not None:
+            return DeviceTime(1.0 / (self._law.rate_hz * counter.step), counter.wrap)
         return None
 
     def _discard(self) -> None:

@@ -69,16 +69,16 @@ class Certification:
         }  # fmt: skip
 
 
-def read_certification(given: Mapping[str, object]) -> Certification:
+def read_certification(document: Mapping[str, object]) -> Certification:
     """Read the value of `certification`. Raises LookupError, TypeError or ValueError for one that is not whole."""
     states: tuple[State, ...] = get_args(State)
-    stated, due = given["state"], given["due"]
+    stated, due = document["state"], document["due"]
     state: State | None = next((each for each in states if each == stated), None)
     if state is None:
         raise ValueError(f"the state is {str(stated)[:80]!r}, but must be one of {', '.join(states)}")
     return Certification(
-        state, str(given["by"]), str(given["reason"]), _instant(given["at"]),
-        None if due is None else _instant(due), str(given["calibration_hash"]),
+        state, str(document["by"]), str(document["reason"]), _instant(document["at"]),
+        None if due is None else _instant(due), str(document["calibration_hash"]),
     )  # fmt: skip
 
 

@@ -129,10 +129,10 @@ class Calibration:
         `reported` is what it says of itself, by the same names; what only one of the two has is not compared.
         """
         if changes := changed(self.configuration, reported):
-            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
+            changes_text = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
             raise OtherConfiguration(
                 f"calibration of {self.serial} version {self.version}: the unit is set otherwise than when it was "
-                f"measured: {said}; set it as it was, or calibrate it as it is"
+                f"measured: {changes_text}; set it as it was, or calibrate it as it is"
             )
 
     @property

@@ -76,10 +76,10 @@ def _declared() -> list[tuple[CampaignAct[Any], CampaignCommand]]:
 def command_of(act: CampaignAct[AddressedT], line: CampaignCommand) -> TyperCommand:
     """Return the command of an act: the campaign, the options that it states, --json and --database."""
 
-    def perform(campaign: int | None, as_json: bool, database: str | None, **given: object) -> None:
+    def perform(campaign: int | None, as_json: bool, database: str | None, **options: object) -> None:
         with one_clear_line():
             number = _campaign(line.default_campaign, database, campaign)
-            answer = _send(act, line, number, given, database, quiet=as_json)
+            answer = _send(act, line, number, options, database, quiet=as_json)
         if line.runs_here:
             print_end(answer, as_json=as_json)
         else:
@@ -100,20 +100,20 @@ def command_of(act: CampaignAct[AddressedT], line: CampaignCommand) -> TyperComm
     return made
 
 
-def _campaign(default: DefaultCampaign, database: str | None, given: int | None) -> int | None:
+def _campaign(default: DefaultCampaign, database: str | None, campaign: int | None) -> int | None:
     """Return the number of the campaign that is meant. Raises NotFound."""
     from labctl.services.commands.open import campaign_to_resume, current_status
 
     if default == "resumable":
-        return campaign_to_resume(database, given)
-    return given if given is not None or default == "none" else current_status(database, None).id
+        return campaign_to_resume(database, campaign)
+    return campaign if campaign is not None or default == "none" else current_status(database, None).id
 
 
 def _send(
     act: CampaignAct[AddressedT],
     line: CampaignCommand,
     campaign: int | None,
-    given: Mapping[str, object],
+    options: Mapping[str, object],
     database: str | None,
     *,
     quiet: bool,
@@ -121,7 +121,7 @@ def _send(
     """Have an act carried out: what the options give is a field of its request, or else of the address."""
     from labctl.services.commands.open import execute
 
-    named = {**given, "by": person(given["by"])} if "by" in given else given
+    named = {**options, "by": person(options["by"])} if "by" in options else options
     values = line.request(named)
     body = act.body.model_validate({name: value for name, value in values.items() if name in act.body.model_fields})
     address = {name: value for name, value in values.items() if name not in act.body.model_fields}

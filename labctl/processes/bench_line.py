@@ -71,7 +71,7 @@ class BenchLine:
             line.send_bytes(supervisor_form("supervise").call(settings))
             if not line.poll(ANSWER_S):
                 self._end_silent()
-            said = receive(line)
+            reply = receive(line)
         except (EOFError, OSError) as error:
             line.close()
             raise BenchSilent(
@@ -82,7 +82,7 @@ class BenchLine:
             line.close()
             raise
         try:
-            value_of(SAID_BY_BENCH, said)
+            value_of(SAID_BY_BENCH, reply)
         except Exception:
             line.close()
             raise
@@ -101,11 +101,11 @@ class BenchLine:
     def _hear(self) -> None:
         with contextlib.suppress(EOFError, OSError, LabctlError):  # what it cannot say counts as its silence
             while True:
-                said = value_of(SAID_BY_BENCH, receive(self._line))
+                message = value_of(SAID_BY_BENCH, receive(self._line))
                 self._heard.restart()
-                self.at_rest = said == "at rest"
-                if isinstance(said, BenchLeft):
-                    self.left = said
+                self.at_rest = message == "at rest"
+                if isinstance(message, BenchLeft):
+                    self.left = message
 
     @property
     def heard_s(self) -> float:

@@ -71,7 +71,7 @@ class Child:
             while not self.line.poll(LOOK_S):
                 if gives_up():
                     raise Failed(f"the {self.name} was not ready when it was asked to end; start the service again")
-            said = receive(self.line)
+            reply = receive(self.line)
         except (EOFError, OSError):
             self._process.wait()
             raise Failed(
@@ -79,7 +79,7 @@ class Child:
                 "read the log for the cause"
             ) from None
         try:
-            value_of(SAID_BY_CHILD, said)
+            value_of(SAID_BY_CHILD, reply)
         except BadDocument:
             self.kill()  # it may go on, and what it does is not known
             raise

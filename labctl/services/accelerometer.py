@@ -183,13 +183,13 @@ def _over_temperature(fitted: OverTemperature, rests: Rests) -> AccelerometerRes
 
     low, high = fitted.range_c
     answer = _response(fitted.reference, rests, fitted.adequacy)
-    said = (
+    sentence = (
         f"Over {low:.1f} to {high:.1f} deg C ({fitted.temperatures} temperatures), about {fitted.reference_c:g} deg C: "
         f"bias to the power {len(fitted.bias_g)}, scale factors to the power {len(fitted.scale_factor)}; constants "
         f"would leave {fitted.constant_g:.2g} g."
     )
     return answer.model_copy(update={
-        "text": [*answer.text, said],
+        "text": [*answer.text, sentence],
         "temperature": AccelerometerTemperature(
             reference_c=fitted.reference_c, range_c=fitted.range_c, temperatures=fitted.temperatures,
             bias_g=terms(fitted.bias_g, begin), scale_factor=terms(fitted.scale_factor, begin + fitted.bias_g.size),

@@ -89,12 +89,14 @@ def alarms(store: Store) -> int:
     return count
 
 
-def _temperature(store: Store, serial: str, given: float | None) -> float:
-    if given is not None:
+def _temperature(store: Store, serial: str, temperature_c: float | None) -> float:
+    if temperature_c is not None:
         low, high = POSSIBLE["temperature_c"]
-        if not low <= given <= high:  # also true for NaN
-            raise BadInput(f"temperature_c = {given} deg C: give a temperature between {low:g} and {high:g} deg C")
-        return given
+        if not low <= temperature_c <= high:  # also true for NaN
+            raise BadInput(
+                f"temperature_c = {temperature_c} deg C: give a temperature between {low:g} and {high:g} deg C"
+            )
+        return temperature_c
     versions = store.calibrations.of_unit(serial)
     if not versions:
         raise NotEnoughData(f"unit {serial} has no version; fit one with `labctl fit {serial}`")

@@ -67,9 +67,9 @@ _flights_guard = threading.Lock()
 
 
 @contextmanager
-def single_flight(asked: str) -> Iterator[None]:
+def single_flight(key: str) -> Iterator[None]:
     """Allow one thread of this process at a time to work at the same question. Raises Cancelled."""
     with _flights_guard:
-        flight = _flights.setdefault(asked, _Flight())
+        flight = _flights.setdefault(key, _Flight())
     with flight.turn():
         yield

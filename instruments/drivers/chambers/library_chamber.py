@@ -26,10 +26,10 @@ class LibraryChamber(SetpointChamber):
 
         Raises WrongInstrument for another serial number, InstrumentError.
         """
-        said = self._instrument.identity()
-        refuse_other_serial(self.name, said, self._names.serial, holds_serial=bool(self._names.identity))
+        identity = self._instrument.identity()
+        refuse_other_serial(self.name, identity, self._names.serial, holds_serial=bool(self._names.identity))
         self._read_air()
-        return f"{self._names.instrument} of {self._names.library} {said}".strip()
+        return f"{self._names.instrument} of {self._names.library} {identity}".strip()
 
     def make_safe(self) -> float:
         """Control the chamber to its safe set point, and off where the bench file says so; returns the value read back.

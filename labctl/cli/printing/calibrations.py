@@ -147,8 +147,8 @@ def print_certifications(rows: Sequence[CertificationResponse], waiting: Sequenc
     if not rows:
         console.print("nothing has been certified yet")
     for row in rows:
-        said = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {_persons(row)}: {row.reason}"
-        console.print(said, soft_wrap=True)
+        line = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {_persons(row)}: {row.reason}"
+        console.print(line, soft_wrap=True)
         if row.act == "certify":
             console.print(f"  verdict: {_verdict(row)}", soft_wrap=True)
         _print_objections(row)

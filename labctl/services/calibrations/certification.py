@@ -138,10 +138,10 @@ def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: 
 def refusal(known: AssessmentResponse) -> str:
     """Return in one message why a version is not certified, and what to do; of wrong data only the first is said."""
     data = [each for each in known.objections if each["what"] == "data"]
-    said = [each for each in known.objections if each not in data[1:]]
+    others = [each for each in known.objections if each not in data[1:]]
     more = f" (and {len(data) - 1} more in its data)" if len(data) > 1 else ""
-    objections = "; ".join(each["text"] for each in said)
-    todo = "; ".join(dict.fromkeys(each["do"] for each in said))
+    objections = "; ".join(each["text"] for each in others)
+    todo = "; ".join(dict.fromkeys(each["do"] for each in others))
     return (
         f"certification of version {known.version} of {known.serial} is refused: {objections}{more}. To do: {todo}. "
         "To certify it nevertheless:"

@@ -64,17 +64,17 @@ class ForegroundControl:
         """Carry out an act in this process."""
         return act.in_foreground(self, context, request)
 
-    def run_campaign(self, asked: CampaignStart) -> CampaignResponse:
+    def run_campaign(self, start: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
         request = StartRequest(
-            recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, hide=asked.body.hide, fit=asked.body.fit,
-            speed=asked.speed, seed=asked.seed, simulated_start=asked.simulated_start,
-            confirmed_by=asked.body.confirmed_by, checks=asked.body.checks,
+            recipe=start.body.recipe, bench=start.bench, clip=start.body.clip, hide=start.body.hide, fit=start.body.fit,
+            speed=start.speed, seed=start.seed, simulated_start=start.simulated_start,
+            confirmed_by=start.body.confirmed_by, checks=start.body.checks,
         )  # fmt: skip
         with self._open_terminal() as terminal:
             answer = run_here(
                 self._database, request, terminal.observe, terminal.attend, terminal.say, terminal.ask_clear,
-                wire_log=asked.wire_log,
+                wire_log=start.wire_log,
             )  # fmt: skip
         return self._with_drafts(answer)
 

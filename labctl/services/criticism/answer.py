@@ -36,8 +36,8 @@ DATA_FIRST = {"certain": "The data are wrong", "likely": "Check the data"}
 
 def with_warnings(answer: CriticismResponse, warnings: list[DataWarning]) -> CriticismResponse:
     """Return an answer that says first what is wrong with the data: a verdict on wrong data means nothing."""
-    said = [f"{DATA_FIRST[warning.severity]}: {warning.text}." for warning in warnings]
-    return answer.model_copy(update={"warnings": [*warnings, *answer.warnings], "text": [*said, *answer.text]})
+    warnings_text = [f"{DATA_FIRST[warning.severity]}: {warning.text}." for warning in warnings]
+    return answer.model_copy(update={"warnings": [*warnings, *answer.warnings], "text": [*warnings_text, *answer.text]})
 
 
 #: Up to this many noise floors an error counts as noise: a model does not follow drift, and points that are measured
@@ -159,35 +159,37 @@ def sentences(criticism: Criticism, experiments: Sequence[Experiment] = ()) -> l
     family = [] if criticism.family is None else [criticism.family.sentence]
     family += [] if criticism.hint is None else [criticism.hint.hint]
     first = not_logged(criticism) or doubtful(criticism) or _first(criticism)
-    said = [first, *family, *what_to_log(criticism), *coarse_steps(criticism)]
+    answer_text = [first, *family, *what_to_log(criticism), *coarse_steps(criticism)]
     if verdict.remainder is not None and verdict.groups:
-        said.append(_remainder(verdict))
+        answer_text.append(_remainder(verdict))
     if verdict.form == "unexplained" and verdict.confounded:
-        said.append(
+        answer_text.append(
             f"This schedule cannot distinguish {verdict.depends_on[0]} from {_list(verdict.confounded)}: confounded."
         )
     if _leg(criticism) and (verdict.groups or verdict.form == "unexplained"):
-        said.append(
+        answer_text.append(
             "Since the temperature only rises in this recording, an error that grows with time cannot be "
             "distinguished from one that grows with temperature."
         )
     if verdict.form == "ambiguous" and verdict.indistinguishable:
-        said += to_distinguish(verdict.indistinguishable, experiments)
-    said += advice_sentences(criticism.advice)
+        answer_text += to_distinguish(verdict.indistinguishable, experiments)
+    answer_text += advice_sentences(criticism.advice)
     if verdict.not_physical and verdict.groups:
         technology = criticism.data.info.technology or "this technology"
-        said.append(f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}.")
-    said += _further(criticism)
+        answer_text.append(
+            f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}."
+        )
+    answer_text += _further(criticism)
     if criticism.data.info.rate_reference == "demanded":
-        said.append(UNMEASURED)
+        answer_text.append(UNMEASURED)
     if verdict.form == "adequate" and criticism.has_large_drift:
-        said.append(
+        answer_text.append(
             f"The drift is larger than specified: {criticism.drift_over_datasheet:.1f} times the value expected from "
             "the data sheet."
         )
     if criticism.data.left_out:
-        said.append(f"{criticism.data.left_out} readings far outside their data set were left out.")
-    return said
+        answer_text.append(f"{criticism.data.left_out} readings far outside their data set were left out.")
+    return answer_text
 
 
 def _remainder(verdict: Verdict) -> str:

@@ -80,13 +80,13 @@ def _with_undistinguished(
         others = [each for each in groups.get(effect, ()) if each in earlier.named and each not in added]
         if effect in earlier.named and others:
             undistinguished.append({"effect": effect, "others": others})
-    said = [
+    sentences = [
         f"These data do not show that the cause is {each['effect']}, which version {row.version} contains: "
         f"{' or '.join(each['others'])} would explain them as well (criticism of version {before.version})."
         for each in undistinguished
     ]
     first, *rest = answer.text
-    return answer.model_copy(update={"undistinguished": undistinguished, "text": [first, *said, *rest]})
+    return answer.model_copy(update={"undistinguished": undistinguished, "text": [first, *sentences, *rest]})
 
 
 def residuals_unit(

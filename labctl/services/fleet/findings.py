@@ -60,13 +60,17 @@ def population_in(units: Sequence[UnitCoefficients]) -> Compared:
         FleetOutlier(serial=each.serial_number, coefficient=each.coefficient, t=each.t, text=each.reason)
         for each in population.outliers
     ]
-    said = [f"{len(population.table)} units were compared."]
-    said += [each.text for each in groups] or ["No batch, bench, supplier or trend differs from the rest of the type."]
+    sentences = [f"{len(population.table)} units were compared."]
+    sentences += [each.text for each in groups] or [
+        "No batch, bench, supplier or trend differs from the rest of the type."
+    ]
     if outliers:
-        said.append(f"{len({each.serial for each in outliers})} units are not like their type.")
+        sentences.append(f"{len({each.serial for each in outliers})} units are not like their type.")
     if population.left_out:
         first = population.left_out[0]
-        said.append(f"{len(population.left_out)} units were left out, first {first.serial_number}: {first.reason}.")
+        sentences.append(
+            f"{len(population.left_out)} units were left out, first {first.serial_number}: {first.reason}."
+        )
     return Compared(
         len(population.table),
         len(population.left_out),
@@ -78,7 +82,7 @@ def population_in(units: Sequence[UnitCoefficients]) -> Compared:
         ],
         groups,
         outliers[:MAX_OUTLIERS],
-        said,
+        sentences,
     )
 
 
@@ -131,19 +135,19 @@ def evidence_in(store: Store, type_: str, model: str, *, whole: bool) -> Evidenc
         else:
             not_current += part.units
     evidence = judged(sums)
-    said = [f"What the model of the type is missing was judged by the criticisms of {sums.units} units."]
+    sentences = [f"What the model of the type is missing was judged by the criticisms of {sums.units} units."]
     if evidence.reason:
-        said = [f"What the model is missing: {evidence.reason}; `labctl fleet criticise` does it."]
+        sentences = [f"What the model is missing: {evidence.reason}; `labctl fleet criticise` does it."]
     if not_current:
-        said.append(
+        sentences.append(
             f"The criticisms of {not_current} units do not count, as others that were added to them were made again, "
             "or an older program made them; `labctl fleet criticise --again` makes all again."
         )
     missing = [_missing(each) for each in evidence.named]
-    said += [each.text for each in missing]
+    sentences += [each.text for each in missing]
     if not missing and not evidence.reason:
-        said.append("No effect is named for the type by all units together.")
-    return Evidence(sums.units, missing, said)
+        sentences.append("No effect is named for the type by all units together.")
+    return Evidence(sums.units, missing, sentences)
 
 
 def _missing(effect: TypeEffect) -> FleetMissing:

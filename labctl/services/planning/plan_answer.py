@@ -131,10 +131,10 @@ def _wider(recipe: Recipe) -> Iterator[tuple[str, str, Recipe]]:
 
 def _toml(name: str, table: Indexing | Inverted) -> str:
     """Return a table of a recipe as TOML, a line for each key."""
-    given = table.model_dump(exclude_defaults=True)
+    document = table.model_dump(exclude_defaults=True)
     lines = [
         f"{key} = [{', '.join(f'{each:g}' for each in value)}]" if isinstance(value, tuple) else f"{key} = {value:g}"
-        for key, value in given.items()
+        for key, value in document.items()
     ]
     return "\n".join([f"[{name}]", *lines])
 

@@ -75,8 +75,8 @@ def of_unit(store: Store, serial: str, recording: int | None) -> Measured:
     rest = None
     if row.kind == "samples" and (number := _longest_rest(store, row.id)) is not None:
         rest = rest_in(store.recordings.dataset(row.id, number), points)
-    said = f"Unit {serial}, recording {row.id}: {row.datasets} data sets ({points.info.model})."
-    return Measured(serial, said, points, rest, row.id)
+    description = f"Unit {serial}, recording {row.id}: {row.datasets} data sets ({points.info.model})."
+    return Measured(serial, description, points, rest, row.id)
 
 
 def _longest_rest(store: Store, recording: int) -> int | None:

@@ -91,13 +91,13 @@ def _tables(measured: Measured, axis: str) -> Findings:
             ("offset", offset, "another unit: its curve is of the same shape, not of the same numbers"),
         ):
             value = float(np.interp(temperature, nodes, values)) if inside else None
-            said = "taken in as it is printed" if is_printed else reason
+            treatment = "taken in as it is printed" if is_printed else reason
             findings.values.append(
                 Value(
                     f"{name}_{temperature:g}",
                     measured.name,
                     value,
-                    said if inside else f"measured from {nodes[0]:.1f} to {nodes[-1]:.1f} deg C only",
+                    treatment if inside else f"measured from {nodes[0]:.1f} to {nodes[-1]:.1f} deg C only",
                 )
             )
     findings.values += _claims(measured.name, nodes, scale, offset)

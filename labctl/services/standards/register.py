@@ -186,21 +186,23 @@ def _states(standard: RegisteredStandard, on: date) -> Iterator[tuple[StandardSt
         yield "no certificate", [f"Standard {label} has no certificate; add it with `labctl standards certificate`."]
 
 
-def _certificate(given: StandardCertificate) -> StandardCertificateResponse:
+def _certificate(certificate: StandardCertificate) -> StandardCertificateResponse:
     return StandardCertificateResponse(
-        number=given.number, laboratory=given.laboratory, calibrated=given.calibrated, due=given.due,
-        adjusted=given.adjusted, traceability=given.traceability, reason=given.reason, by=given.by, at=given.at,
+        number=certificate.number, laboratory=certificate.laboratory, calibrated=certificate.calibrated,
+        due=certificate.due, adjusted=certificate.adjusted, traceability=certificate.traceability,
+        reason=certificate.reason, by=certificate.by, at=certificate.at,
         points=[
-            CertifiedPointResponse(nominal=each.nominal, value=each.value, u=each.u, k=each.k) for each in given.points
+            CertifiedPointResponse(nominal=each.nominal, value=each.value, u=each.u, k=each.k)
+            for each in certificate.points
         ],
     )  # fmt: skip
 
 
-def _finding(given: StandardFinding, withdrawn: StandardFinding | None) -> StandardFindingResponse:
-    if given.bad_from is None:
-        raise BadInput(f"finding {given.id} has no first day; check the database with `labctl check`")
-    said = "" if withdrawn is None else f"{withdrawn.by}, {withdrawn.at:%Y-%m-%d}: {withdrawn.reason}"
+def _finding(finding: StandardFinding, withdrawn: StandardFinding | None) -> StandardFindingResponse:
+    if finding.bad_from is None:
+        raise BadInput(f"finding {finding.id} has no first day; check the database with `labctl check`")
+    withdrawal = "" if withdrawn is None else f"{withdrawn.by}, {withdrawn.at:%Y-%m-%d}: {withdrawn.reason}"
     return StandardFindingResponse(
-        number=given.id, bad_from=given.bad_from, bad_until=given.bad_until, reason=given.reason, by=given.by,
-        at=given.at, withdrawn=said,
+        number=finding.id, bad_from=finding.bad_from, bad_until=finding.bad_until, reason=finding.reason, by=finding.by,
+        at=finding.at, withdrawn=withdrawal,
     )  # fmt: skip

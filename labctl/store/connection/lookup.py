@@ -128,7 +128,7 @@ class ServerLookup:
 
         try:
             connection = await self._connected()
-            texts = [_array(keys) if given is None else str(given).encode() for given in self._given]
+            texts = [_array(keys) if fixed is None else str(fixed).encode() for fixed in self._given]
             connection.pgconn.send_query_prepared(_PREPARED, texts, result_format=_BINARY)
             return self._decoded(connection, await _result(connection.pgconn))
         except psycopg.Error as error:

@@ -56,7 +56,11 @@ def test_every_transaction_gets_what_was_given(name: str, monkeypatch: pytest.Mo
 
 
 ASKED: dict[str, tuple[object, ...]] = {
-    **{act.name: (act.request_type(1, ReasonRequest(reason="tea")),) for act in CAMPAIGN_ACTS if act.body is ReasonRequest},
+    **{
+        act.name: (act.request_type(1, ReasonRequest(reason="tea")),)
+        for act in CAMPAIGN_ACTS
+        if act.body is ReasonRequest
+    },
     "start": (
         CampaignStart(CampaignRequest(recipe="short", checks=["table_free"]), simulated_start=AT, wire_log=Path("é")),
     ),

@@ -168,12 +168,12 @@ class Search:
         )
 
     def _design(self, axis: str, beside: Sequence[str], tried: Sequence[tuple[str, ...]]) -> Design:
-        given = self._comparison.designs[axis]
+        design = self._comparison.designs[axis]
         more = [self._columns(axis, text) for text in beside]
-        base = np.concatenate([given.base, *more], axis=2)
-        precision = np.concatenate([given.precision, np.zeros(len(more))])
+        base = np.concatenate([design.base, *more], axis=2)
+        precision = np.concatenate([design.precision, np.zeros(len(more))])
         # shapes are centred on what was measured, and need not be made orthogonal to the base as a person's formulas
-        return replace(given, base=base, precision=precision, options=[self._option(axis, texts) for texts in tried])
+        return replace(design, base=base, precision=precision, options=[self._option(axis, texts) for texts in tried])
 
     def _option(self, axis: str, texts: tuple[str, ...]) -> CandidateShape:
         rows = np.concatenate([self._columns(axis, text) for text in texts], axis=2)

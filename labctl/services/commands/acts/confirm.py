@@ -18,8 +18,8 @@ def _in_service(control: ServiceBench, context: CommandContext, request: Address
     if control.runner is None:
         raise not_running(context.store, request.campaign, f"answer question {body.prompt}")
     answer = control.runner.confirm(request.campaign, body)
-    said = f"{body.prompt}: {'done' if body.confirmed else 'cannot be done'}; {body.by}; {body.reason}"
-    control.record(context, CONFIRM.name, request.campaign, said)
+    text = f"{body.prompt}: {'done' if body.confirmed else 'cannot be done'}; {body.by}; {body.reason}"
+    control.record(context, CONFIRM.name, request.campaign, text)
     return answer
 
 
@@ -28,14 +28,14 @@ def _in_foreground(_: Foreground, context: CommandContext, request: AddressedReq
     raise not_running(context.store, request.campaign, f"answer question {request.body.prompt}")
 
 
-def _request(given: Values) -> Values:
+def _request(values: Values) -> Values:
     """Return the answer that the options give. Raises BadInput for two answers."""
-    is_declined = given["decline"] is not None
-    if given["again"] and is_declined:
+    is_declined = values["decline"] is not None
+    if values["again"] and is_declined:
         raise BadInput("--again and --decline answer the same question; give one of them")
     return {
-        "prompt": given["prompt"], "by": given["by"], "confirmed": not (is_declined or given["again"]),
-        "again": given["again"], "reason": given["decline"] or "",
+        "prompt": values["prompt"], "by": values["by"], "confirmed": not (is_declined or values["again"]),
+        "again": values["again"], "reason": values["decline"] or "",
     }  # fmt: skip
 
 
