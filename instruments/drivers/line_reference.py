@@ -69,11 +69,11 @@ class LineReference:
     def _raw(self, quantity: Quantity) -> int:
         request = quantity.ask.replace("{input}", str(self.settings.input))
         match = self._lines.ask(request, quantity.pattern, f"read by {request!r}")
-        unit = match.groupdict().get("unit")
-        if unit is not None and unit != quantity.says_unit:
+        unit_symbol = match.groupdict().get("unit")
+        if unit_symbol is not None and unit_symbol != quantity.says_unit:
             raise MalformedReply(
                 self.name,
-                f"answers in {unit!r} instead of {quantity.says_unit!r}; set the unit of measurement "
+                f"answers in {unit_symbol!r} instead of {quantity.says_unit!r}; set the unit of measurement "
                 "at the panel of the instrument",
             )
         return round(float(match["value"]) / quantity.resolution)

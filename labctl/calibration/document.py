@@ -102,7 +102,7 @@ class Calibration:
         from labctl.answers.recording_head import OutputUnit  # noqa: PLC0415  needs pydantic
 
         with _reading("output"):
-            units = {axis: OutputUnit.model_validate(unit) for axis, unit in self.document["output"].items()}
+            units = {axis: OutputUnit.model_validate(output) for axis, output in self.document["output"].items()}
             return units | {axis: units[axis] for axis in self.axes}  # each axis has one
 
     @property

@@ -266,8 +266,8 @@ def _head(name: str, calibration: Calibration) -> str:
     slowest, fastest = output_limits_dps(calibration)
     is_limited = math.isfinite(slow) and math.isfinite(fast)
     nominal = "; ".join(
-        f"{axis}: (output in {unit.unit} - {unit.offset:g}) / {unit.scale:g}"
-        for axis, unit in calibration.output.items()
+        f"{axis}: (output in {output.unit} - {output.offset:g}) / {output.scale:g}"
+        for axis, output in calibration.output.items()
     )
     return HEAD.format(
         serial=_in_comment(calibration.serial),

@@ -52,8 +52,8 @@ def add_readings(store: Store, request: RoomEnvironmentRequest, at: datetime) ->
         if measured_at > at + AHEAD:
             raise BadInput(f"measured_at {measured_at.isoformat()} is a time to come; correct the clock of the logger")
         for value in record.values:
-            unit, converted = _converted(value)
-            rows.append(RoomReading(measured_at, request.bench, value.quantity, unit, converted, request.source))
+            unit_symbol, converted = _converted(value)
+            rows.append(RoomReading(measured_at, request.bench, value.quantity, unit_symbol, converted, request.source))
     store.room_environment.add(rows, at, request.by)
     return environment(store, min(row.measured_at for row in rows), max(row.measured_at for row in rows), request.bench)
 

@@ -95,8 +95,8 @@ def _kept(
 
 def list_versions(store: Store, serial: str) -> list[SensorVersionResponse]:
     """Return every version of a unit's accelerometer and magnetometer, newest first. Raises NotFound."""
-    unit = store.units.get(serial).serial
-    return [_answer(row) for row in store.sensor_versions.of_unit(unit)]
+    stored_serial = store.units.get(serial).serial
+    return [_answer(row) for row in store.sensor_versions.of_unit(stored_serial)]
 
 
 def one_accelerometer(store: Store, serial: str, version: int | None = None) -> AccelerometerVersion:

@@ -97,9 +97,9 @@ def read_messages(dbc: str) -> dict[str, PackedMessage]:
             message = PackedMessage(int(begins[1]), begins[2], int(begins[3]))
             by_name[message.name] = message
         elif match := _SIGNAL.match(line):
-            name, start, bits, order, sign, scale, offset, unit = match.groups()
+            name, start, bits, order, sign, scale, offset, unit_symbol = match.groups()
             message.signals[name] = PackedSignal(
-                name, int(start), int(bits), order == "1", sign == "-", float(scale), float(offset), unit
+                name, int(start), int(bits), order == "1", sign == "-", float(scale), float(offset), unit_symbol
             )
     by_id = {each.id: each for each in by_name.values()}
     for line in dbc.splitlines():

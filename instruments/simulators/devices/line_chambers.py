@@ -28,8 +28,8 @@ class SimulatedEspec(LineDevice):
 
     def __init__(self, setup: InstrumentSetup) -> None:
         super().__init__(ESPEC.syntax, setup.faults)
-        unit = part_of(setup.instrument("chamber"), EspecSettings).unit
-        self._prefix = "" if unit is None else f"{unit},"
+        address = part_of(setup.instrument("chamber"), EspecSettings).unit
+        self._prefix = "" if address is None else f"{address},"
         self.chamber = ChamberState(setup)
         self.is_locked = False
 

@@ -331,7 +331,7 @@ def coefficients_of(comparison: Comparison, candidate: Candidate) -> dict[str, d
         values, covariance = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
         u = np.sqrt(np.diag(covariance))
         by_axis[axis] = with_derived({
-            name: {"value": float(value), "u": float(error), "unit": unit}
-            for name, unit, value, error in zip(option.names, option.units, values, u, strict=True)
+            name: {"value": float(value), "u": float(error), "unit": unit_symbol}
+            for name, unit_symbol, value, error in zip(option.names, option.units, values, u, strict=True)
         })  # fmt: skip
     return by_axis

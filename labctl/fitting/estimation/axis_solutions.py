@@ -245,7 +245,7 @@ def _axis_fit(design: AxisDesign, solution: Solution, late: TimeErrors | None = 
     return AxisFit(
         tuple(owner for owner, _, _ in names),
         tuple(name for _, name, _ in names),
-        tuple(unit for _, _, unit in names),
+        tuple(unit_symbol for _, _, unit_symbol in names),
         values.reshape(len(names), -1),
         sum((part.covariance for part in parts), covariance),
         parts,

@@ -231,10 +231,11 @@ def _of_axis(
     return held
 
 
-def _check(quantity: str, coefficient: HeldCoefficient, unit: str, model: ErrorModel) -> None:
-    if coefficient.unit and coefficient.unit != unit:
+def _check(quantity: str, coefficient: HeldCoefficient, unit_symbol: str, model: ErrorModel) -> None:
+    if coefficient.unit and coefficient.unit != unit_symbol:
         raise BadInput(
-            f"{quantity}: the unit of this coefficient is {unit!r}, not {coefficient.unit!r}; write value and u in it"
+            f"{quantity}: the unit of this coefficient is {unit_symbol!r}, not {coefficient.unit!r}; write value and u "
+            "in it"
         )
     term = next(term for term in model.terms if term.effect == coefficient.effect)
     if kind_of(term).parameters:

@@ -104,7 +104,7 @@ def _slopes(histories: dict[str, list[UnitCoefficients]], name: str) -> _Slopes:
     return slopes
 
 
-def _ageing(name: str, unit: str, slopes: _Slopes) -> CoefficientAgeing:
+def _ageing(name: str, unit_symbol: str, slopes: _Slopes) -> CoefficientAgeing:
     y, variance = np.array(slopes.values), np.array(slopes.variances)
     ones: NDArray[np.float64] = np.ones((len(y), 1))
     fitted, tau = robust_fit(y, variance, ones)
@@ -113,7 +113,7 @@ def _ageing(name: str, unit: str, slopes: _Slopes) -> CoefficientAgeing:
     spread = reml(y[kept], variance[kept], ones[kept])
     u_mean = float(np.sqrt(spread.covariance[0, 0]))
     return CoefficientAgeing(
-        name, unit, float(spread.values[0]), u_mean, spread.tau, spread.low, spread.high,
+        name, unit_symbol, float(spread.values[0]), u_mean, spread.tau, spread.low, spread.high,
         float(np.hypot(spread.tau, u_mean)), float(kept.sum() - 1), int(kept.sum()),
         (min(slopes.years), max(slopes.years)),
         tuple(serial for serial, is_kept in zip(slopes.serial_numbers, kept.tolist(), strict=True) if not is_kept),

@@ -238,10 +238,10 @@ def _sizes(sums: AxisSums, axis: str, shape: int, ratio: float) -> list[MeanSize
     shaped = sums.shapes[shape]
     return [
         MeanSize(
-            axis, name, unit, float(values[i]), float(np.sqrt(variance[i])), float(np.sqrt(spread_var[i])),
+            axis, name, unit_symbol, float(values[i]), float(np.sqrt(variance[i])), float(np.sqrt(spread_var[i])),
             float(values[i] / np.sqrt(variance[i])), float(ratio / np.sqrt(mean_weight[i])),
         )
-        for i, (name, unit) in enumerate(zip(shaped.names, shaped.units, strict=True))
+        for i, (name, unit_symbol) in enumerate(zip(shaped.names, shaped.units, strict=True))
     ]  # fmt: skip
 
 

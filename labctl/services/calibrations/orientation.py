@@ -218,8 +218,8 @@ def _axis(source: _Source, axis_name: str | None) -> str:
 def _rate_dps(source: _Source, axis: str, calibration: Calibration | None) -> tuple[Array, str]:
     """Return the rate about an axis at every row, deg/s, and what has to be said of the calibration."""
     if calibration is None:
-        unit = source.units.get(axis, OutputUnit())
-        return (_column(source, f"gyro_{axis}") - unit.offset) / unit.scale, ""
+        output_unit = source.units.get(axis, OutputUnit())
+        return (_column(source, f"gyro_{axis}") - output_unit.offset) / output_unit.scale, ""
     if axis not in calibration.axes:
         raise BadInput(
             f"{source.what}: the calibration has axes {', '.join(calibration.axes)}, not {axis}; name one of these axes"

@@ -287,7 +287,7 @@ def _unit(
             "technology": identity.technology or None,
             "datasheet": dict(identity.datasheet),
             "datasheet_conventions": _conventions(identity, bench),
-            "output": {axis: dict(unit) for axis, unit in identity.output.items()},
+            "output": {axis: dict(output_unit) for axis, output_unit in identity.output.items()},
             "standards": standards,
             "thermometer": temperature_instrument(bench),
             "configuration": configuration_of(identity.reported),

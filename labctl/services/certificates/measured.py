@@ -82,8 +82,8 @@ def environment_of_room(spans: Sequence[RoomSpan], ordered: RoomConditions) -> t
     """Return the environment of the room: what was recorded while the campaign ran, else what the order states."""
     recorded = {each.quantity: (each.low, each.high) for each in spans}
     return tuple(
-        Condition(name=name, unit=unit, low=limits[0], high=limits[1])
-        for quantity, (name, unit, stated) in ROOM.items()
+        Condition(name=name, unit=unit_symbol, low=limits[0], high=limits[1])
+        for quantity, (name, unit_symbol, stated) in ROOM.items()
         if (limits := recorded.get(quantity) or getattr(ordered, stated)) is not None
     )
 
@@ -91,10 +91,10 @@ def environment_of_room(spans: Sequence[RoomSpan], ordered: RoomConditions) -> t
 def environment(points: Recording) -> tuple[Condition, ...]:
     """Return the least and the largest mean of each condition that was logged."""
     conditions = []
-    for column, (name, unit) in CONDITIONS.items():
+    for column, (name, unit_symbol) in CONDITIONS.items():
         values = np.asarray(points.columns.get(column, []), dtype=np.float64)
         if (values := values[np.isfinite(values)]).size:
-            conditions.append(Condition(name=name, unit=unit, low=float(values.min()), high=float(values.max())))
+            conditions.append(Condition(name=name, unit=unit_symbol, low=float(values.min()), high=float(values.max())))
     return tuple(conditions)
 
 

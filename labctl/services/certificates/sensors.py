@@ -166,11 +166,11 @@ def _over_temperature(law: AccelerometerTemperature, ratio: float, freedom: floa
     """Return the coefficients of temperature; the uncertainty of gravity is too small a share of them to count."""
     coefficients = []
     u = iter(np.sqrt(np.diag(np.array(law.covariance)))[ACCELEROMETER_PARAMETERS:].tolist())
-    for name, unit, terms, factor in (
+    for name, unit_symbol, terms, factor in (
         ("bias", "m/s^2", law.bias_g, STANDARD_GRAVITY), ("scale factor", "1", law.scale_factor, ratio)
     ):  # fmt: skip
         for power in range(1, len(terms[AXES[0]]) + 1):
-            per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
+            per = f"{unit_symbol}/K" + (f"^{power}" if power > 1 else "")
             for axis in AXES:
                 was = terms[axis][power - 1]
                 fit = factor * next(u), was.degrees_of_freedom or freedom
@@ -238,17 +238,17 @@ def _freedom_of(result: AccelerometerResponse) -> float:
 
 
 def _coefficient(
-    name: str, value: float, unit: str, of_fit: tuple[float, float | None], of_reference: float
+    name: str, value: float, unit_symbol: str, of_fit: tuple[float, float | None], of_reference: float
 ) -> SensorCoefficient:
     """Return a coefficient with U: `of_fit` is the standard uncertainty of the fit, and its degrees of freedom."""
     u, freedom = of_fit
-    lines = [BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom)]
+    lines = [BudgetLine("coefficients", "fit", "A", "normal", u, unit_symbol, 1.0, u, freedom)]
     if of_reference:
         size = abs(of_reference)
-        lines.append(BudgetLine("reference", "reference", "B", "normal", size, unit, 1.0, size, is_common=True))
-    budget = budget_of(name, unit, lines, value)
+        lines.append(BudgetLine("reference", "reference", "B", "normal", size, unit_symbol, 1.0, size, is_common=True))
+    budget = budget_of(name, unit_symbol, lines, value)
     combined, expanded, k = budget.combined or 0.0, budget.expanded or 0.0, budget.k or 0.0  # every line is known
-    return SensorCoefficient(name=name, value=value, u=combined, expanded=expanded, k=k, unit=unit)
+    return SensorCoefficient(name=name, value=value, u=combined, expanded=expanded, k=k, unit=unit_symbol)
 
 
 def _result(

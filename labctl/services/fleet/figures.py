@@ -69,8 +69,8 @@ def fleet_chart(store: Store, request: FleetChartRequest) -> FleetChartResponse:
     if factor not in FACTORS:
         raise BadInput(f"factor {factor!r}: choose one of {', '.join(FACTORS)}")
     wanted = filter_of(request)
-    known = [FleetChartCoefficient(axis=a, name=n, unit=unit, units=units)
-             for a, n, unit, units in store.fleet_reports.coefficients(wanted)]  # fmt: skip
+    known = [FleetChartCoefficient(axis=a, name=n, unit=unit_symbol, units=units)
+             for a, n, unit_symbol, units in store.fleet_reports.coefficients(wanted)]  # fmt: skip
     chosen = next((each for each in known if each.name == name and axis in {"", each.axis}), None)
     if name and chosen is None:
         raise BadInput(

@@ -67,7 +67,7 @@ class GyroSource:
             "sample_rate_hz": gyro.sample_rate_hz, "max_rate_dps": gyro.limits.max_rate_dps,
             "technology": identity.technology or None, "datasheet": dict(identity.datasheet),
             "datasheet_conventions": conventions,
-            "output": {axis: dict(unit) for axis, unit in identity.output.items()},
+            "output": {axis: dict(output_unit) for axis, output_unit in identity.output.items()},
             "configuration": configuration_of(identity.reported),
             "standards": standards_of(self._bench_file), "notes": "turned by hand, live",
         })  # fmt: skip

@@ -99,8 +99,10 @@ def rest_in(columns: Columns, recording: Recording) -> Rest | None:
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[good]
     rests = {}
     for axis in recording.info.axes:
-        unit = recording.info.output.get(axis, OutputUnit())
-        rests[str(axis)] = (np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[good] - unit.offset) / unit.scale
+        output_unit = recording.info.output.get(axis, OutputUnit())
+        rests[str(axis)] = (
+            np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[good] - output_unit.offset
+        ) / output_unit.scale
     return Rest(t_s - t_s[0], rests)
 
 

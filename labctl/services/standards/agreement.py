@@ -157,11 +157,11 @@ def _differences(entry: Standard, known: RegisteredStandard, on: date) -> Iterat
 
 
 def _of_uncertainty(entry: Standard, known: RegisteredStandard, on: date) -> Iterator[str]:
-    label, unit = known.row.label, entry.unit_name
-    if (entry.quantity, unit) != (known.row.quantity, known.row.unit):
+    label, unit_symbol = known.row.label, entry.unit_name
+    if (entry.quantity, unit_symbol) != (known.row.quantity, known.row.unit):
         yield (
-            f"standard {label}: {entry.quantity} in {unit} in the bench file, {known.row.quantity} in {known.row.unit} "
-            "in the register; its uncertainty is not compared. Correct the one that is wrong"
+            f"standard {label}: {entry.quantity} in {unit_symbol} in the bench file, {known.row.quantity} in "
+            f"{known.row.unit} in the register; its uncertainty is not compared. Correct the one that is wrong"
         )
         return
     if not known.in_force:
@@ -169,15 +169,15 @@ def _of_uncertainty(entry: Standard, known: RegisteredStandard, on: date) -> Ite
     stated = max(point.u for point in known.in_force[-1].points)
     if not math.isclose(stated, entry.standard_u, rel_tol=ROUNDING):
         yield (
-            f"standard {label}: u = {entry.standard_u:.3g} {unit} in the bench file, {stated:.3g} {unit} by "
-            f"certificate {known.in_force[-1].number} in the register; the larger one counts. Correct the "
+            f"standard {label}: u = {entry.standard_u:.3g} {unit_symbol} in the bench file, {stated:.3g} {unit_symbol} "
+            f"by certificate {known.in_force[-1].number} in the register; the larger one counts. Correct the "
             "one that is wrong"
         )
     used = _as_used(entry, known, on)
     if used.standard_u > max(stated, entry.standard_u) * (1 + ROUNDING):
         yield (
-            f"standard {label}: u = {used.standard_u:.3g} {unit} on {on} with the uncertainty of its drift, which the "
-            "campaign records and its budgets use; a new calibration of the standard makes it smaller"
+            f"standard {label}: u = {used.standard_u:.3g} {unit_symbol} on {on} with the uncertainty of its drift, "
+            "which the campaign records and its budgets use; a new calibration of the standard makes it smaller"
         )
 
 

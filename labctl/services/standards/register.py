@@ -41,15 +41,16 @@ WORST_FIRST: tuple[StandardState, ...] = ("bad", "check it", "overdue", "no cert
 def add_standard(store: Store, request: StandardRequest, at: datetime) -> StandardResponse:
     """Enter a standard. Raises BadInput for a unit that its quantity has not, Conflict for a label that is taken."""
     units = next((units for quantity, units in UNITS.items() if quantity == request.quantity), None)
-    unit = request.unit or (units[0] if units else None)
-    if unit is None:
+    unit_symbol = request.unit or (units[0] if units else None)
+    if unit_symbol is None:
         raise BadInput(f"standard {request.label}: no usual unit of {request.quantity!r} is known; give its unit")
-    if units and unit not in units:
+    if units and unit_symbol not in units:
         raise BadInput(
-            f"standard {request.label}: unit {unit!r} is not accepted for {request.quantity}; give {' or '.join(units)}"
+            f"standard {request.label}: unit {unit_symbol!r} is not accepted for {request.quantity}; give "
+            f"{' or '.join(units)}"
         )
     store.standards.add(
-        StandardRow(request.label, request.serial, request.quantity, unit, request.description, request.by, at)
+        StandardRow(request.label, request.serial, request.quantity, unit_symbol, request.description, request.by, at)
     )  # fmt: skip
     return one_standard(store, request.label, at.date())
 

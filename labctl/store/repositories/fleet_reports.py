@@ -149,7 +149,7 @@ class FleetReports:
         query = sa.select(f.axis, f.name, f.unit, sa.func.count()).join(tables.units, u.serial == f.serial)
         grouped = query.where(wanted.condition).group_by(f.axis, f.name, f.unit).order_by(f.axis, f.name)
         with self._database.reading() as connection:
-            return [(axis, name, unit, n) for axis, name, unit, n in connection.execute(grouped)]
+            return [(axis, name, unit_symbol, n) for axis, name, unit_symbol, n in connection.execute(grouped)]
 
     def chart(
         self, wanted: FleetFilter, axis: str, name: str, factor: str, spans: int

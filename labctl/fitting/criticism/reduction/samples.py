@@ -155,5 +155,5 @@ def _steps_var(recording: Recording, numbers: Mapping[str, Array], axis: str) ->
     step_columns = numbers.get(f"gyro_{axis}{QUANTISATION}")
     if step_columns is None:
         return np.zeros(len(numbers[f"gyro_{axis}"]))
-    output = next((unit for name, unit in recording.info.output.items() if name == axis), None)
+    output = next((output_unit for name, output_unit in recording.info.output.items() if name == axis), None)
     return np.asarray((step_columns / (output.scale if output else 1.0)) ** 2)
