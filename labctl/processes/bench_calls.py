@@ -88,7 +88,7 @@ class BenchCalls:
         if area == "store":
             return self._store.run(name, (), call.arguments)
         if area == "control":
-            return BENCH_ACTS[name].execute(self._context, call.arguments["asked"])
+            return BENCH_ACTS[name].execute(self._context, call.arguments["request"])
         if call.name == "bench.live":
             campaign = call.arguments["campaign"]
             assert isinstance(campaign, int)  # by the form of the call

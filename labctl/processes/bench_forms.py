@@ -35,7 +35,7 @@ def form_of(name: str) -> CallForm:
         return CallForm.of_method(name, TRANSACTIONS[rest])
     if area == "control" and rest in BENCH_ACTS:
         hints = get_type_hints(BENCH_ACTS[rest].in_service)
-        return CallForm(name, [parameter("asked", hints["asked"])], hints["return"])
+        return CallForm(name, [parameter("request", hints["request"])], hints["return"])
     made = _QUESTIONS.get(name)
     return supervisor_form(name) if made is None else made(name)
 

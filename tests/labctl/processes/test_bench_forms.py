@@ -77,7 +77,7 @@ ASKED: dict[str, tuple[object, ...]] = {
 @pytest.mark.parametrize("name", BENCH_ACTS)
 def test_every_act_gets_what_was_asked(name: str) -> None:
     for asked in ASKED[name]:
-        found: Any = arrived(form_of(f"control.{name}"), asked=asked)["asked"]
+        found: Any = arrived(form_of(f"control.{name}"), request=asked)["request"]
         assert (type(found), found) == (type(asked), asked)
         body = getattr(asked, "body", asked)
         assert getattr(found, "body", found).model_fields_set == body.model_fields_set
