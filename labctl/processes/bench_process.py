@@ -47,7 +47,7 @@ log = get_logger()
 ANSWER_WITHIN_S = 0.2
 #: A bench process without a supervisor ends by itself when no campaign has run for so long, s.
 ALONE_S = 60.0
-LOOK_S = 0.5
+POLL_INTERVAL_S = 0.5
 SWITCH_S = 0.0005
 
 
@@ -123,7 +123,7 @@ class BenchProcess:
     def _serve(self) -> None:
         begun = False
         while not self._waker.ending:
-            self._waker.wait(LOOK_S)
+            self._waker.wait(POLL_INTERVAL_S)
             if self._supervision.begin and not begun:
                 begun = True
                 log.info("bench.begun")

@@ -30,7 +30,7 @@ SAID_BY_CHILD: Form[ChildWord] = Form(ChildWord, "what a process of the service 
 SettingsT = TypeVar("SettingsT")
 #: Of linux/prctl.h.
 PR_SET_PDEATHSIG = 1
-LOOK_S = 0.5
+POLL_INTERVAL_S = 0.5
 
 
 class Failed(LabctlError):
@@ -68,7 +68,7 @@ class Child:
         """
         try:
             self.line.send_bytes(Form[object](type(settings), "the settings of a process").encode(settings))
-            while not self.line.poll(LOOK_S):
+            while not self.line.poll(POLL_INTERVAL_S):
                 if gives_up():
                     raise Failed(f"the {self.name} was not ready when it was asked to end; start the service again")
             reply = receive(self.line)

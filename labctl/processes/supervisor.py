@@ -47,7 +47,7 @@ from procedures.execution.signals import ENDING, restore
 
 log = get_logger()
 
-LOOK_S, BEAT_S = 0.25, 0.5
+POLL_INTERVAL_S, BEAT_S = 0.25, 0.5
 #: A bench process that gave no sign of life for so long is ended, its bench stopped, and another one started, s.
 SILENT_S = 3.0
 #: A bench process that starts may take this long to answer for the first time, s.
@@ -191,9 +191,9 @@ class Supervisor:
         if self._guardian is None:
             return None
         while self._guardian.busy:  # it was asked for a stop, and has ended the process itself
-            self._waker.wait(LOOK_S)
+            self._waker.wait(POLL_INTERVAL_S)
         securing = self._guardian.begin()
-        while not securing.wait(LOOK_S):
+        while not securing.wait(POLL_INTERVAL_S):
             systemd.alive()
         return securing
 
@@ -227,7 +227,7 @@ class Supervisor:
                 starting = holder is not None and holder.calls is not None
                 if not starting or self._waker.ending or trying.s > STARTS_WITHIN_S:
                     raise
-            self._waker.wait(LOOK_S)
+            self._waker.wait(POLL_INTERVAL_S)
 
     def _find_bench(self) -> BenchLine | None:
         """Take charge of the bench process that outlived its service; None where there is none that answers.
@@ -265,7 +265,7 @@ class Supervisor:
         if not bench.at_rest:
             self._latch_end()  # written down first: either process may be killed before it is carried out
         bench.tell("end")
-        while not bench.wait(LOOK_S):
+        while not bench.wait(POLL_INTERVAL_S):
             systemd.alive()
             if ending.s > ENDS_WITHIN_S / 2:
                 web.end_soon()
@@ -326,8 +326,8 @@ class Supervisor:
         notified, since, beaten = Elapsed(), Elapsed(), Elapsed()
         while not self._waker.ending:
             since.restart()
-            self._waker.wait(LOOK_S)
-            if since.s > LOOK_S + LATE_S and self._bench is not None:
+            self._waker.wait(POLL_INTERVAL_S)
+            if since.s > POLL_INTERVAL_S + LATE_S and self._bench is not None:
                 self._bench.excuse()
             self._look_after_bench()
             if self._bench is not None and beaten.s > BEAT_S:

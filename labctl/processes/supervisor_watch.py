@@ -20,7 +20,7 @@ from procedures.execution.signals import ENDING
 
 log = get_logger()
 
-LOOK_S = 0.5
+POLL_INTERVAL_S = 0.5
 
 
 def is_stopped(pid: int) -> bool:
@@ -60,7 +60,7 @@ class SupervisorWatch:
         self._over.set()
 
     def _look(self) -> None:
-        while not self._over.wait(LOOK_S):
+        while not self._over.wait(POLL_INTERVAL_S):
             if unheard_end(self._pid):
                 log.error("supervisor.stands_still", supervisor_pid=self._pid, asked_to_end=True)
                 self._end()

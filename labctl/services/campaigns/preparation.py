@@ -8,7 +8,7 @@ from datetime import datetime
 
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
-from instruments.clock import VIRTUAL_START, Clock, PacedClock, attending
+from instruments.clock import VIRTUAL_START, Clock, PacedClock, registered
 from instruments.configuration import configuration_of
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
@@ -166,7 +166,7 @@ def prepare(
     refuse_bad(store, standards_of(bench_file), today, bench_file.name)
     bench = opened or open_bench(bench_file, clock, wire=wire)
     try:
-        with attending(clock):
+        with registered(clock):
             identities = _identities(bench, clock)
         plan = make_plan(recipe, _limits(bench, bench_file, times_on_bench(store, bench_file)), clip=clip)
         bench_file = _with_reported(store, bench_file, identities)
