@@ -44,9 +44,8 @@ TINY_S = 1e-9
 # processes.
 MAGIC, SPEED, UNTIL, COUNTED, END, FIRST_PLACE = range(6)  # END: where the places that were ever taken end
 THREADS = 120  #: places for registered threads
-PROCESS, THREAD, LAST_HEARTBEAT, PLACE = range(
-    4
-)  # of a place: 0 where it is free; the system's number; when it read the clock
+# Of a place: 0 where it is free; the number by the system; when it read the clock.
+PROCESS, THREAD, LAST_HEARTBEAT, PLACE = range(4)
 SIZE = 8 * (FIRST_PLACE + PLACE * THREADS)
 WRITTEN = int.from_bytes(b"labclk02", "big")
 #: Tries to read a count that its owner is writing, which takes it about a microsecond.

@@ -8,7 +8,7 @@ import string
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
-from labctl.exports.c_code.memory import memory_body
+from labctl.exports.c_code.lag_and_hysteresis import memory_body
 from labctl.exports.c_code.nodes import temperature_nodes
 from labctl.exports.c_code.orientation import orientation_body
 from labctl.exports.c_code.rounding_error import rounding_line

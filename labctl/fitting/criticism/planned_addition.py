@@ -139,16 +139,16 @@ def _joined_channels(one: ReducedRecording, two: ReducedRecording) -> Channels:
 def _joined_history(
     first: TemperatureHistory, second: TemperatureHistory, counted: Mapping[str, int], shift_s: float
 ) -> TemperatureHistory:
-    courses = {
-        number + counted["run"]: replace(course, begin_s=course.begin_s + shift_s)
-        for number, course in second.courses.items()
+    profiles = {
+        number + counted["run"]: replace(profile, begin_s=profile.begin_s + shift_s)
+        for number, profile in second.profiles.items()
     }
     numbers = {
         name: (*first.numbers(name), *(number + counted[name] for number in second.numbers(name))) for name in counted
     }
     low, high = zip(first.span_c, second.span_c, strict=True)
     return TemperatureHistory(
-        {**first.courses, **courses}, numbers, max(first.rate_dps, second.rate_dps), (min(low), max(high)),
+        {**first.profiles, **profiles}, numbers, max(first.rate_dps, second.rate_dps), (min(low), max(high)),
         first.thermometer and second.thermometer, first.middle_s,
     )  # fmt: skip
 

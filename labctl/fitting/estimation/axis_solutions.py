@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size, with_prior
+from labctl.fitting.data.earth_rate import turning_columns, turning_size_dps, with_known_size, with_prior
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.mounting_angles import leaning_rates
 from labctl.fitting.data.rate_profile import TIME_CONSTANT

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Argument, Channels
-from labctl.fitting.data.earth import with_prior
+from labctl.fitting.data.earth_rate import with_prior
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Reference, kind_of
 from labctl.fitting.estimation.requirements import require_channels

@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Argument
 from labctl.fitting.data.covered import Covered
-from labctl.fitting.data.earth import turning_size_dps
+from labctl.fitting.data.earth_rate import turning_size_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.shifts import KINDS
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design

@@ -19,7 +19,7 @@ from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION
 from labctl.store.paging import parts_of
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement, Release, Withdrawal
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.drafts.marks import mark_fitted
+from labctl.store.repositories.drafts.transitions import mark_fitted
 from labctl.store.repositories.releases import waits
 from labctl.store.repositories.units import SEEN
 from labctl.store.repositories.withdrawals import withdraw_of_version
