@@ -16,10 +16,10 @@ from labctl.answers.campaigns import CampaignResponse, ReasonRequest
 from labctl.answers.live import LiveHistoryResponse, LiveStateResponse
 from labctl.errors import BenchSilent, Conflict, LabctlError, NotStopped
 from labctl.log import get_logger
-from labctl.processes.bench_forms import Beat, form_of
-from labctl.processes.calls import Caller
+from labctl.processes.bench_methods import Beat, method_of
 from labctl.processes.documents import receive, value_of
 from labctl.processes.liveness import Elapsed
+from labctl.processes.rpc import RpcClient
 from labctl.processes.settings import CALLS
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.stops import describe_stop, late_stop
@@ -50,7 +50,7 @@ class RemoteWriter:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._caller = Caller(folder / CALLS, WRITES_S, form_of)
+        self._caller = RpcClient(folder / CALLS, WRITES_S, method_of)
 
     def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction there; returns or raises what it did. Raises BenchSilent."""
@@ -79,7 +79,7 @@ class RemoteControl:
         """`may_run`: whether a campaign runs, or may; `last_live`: how it was when the bench process answered last."""
         self._bench, self._place = bench, place
         self._may_run, self._last_live = may_run, last_live
-        self._calls = Caller(folder / CALLS, ANSWER_S, form_of)
+        self._calls = RpcClient(folder / CALLS, ANSWER_S, method_of)
 
     def bench_of(self, _: CampaignStart) -> BenchFile:
         """Return the bench of the bench process. Raises Conflict without one."""
@@ -169,7 +169,7 @@ class RemoteBench:
         self.bench = bench
         self._place = None if bench is None or not location else place_of(location, bench.name)
         self.control = RemoteControl(folder, bench, self._place, self._may_run, self._last_of)
-        self._caller = Caller(folder / CALLS, ANSWER_S, form_of)
+        self._caller = RpcClient(folder / CALLS, ANSWER_S, method_of)
         self._listeners = ChangeListeners()
         self._beat = Beat(running=None, stops=False, schedule_trouble="")
         self._heard = Elapsed()
@@ -301,7 +301,7 @@ class RemoteBench:
 
     def _hear(self) -> None:
         with self._caller.connect() as connection:
-            form = form_of("watch")
+            form = method_of("watch")
             connection.send_bytes(form.call())
             while not self._over.is_set():
                 if not connection.poll(SILENT_S):

@@ -26,12 +26,12 @@ from labctl.errors import BenchSilent, BenchUnconfirmed, Conflict, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
 from labctl.processes.bench_line import EXCUSED_S, BenchLine, bench_process_of
-from labctl.processes.call_forms import supervisor_form
-from labctl.processes.calls import Caller
 from labctl.processes.children import Child
 from labctl.processes.guardian import Guardian, GuardianStop
 from labctl.processes.listening import Listening, listening
 from labctl.processes.liveness import Elapsed, Restarts, Silence
+from labctl.processes.rpc import RpcClient
+from labctl.processes.rpc_methods import supervisor_method
 from labctl.processes.settings import CALLS, BenchSettings, ServeRequest, WebSettings, ahead_of
 from labctl.processes.supervisor_watch import is_stopped
 from labctl.processes.waker import Waker
@@ -98,7 +98,7 @@ def _ask_for_address(request: ServeRequest) -> None:
         if holder is None or holder.calls is None:
             return
         try:
-            Caller(Path(holder.calls) / CALLS, ADDRESS_S, supervisor_form).call("address.give_back")
+            RpcClient(Path(holder.calls) / CALLS, ADDRESS_S, supervisor_method).call("address.give_back")
         except BenchSilent:
             log.error("child.silent", child="bench", child_pid=holder.pid, silent_s=ADDRESS_S)
             end_process(ProcessId.of(holder.pid))

@@ -64,17 +64,17 @@ class ForegroundControl:
         """Carry out an act in this process."""
         return act.in_foreground(self, context, request)
 
-    def run_campaign(self, start: CampaignStart) -> CampaignResponse:
+    def run_campaign(self, request: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
-        request = StartRequest(
-            recipe=start.body.recipe, bench=start.bench, clip=start.body.clip, hide=start.body.hide, fit=start.body.fit,
-            speed=start.speed, seed=start.seed, simulated_start=start.simulated_start,
-            confirmed_by=start.body.confirmed_by, checks=start.body.checks,
+        start_request = StartRequest(
+            recipe=request.body.recipe, bench=request.bench, clip=request.body.clip, hide=request.body.hide, fit=request.body.fit,
+            speed=request.speed, seed=request.seed, simulated_start=request.simulated_start,
+            confirmed_by=request.body.confirmed_by, checks=request.body.checks,
         )  # fmt: skip
         with self._open_terminal() as terminal:
             answer = run_here(
-                self._database, request, terminal.observe, terminal.attend, terminal.say, terminal.ask_clear,
-                wire_log=start.wire_log,
+                self._database, start_request, terminal.observe, terminal.attend, terminal.say, terminal.ask_clear,
+                wire_log=request.wire_log,
             )  # fmt: skip
         return self._with_drafts(answer)
 
