@@ -13,7 +13,7 @@ from benchmarks.machine import describe
 from benchmarks.served import Served, serve
 
 WATCHERS = 50
-LOOK_S = 0.25
+POLL_INTERVAL_S = 0.25
 DURATION_S, RATES = 4, 11
 #: Three channels at 125 readings per second, in real time; only the soak is short.
 RECIPE = f"""
@@ -57,7 +57,7 @@ async def _campaign(service: Served, watchers: int) -> dict[str, float]:
         path = f"/api/campaigns/{status['id']}"
         looking = [asyncio.create_task(_look(service.port, path)) for _ in range(watchers)]
         while not (status := (await client.get(path)).json())["ended_at"]:
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(POLL_INTERVAL_S)
         heard = sum(await asyncio.gather(*looking))
         taken = service.processor_s() - before
         recording = next(iter(status["recordings"].values()))

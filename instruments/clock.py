@@ -19,8 +19,8 @@ from contextlib import AbstractContextManager, nullcontext
 from datetime import UTC, datetime, timedelta
 from typing import Protocol, runtime_checkable
 
-#: A thread that attends to a clock reads it this often, s of real time, unless the clock says more often.
-LOOK_EVERY_S = 0.004
+#: A thread that is registered with a clock reads it this often, s of real time, unless the clock says more often.
+HEARTBEAT_INTERVAL_S = 0.004
 
 
 class Clock(Protocol):
@@ -44,17 +44,17 @@ class Clock(Protocol):
 
 
 @runtime_checkable
-class AttendedClock(Protocol):
+class PausingClock(Protocol):
     """A clock that may stand still while threads on which the bench depends are late."""
 
     @property
-    def stands_in_stalls(self) -> bool:
+    def pauses_in_stalls(self) -> bool:
         """Whether it does."""
         ...
 
     @property
-    def look_every_s(self) -> float:
-        """How often a thread that attends reads the clock, s of real time."""
+    def heartbeat_interval_s(self) -> float:
+        """How often a registered thread reads the clock, s of real time."""
         ...
 
     @property
@@ -62,24 +62,24 @@ class AttendedClock(Protocol):
         """Clock time that bytes may take from one process to the other while no thread counts as late."""
         ...
 
-    def attending(self) -> AbstractContextManager[Callable[[], None]]:
-        """Make the clock wait for this thread: it calls what is given at least every `LOOK_EVERY_S`."""
+    def registered(self) -> AbstractContextManager[Callable[[], None]]:
+        """Make the clock wait for this thread, which calls its heartbeat at least every `HEARTBEAT_INTERVAL_S`."""
         ...
 
 
-def stands_in_stalls(clock: Clock) -> bool:
+def pauses_in_stalls(clock: Clock) -> bool:
     """Return whether a clock of real or scaled time stands still while this computer does not run the bench."""
-    return isinstance(clock, AttendedClock) and clock.stands_in_stalls
+    return isinstance(clock, PausingClock) and clock.pauses_in_stalls
 
 
 def latency_s(clock: Clock) -> float:
     """Return how long bytes may be on their way because threads of a shared clock take turns, s of the clock."""
-    return clock.latency_s if isinstance(clock, AttendedClock) else 0.0
+    return clock.latency_s if isinstance(clock, PausingClock) else 0.0
 
 
-def look_every_s(clock: Clock) -> float:
-    """Return how often a thread that attends to a clock reads it, s of real time."""
-    return clock.look_every_s if isinstance(clock, AttendedClock) else LOOK_EVERY_S
+def heartbeat_interval_s(clock: Clock) -> float:
+    """Return how often a thread that is registered with a clock reads it, s of real time."""
+    return clock.heartbeat_interval_s if isinstance(clock, PausingClock) else HEARTBEAT_INTERVAL_S
 
 
 def wait_s(clock: Clock, timeout_s: float) -> float:
@@ -88,7 +88,7 @@ def wait_s(clock: Clock, timeout_s: float) -> float:
     Where the clock waits for this thread that is less than the time-out of `timeout_s` clock seconds: ask again until
     `Deadline.is_over`.
     """
-    return look_every_s(clock) if stands_in_stalls(clock) else clock.wall_s(timeout_s)
+    return heartbeat_interval_s(clock) if pauses_in_stalls(clock) else clock.wall_s(timeout_s)
 
 
 def processor_s() -> float:
@@ -111,7 +111,7 @@ class Deadline:
     @property
     def is_over(self) -> bool:
         """Whether the time-out, over in real time, is over by the clock too, which may have stood still meanwhile."""
-        return not stands_in_stalls(self._clock) or self._clock.now_s() >= self._end_s
+        return not pauses_in_stalls(self._clock) or self._clock.now_s() >= self._end_s
 
 
 #: When virtual time begins where no other instant is stated.
@@ -132,12 +132,12 @@ class ScaledClock:
     is not positive, and for a start without a time zone.
     """
 
-    #: Whether the clock stands still while this computer does not run a thread that attends to it.
-    stands_in_stalls = False
+    #: Whether the clock stands still while this computer does not run a thread that is registered with it.
+    pauses_in_stalls = False
     #: Clock time that bytes may take from one process to the other while no thread counts as late.
     latency_s = 0.0
-    #: How often a thread that attends reads the clock, s of real time.
-    look_every_s = LOOK_EVERY_S
+    #: How often a registered thread reads the clock, s of real time.
+    heartbeat_interval_s = HEARTBEAT_INTERVAL_S
     #: Least useful time-out of a client library, s of real time, at every speed.
     MIN_WALL_TIMEOUT_S = 0.05
 
@@ -161,14 +161,17 @@ class ScaledClock:
     def wall_s(self, duration_s: float) -> float:
         return max(duration_s / self.speed, self.MIN_WALL_TIMEOUT_S)
 
-    def attending(self) -> AbstractContextManager[Callable[[], None]]:
-        """Make the clock wait for this thread, if it is one that waits: call what is given every `LOOK_EVERY_S`."""
+    def registered(self) -> AbstractContextManager[Callable[[], None]]:
+        """Make a clock that pauses wait for this thread, which calls the heartbeat that it is given.
+
+        At least every `HEARTBEAT_INTERVAL_S`.
+        """
         return nullcontext(_nothing)
 
 
-def attending(clock: Clock) -> AbstractContextManager[Callable[[], None]]:
-    """Make a clock wait for this thread as `ScaledClock.attending` does; virtual time waits for every thread."""
-    return clock.attending() if isinstance(clock, AttendedClock) else nullcontext(_nothing)
+def registered(clock: Clock) -> AbstractContextManager[Callable[[], None]]:
+    """Make a clock wait for this thread as `ScaledClock.registered` does; virtual time waits for every thread."""
+    return clock.registered() if isinstance(clock, PausingClock) else nullcontext(_nothing)
 
 
 class SystemClock(ScaledClock):

@@ -65,8 +65,8 @@ class DatasheetFigure:
     @property
     def text(self) -> str:
         """The figure, its convention, where that is from, and what follows from it."""
-        name, _, unit = self.name.rpartition("_")
-        words = f"{name.replace('_', ' ')} {self.value:g} {'deg/s' if unit == 'dps' else unit}"
+        name, _, unit_symbol = self.name.rpartition("_")
+        words = f"{name.replace('_', ' ')} {self.value:g} {'deg/s' if unit_symbol == 'dps' else unit_symbol}"
         by = f" ({self.source})" if self.source else ""
         return f"{words}, {self.convention}{by}: {_U_OVER_FIGURE[self.convention][1]}"
 

@@ -50,7 +50,7 @@ def serial_ports() -> list[PortInfo]:
 
 
 #: A port is read this often, s.
-LOOK_S = 0.05
+POLL_INTERVAL_S = 0.05
 HOST_S = 1.0
 ROOM_C = 25.0
 #: Stands for a serial number while the unit is asked for its own.
@@ -189,8 +189,8 @@ def _exchange(ports: Ports, path: str, baudrate: int, asks: bytes, wait_s: float
 def _listen(port: SerialPort, wait_s: float, clock: Clock) -> bytes:
     """Return what comes within a time, counted in looks: on a busy computer each of them takes longer."""
     data = b""
-    for _ in range(math.ceil(wait_s / LOOK_S)):
-        clock.sleep(LOOK_S)
+    for _ in range(math.ceil(wait_s / POLL_INTERVAL_S)):
+        clock.sleep(POLL_INTERVAL_S)
         if waiting := port.in_waiting:
             data += port.read(waiting)
     return data

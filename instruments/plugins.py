@@ -84,19 +84,19 @@ def installed() -> tuple[Plugin, ...]:
     """
     from importlib import metadata  # noqa: PLC0415  a tenth of the start of a robot's program, which asks for no plug-in
 
-    found: dict[str, list[Plugin]] = {}
+    by_distribution: dict[str, list[Plugin]] = {}
     for distribution in metadata.distributions():
         try:
             text = distribution.read_text("entry_points.txt") or ""
-            if f"[{PREFIX}" in text and (name := distribution.metadata["Name"]) not in found:
-                found[name] = [
+            if f"[{PREFIX}" in text and (name := distribution.metadata["Name"]) not in by_distribution:
+                by_distribution[name] = [
                     Plugin(each.group, each.name, each.value, name, distribution.version)
                     for each in distribution.entry_points
                     if each.group.startswith(PREFIX)
                 ]
         except Exception as error:  # noqa: BLE001  the metadata of others may hold anything
             _log.warning("entry points of %s cannot be read: %s; it is left out", distribution, summary(error))
-    each_of = [plugin for plugins in found.values() for plugin in plugins]
+    each_of = [plugin for plugins in by_distribution.values() for plugin in plugins]
     return tuple(sorted(each_of, key=lambda p: (not p.is_own, p.distribution, p.name)))
 
 
@@ -132,21 +132,21 @@ class PluginGroup(Generic[PluginT]):
 
         A name of labctl's own stays labctl's own, also where another distribution has it.
         """
-        found = self._by_name.get(name)
-        if not found:
+        candidates = self._by_name.get(name)
+        if not candidates:
             raise UnknownPlugin(self.unknown(name))
-        if len(found) > 1 and not found[0].is_own:
-            raise PluginError(self._doubled(found))
-        return found[0]
+        if len(candidates) > 1 and not candidates[0].is_own:
+            raise PluginError(self._doubled(candidates))
+        return candidates[0]
 
     def get(self, name: str) -> PluginT:
         """Return the object of a name, imported at first use; raises UnknownPlugin, PluginError."""
         if name not in self._loaded:
             self._loaded[name] = self._load(self.plugin(name))
-        found = self._loaded[name]
-        if isinstance(found, PluginError):
-            raise found
-        return found
+        loaded = self._loaded[name]
+        if isinstance(loaded, PluginError):
+            raise loaded
+        return loaded
 
     def all(self) -> dict[str, PluginT]:
         """Return every object by name, labctl's own first; those that cannot be used are logged, once, and left out."""
@@ -167,8 +167,8 @@ class PluginGroup(Generic[PluginT]):
         """
         owner: dict[str, str] = {}
         whole: dict[str, PartT] = {}
-        for name, found in self.all().items():
-            for part_name, part in parts(found):
+        for name, plugin_object in self.all().items():
+            for part_name, part in parts(plugin_object):
                 if part_name in owner:
                     plugin = self.plugin(name)
                     self.report(
@@ -181,7 +181,7 @@ class PluginGroup(Generic[PluginT]):
 
     def status(self) -> list[tuple[Plugin, str]]:
         """Return every entry point with why it cannot be used, empty where it can; everything is imported."""
-        found: list[tuple[Plugin, str]] = []
+        reasons: list[tuple[Plugin, str]] = []
         for name, plugins in self._by_name.items():
             try:
                 self.get(name)
@@ -189,8 +189,8 @@ class PluginGroup(Generic[PluginT]):
             except PluginError as error:
                 why = str(error)
             doubled = self._doubled(plugins) if len(plugins) > 1 else ""
-            found += [(plugin, doubled or why) if plugin is not plugins[0] else (plugin, why) for plugin in plugins]
-        return found
+            reasons += [(plugin, doubled or why) if plugin is not plugins[0] else (plugin, why) for plugin in plugins]
+        return reasons
 
     def problems(self) -> list[str]:
         """Return one line for each plug-in that cannot be used; everything is imported."""
@@ -217,11 +217,11 @@ class PluginGroup(Generic[PluginT]):
             return ""
         return "; labctl's own are not registered either: install labctl again (`make install`)"
 
-    def _doubled(self, found: Sequence[Plugin]) -> str:
-        each = " and ".join(f"{plugin.release} ({plugin.target})" for plugin in found)
-        kept = f"{OWN}'s own is used" if found[0].is_own else "none of them is used"
+    def _doubled(self, plugins: Sequence[Plugin]) -> str:
+        each = " and ".join(f"{plugin.release} ({plugin.target})" for plugin in plugins)
+        kept = f"{OWN}'s own is used" if plugins[0].is_own else "none of them is used"
         return (
-            f"entry point {found[0].name!r} in group {self.group} is of {each}; {kept}: uninstall all but one, "
+            f"entry point {plugins[0].name!r} in group {self.group} is of {each}; {kept}: uninstall all but one, "
             "or ask for another name"
         )
 
@@ -235,9 +235,9 @@ class PluginGroup(Generic[PluginT]):
 def instance_of(kind: type[PluginT]) -> Callable[[object], PluginT]:
     """Return a check that an object is an instance of a class."""
 
-    def check(found: object) -> PluginT:
-        if not isinstance(found, kind):
-            raise TypeError(f"{found!r} is not a {kind.__module__}.{kind.__qualname__}"[:LONGEST_ERROR])
-        return found
+    def check(loaded: object) -> PluginT:
+        if not isinstance(loaded, kind):
+            raise TypeError(f"{loaded!r} is not a {kind.__module__}.{kind.__qualname__}"[:LONGEST_ERROR])
+        return loaded
 
     return check

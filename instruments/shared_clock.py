@@ -1,7 +1,7 @@
 """One scaled clock for several processes of this computer: a simulator, and those that drive its instruments.
 
 The process that serves the simulated instruments owns the clock and counts its time in a small file, which the others
-map into their memory. Threads on which the bench depends attend to it: they read it every few milliseconds.
+map into their memory. Threads on which the bench depends are registered with it: they read it every few milliseconds.
 While one of them is late, because this computer does not run it, the clock stands still for all processes. A time-out,
 a ramp or a stream so lasts as long, in the time of the bench, as on a computer that has nothing else to do.
 """
@@ -25,11 +25,11 @@ from instruments.clock import Clock, RealWall, ScaledClock, SystemClock, Wall
 
 log = logging.getLogger(__name__)
 
-#: The clock stands still while a thread that attends is later than this: s of the clock, and at most s of real time.
+#: The clock stands still while a registered thread is later than this: s of the clock, and at most s of real time.
 #: The first is the latency of all links, and so below what makes a stream count as late.
 LATE_CLOCK_S, LATE_S = 0.06, 0.012
-#: A thread that attends reads the clock this often in that time.
-LOOKS = 3
+#: A registered thread reads the clock this often in that time.
+HEARTBEATS = 3
 #: The process of a thread that is later than `DOUBTED_S` may have ended. From `GIVEN_UP_S` on no thread is waited for
 #: that is halted, or waits for something else than this computer, and from `MAX_HELD_UP_S` on none at all.
 DOUBTED_S, GIVEN_UP_S, MAX_HELD_UP_S = 0.25, 5.0, 120.0
@@ -43,8 +43,9 @@ TINY_S = 1e-9
 # The file: 64-bit values in the order of this computer. Real time is that of the monotonic clock, the same for all
 # processes.
 MAGIC, SPEED, UNTIL, COUNTED, END, FIRST_PLACE = range(6)  # END: where the places that were ever taken end
-THREADS = 120  #: places for threads that attend
-PROCESS, THREAD, LOOKED, PLACE = range(4)  # of a place: 0 where it is free; the system's number; when it read the clock
+THREADS = 120  #: places for registered threads
+# Of a place: 0 where it is free; the number by the system; when it read the clock.
+PROCESS, THREAD, LAST_HEARTBEAT, PLACE = range(4)
 SIZE = 8 * (FIRST_PLACE + PLACE * THREADS)
 WRITTEN = int.from_bytes(b"labclk02", "big")
 #: Tries to read a count that its owner is writing, which takes it about a microsecond.
@@ -94,7 +95,7 @@ class ClockFile:
 
     @property
     def late_s(self) -> float:
-        """How late a thread that attends may be without the clock standing still, s of real time."""
+        """How late a registered thread may be without the clock standing still, s of real time."""
         return min(LATE_S, LATE_CLOCK_S / self.speed)
 
     def count(self) -> tuple[float, float] | None:
@@ -115,12 +116,12 @@ class ClockFile:
         self._times[UNTIL] = until_s
 
     def take_place(self, now_s: float) -> int:
-        """Return a place for this thread, which attends from `now_s` on; raises OSError where there is none."""
+        """Return a place for this thread, which is registered from `now_s` on; raises OSError where there is none."""
         fcntl.flock(self._descriptor, fcntl.LOCK_EX)
         try:
             for place in range(FIRST_PLACE, FIRST_PLACE + PLACE * THREADS, PLACE):
                 if not self._numbers[place]:
-                    self.look(place, now_s)
+                    self.heartbeat(place, now_s)
                     self._numbers[place + THREAD] = threading.get_native_id()
                     self._numbers[place + PROCESS] = os.getpid()
                     self._numbers[END] = max(self._numbers[END], place + PLACE)
@@ -134,16 +135,16 @@ class ClockFile:
         self._numbers[place] = 0
 
     @property
-    def attending(self) -> int:
-        """How many threads attend, of all processes."""
+    def registered(self) -> int:
+        """How many threads are registered, of all processes."""
         return sum(bool(self._numbers[place]) for place in range(FIRST_PLACE, self._numbers[END], PLACE))
 
-    def look(self, place: int, now_s: float) -> None:
+    def heartbeat(self, place: int, now_s: float) -> None:
         """Note that a thread read the clock at real time `now_s`."""
-        self._times[place + LOOKED] = now_s
+        self._times[place + LAST_HEARTBEAT] = now_s
 
     def horizon_s(self, now_s: float) -> tuple[float, bool]:
-        """Return until when time may be counted, at most `now_s`: no thread that attends is late by then.
+        """Return until when time may be counted, at most `now_s`: no registered thread is late by then.
 
         And whether a thread is no longer waited for: it may be that of the owner, which then counts nothing.
         """
@@ -151,14 +152,14 @@ class ClockFile:
         for place in range(FIRST_PLACE, self._numbers[END], PLACE):
             if not (process := self._numbers[place]):
                 continue
-            looked_s = self._times[place + LOOKED]
-            late_s = now_s - looked_s
-            if looked_s + allowed_s >= horizon_s:
+            heartbeat_s = self._times[place + LAST_HEARTBEAT]
+            late_s = now_s - heartbeat_s
+            if heartbeat_s + allowed_s >= horizon_s:
                 continue
             if late_s > DOUBTED_S and not _lives(process):
                 self.leave_place(place)
             elif self._is_waited_for(self._numbers[place + THREAD], late_s):
-                horizon_s = looked_s + allowed_s
+                horizon_s = heartbeat_s + allowed_s
             else:
                 is_one_given_up = True
         return horizon_s, is_one_given_up
@@ -208,16 +209,16 @@ class SharedClock(ScaledClock):
     `MAX_HELD_UP_S`.
     """
 
-    stands_in_stalls = True
+    pauses_in_stalls = True
 
     def __init__(self, file: ClockFile, *, owns: bool = False, wall: Wall | None = None) -> None:
         super().__init__(file.speed)
-        self.look_every_s = file.late_s / LOOKS
-        self.latency_s = 2 * (self.look_every_s + file.late_s) * file.speed
+        self.heartbeat_interval_s = file.late_s / HEARTBEATS
+        self.latency_s = 2 * (self.heartbeat_interval_s + file.late_s) * file.speed
         self._file, self._owns, self._wall = file, owns, wall or RealWall()
         self._lock = threading.RLock()  # a signal handler may read the clock while its thread does
         self._never = threading.Condition()
-        self._here = threading.local()  # its `place`: that of the present thread, where it attends
+        self._here = threading.local()  # its `place`: that of the present thread, where it is registered
         self._counted_s = 0.0  # s of real time; never less than was returned before
         self._read_s = -math.inf  # real time of the last reading
         self._zero_s = self._counted()
@@ -230,38 +231,38 @@ class SharedClock(ScaledClock):
     def now_s(self) -> float:
         now_s = (self._counted() - self._zero_s) * self.speed
         if (place := self._place) is not None:
-            self._file.look(place, self._wall.now_s())
+            self._file.heartbeat(place, self._wall.now_s())
         return now_s
 
     def sleep(self, duration_s: float) -> None:
         until_s = self.now_s() + duration_s
-        step_s = STEP_S if self._place is None else self.look_every_s
+        step_s = STEP_S if self._place is None else self.heartbeat_interval_s
         while (left_s := until_s - self.now_s()) > TINY_S:
             with self._never:
                 self._wall.wait(self._never, min(left_s / self.speed, step_s))
 
     @contextmanager
-    def attending(self) -> Iterator[Callable[[], None]]:
-        """Make the clock wait for this thread, which reads it, sleeps on it or calls what it is given all the time.
+    def registered(self) -> Iterator[Callable[[], None]]:
+        """Make the clock wait for this thread, which reads it, sleeps on it or calls its heartbeat all the time.
 
         Whatever else it does, it takes at most `late_s` of real time from the clock.
         """
         if self._place is not None:
-            yield self._look
+            yield self._heartbeat
             return
         self._here.place = self._file.take_place(self._wall.now_s())
         try:
-            yield self._look
+            yield self._heartbeat
         finally:
             self._file.leave_place(self._here.place)
             self._here.place = None
 
     @property
     def _place(self) -> int | None:
-        """The place of this thread, where it attends."""
+        """The place of this thread, where it is registered."""
         return getattr(self._here, "place", None)
 
-    def _look(self) -> None:
+    def _heartbeat(self) -> None:
         self.now_s()
 
     def _counted(self) -> float:

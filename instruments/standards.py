@@ -80,9 +80,9 @@ class Standard(BaseModel):
 
     @model_validator(mode="after")
     def _one_uncertainty(self) -> Standard:
-        given = [name for name in ("u", "expanded", "half_width") if getattr(self, name) is not None]
-        if len(given) != 1:
-            stated = " and ".join(given) or "none"
+        names = [name for name in ("u", "expanded", "half_width") if getattr(self, name) is not None]
+        if len(names) != 1:
+            stated = " and ".join(names) or "none"
             raise ValueError(
                 f"standard {self.quantity}: {stated} of the keys u, expanded and half_width are given; give "
                 f"exactly one, in {UNITS[self.quantity][0]}"

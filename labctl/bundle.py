@@ -152,25 +152,27 @@ class Bundle(ClosedAtEnd):
                 "or export a bundle once the unit has a certified version"
             )
         content = _member(self._path, self._archive, entry.file, MAX_BYTES)
-        if (found := hashlib.sha256(content).hexdigest()) != entry.sha256:
+        if (sha256 := hashlib.sha256(content).hexdigest()) != entry.sha256:
             raise BadCalibrationFile(
-                f"{self._path}: {entry.file} of unit {serial} has the SHA-256 {found}, the manifest names "
+                f"{self._path}: {entry.file} of unit {serial} has the SHA-256 {sha256}, the manifest names "
                 f"{entry.sha256}: the file was changed; get the bundle again"
             )
         return content
 
     def calibration(self, serial: str) -> Calibration:
         """Return the calibration of a unit. Raises as `content`, and CalibrationOverdue past its due date."""
-        found = read_calibration(self.content(serial))
-        certification = found.certification
-        if found.serial != serial or certification is None:
+        calibration = read_calibration(self.content(serial))
+        certification = calibration.certification
+        if calibration.serial != serial or certification is None:
             raise BadCalibrationFile(
-                f"{self._path}: the calibration of unit {serial} is that of unit {found.serial}, or is not certified; "
-                "export the bundle again"
+                f"{self._path}: the calibration of unit {serial} is that of unit {calibration.serial}, or is not "
+                "certified; export the bundle again"
             )
         if certification.is_overdue(self._clock.utc()):
-            raise CalibrationOverdue(certification.warning(f"{serial} version {found.version}", self._clock.utc()))
-        return found
+            raise CalibrationOverdue(
+                certification.warning(f"{serial} version {calibration.version}", self._clock.utc())
+            )
+        return calibration
 
     def compensator(self, serial: str, outside: Outside = "clamp") -> Compensator:
         """Return what corrects the output of a unit. Raises as `calibration`."""
@@ -201,8 +203,8 @@ def _refuse_unsigned(path: Path, archive: zipfile.ZipFile, manifest: bytes, key:
             "the seal key"
         )
     try:
-        said = json.loads(_member(path, archive, SIGNATURE, MAX_BYTES))
-        signature, by = bytes.fromhex(said["signature"]), str(said["fingerprint"])
+        signature_document = json.loads(_member(path, archive, SIGNATURE, MAX_BYTES))
+        signature, by = bytes.fromhex(signature_document["signature"]), str(signature_document["fingerprint"])
     except (ValueError, LookupError, TypeError) as error:
         raise BadCalibrationFile(f"{path}: {SIGNATURE} is not whole; get the bundle again") from error
     if not key.fits(signature, signed_digest(manifest)):
@@ -214,33 +216,35 @@ def _refuse_unsigned(path: Path, archive: zipfile.ZipFile, manifest: bytes, key:
 
 def _manifest(path: Path, content: bytes) -> BundleManifest:
     try:
-        said = json.loads(content)
-        if said["format"] != FORMAT:
-            raise ValueError(f"the format is {str(said['format'])[:80]!r}, but must be {FORMAT!r}")
-        due = said["expires_at"]
+        document = json.loads(content)
+        if document["format"] != FORMAT:
+            raise ValueError(f"the format is {str(document['format'])[:80]!r}, but must be {FORMAT!r}")
+        due = document["expires_at"]
         return BundleManifest(
-            None if said["model"] is None else str(said["model"]), _instant(said["made_at"]),
+            None if document["model"] is None else str(document["model"]), _instant(document["made_at"]),
             None if due is None else _instant(due),
             tuple(
                 BundleEntry(str(each["serial"]), int(each["version"]), str(each["file"]), str(each["sha256"]))
-                for each in said["calibrations"]
+                for each in document["calibrations"]
             ),
-            tuple(_withdrawn(each) for each in said["withdrawn"]),
+            tuple(_withdrawn(each) for each in document["withdrawn"]),
         )  # fmt: skip
     except (ValueError, LookupError, TypeError, RecursionError) as error:
         raise BadCalibrationFile(f"{path}: {MANIFEST} is not whole ({error}); get the bundle again") from error
 
 
-def _withdrawn(said: Mapping[str, Any]) -> WithdrawnEntry:
-    notice = Withdrawn(_instant(said["at"]), str(said["by"]), str(said["reason"]), str(said["certificate"]))
-    return WithdrawnEntry(str(said["serial"]), int(said["version"]), notice)
+def _withdrawn(document: Mapping[str, Any]) -> WithdrawnEntry:
+    notice = Withdrawn(
+        _instant(document["at"]), str(document["by"]), str(document["reason"]), str(document["certificate"])
+    )
+    return WithdrawnEntry(str(document["serial"]), int(document["version"]), notice)
 
 
 def _instant(text: Any) -> datetime:
-    found = datetime.fromisoformat(text)
-    if found.tzinfo is None:
+    instant = datetime.fromisoformat(text)
+    if instant.tzinfo is None:
         raise ValueError(f"{text!r} has no time zone")
-    return found.astimezone(UTC)
+    return instant.astimezone(UTC)
 
 
 def _said(at: datetime) -> str:

@@ -92,8 +92,8 @@ class Compensator:
         self._low_c, self._high_c = calibration.temperature_c
         self._slow, self._fast = output_limits_dps(calibration)
         units = [calibration.output[axis] for axis in self.axes]
-        self._offset = np.array([unit.offset for unit in units])
-        self._scale = np.array([unit.scale for unit in units])
+        self._offset = np.array([output.offset for output in units])
+        self._scale = np.array([output.scale for output in units])
         rest, self._memory = split_memory(calibration.fitted, self.axes)
         self._model = rest
         self._correct = correction(rest, self.axes)

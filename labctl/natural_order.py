@@ -21,9 +21,9 @@ def natural_key(text: str) -> str:
     """
     zeros: list[str] = []
 
-    def with_length(found: re.Match[str]) -> str:
-        digits = found.group().lstrip("0") or "0"
-        zeros.append(f"{len(found.group()) - len(digits):0{_LENGTH_DIGITS}d}")
+    def with_length(match: re.Match[str]) -> str:
+        digits = match.group().lstrip("0") or "0"
+        zeros.append(f"{len(match.group()) - len(digits):0{_LENGTH_DIGITS}d}")
         return f"{len(digits):0{_LENGTH_DIGITS}d}{digits}"
 
     key = _NUMBER.sub(with_length, text)

@@ -108,8 +108,8 @@ class ServiceConnection(ClosedAtEnd):
 
 def _retry_after_s(response: httpx.Response) -> float:
     """Return after how long a service that is busy wants to be asked again, s."""
-    said = response.headers.get("retry-after", "")
-    return float(said) if said.isascii() and said.isdigit() else RETRY_AFTER_S
+    value = response.headers.get("retry-after", "")
+    return float(value) if value.isascii() and value.isdigit() else RETRY_AFTER_S
 
 
 def refusal(response: httpx.Response) -> ServiceRefused:
@@ -139,5 +139,5 @@ def _without_none(query: dict[str, str | int | float | None]) -> dict[str, str |
 
 def query_string(**values: str | int | None) -> str:
     """Return a query string; values that are None or empty are left out."""
-    given = {name: value for name, value in values.items() if value not in (None, "")}
-    return f"?{urlencode(given)}" if given else ""
+    parameters = {name: value for name, value in values.items() if value not in (None, "")}
+    return f"?{urlencode(parameters)}" if parameters else ""

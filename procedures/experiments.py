@@ -13,7 +13,7 @@ import numpy as np
 
 from instruments.plugins import PluginGroup
 from instruments.positions import AXES, Position
-from procedures.recipe.recipe import Recipe
+from procedures.recipe.recipe import Recipe, validated_recipe
 
 #: Changes of a recipe, by key; None where the recipe does not lend itself to the experiment.
 Changes = Mapping[str, object] | None
@@ -37,16 +37,16 @@ class Block:
     def changed(self, recipe: Recipe) -> Recipe | None:
         """Return the recipe of the experiment; None where this recipe does not lend itself to it.
 
-        Raises ValueError where the changes make no recipe.
+        Raises RecipeError where the changes make no recipe.
         """
         changes = None if recipe.turns is not None else self.change(recipe)
         if changes is None:
             return None
-        return Recipe.model_validate({**recipe.model_dump(), **NOT_TAKEN, **changes})
+        return validated_recipe({**recipe.model_dump(), **NOT_TAKEN, **changes}, source=f"experiment {self.id}")
 
 
-def _checked(found: object) -> tuple[Block, ...]:
-    blocks = tuple(found) if isinstance(found, Iterable) else (found,)
+def _checked(loaded: object) -> tuple[Block, ...]:
+    blocks = tuple(loaded) if isinstance(loaded, Iterable) else (loaded,)
     for block in blocks:
         if not isinstance(block, Block):
             raise TypeError(f"{block!r} is not a Block; make one of procedures.experiments.Block")

@@ -22,7 +22,7 @@ import numpy as np
 from studies.attack_kinds import ATTACKS, WITHIN_S, Target
 
 ABORTS = int(os.environ.get("LABCTL_STUDY_ABORTS", "20"))
-LOOK_S = 0.05
+POLL_INTERVAL_S = 0.05
 RECIPE = """
 format = "labctl-recipe/1"
 name = "attacked"
@@ -75,7 +75,7 @@ def _abort_once(target: Target, seen: Seen, after_s: float) -> None:
     answer = _ask(target, seen, f"/api/campaigns/{campaign}/abort", {"reason": "the study"})
     seen.answer_s.append(time.monotonic() - begun_s)
     while answer is None or answer["state"] not in {"aborted", "failed", "done"}:
-        time.sleep(LOOK_S)
+        time.sleep(POLL_INTERVAL_S)
         with suppress(httpx.TransportError, ValueError, KeyError):
             answer = target.http.get(f"/api/campaigns/{campaign}").json()
     seen.safe_s.append(time.monotonic() - begun_s)
@@ -87,7 +87,7 @@ def _ask(target: Target, seen: Seen, path: str, body: Mapping[str, Any]) -> Any:
         return answer.json()
     seen.refused += 1
     print(f"   {answer.status_code} {answer.text[:200]}", flush=True)
-    time.sleep(LOOK_S)
+    time.sleep(POLL_INTERVAL_S)
     return None
 
 

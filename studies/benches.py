@@ -61,7 +61,7 @@ acquire_attempts = 20
 """
 NAMES = ("bench-a", "bench-b", "bench-c")
 KILLED, CUT = 1, 2
-LOOK_S, REQUEST_S, WITHIN_S = 0.2, 30.0, 500.0
+POLL_INTERVAL_S, REQUEST_S, WITHIN_S = 0.2, 30.0, 500.0
 
 
 @dataclass
@@ -149,7 +149,7 @@ def wait(holds: Callable[[], bool]) -> None:
     while not holds():
         if time.monotonic() > end_s:
             raise TimeoutError
-        time.sleep(LOOK_S)
+        time.sleep(POLL_INTERVAL_S)
 
 
 @contextmanager

@@ -29,7 +29,7 @@ FILES = int(os.environ.get("LABCTL_STUDY_DAMAGED_LOGS", "300"))
 SEED = int(os.environ.get("LABCTL_STUDY_DAMAGED_SEED", "2929"))
 #: A worker may take this long and what waits before it as long again, s.
 ANSWER_S = 900.0
-LOOK_S = 0.1
+POLL_INTERVAL_S = 0.1
 #: What a recording or a refusal answers; anything else is a fault.
 IMPORTED, REFUSED = frozenset({201}), frozenset({400, 409, 413, 422})
 
@@ -106,7 +106,7 @@ def _measured(target: Target, folder: Path, files: int, seed: int) -> str:
     memory, over, faults = Memory(), threading.Event(), list[str]()
 
     def watch() -> None:
-        while not over.wait(LOOK_S):
+        while not over.wait(POLL_INTERVAL_S):
             memory.look(target)
 
     watching = threading.Thread(target=watch, daemon=True)

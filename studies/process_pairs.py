@@ -39,7 +39,7 @@ SIGNALS = (signal.SIGKILL, signal.SIGSTOP)
 WATCHDOG_S = 5.0
 #: Everything must be over within this, s.
 WITHIN_S = 180.0
-LOOK_S = 0.2
+POLL_INTERVAL_S = 0.2
 #: What is far is not known to be simulated.
 START = {"recipe": RECIPE, "confirmed_by": "the study", "checks": list(BENCH_CHECKS)}
 
@@ -122,7 +122,7 @@ class Service:
                 answer = self.http.get(path).json()
                 if holds(answer):
                     break
-            time.sleep(LOOK_S)
+            time.sleep(POLL_INTERVAL_S)
         return answer
 
     def close(self) -> None:

@@ -23,7 +23,7 @@ from instruments.bench_config import read_bench
 ABORT = "!1a"
 MOVES = re.compile(r"!1[hm]\d")
 #: How often the log is read, s.
-LOOK_S = 0.005
+POLL_INTERVAL_S = 0.005
 RECIPE = """
 format = "labctl-recipe/1"
 name = "stops"
@@ -72,11 +72,11 @@ class Table:
 
     def _read(self) -> None:
         while not self._log.exists():
-            if self._over.wait(LOOK_S):
+            if self._over.wait(POLL_INTERVAL_S):
                 return
         with self._log.open(encoding="utf-8") as log:
             rest = ""
-            while not self._over.wait(LOOK_S):
+            while not self._over.wait(POLL_INTERVAL_S):
                 rest += log.read()
                 *lines, rest = rest.split("\n")
                 now_s = time.monotonic()

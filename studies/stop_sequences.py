@@ -29,8 +29,8 @@ import numpy as np
 from instruments.errors import InstrumentError
 from labctl.answers.campaigns import BENCH_CHECKS, CampaignRequest, ResumeRequest
 from labctl.errors import LabctlError
-from labctl.processes.bench_forms import form_of
-from labctl.processes.calls import Caller
+from labctl.processes.bench_methods import method_of
+from labctl.processes.rpc import RpcClient
 from labctl.processes.settings import CALLS, ServeRequest
 from labctl.services.commands.requests import CampaignResume, CampaignStart
 from labctl.stop.places import places_of
@@ -134,7 +134,7 @@ class Bench:
     def _ask(self, name: str, asked: object) -> Any:
         note = places_of(str(self.database))[0].note()
         assert note is not None
-        caller = Caller(Path(note.socket).parent / CALLS, ASKED_S, form_of)
+        caller = RpcClient(Path(note.socket).parent / CALLS, ASKED_S, method_of)
         try:
             return caller.call(name, asked)
         finally:

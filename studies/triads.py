@@ -97,7 +97,7 @@ def scores_with_earlier(seed: int, rests: int) -> Scores:
     errors = np.array([was.errors[place] for place in UPPER])
     known = Known(errors, was.covariance[3:, 3:] + of_change, was.bias_g, scatter_then(was, rests_then))
     fewer = by_fewer_poses(readings, found, known)
-    return _scores(now, readings, solve(readings, (found, fewer.found)), parts)
+    return _scores(now, readings, solve(readings, (found, fewer.accelerometer)), parts)
 
 
 def scatter_then(was: Accelerometer, rests: Rests) -> Scatter:

@@ -35,8 +35,8 @@ ALLOWED = {
     "labctl/cli/option_groups.py": ({"with_options"}, "commands of any signature, as typer takes them"),
     "labctl/log/redaction.py": ({"Redaction.fields"}, STRUCTLOG),
     "labctl/log/rendering.py": ({"Fields", "Rendering.__call__", "error_fields"}, STRUCTLOG),
-    "labctl/processes/call_forms.py": ({"CallForm.__init__", "parameter"}, KIND),
-    "labctl/processes/calls.py": ({"Answer.value", "Caller.call"}, BY_NAME),
+    "labctl/processes/rpc_methods.py": ({"RpcMethod.__init__", "parameter"}, KIND),
+    "labctl/processes/rpc.py": ({"Answer.value", "Caller.call"}, BY_NAME),
     "labctl/processes/documents.py": ({"Form.__init__"}, KIND),
     "labctl/service_connection.py": (
         {"ServiceConnection.request", "json_of"},

@@ -106,18 +106,18 @@ class Homing:
 
     def check(self, homing: TimedHome, settings: ArrickC4Settings) -> HomeCheck:
         """Return how many steps away from home a homing began; fewer than none where it ended sooner than from home."""
-        found = self._check((homing.took_s - self.from_home_s) / self.step_s, settings)
-        if homing.stood_s is None or found.missed_steps <= found.doubt_steps:
-            return replace(found, is_shown=homing.moved)
+        checked = self._check((homing.took_s - self.from_home_s) / self.step_s, settings)
+        if homing.stood_s is None or checked.missed_steps <= checked.doubt_steps:
+            return replace(checked, is_shown=homing.moved)
         late_s = homing.took_s - homing.stood_s
         why = (
             f"the reply that the homing has ended came {late_s:.2f} s after the controller said that the table stands"
             if late_s > MAX_BEHIND_S
             else "the controller said that the table stands when it was asked whether it still homes"
         )
-        at_most = round(min(found.missed_steps, (homing.stood_s - self.from_home_s) / self.step_s), 1)
-        text = f"home seems {found.missed_steps:g} steps from where it was left, but {why}"
-        return replace(found, missed_steps=at_most, explained=text)
+        at_most = round(min(checked.missed_steps, (homing.stood_s - self.from_home_s) / self.step_s), 1)
+        text = f"home seems {checked.missed_steps:g} steps from where it was left, but {why}"
+        return replace(checked, missed_steps=at_most, explained=text)
 
     def check_learning(self, took_s: Sequence[float], settings: ArrickC4Settings) -> HomeCheck:
         """Return how many steps were missed in the turns, of equal spacing, that the homing was learned from."""

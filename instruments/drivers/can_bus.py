@@ -46,7 +46,7 @@ class CanGyro(StreamedGyro):
     @property
     def channels(self) -> tuple[Channel, ...]:
         """What a reading holds: the signals of the bench file, in deg/s, deg C and g."""
-        return tuple(Channel(name, found.unit, found.scale, found.offset) for name, found in self._scales.items())
+        return tuple(Channel(name, scale.unit, scale.scale, scale.offset) for name, scale in self._scales.items())
 
     def identify(self) -> GyroIdentity:
         """Get the unit's identity from the bench file, after one reading came; raises NoReply, LinkError."""
@@ -62,15 +62,15 @@ class CanGyro(StreamedGyro):
         Raises NoReply after SILENCE_S, or five sampling periods, without a reading; MalformedReply for a counter that
         stands; WrongInstrument for another rate; LinkError, also where the interface has left the bus.
         """
-        found = super().read(duration_s)
+        readings = super().read(duration_s)
         self._refuse_bus_off()
-        return found
+        return readings
 
     def read_latest(self) -> Readings:
         """Get one fresh reading and drop everything older; raises NoReply after SILENCE_S, LinkError."""
-        found = super().read_latest()
+        readings = super().read_latest()
         self._refuse_bus_off()
-        return found
+        return readings
 
     def _refuse_bus_off(self) -> None:
         if self._decoder.is_bus_off:

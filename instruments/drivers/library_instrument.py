@@ -23,10 +23,10 @@ LONGEST_REPLY_BYTES = 4096
 USUAL_IDENTITIES = ("id", "identity", "idn", "get_identity")
 
 
-def _in_one_line(said: object) -> str:
-    if said is None:
+def _in_one_line(text: object) -> str:
+    if text is None:
         return ""
-    return one_line(", ".join(str(part) for part in said) if isinstance(said, list | tuple) else str(said))
+    return one_line(", ".join(str(part) for part in text) if isinstance(text, list | tuple) else str(text))
 
 
 class LibraryInstrument:
@@ -63,18 +63,18 @@ class LibraryInstrument:
     def get(self, attribute: str) -> object:
         """Return the value of an attribute, or what a method without arguments returns. Raises InstrumentError."""
         with self._one_line(f"read {attribute}"):
-            found = getattr(self._opened(), attribute)
-            return found() if callable(found) else found
+            value = getattr(self._opened(), attribute)
+            return value() if callable(value) else value
 
     def number(self, attribute: str) -> float:
         """Return a value as a number; raises MalformedReply for none, and as `get` does."""
-        found = self.get(attribute)
+        value = self.get(attribute)
         with contextlib.suppress(ValueError):
-            if isinstance(found, int | float | str):
-                return float(found)
+            if isinstance(value, int | float | str):
+                return float(value)
         raise MalformedReply(
             self.device,
-            f"attribute {attribute} holds {found!r}, which is not a number; correct the bench file: name the "
+            f"attribute {attribute} holds {value!r}, which is not a number; correct the bench file: name the "
             "attribute that holds the measured value",
         )
 
@@ -160,14 +160,14 @@ class LibraryInstrument:
     def _of_pymeasure(self) -> Any:
         settings = self._settings
         module, _, name = settings.instrument.partition(":")
-        found = getattr(importlib.import_module(module), name)
+        driver_class = getattr(importlib.import_module(module), name)
         base = importlib.import_module("pymeasure.adapters").Adapter
         adapter = type("PortAdapter", (base,), {"_write": self._write, "_read": self._read,
                        "_write_bytes": self._write_bytes, "_read_bytes": self._read_bytes,
                        "flush_read_buffer": self._flush, "close": lambda _: None})  # fmt: skip
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FutureWarning)  # to PyMeasure's maintainers, not to who calibrates
-            return found(adapter(), **settings.arguments)
+            return driver_class(adapter(), **settings.arguments)
 
     def _open_port(self) -> SerialPort:
         if self._port is None:

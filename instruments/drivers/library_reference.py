@@ -25,11 +25,11 @@ class LibraryReference:
 
     def identify(self) -> str:
         """Get what the instrument says of itself; raises WrongInstrument for another serial number, InstrumentError."""
-        settings, said = self.settings, self._instrument.identity()
-        refuse_other_serial(self.name, said, settings.serial, holds_serial=bool(settings.identity))
+        settings, identity = self.settings, self._instrument.identity()
+        refuse_other_serial(self.name, identity, settings.serial, holds_serial=bool(settings.identity))
         self.read()
         certificate = f"; certificate {settings.certificate}" if settings.certificate else ""
-        return f"{settings.instrument} of {settings.library} {said}".strip() + certificate
+        return f"{settings.instrument} of {settings.library} {identity}".strip() + certificate
 
     def read(self) -> ReferenceState:
         """Get one reading of every quantity; raises InstrumentError."""

@@ -50,13 +50,13 @@ class LineReference:
 
         Raises WrongInstrument for another serial number than the bench file's, MalformedReply, NoReply, LinkError.
         """
-        said = ""
+        identity = ""
         if self._model.identity:
-            said = self._lines.ask(self._model.identity, r".*\S.*", "say what it is")[0]
-            refuse_other_serial(self.name, said, self.settings.serial, holds_serial=True)
+            identity = self._lines.ask(self._model.identity, r".*\S.*", "say what it is")[0]
+            refuse_other_serial(self.name, identity, self.settings.serial, holds_serial=True)
         self.read()
         certificate = f"; certificate {self.settings.certificate}" if self.settings.certificate else ""
-        return f"{said or self._model.title}{certificate}"
+        return f"{identity or self._model.title}{certificate}"
 
     def read(self) -> ReferenceState:
         """Get one reading of every quantity; raises MalformedReply for another unit, NoReply, LinkError."""
@@ -68,15 +68,15 @@ class LineReference:
 
     def _raw(self, quantity: Quantity) -> int:
         request = quantity.ask.replace("{input}", str(self.settings.input))
-        found = self._lines.ask(request, quantity.pattern, f"read by {request!r}")
-        unit = found.groupdict().get("unit")
-        if unit is not None and unit != quantity.says_unit:
+        match = self._lines.ask(request, quantity.pattern, f"read by {request!r}")
+        unit_symbol = match.groupdict().get("unit")
+        if unit_symbol is not None and unit_symbol != quantity.says_unit:
             raise MalformedReply(
                 self.name,
-                f"answers in {unit!r} instead of {quantity.says_unit!r}; set the unit of measurement "
+                f"answers in {unit_symbol!r} instead of {quantity.says_unit!r}; set the unit of measurement "
                 "at the panel of the instrument",
             )
-        return round(float(found["value"]) / quantity.resolution)
+        return round(float(match["value"]) / quantity.resolution)
 
     def close(self) -> None:
         """Control the link: close it; safe to call twice."""

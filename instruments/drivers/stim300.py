@@ -247,9 +247,9 @@ class Stim300:
         """Return what the unit has said of itself."""
         reported = {} if self._serial is None else {"serial": self._serial}
         if self._set is not None:
-            unit = f"{self._set.unit}, delayed" if self._set.is_delayed else self._set.unit
+            set_unit = f"{self._set.unit}, delayed" if self._set.is_delayed else self._set.unit
             reported |= {
-                "firmware": str(self._set.firmware), "revision": self._set.revision, "output_unit": unit,
+                "firmware": str(self._set.firmware), "revision": self._set.revision, "output_unit": set_unit,
                 "filter_hz": " ".join(self._set.filters_hz), "g_compensation": self._set.g_compensation,
                 "range_dps": " ".join(self._set.ranges_dps), "datagram": f"0x{self.options.datagram:02X}",
                 "sample_rate_hz": str(self._set.sample_rate_hz or "external trigger"),

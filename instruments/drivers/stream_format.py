@@ -52,7 +52,7 @@ class StreamFormatGyro(StreamedGyro):
     def channels(self) -> tuple[Channel, ...]:
         """What a message holds: the fields with a unit, in deg/s, deg C and g."""
         scales = [(each.name, scale_of(each, self.sample_rate_hz)) for each in self._fields]
-        return tuple(Channel(name, found.unit, found.scale, found.offset) for name, found in scales)
+        return tuple(Channel(name, scale.unit, scale.scale, scale.offset) for name, scale in scales)
 
     def identify(self) -> GyroIdentity:
         """Get the unit's identity from the bench file, after one message was read.

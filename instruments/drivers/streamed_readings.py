@@ -140,8 +140,10 @@ class StreamedReadings:
         return max(SILENCE_S, 5 / self._law.rate_hz)
 
     def _new_counter(self) -> SampleCounter | None:
-        given = self._law.counter
-        return None if given is None else SampleCounter(self._device, self._port, step=given.step, wrap=given.wrap)
+        counter = self._law.counter
+        return (
+            None if counter is None else SampleCounter(self._device, self._port, step=counter.step, wrap=counter.wrap)
+        )
 
     def _new_device_time(self) -> DeviceClock | None:
         """Return the unit's own time: by pulses, by its time stamps, or by its counter; None without any."""
@@ -155,8 +157,8 @@ class StreamedReadings:
     def _new_own_time(self) -> DeviceTime | None:
         if (ticks := self._law.stamps) is not None:
             return DeviceTime(ticks.tick_s, ticks.wrap)
-        if (given := self._law.counter) is not None:
-            return DeviceTime(1.0 / (self._law.rate_hz * given.step), given.wrap)
+        if (counter := self._law.counter) is not None:
+            return DeviceTime(1.0 / (self._law.rate_hz * counter.step), counter.wrap)
         return None
 
     def _discard(self) -> None:
@@ -172,30 +174,30 @@ class StreamedReadings:
         return NoReply(self._device, self._unread(self._stream, silence_s))
 
     def _decode(self, data: bytes) -> Readings:
-        found = self._decoder.feed(data)
-        damaged, kept = found.damaged, np.ones(len(found), dtype=bool)
-        if self._counter is not None and self._law.counter is not None and len(found):
-            content = np.stack(list(found.values.values()), axis=1)
-            kept = self._counter.is_new(found.values[self._law.counter.field], content)
+        decoded = self._decoder.feed(data)
+        damaged, kept = decoded.damaged, np.ones(len(decoded), dtype=bool)
+        if self._counter is not None and self._law.counter is not None and len(decoded):
+            content = np.stack(list(decoded.values.values()), axis=1)
+            kept = self._counter.is_new(decoded.values[self._law.counter.field], content)
             damaged += len(kept) - int(kept.sum())
-        raw = {name: found.values[name][kept] for name in self._law.channels}
-        valid = found.valid[kept]
+        raw = {name: decoded.values[name][kept] for name in self._law.channels}
+        valid = decoded.valid[kept]
         if not len(valid):
             device_s = None if self._device_time is None else np.zeros(0)
             return Readings(np.zeros(0), raw, valid, 0, damaged, device_s, np.zeros(0))
         self._last_s, self._stream.unused = self._clock.now_s(), 0
-        advance = self._advance(found, kept)
-        came, arrival_s = self._stream.last, self._stream.arrival_s(found.behind[kept])
+        advance = self._advance(decoded, kept)
+        came, arrival_s = self._stream.last, self._stream.arrival_s(decoded.behind[kept])
         turn = 0 if self._counter is None else self._counter.readings_per_turn
         times, uncounted = self._time.times(advance, came.now_s, turn, width_s=came.width_s, arrival_s=arrival_s)
         refuse_other_rate(self._device, self._port, self._time.line)
         counts = self._counter is not None or self._law.stamps is not None
         lost = int(advance.sum()) - len(advance) + uncounted if counts else uncounted
-        ticks = self._ticks(found, kept)
+        ticks = self._ticks(decoded, kept)
         readings = Readings(times, raw, valid, lost, damaged, None, arrival_s)
         return self._undecided.pass_on(readings, self._time, self._device_time, ticks)
 
-    def _ticks(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+    def _ticks(self, decoded: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64] | None:
         """Return what each reading says of the unit's own time, (n,), or (n, 2) with the number of pulses."""
         time_field, pulses = self._law.stamps or self._law.counter, self._law.pulses
         if time_field is None and pulses is None:
@@ -203,18 +205,18 @@ class StreamedReadings:
         fields = [each.field for each in (time_field, pulses) if each is not None]
         if pulses is not None and pulses.tick_s:
             fields = [pulses.field]
-        columns = [found.values[field][kept].astype(np.int64) for field in fields]
+        columns = [decoded.values[field][kept].astype(np.int64) for field in fields]
         return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
 
-    def _advance(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def _advance(self, decoded: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return how many periods each reading, (n,), is from the one before."""
         if self._counter is not None and self._law.counter is not None:
-            return self._counter.advance(found.values[self._law.counter.field][kept])
+            return self._counter.advance(decoded.values[self._law.counter.field][kept])
         if (ticks := self._law.stamps) is not None:
-            return self._advance_by_time(found.values[ticks.field], ticks)
-        advance = np.ones(len(found), dtype=np.int64)
+            return self._advance_by_time(decoded.values[ticks.field], ticks)
+        advance = np.ones(len(decoded), dtype=np.int64)
         # a damaged message has taken its sampling period too
-        advance[0] += found.damaged if found.missed is None else found.missed
+        advance[0] += decoded.damaged if decoded.missed is None else decoded.missed
         return advance
 
     def _advance_by_time(self, stamps: NDArray[np.int64], ticks: StampTicks) -> NDArray[np.int64]:

@@ -99,12 +99,12 @@ class CountedPulseTime:
             return np.zeros(0)
         own_s, counts = self._own.of(ticks[:, 0], t_s), ticks[:, 1]
         before_s, before = self._newest or (float(own_s[0]), int(counts[0]))
-        found = own_s + self._offset_s
+        times_s = own_s + self._offset_s
         for k in np.flatnonzero(np.diff(counts, prepend=before)):
             self._pulse(before_s if k == 0 else float(own_s[k - 1]), float(own_s[k]))
-            found[k:] = own_s[k:] + self._offset_s
+            times_s[k:] = own_s[k:] + self._offset_s
         self._newest = float(own_s[-1]), int(counts[-1])
-        return np.asarray(found, dtype=np.float64)
+        return np.asarray(times_s, dtype=np.float64)
 
     @property
     def _offset_s(self) -> float:

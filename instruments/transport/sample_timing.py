@@ -163,12 +163,12 @@ class StreamTime:
 
     def _lost(self, index: Whole, arrival_s: Times, wrap: int, width_s: float) -> int:
         """Return how many readings are missing that no counter shows: the stream stays too far behind the Clock."""
-        line, unit = self._line, wrap or 1
+        line, step = self._line, wrap or 1
         behind = (arrival_s - self._anchor_s) / line.period_s - index
         # while the period is hardly known, a slow device falls behind without any loss
         share = line.u_share if line.is_known else max(line.u_share, line.tolerance)
         slow = share * (arrival_s - self._on_time_s) / line.period_s
-        limit = 0.5 * unit if unit > 1 else LOST_PERIODS + LOST_WIDTHS * width_s / line.period_s
+        limit = 0.5 * step if step > 1 else LOST_PERIODS + LOST_WIDTHS * width_s / line.period_s
         on_time = np.flatnonzero(behind <= limit + slow)
         if len(on_time):
             self._late_since_s, self._on_time_s = None, float(arrival_s[on_time[-1]])
@@ -183,7 +183,7 @@ class StreamTime:
             return 0
         self._late_since_s, self._on_time_s = None, float(arrival_s[-1])
         usual = max(min((self._behind(*each) for each in self._floor), default=0.0), 0.0)
-        return unit * round((self._least_behind - usual) / unit)
+        return step * round((self._least_behind - usual) / step)
 
     def _behind(self, number: int, came_s: float) -> float:
         return (came_s - self._anchor_s) / self._line.period_s - number

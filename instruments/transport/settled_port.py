@@ -24,9 +24,9 @@ def settle(port: serial.Serial) -> None:
     if not CAN_POLL:
         return
     with suppress(OSError, ValueError, serial.SerialException):  # what reads the port reports its failure
-        asked = select.poll()
-        asked.register(port.fileno(), select.POLLIN)
-        asked.poll(0)
+        poll = select.poll()
+        poll.register(port.fileno(), select.POLLIN)
+        poll.poll(0)
 
 
 class SettledSerial(serial.Serial):  # type: ignore[misc]  # its type depends on the system

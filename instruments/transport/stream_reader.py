@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from typing import NamedTuple, Protocol
 
-from instruments.clock import Clock, attending, look_every_s
+from instruments.clock import Clock, heartbeat_interval_s, registered
 from instruments.transport.serial import BROKEN, SerialPort, StampingPort
 
 #: A USB adapter holds bytes back for this long, s of real time (latency timer of the FTDI chips, as delivered).
@@ -120,15 +120,15 @@ class ThreadedReader:
         self._thread.join(JOIN_S)
 
     def _run(self) -> None:
-        every_s = look_every_s(self._clock)
-        with attending(self._clock) as look:
+        every_s = heartbeat_interval_s(self._clock)
+        with registered(self._clock) as heartbeat:
             while not self._closing.wait(every_s):
                 with self._lock:
                     if not self._closing.is_set():
                         self._empty()
                     if self._broken is not None:
                         return
-                look()  # here: from one emptying to the next no more comes than a port holds
+                heartbeat()  # here: from one emptying to the next no more comes than a port holds
 
     def _empty(self) -> None:
         if self._broken is not None:

@@ -26,15 +26,15 @@ class Undecided:
 
     def take(self, device_time: DeviceClock | None = None) -> Readings | None:
         """Return what is kept, n >= 1, at the times that hold if none is lost, and forget it; None where nothing is."""
-        found: Readings | None = None
+        joined: Readings | None = None
         parts: list[Ticks] = []
         for readings, ticks in self._kept:
-            found = readings if found is None else readings.after(found)
+            joined = readings if joined is None else readings.after(joined)
             parts += [] if ticks is None else [ticks]
         self._kept.clear()
-        if found is None or device_time is None or not parts:
-            return found
-        return replace(found, device_s=device_time.of(np.concatenate(parts), found.t_s))
+        if joined is None or device_time is None or not parts:
+            return joined
+        return replace(joined, device_s=device_time.of(np.concatenate(parts), joined.t_s))
 
     def pass_on(
         self, readings: Readings, time: StreamTime, device_time: DeviceClock | None = None, ticks: Ticks | None = None

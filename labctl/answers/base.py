@@ -61,10 +61,10 @@ class Request(BaseModel):
             return cleaned(value)
         lines = any(isinstance(each, SeveralLines) for each in cls.model_fields[name].metadata)
         for text in _texts(value):
-            if found := control_character(text, lines=lines):
+            if character := control_character(text, lines=lines):
                 what = "a line break, tab or other control character" if not lines else "a control character"
                 words = "it has {what} ({found}); write it without"
-                raise PydanticCustomError("control_character", words, {"what": what, "found": found})
+                raise PydanticCustomError("control_character", words, {"what": what, "found": character})
         return value
 
 

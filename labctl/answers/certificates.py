@@ -36,10 +36,10 @@ SUPERSEDED_BY = (
 VALID_INSTEAD = "Number of the unit's valid certificate; null: it is this one, or none is valid."
 
 
-def _in_order(given: tuple[float, float]) -> tuple[float, float]:
-    if not (math.isfinite(given[0]) and math.isfinite(given[1]) and given[0] <= given[1]):
-        raise ValueError(f"{list(given)}: give the least value, then the largest")
-    return given
+def _in_order(limits: tuple[float, float]) -> tuple[float, float]:
+    if not (math.isfinite(limits[0]) and math.isfinite(limits[1]) and limits[0] <= limits[1]):
+        raise ValueError(f"{list(limits)}: give the least value, then the largest")
+    return limits
 
 
 class Customer(Contact):

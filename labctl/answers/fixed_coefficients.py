@@ -59,13 +59,13 @@ class FixedCoefficient(Request):
     @property
     def us(self) -> tuple[float, ...]:
         """The standard uncertainty of each value; NaN where it is not stated."""
-        given = self.u if isinstance(self.u, list) else [self.u] * len(self.values)
-        return tuple(math.nan if u is None else u if u >= MIN_U else 0.0 for u in given)
+        values = self.u if isinstance(self.u, list) else [self.u] * len(self.values)
+        return tuple(math.nan if u is None else u if u >= MIN_U else 0.0 for u in values)
 
 
-def _with_value(given: object) -> object:
+def _with_value(document: object) -> object:
     """Take a plain number as a coefficient without uncertainty."""
-    return given if isinstance(given, Mapping | FixedCoefficient) else {"value": given}
+    return document if isinstance(document, Mapping | FixedCoefficient) else {"value": document}
 
 
 KnownCoefficient = Annotated[

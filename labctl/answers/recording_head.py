@@ -39,13 +39,13 @@ class OutputUnit(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _default_scale(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "scale" not in given:
-            unit = given.get("unit", "deg/s")
+    def _default_scale(cls, document: Any) -> Any:
+        if isinstance(document, dict) and "scale" not in document:
+            unit = document.get("unit", "deg/s")
             if unit in RATE_UNITS:
-                return {**given, "scale": RATE_UNITS[unit]}
+                return {**document, "scale": RATE_UNITS[unit]}
             raise ValueError(f"unit {unit!r} needs a scale: the output's change, in that unit, per deg/s")
-        return given
+        return document
 
     @model_validator(mode="after")
     def _usable(self) -> OutputUnit:

@@ -9,15 +9,15 @@ from fastapi import APIRouter
 from labctl.answers.base import Request
 from labctl.answers.campaigns import CampaignResponse
 from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
-from labctl.services.commands.acts.campaign_act import AskedT, CampaignAct
+from labctl.services.commands.acts.campaign_act import AddressedT, CampaignAct
 from labctl.services.lab_service import LabService
 
 
-def add_act_route(router: APIRouter, act: CampaignAct[AskedT]) -> None:
+def add_act_route(router: APIRouter, act: CampaignAct[AddressedT]) -> None:
     """Route an act; one that is urgent is executed in threads that no other requests fill."""
 
     def perform(campaign: int, request: Request, service: LabService) -> CampaignResponse:
-        return service.execute(act.command, act.asked(campaign, request))
+        return service.execute(act.command, act.request_type(campaign, request))
 
     if act.is_urgent:
 

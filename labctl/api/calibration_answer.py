@@ -23,7 +23,7 @@ LOST = "X-Labctl-Lost"
 
 
 @dataclass(frozen=True)
-class CalibrationAsked:
+class CalibrationRequest:
     """Which calibration a request asks for, in which form, and who asks."""
 
     serial: str
@@ -35,38 +35,38 @@ class CalibrationAsked:
     options: Sequence[str] = ()
 
 
-async def calibration_answer(service: LabService, asked: CalibrationAsked) -> Response:
+async def calibration_answer(service: LabService, request: CalibrationRequest) -> Response:
     """Return a calibration as a file, or status 304 where the caller has it; notes who fetched it. Raises LabctlError.
 
     What is in force, and whether it was withdrawn, is read from the database for each request.
     """
-    file = await _file(service, asked)
+    file = await _file(service, request)
     now = service.clock.utc()
     headers = file.headers(now)
-    is_known = asked.known_etags and f'"{file.etag}"' in asked.known_etags
+    is_known = request.known_etags and f'"{file.etag}"' in request.known_etags
     if is_known:
         answer = Response(status_code=304, headers=headers)
     else:
         answer = Response(file.content, headers=headers, media_type=file.media_type)
     for loss in file.losses:
         answer.headers.append(LOST, loss.text)
-    who = asked.caller.name if asked.caller.via == "key" else ANONYMOUS
-    if asked.method == "GET" and service.fetches.note(file.serial, file.version, who, now):
+    who = request.caller.name if request.caller.via == "key" else ANONYMOUS
+    if request.method == "GET" and service.fetches.note(file.serial, file.version, who, now):
         answer.background = BackgroundTask(service.fetches.write)
     return answer
 
 
-async def _file(service: LabService, asked: CalibrationAsked) -> CalibrationFile:
+async def _file(service: LabService, request: CalibrationRequest) -> CalibrationFile:
     # JSON from a file is a point read of tens of microseconds: it runs in the event loop, without a switch to a thread
-    is_own = asked.format == "json" and not asked.options
+    is_own = request.format == "json" and not request.options
     if is_own and not service.store.is_shared:
-        return calibration_file(service.store, asked.serial, asked.version, asked.format)
-    if is_own and asked.version is None:
-        served = await service.in_force.get(asked.serial)
+        return calibration_file(service.store, request.serial, request.version, request.format)
+    if is_own and request.version is None:
+        served = await service.in_force.get(request.serial)
         if served is not None and served.act is not None:
-            return own_file(asked.serial, served.act.version, served)
+            return own_file(request.serial, served.act.version, served)
     return await run_in_threadpool(  # it computes, or says why there is none
-        calibration_file, service.store, asked.serial, asked.version, asked.format, asked.options
+        calibration_file, service.store, request.serial, request.version, request.format, request.options
     )
 
 
@@ -91,12 +91,12 @@ class InForceMiddleware:
             await self._app(scope, receive, send)
             return
         known_etags = next((value for name, value in scope["headers"] if name == b"if-none-match"), None)
-        asked = CalibrationAsked(
+        request = CalibrationRequest(
             serial, scope["method"], scope["state"]["caller"],
             None if known_etags is None else known_etags.decode("latin-1"),
         )  # fmt: skip
         try:
-            answer = await calibration_answer(self._service, asked)
+            answer = await calibration_answer(self._service, request)
         except LabctlError as error:
             answer = as_problem(error, scope["path"])
         await answer(scope, receive, send)
@@ -105,5 +105,5 @@ class InForceMiddleware:
         """Return the serial number of a request of this kind; None for another."""
         if scope["type"] != "http" or scope["query_string"] or scope["method"] not in self._METHODS:
             return None
-        found = self._PATH.fullmatch(scope["path"])
-        return None if found is None else found[1]
+        match = self._PATH.fullmatch(scope["path"])
+        return None if match is None else match[1]

@@ -60,15 +60,15 @@ async def while_connected(
     request: Request, service: LabService, work: Work[..., T], *args: object, **named: object
 ) -> T:
     """Return what `work` returns, from the cache or computed; it is ended at once when the client leaves."""
-    asked = asyncio.ensure_future(_result(request, service, Call(work, args, named), lambda _: None))
+    result = asyncio.ensure_future(_result(request, service, Call(work, args, named), lambda _: None))
     left = asyncio.ensure_future(_left(request))
     try:
-        await asyncio.wait({asked, left}, return_when=asyncio.FIRST_COMPLETED)
-        if not asked.done():
+        await asyncio.wait({result, left}, return_when=asyncio.FIRST_COMPLETED)
+        if not result.done():
             raise HTTPException(CLIENT_LEFT, "the client has disconnected before the answer was computed")
-        return asked.result()
+        return result.result()
     finally:
-        await _end(asked, left)
+        await _end(result, left)
 
 
 async def follow(
@@ -85,16 +85,16 @@ async def follow(
         with suppress(RuntimeError):  # the loop was closed meanwhile
             loop.call_soon_threadsafe(stages.put_nowait, stage)
 
-    asked = asyncio.ensure_future(_result(request, service, Call(work, args, named), tell))
-    asked.add_done_callback(lambda _: loop.call_soon(stages.put_nowait, None))
+    result = asyncio.ensure_future(_result(request, service, Call(work, args, named), tell))
+    result.add_done_callback(lambda _: loop.call_soon(stages.put_nowait, None))
     left = asyncio.ensure_future(_left(request))
-    left.add_done_callback(lambda _: asked.cancel())
+    left.add_done_callback(lambda _: result.cancel())
     first = await stages.get()
-    if asked.cancelled() or (first is None and asked.exception() is not None):
+    if result.cancelled() or (first is None and result.exception() is not None):
         await _end(left)
-        if asked.cancelled():
+        if result.cancelled():
             raise HTTPException(CLIENT_LEFT, "the client has disconnected before the computation began")
-        asked.result()
+        result.result()
 
     async def stream() -> AsyncIterator[bytes]:
         try:
@@ -107,17 +107,17 @@ async def follow(
                     stage = await asyncio.wait_for(stages.get(), HEARTBEAT_S)
                 except TimeoutError:
                     yield b": alive\n\n"
-            if not asked.cancelled():
-                yield _last_event(asked, request.url.path)
+            if not result.cancelled():
+                yield _last_event(result, request.url.path)
         finally:
-            await _end(asked, left)
+            await _end(result, left)
 
     return EventStream(stream(), headers={"Cache-Control": "no-cache"})
 
 
-async def execute(service: LabService, command: Command[RequestT, ResponseT], asked: RequestT) -> ResponseT:
+async def execute(service: LabService, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
     """Execute a command that computes. It was asked to be done: it goes on when the client leaves."""
-    pending = service.submit(command, asked)
+    pending = service.submit(command, request)
     return await asyncio.wrap_future(pending.future)
 
 
@@ -139,9 +139,9 @@ async def _result(request: Request, service: LabService, call: Call, progress: P
             )
         try:
             with suppress(*(() if pending.same else (Exception,))):  # an error there may be of other work
-                found = await asyncio.wrap_future(pending.future)
+                result = await asyncio.wrap_future(pending.future)
                 if pending.same:
-                    return found
+                    return result
         finally:
             pending.leave()
 
@@ -164,9 +164,9 @@ async def _end(*tasks: asyncio.Future[Any]) -> None:
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-def _last_event(asked: asyncio.Future[Any], path: str) -> bytes:
+def _last_event(result: asyncio.Future[Any], path: str) -> bytes:
     try:
-        return _event("answer", asked.result().model_dump_json())
+        return _event("answer", result.result().model_dump_json())
     except LabctlError as error:
         return _event("problem", bytes(as_problem(error, path).body).decode())
 

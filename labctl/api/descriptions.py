@@ -41,8 +41,8 @@ def typed_dictionaries() -> dict[str, dict[str, str]]:
     """
     kinds: dict[str, type] = {}
     own_fields: dict[str, dict[str, str]] = {}
-    for found in pkgutil.walk_packages(answers.__path__, f"{answers.__name__}."):
-        module = import_module(found.name)
+    for info in pkgutil.walk_packages(answers.__path__, f"{answers.__name__}."):
+        module = import_module(info.name)
         classes = {
             node.name: node for node in ast.parse(inspect.getsource(module)).body if isinstance(node, ast.ClassDef)
         }
@@ -66,17 +66,17 @@ def _docs(kind: type) -> dict[str, str]:
 
 def _with_inherited(kind: type, own_fields: dict[str, dict[str, str]]) -> dict[str, str]:
     """Return the descriptions of a typed dictionary's own fields, and of those of its bases."""
-    found: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     for base in get_original_bases(kind):
         if is_typeddict(base):
-            found |= _with_inherited(base, own_fields)
-    return found | own_fields.get(kind.__name__, {})
+            descriptions |= _with_inherited(base, own_fields)
+    return descriptions | own_fields.get(kind.__name__, {})
 
 
 def _docstrings(node: ast.ClassDef) -> dict[str, str]:
     """Return field -> docstring of a class, in one line each."""
-    found = {}
+    docstrings = {}
     for field, below in zip(node.body, node.body[1:], strict=False):
         if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(below, ast.Expr):
-            found[field.target.id] = " ".join(str(ast.literal_eval(below.value)).split())
-    return found
+            docstrings[field.target.id] = " ".join(str(ast.literal_eval(below.value)).split())
+    return docstrings

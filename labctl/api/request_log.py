@@ -53,8 +53,8 @@ class RequestLogMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        given = next((value for name, value in scope["headers"] if name == _REQUEST_ID), b"")
-        number = new_request_id(given.decode("latin-1"))
+        request_id = next((value for name, value in scope["headers"] if name == _REQUEST_ID), b"")
+        number = new_request_id(request_id.decode("latin-1"))
         begin_request(number)
         status, begun_s = 0, self._clock.now_s()
 

@@ -108,5 +108,5 @@ def _evidence(use: Mapping[str, AxisEvidenceJson]) -> dict[str, AxisEvidence]:
     return {axis: AxisEvidence.from_json(one) for axis, one in use.items()}
 
 
-def _unit_json(unit: OutputUnit) -> OutputUnitJson:
-    return {"unit": unit.unit, "scale": unit.scale, "offset": unit.offset}
+def _unit_json(output: OutputUnit) -> OutputUnitJson:
+    return {"unit": output.unit, "scale": output.scale, "offset": output.offset}

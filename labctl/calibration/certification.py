@@ -69,16 +69,16 @@ class Certification:
         }  # fmt: skip
 
 
-def read_certification(given: Mapping[str, object]) -> Certification:
+def read_certification(document: Mapping[str, object]) -> Certification:
     """Read the value of `certification`. Raises LookupError, TypeError or ValueError for one that is not whole."""
     states: tuple[State, ...] = get_args(State)
-    stated, due = given["state"], given["due"]
+    stated, due = document["state"], document["due"]
     state: State | None = next((each for each in states if each == stated), None)
     if state is None:
         raise ValueError(f"the state is {str(stated)[:80]!r}, but must be one of {', '.join(states)}")
     return Certification(
-        state, str(given["by"]), str(given["reason"]), _instant(given["at"]),
-        None if due is None else _instant(due), str(given["calibration_hash"]),
+        state, str(document["by"]), str(document["reason"]), _instant(document["at"]),
+        None if due is None else _instant(due), str(document["calibration_hash"]),
     )  # fmt: skip
 
 
@@ -95,10 +95,10 @@ def warn(text: str, category: type[Warning] = CalibrationWarning) -> None:
 def _instant(text: object) -> datetime:
     if not isinstance(text, str):
         raise TypeError(f"{text!r} is not a time; write it as 2027-03-01T08:00:00Z")
-    found = datetime.fromisoformat(text)
-    if found.tzinfo is None:
+    instant = datetime.fromisoformat(text)
+    if instant.tzinfo is None:
         raise ValueError(f"{text!r} has no time zone; end it with Z or an offset such as +01:00")
-    return found.astimezone(UTC)
+    return instant.astimezone(UTC)
 
 
 def _said(at: datetime) -> str:
@@ -107,8 +107,10 @@ def _said(at: datetime) -> str:
 
 def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:
     """Return the bytes of a calibration file with its certification, and their hash, which covers it."""
-    whole, found = _inserted(content, known) or with_own_hash({**json.loads(content), "certification": known.to_json()})
-    return whole + b"\n", found
+    whole, digest = _inserted(content, known) or with_own_hash(
+        {**json.loads(content), "certification": known.to_json()}
+    )
+    return whole + b"\n", digest
 
 
 def _inserted(content: bytes, known: Certification) -> tuple[bytes, str] | None:

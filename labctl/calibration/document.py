@@ -102,7 +102,7 @@ class Calibration:
         from labctl.answers.recording_head import OutputUnit  # noqa: PLC0415  needs pydantic
 
         with _reading("output"):
-            units = {axis: OutputUnit.model_validate(unit) for axis, unit in self.document["output"].items()}
+            units = {axis: OutputUnit.model_validate(output) for axis, output in self.document["output"].items()}
             return units | {axis: units[axis] for axis in self.axes}  # each axis has one
 
     @property
@@ -129,10 +129,10 @@ class Calibration:
         `reported` is what it says of itself, by the same names; what only one of the two has is not compared.
         """
         if changes := changed(self.configuration, reported):
-            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
+            changes_text = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
             raise OtherConfiguration(
                 f"calibration of {self.serial} version {self.version}: the unit is set otherwise than when it was "
-                f"measured: {said}; set it as it was, or calibrate it as it is"
+                f"measured: {changes_text}; set it as it was, or calibrate it as it is"
             )
 
     @property

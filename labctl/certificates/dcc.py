@@ -196,8 +196,8 @@ def _condition(parent: ET.Element, condition: Condition) -> None:
     texts(element, "name", condition.name)
     data = child(element, "data")
     for name, value, suffix in (("Least", condition.low, "Min"), ("Largest", condition.high, "Max")):
-        said = f"{name} value during the calibration"
-        quantity(data, said, [value], condition.unit, ref_type=ref_type and f"{ref_type}{suffix}")
+        name_text = f"{name} value during the calibration"
+        quantity(data, name_text, [value], condition.unit, ref_type=ref_type and f"{ref_type}{suffix}")
 
 
 def _method(made: ET.Element, certificate: Certificate) -> None:
@@ -218,11 +218,11 @@ def _method(made: ET.Element, certificate: Certificate) -> None:
 def _standard(parent: ET.Element, standard: StandardUsed) -> None:
     element = child(parent, "measuringEquipment", **referred("basic_standardUsed"))
     texts(element, "name", standard.name or standard.quantity)
-    said = [f"Reference standard of {standard.quantity}."]
-    said += [f"Calibrated {standard.calibrated}."] if standard.calibrated else []
-    said += [f"Due {standard.due}."] if standard.due else []
-    said += [f"Traceability: {standard.traceability}."] if standard.traceability else []
-    texts(element, "description", *said)
+    sentences = [f"Reference standard of {standard.quantity}."]
+    sentences += [f"Calibrated {standard.calibrated}."] if standard.calibrated else []
+    sentences += [f"Due {standard.due}."] if standard.due else []
+    sentences += [f"Traceability: {standard.traceability}."] if standard.traceability else []
+    texts(element, "description", *sentences)
     if standard.certificate:
         identification = child(element, "identifications")
         _identification(identification, "calibrationLaboratory", standard.certificate,

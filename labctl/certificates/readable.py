@@ -112,11 +112,11 @@ def _with_unit(value: float, unit: str) -> str:
 
 def _standard(standard: StandardUsed) -> list[str]:
     dates = [each.isoformat() if each else "–" for each in (standard.calibrated, standard.due)]
-    said = [each or "–" for each in (standard.certificate, standard.issued_by)]
+    cells = [each or "–" for each in (standard.certificate, standard.issued_by)]
     return [
         _standard_name(standard),
         _with_unit(standard.u, standard.unit),
-        *said,
+        *cells,
         *dates,
         standard.traceability or "–",
     ]
@@ -293,10 +293,11 @@ def _sensor(result: SensorResult) -> Mapping[str, object]:
     }
 
 
-def reference_text(given: SensorReference) -> str:
+def reference_text(reference: SensorReference) -> str:
     """Return the quantity by which a sensor was calibrated, its uncertainty and traceability."""
-    u = "" if given.u is None else f", u = {given.u:.2g} {readable(given.unit)}"
-    return f"{given.quantity} {given.value:.7g} {readable(given.unit)}{u}. Traceability: {given.traceability}"
+    u = "" if reference.u is None else f", u = {reference.u:.2g} {readable(reference.unit)}"
+    value = f"{reference.value:.7g} {readable(reference.unit)}"
+    return f"{reference.quantity} {value}{u}. Traceability: {reference.traceability}"
 
 
 def _state(title: str, state: StateOfItem) -> Mapping[str, object]:

@@ -27,10 +27,10 @@ def referred(ref_type: str) -> dict[str, str]:
     return {"refType": ref_type} if ref_type else {}
 
 
-def texts(parent: ET.Element, name: str, *said: str, **attributes: str) -> ET.Element:
-    """Add an element with its text in English; `said` is joined, as PTB's rules allow one text per language."""
+def texts(parent: ET.Element, name: str, *text: str, **attributes: str) -> ET.Element:
+    """Add an element with its text in English; `text` is joined, as PTB's rules allow one text per language."""
     element = child(parent, name, **attributes)
-    child(element, "content", " ".join(said), lang=ENGLISH)
+    child(element, "content", " ".join(text), lang=ENGLISH)
     return element
 
 
@@ -77,8 +77,10 @@ def quantity(
     texts(element_made, "name", name)
     symbol = dsi(unit)
     if symbol is None:
-        said = "; ".join(f"{value:.{DIGITS}g}" for value in values) + ("" if u is None else f", u = {u:.{DIGITS}g}")
-        texts(element_made, "noQuantity", f"{said} {readable(unit)}")
+        values_text = "; ".join(f"{value:.{DIGITS}g}" for value in values) + (
+            "" if u is None else f", u = {u:.{DIGITS}g}"
+        )
+        texts(element_made, "noQuantity", f"{values_text} {readable(unit)}")
         return element_made
     several = len(values) > 1
     tail = "XMLList" if several else ""

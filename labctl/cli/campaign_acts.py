@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from typer._click.core import Command, Context
 
     from labctl.answers.campaigns import CampaignResponse
-    from labctl.services.commands.acts.campaign_act import AskedT, CampaignAct
+    from labctl.services.commands.acts.campaign_act import AddressedT, CampaignAct
     from labctl.services.commands.acts.campaign_command import CampaignCommand, CommandOption, DefaultCampaign
 
 Id = Annotated[int, typer.Argument(metavar="ID", help="Number of the campaign.")]
@@ -73,13 +73,13 @@ def _declared() -> list[tuple[CampaignAct[Any], CampaignCommand]]:
 
 
 @cache
-def command_of(act: CampaignAct[AskedT], line: CampaignCommand) -> TyperCommand:
+def command_of(act: CampaignAct[AddressedT], line: CampaignCommand) -> TyperCommand:
     """Return the command of an act: the campaign, the options that it states, --json and --database."""
 
-    def perform(campaign: int | None, as_json: bool, database: str | None, **given: object) -> None:
+    def perform(campaign: int | None, as_json: bool, database: str | None, **options: object) -> None:
         with one_clear_line():
             number = _campaign(line.default_campaign, database, campaign)
-            answer = _send(act, line, number, given, database, quiet=as_json)
+            answer = _send(act, line, number, options, database, quiet=as_json)
         if line.runs_here:
             print_end(answer, as_json=as_json)
         else:
@@ -100,20 +100,20 @@ def command_of(act: CampaignAct[AskedT], line: CampaignCommand) -> TyperCommand:
     return made
 
 
-def _campaign(default: DefaultCampaign, database: str | None, given: int | None) -> int | None:
+def _campaign(default: DefaultCampaign, database: str | None, campaign: int | None) -> int | None:
     """Return the number of the campaign that is meant. Raises NotFound."""
     from labctl.services.commands.open import campaign_to_resume, current_status
 
     if default == "resumable":
-        return campaign_to_resume(database, given)
-    return given if given is not None or default == "none" else current_status(database, None).id
+        return campaign_to_resume(database, campaign)
+    return campaign if campaign is not None or default == "none" else current_status(database, None).id
 
 
 def _send(
-    act: CampaignAct[AskedT],
+    act: CampaignAct[AddressedT],
     line: CampaignCommand,
     campaign: int | None,
-    given: Mapping[str, object],
+    options: Mapping[str, object],
     database: str | None,
     *,
     quiet: bool,
@@ -121,7 +121,7 @@ def _send(
     """Have an act carried out: what the options give is a field of its request, or else of the address."""
     from labctl.services.commands.open import execute
 
-    named = {**given, "by": person(given["by"])} if "by" in given else given
+    named = {**options, "by": person(options["by"])} if "by" in options else options
     values = line.request(named)
     body = act.body.model_validate({name: value for name, value in values.items() if name in act.body.model_fields})
     address = {name: value for name, value in values.items() if name not in act.body.model_fields}
@@ -130,10 +130,10 @@ def _send(
         from labctl.cli.campaign_terminal import campaign_terminal
 
         terminal = campaign_terminal(quiet=quiet)
-    return execute(database, act.command, act.asked(campaign, body, **address), terminal)
+    return execute(database, act.command, act.request_type(campaign, body, **address), terminal)
 
 
-def _options(act: CampaignAct[AskedT], line: CampaignCommand) -> list[inspect.Parameter]:
+def _options(act: CampaignAct[AddressedT], line: CampaignCommand) -> list[inspect.Parameter]:
     """Return the parameters of a command for its campaign and its options, in the order of the help."""
     fields = act.body.model_fields
     options = [

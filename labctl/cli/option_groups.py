@@ -21,8 +21,8 @@ def with_options(group: type[Any]) -> Callable[[Callable[..., None]], Callable[.
         hints.pop(first, None)
         both = [each.replace(annotation=hints[name]) for name, each in {**own, **shared}.items()]
 
-        def run(**given: Any) -> None:
-            command(group(**{name: given.pop(name) for name in shared}), **given)
+        def run(**options: Any) -> None:
+            command(group(**{name: options.pop(name) for name in shared}), **options)
 
         run.__name__, run.__qualname__, run.__doc__ = command.__name__, command.__qualname__, command.__doc__
         run.__module__, run.__annotations__ = command.__module__, hints

@@ -97,13 +97,13 @@ def simulated_start(text: str | None) -> datetime | None:
         ) from error
 
 
-def recording_numbers(given: str | None) -> list[int]:
+def recording_numbers(listed: str | None) -> list[int]:
     """Return the numbers of recordings in "3" or "1,2,3", none where nothing was given. Raises BadInput."""
     numbers: list[int] = []
-    for text in (given or "").split(",") if given is not None else ():
+    for text in (listed or "").split(",") if listed is not None else ():
         if not text.strip().isdecimal() or not text.isascii():
             raise BadInput(
-                f"--recording {given!r}: {text!r} is not a recording number; write one number such as 3, "
+                f"--recording {listed!r}: {text!r} is not a recording number; write one number such as 3, "
                 "or several as 1,2,3"
             )
         numbers.append(int(text))

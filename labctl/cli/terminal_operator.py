@@ -18,7 +18,7 @@ from procedures.contracts.operator import HumanOperator
 if TYPE_CHECKING:
     from procedures.contracts.operator import Operator, Prompt
 
-LOOK_S = 0.5
+POLL_INTERVAL_S = 0.5
 #: What a person types who wants a turn by hand to be asked again.
 AGAIN = "again"
 
@@ -40,7 +40,7 @@ class TerminalOperator:
 
     def _serve(self, operator: HumanOperator, note: Callable[[str], None]) -> None:
         asked_prompt = ""
-        while not self._closed.wait(LOOK_S):
+        while not self._closed.wait(POLL_INTERVAL_S):
             prompt = operator.pending
             if prompt is not None and prompt.id != asked_prompt:
                 asked_prompt = prompt.id

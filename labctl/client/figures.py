@@ -64,8 +64,8 @@ class FigureMethods(ClientPart):
     ) -> TraceResponse:  # fmt: skip
         """Return least, largest and mean reading of a channel in at most `points` bins of a window, s."""
         query = {"channel": channel, "from_s": from_s, "until_s": until_s, "points": points}
-        given = {name: value for name, value in query.items() if value is not None}
-        response = self._connection.request("GET", f"/api/recordings/{recording}/trace", params=given)
+        parameters = {name: value for name, value in query.items() if value is not None}
+        response = self._connection.request("GET", f"/api/recordings/{recording}/trace", params=parameters)
         return TraceResponse.model_validate(json_of(response))
 
     def trace_point(
@@ -85,8 +85,8 @@ class FigureMethods(ClientPart):
     def trend(self, serial: str, *, version: int | None = None, limit_dps: float | None = None) -> TrendResponse:
         """Return what a version (default: the first) leaves of each recording of a unit, and its drift per year."""
         query = {"version": version, "limit_dps": limit_dps}
-        given = {name: value for name, value in query.items() if value is not None}
-        response = self._connection.request("GET", f"/api/units/{part(serial)}/trend", params=given)
+        parameters = {name: value for name, value in query.items() if value is not None}
+        response = self._connection.request("GET", f"/api/units/{part(serial)}/trend", params=parameters)
         return TrendResponse.model_validate(json_of(response))
 
     def trend_point(
@@ -99,7 +99,7 @@ class FigureMethods(ClientPart):
         )  # fmt: skip
 
     def _figure_point(self, path: str, **query: str | float | None) -> FigurePointResponse:
-        given = {name: value for name, value in query.items() if value is not None}
+        parameters = {name: value for name, value in query.items() if value is not None}
         return FigurePointResponse.model_validate(
-            json_of(self._connection.request("GET", f"/api/{path}", params=given))
+            json_of(self._connection.request("GET", f"/api/{path}", params=parameters))
         )

@@ -8,7 +8,7 @@ import string
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
-from labctl.exports.c_code.memory import memory_body
+from labctl.exports.c_code.lag_and_hysteresis import memory_body
 from labctl.exports.c_code.nodes import temperature_nodes
 from labctl.exports.c_code.orientation import orientation_body
 from labctl.exports.c_code.rounding_error import rounding_line
@@ -266,8 +266,8 @@ def _head(name: str, calibration: Calibration) -> str:
     slowest, fastest = output_limits_dps(calibration)
     is_limited = math.isfinite(slow) and math.isfinite(fast)
     nominal = "; ".join(
-        f"{axis}: (output in {unit.unit} - {unit.offset:g}) / {unit.scale:g}"
-        for axis, unit in calibration.output.items()
+        f"{axis}: (output in {output.unit} - {output.offset:g}) / {output.scale:g}"
+        for axis, output in calibration.output.items()
     )
     return HEAD.format(
         serial=_in_comment(calibration.serial),

@@ -20,9 +20,9 @@ def head_lines(
 ) -> list[str]:
     """Return the lines, without the sign that begins a comment."""
     (low, high), (slow, fast) = calibration.temperature_c, calibration.rate_dps
-    unit, model = plain(calibration.serial), plain(calibration.fitted.model.name)
+    serial, model = plain(calibration.serial), plain(calibration.fitted.model.name)
     lines = [
-        f"Gyro {unit}, calibration version {calibration.version}: model {model}",
+        f"Gyro {serial}, calibration version {calibration.version}: model {model}",
         f"Hash of the calibration: {calibration.calibration_hash}",
         f"Calibrated from {low:g} to {high:g} deg C and from {slow:g} to {fast:g} deg/s.",
         f"Carries: {carries}.",

@@ -61,8 +61,8 @@ def write(calibration: Calibration) -> Written:
         "inside_c": [_limit(low - MARGIN_C), _limit(high + MARGIN_C)],
         "output_dps": [_limit(slowest), _limit(fastest)],
         "output": {
-            axis: {"unit": unit.unit, "offset": unit.offset, "scale": unit.scale}
-            for axis, unit in calibration.output.items()
+            axis: {"unit": output.unit, "offset": output.offset, "scale": output.scale}
+            for axis, output in calibration.output.items()
         },
         **tables,
     }

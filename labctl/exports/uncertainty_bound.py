@@ -103,5 +103,5 @@ def _at_least(bound: float) -> float:
     """Return a bound with two significant digits, rounded up."""
     if bound == 0:
         return 0.0
-    unit = 10.0 ** (math.floor(math.log10(bound)) - 1)
-    return float(f"{math.ceil(bound / unit - 1e-9) * unit:.3g}")
+    last_digit = 10.0 ** (math.floor(math.log10(bound)) - 1)
+    return float(f"{math.ceil(bound / last_digit - 1e-9) * last_digit:.3g}")

@@ -180,9 +180,11 @@ def control_chart(history: Sequence[PastCalibration], years: float, limit: float
     """Return the longest interval by an item's own drift and scatter (method 2), compared with the one before."""
     rate = control_chart_rate(history)
     newest = max(history, key=lambda each: each.on)
-    found = interval_for_risk(newest.error, newest.u, rate, limit, target)
-    decision: Decision = "extend" if found.years > 1.05 * years else "reduce" if found.years < 0.95 * years else "keep"
-    return Interval(found.years, decision, found.risk, found.why)
+    interval = interval_for_risk(newest.error, newest.u, rate, limit, target)
+    decision: Decision = (
+        "extend" if interval.years > 1.05 * years else "reduce" if interval.years < 0.95 * years else "keep"
+    )
+    return Interval(interval.years, decision, interval.risk, interval.why)
 
 
 def _first(years: Array, where: NDArray[np.bool_]) -> float | None:

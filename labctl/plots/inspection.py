@@ -43,7 +43,7 @@ def inspection_picture(courses: Sequence[CourseJson], marks: Sequence[MarkJson])
     figure = grid_of(headings, 1, row_px=ROW_PX + further_px, gap_px=GAP_PX + further_px, shared_xaxes=True)
     figure.update_layout(margin={"t": 30 + LINE_PX * headings[0].count("<br>"), "l": LEFT_PX})
     figure.update_annotations(x=0.0, xanchor="left", xshift=8 - LEFT_PX, yshift=4, align="left", font={"size": 12})
-    unit, unit_s = _time_unit(courses)
+    time_unit, unit_s = _time_unit(courses)
     bands: list[dict[str, object]] = []
     for panel, course in enumerate(courses):
         placement = place(panel, 1)
@@ -53,7 +53,7 @@ def inspection_picture(courses: Sequence[CourseJson], marks: Sequence[MarkJson])
             band for mark in _marks_of(course, marks) for band in _bands(mark, colours[mark["what"]], panel, unit_s)
         ]
     figure.update_layout(shapes=bands)  # all at once: plotly copies its figure for each that is added by itself
-    figure.update_xaxes(title=f"time, {unit}", row=len(courses), col=1)
+    figure.update_xaxes(title=f"time, {time_unit}", row=len(courses), col=1)
     return Picture("inspection", TITLE, CAPTION, figure)
 
 
@@ -90,7 +90,7 @@ def _time_unit(courses: Sequence[CourseJson]) -> tuple[str, float]:
     """Return the unit of the axis of time, and its seconds: hours from 3 h on, minutes from 10 min on, else seconds."""
     times_s = [t_s for course in courses for t_s in course["t_s"] if t_s is not None]
     span_s = max(times_s, default=0.0) - min(times_s, default=0.0)
-    return next(unit for unit in TIME_UNITS if span_s >= unit[2])[:2]
+    return next(time_unit for time_unit in TIME_UNITS if span_s >= time_unit[2])[:2]
 
 
 def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:

@@ -154,11 +154,11 @@ def pictures_of(
     criticism: CriticismResponse, ladder: LadderResponse | None = None, comparison: ComparisonResponse | None = None
 ) -> list[Picture]:
     """Return the pictures of a criticism, a ladder and a comparison, as far as there is something to draw."""
-    found = [_picture(kind, criticism, _effects(kind.id, criticism)) for kind in KINDS]
-    found += [_picture(kind, comparison, ()) for kind in COMPARED if comparison is not None]
+    pictures = [_picture(kind, criticism, _effects(kind.id, criticism)) for kind in KINDS]
+    pictures += [_picture(kind, comparison, ()) for kind in COMPARED if comparison is not None]
     if ladder is not None:
-        found.append(_picture(LADDER, ladder, ()))
-    return [picture for picture in found if picture is not None]
+        pictures.append(_picture(LADDER, ladder, ()))
+    return [picture for picture in pictures if picture is not None]
 
 
 def _picture(kind: _Kind[AnswerT], answer: AnswerT, effects: tuple[str, ...]) -> Picture | None:

@@ -96,10 +96,10 @@ def time(answer: CriticismResponse) -> go.Figure | None:
     if not lines or not sets:
         return None
     timed = sets.get("timed", False)
-    name, unit = ("t_s", HOUR_S) if timed else ("order", 1.0)
+    name, per = ("t_s", HOUR_S) if timed else ("order", 1.0)
     channels = sets.get("channels", {})
     residuals, numbers = sets.get("residual_dps", {}), [f"data set {n}" for n in sets.get("dataset", ())]
-    along = _over(channels[name], unit)
+    along = _over(channels[name], per)
     titles = [_time_title(line) + shown_text(sets) for line in lines]
     figure = grid_of([*titles, "temperature"], 1, shared_xaxes=True)
     for panel, line in enumerate(lines):
@@ -111,8 +111,8 @@ def time(answer: CriticismResponse) -> go.Figure | None:
             else (line.get("order", []), line.get("power_on_order", []))
         )
         mean, low, high = line["mean_dps"], line["low_dps"], line["high_dps"]
-        banded(figure, _over(at, unit), mean, low, high, colour, line["axis"], **placement)
-        for begin in _over(begins, unit):
+        banded(figure, _over(at, per), mean, low, high, colour, line["axis"], **placement)
+        for begin in _over(begins, per):
             figure.add_vline(x=begin, line={"color": WARM, "width": 1, "dash": "dot"}, **placement)
         figure.update_yaxes(title="deg/s", **placement)
     placement = place(len(lines), 1)
@@ -125,8 +125,8 @@ def time(answer: CriticismResponse) -> go.Figure | None:
     return figure
 
 
-def _over(values: Numbers, unit: float) -> Numbers:
-    return [None if value is None else value / unit for value in values]
+def _over(values: Numbers, per: float) -> Numbers:
+    return [None if value is None else value / per for value in values]
 
 
 def _time_title(line: TimeLine) -> str:

@@ -15,11 +15,11 @@ from typing import NoReturn
 from instruments.clock import WallClock
 from labctl.errors import BenchSilent, LabctlError
 from labctl.log import get_logger
-from labctl.processes.call_forms import supervisor_form
-from labctl.processes.calls import Caller
 from labctl.processes.children import Child
 from labctl.processes.documents import receive, value_of
 from labctl.processes.liveness import Silence
+from labctl.processes.rpc import RpcClient
+from labctl.processes.rpc_methods import supervisor_method
 from labctl.processes.settings import CALLS, BenchSettings, ServeRequest
 from labctl.processes.supervision import SAID_BY_BENCH, SAID_BY_SUPERVISOR, SupervisorWord
 from labctl.services.benches.bench_left import BenchLeft
@@ -66,12 +66,12 @@ class BenchLine:
         self._thread.start()
 
     def _take_charge(self, settings: BenchSettings) -> Connection:
-        line = Caller(settings.folder / CALLS, ANSWER_S, supervisor_form).connect()
+        line = RpcClient(settings.folder / CALLS, ANSWER_S, supervisor_method).connect()
         try:
-            line.send_bytes(supervisor_form("supervise").call(settings))
+            line.send_bytes(supervisor_method("supervise").call(settings))
             if not line.poll(ANSWER_S):
                 self._end_silent()
-            said = receive(line)
+            reply = receive(line)
         except (EOFError, OSError) as error:
             line.close()
             raise BenchSilent(
@@ -82,7 +82,7 @@ class BenchLine:
             line.close()
             raise
         try:
-            value_of(SAID_BY_BENCH, said)
+            value_of(SAID_BY_BENCH, reply)
         except Exception:
             line.close()
             raise
@@ -101,11 +101,11 @@ class BenchLine:
     def _hear(self) -> None:
         with contextlib.suppress(EOFError, OSError, LabctlError):  # what it cannot say counts as its silence
             while True:
-                said = value_of(SAID_BY_BENCH, receive(self._line))
+                message = value_of(SAID_BY_BENCH, receive(self._line))
                 self._heard.restart()
-                self.at_rest = said == "at rest"
-                if isinstance(said, BenchLeft):
-                    self.left = said
+                self.at_rest = message == "at rest"
+                if isinstance(message, BenchLeft):
+                    self.left = message
 
     @property
     def heard_s(self) -> float:

@@ -18,13 +18,13 @@ from multiprocessing.connection import Connection
 from instruments.clock import Clock, WallClock
 from labctl.errors import BadInput, LabctlError
 from labctl.log import get_logger
-from labctl.processes.bench_calls import BenchCalls
-from labctl.processes.bench_forms import form_of
-from labctl.processes.calls import CallServer
+from labctl.processes.bench_methods import method_of
+from labctl.processes.bench_rpc import BenchRpc
 from labctl.processes.children import begin_child_log, leave, line_to_parent, tell, tell_refusal
 from labctl.processes.driver_note import DriverNoteWriter
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import EngineWatch
+from labctl.processes.rpc import RpcServer
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.processes.supervisor_watch import unheard_end
@@ -47,7 +47,7 @@ log = get_logger()
 ANSWER_WITHIN_S = 0.2
 #: A bench process without a supervisor ends by itself when no campaign has run for so long, s.
 ALONE_S = 60.0
-LOOK_S = 0.5
+POLL_INTERVAL_S = 0.5
 SWITCH_S = 0.0005
 
 
@@ -104,9 +104,9 @@ class BenchProcess:
         )  # fmt: skip
         if local.scheduler is not None:
             local.scheduler.attended = lambda: self._supervision.alone_s == 0.0
-        self._calls = BenchCalls(store, local, self._supervision, self._address, WallClock(settings.ahead))
+        self._calls = BenchRpc(store, local, self._supervision, self._address, WallClock(settings.ahead))
         self._stop_server = StopServer(settings.folder / STOP, local.request_stop)
-        self._call_server = CallServer(settings.folder / CALLS, self._calls.answer, form_of)
+        self._call_server = RpcServer(settings.folder / CALLS, self._calls.answer, method_of)
 
     def run(self, line: Connection) -> None:
         """Serve until asked to end, or left alone; the bench is safe and the database closed when this returns."""
@@ -123,7 +123,7 @@ class BenchProcess:
     def _serve(self) -> None:
         begun = False
         while not self._waker.ending:
-            self._waker.wait(LOOK_S)
+            self._waker.wait(POLL_INTERVAL_S)
             if self._supervision.begin and not begun:
                 begun = True
                 log.info("bench.begun")

@@ -30,7 +30,7 @@ SAID_BY_CHILD: Form[ChildWord] = Form(ChildWord, "what a process of the service 
 SettingsT = TypeVar("SettingsT")
 #: Of linux/prctl.h.
 PR_SET_PDEATHSIG = 1
-LOOK_S = 0.5
+POLL_INTERVAL_S = 0.5
 
 
 class Failed(LabctlError):
@@ -68,10 +68,10 @@ class Child:
         """
         try:
             self.line.send_bytes(Form[object](type(settings), "the settings of a process").encode(settings))
-            while not self.line.poll(LOOK_S):
+            while not self.line.poll(POLL_INTERVAL_S):
                 if gives_up():
                     raise Failed(f"the {self.name} was not ready when it was asked to end; start the service again")
-            said = receive(self.line)
+            reply = receive(self.line)
         except (EOFError, OSError):
             self._process.wait()
             raise Failed(
@@ -79,7 +79,7 @@ class Child:
                 "read the log for the cause"
             ) from None
         try:
-            value_of(SAID_BY_CHILD, said)
+            value_of(SAID_BY_CHILD, reply)
         except BadDocument:
             self.kill()  # it may go on, and what it does is not known
             raise

@@ -60,8 +60,8 @@ class ErrorDocument(BaseModel):
             return cls(kind=OtherProcessFailed.__name__, args=[text], notes=notes)
         attributes = {name: value for name, value in vars(error).items() if name != NOTES}
         if kind is not type(error):
-            said = {name: getattr(error, name, None) for name in OF_THE_KIND}
-            attributes |= {name: value for name, value in said.items() if value != getattr(kind, name, None)}
+            values = {name: getattr(error, name, None) for name in OF_THE_KIND}
+            attributes |= {name: value for name, value in values.items() if value != getattr(kind, name, None)}
         return cls(kind=kind.__name__, args=_plain(list(error.args)), attributes=_plain(attributes), notes=notes)
 
     def error(self) -> Exception:

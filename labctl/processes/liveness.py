@@ -68,12 +68,12 @@ def run_delays_s(pid: int) -> dict[int, float]:
 
     Linux, Documentation/scheduler/sched-stats.rst: the second field of /proc/<pid>/task/<tid>/schedstat, ns.
     """
-    found: dict[int, float] = {}
+    delays_s: dict[int, float] = {}
     with suppress(OSError, ValueError):
         for task in Path(f"/proc/{pid}/task").iterdir():
             with suppress(OSError, ValueError, IndexError):
-                found[int(task.name)] = 1e-9 * int((task / "schedstat").read_text(encoding="ascii").split()[1])
-    return found
+                delays_s[int(task.name)] = 1e-9 * int((task / "schedstat").read_text(encoding="ascii").split()[1])
+    return delays_s
 
 
 class EngineWatch:

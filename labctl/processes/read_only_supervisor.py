@@ -29,7 +29,7 @@ from labctl.stop.wire import Stopping
 
 log = get_logger()
 
-LOOK_S = 0.25
+POLL_INTERVAL_S = 0.25
 
 
 def serve_read_only(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
@@ -89,7 +89,7 @@ def _serve(keepers: list[WebKeeper], at: Listening, waker: Waker, ready: Callabl
     systemd.ready()
     notified = Elapsed()
     while not waker.ending:
-        waker.wait(LOOK_S)
+        waker.wait(POLL_INTERVAL_S)
         if notified.s > systemd.period_s():
             notified.restart()
             systemd.alive()

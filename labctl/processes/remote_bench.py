@@ -16,10 +16,10 @@ from labctl.answers.campaigns import CampaignResponse, ReasonRequest
 from labctl.answers.live import LiveHistoryResponse, LiveStateResponse
 from labctl.errors import BenchSilent, Conflict, LabctlError, NotStopped
 from labctl.log import get_logger
-from labctl.processes.bench_forms import Beat, form_of
-from labctl.processes.calls import Caller
+from labctl.processes.bench_methods import Beat, method_of
 from labctl.processes.documents import receive, value_of
 from labctl.processes.liveness import Elapsed
+from labctl.processes.rpc import RpcClient
 from labctl.processes.settings import CALLS
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.stops import describe_stop, late_stop
@@ -50,7 +50,7 @@ class RemoteWriter:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._caller = Caller(folder / CALLS, WRITES_S, form_of)
+        self._caller = RpcClient(folder / CALLS, WRITES_S, method_of)
 
     def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction there; returns or raises what it did. Raises BenchSilent."""
@@ -79,7 +79,7 @@ class RemoteControl:
         """`may_run`: whether a campaign runs, or may; `last_live`: how it was when the bench process answered last."""
         self._bench, self._place = bench, place
         self._may_run, self._last_live = may_run, last_live
-        self._calls = Caller(folder / CALLS, ANSWER_S, form_of)
+        self._calls = RpcClient(folder / CALLS, ANSWER_S, method_of)
 
     def bench_of(self, _: CampaignStart) -> BenchFile:
         """Return the bench of the bench process. Raises Conflict without one."""
@@ -93,27 +93,27 @@ class RemoteControl:
             raise Conflict(NO_BENCH)
         return self._bench
 
-    def perform(self, act: BenchAct[RequestT, ResponseT], _: CommandContext, asked: RequestT) -> ResponseT:
+    def perform(self, act: BenchAct[RequestT, ResponseT], _: CommandContext, request: RequestT) -> ResponseT:
         """Have the bench process carry out an act; an abort stops the bench by a way of its own first."""
         if act.name == ABORT.name:
-            return cast(ResponseT, self._abort(cast(ToCampaign[ReasonRequest], asked)))
-        return self._ask(act, asked, act.wait_s)
+            return cast(ResponseT, self._abort(cast(ToCampaign[ReasonRequest], request)))
+        return self._ask(act, request, act.wait_s)
 
-    def _abort(self, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+    def _abort(self, request: ToCampaign[ReasonRequest]) -> CampaignResponse:
         """End a campaign now, in the safe state: first the stop, by a way of its own; then it is written down.
 
         Raises NotStopped where it is not confirmed within some seconds that the table stands.
         """
-        if self._place is None or not self._may_run(asked.campaign):
-            return self._recorded(asked)
-        attempt = self._attempt(asked.body.text, asked.campaign)
-        found = attempt.result(STANDS_S)
-        if found is None or not found.stands:
+        if self._place is None or not self._may_run(request.campaign):
+            return self._recorded(request)
+        attempt = self._attempt(request.body.text, request.campaign)
+        outcome = attempt.result(STANDS_S)
+        if outcome is None or not outcome.stands:
             raise NotStopped(not_stopped_text(attempt.text))
         try:
-            return self._recorded(asked)
+            return self._recorded(request)
         except BenchSilent as silent:
-            last = self._last_live(asked.campaign)
+            last = self._last_live(request.campaign)
             if last is None:
                 raise BenchSilent(
                     f"the table stands ({attempt.text}), but that is not recorded yet; try again once the bench "
@@ -127,21 +127,21 @@ class RemoteControl:
         if self._place is None or self._bench is None:
             raise Conflict(NO_BENCH)
         attempt = self._attempt(reason, None)
-        found = attempt.result(STANDS_S)
-        if found is None or not found.stands:
+        outcome = attempt.result(STANDS_S)
+        if outcome is None or not outcome.stands:
             raise NotStopped(not_stopped_text(attempt.text))
-        return StopResponse(bench=self._bench.name, stands=True, text=found.text, campaign=found.campaign)
+        return StopResponse(bench=self._bench.name, stands=True, text=outcome.text, campaign=outcome.campaign)
 
     def _attempt(self, reason: str, campaign: int | None) -> StopAttempt:
         assert self._place is not None
         stop = StopRequest.new(actor().name, actor().via, reason, campaign)
         return StopAttempt(self._place, _asked_before(stop, self._place.latch.state()) or stop)
 
-    def _recorded(self, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-        return self._ask(ABORT, asked, ANSWER_S)
+    def _recorded(self, request: ToCampaign[ReasonRequest]) -> CampaignResponse:
+        return self._ask(ABORT, request, ANSWER_S)
 
-    def _ask(self, act: BenchAct[RequestT, ResponseT], asked: RequestT, timeout_s: float) -> ResponseT:
-        return self._calls.call(f"control.{act.name}", asked, timeout_s=timeout_s)
+    def _ask(self, act: BenchAct[RequestT, ResponseT], request: RequestT, timeout_s: float) -> ResponseT:
+        return self._calls.call(f"control.{act.name}", request, timeout_s=timeout_s)
 
     def close(self) -> None:
         """Close the connections."""
@@ -169,7 +169,7 @@ class RemoteBench:
         self.bench = bench
         self._place = None if bench is None or not location else place_of(location, bench.name)
         self.control = RemoteControl(folder, bench, self._place, self._may_run, self._last_of)
-        self._caller = Caller(folder / CALLS, ANSWER_S, form_of)
+        self._caller = RpcClient(folder / CALLS, ANSWER_S, method_of)
         self._listeners = ChangeListeners()
         self._beat = Beat(running=None, stops=False, schedule_trouble="")
         self._heard = Elapsed()
@@ -301,7 +301,7 @@ class RemoteBench:
 
     def _hear(self) -> None:
         with self._caller.connect() as connection:
-            form = form_of("watch")
+            form = method_of("watch")
             connection.send_bytes(form.call())
             while not self._over.is_set():
                 if not connection.poll(SILENT_S):

@@ -109,15 +109,15 @@ class Supervision:
 
     def _hear(self, line: Connection) -> None:
         with contextlib.suppress(EOFError, OSError):
-            while (said := self._said(line)) is not None:
+            while (message := self._said(line)) is not None:
                 if self._heard is not None:
                     self._heard.restart()
-                if said == "listener":
+                if message == "listener":
                     self._address.take(socket.socket(fileno=recv_handle(line)))
-                elif said == "begin":
+                elif message == "begin":
                     self.begin = True
                     self._waker.wake()
-                elif said == "end":
+                elif message == "end":
                     self._on_end()
                     self._waker.end()
         self._let_go(line)

@@ -26,12 +26,12 @@ from labctl.errors import BenchSilent, BenchUnconfirmed, Conflict, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
 from labctl.processes.bench_line import EXCUSED_S, BenchLine, bench_process_of
-from labctl.processes.call_forms import supervisor_form
-from labctl.processes.calls import Caller
 from labctl.processes.children import Child
 from labctl.processes.guardian import Guardian, GuardianStop
 from labctl.processes.listening import Listening, listening
 from labctl.processes.liveness import Elapsed, Restarts, Silence
+from labctl.processes.rpc import RpcClient
+from labctl.processes.rpc_methods import supervisor_method
 from labctl.processes.settings import CALLS, BenchSettings, ServeRequest, WebSettings, ahead_of
 from labctl.processes.supervisor_watch import is_stopped
 from labctl.processes.waker import Waker
@@ -47,7 +47,7 @@ from procedures.execution.signals import ENDING, restore
 
 log = get_logger()
 
-LOOK_S, BEAT_S = 0.25, 0.5
+POLL_INTERVAL_S, BEAT_S = 0.25, 0.5
 #: A bench process that gave no sign of life for so long is ended, its bench stopped, and another one started, s.
 SILENT_S = 3.0
 #: A bench process that starts may take this long to answer for the first time, s.
@@ -98,7 +98,7 @@ def _ask_for_address(request: ServeRequest) -> None:
         if holder is None or holder.calls is None:
             return
         try:
-            Caller(Path(holder.calls) / CALLS, ADDRESS_S, supervisor_form).call("address.give_back")
+            RpcClient(Path(holder.calls) / CALLS, ADDRESS_S, supervisor_method).call("address.give_back")
         except BenchSilent:
             log.error("child.silent", child="bench", child_pid=holder.pid, silent_s=ADDRESS_S)
             end_process(ProcessId.of(holder.pid))
@@ -191,9 +191,9 @@ class Supervisor:
         if self._guardian is None:
             return None
         while self._guardian.busy:  # it was asked for a stop, and has ended the process itself
-            self._waker.wait(LOOK_S)
+            self._waker.wait(POLL_INTERVAL_S)
         securing = self._guardian.begin()
-        while not securing.wait(LOOK_S):
+        while not securing.wait(POLL_INTERVAL_S):
             systemd.alive()
         return securing
 
@@ -216,8 +216,8 @@ class Supervisor:
         """
         trying = Elapsed()
         while True:
-            if (found := self._find_bench()) is not None:
-                return found
+            if (bench := self._find_bench()) is not None:
+                return bench
             self._folder = Path(tempfile.mkdtemp(prefix="labctl-"))
             self._secure_orphan()
             try:
@@ -227,7 +227,7 @@ class Supervisor:
                 starting = holder is not None and holder.calls is not None
                 if not starting or self._waker.ending or trying.s > STARTS_WITHIN_S:
                     raise
-            self._waker.wait(LOOK_S)
+            self._waker.wait(POLL_INTERVAL_S)
 
     def _find_bench(self) -> BenchLine | None:
         """Take charge of the bench process that outlived its service; None where there is none that answers.
@@ -265,7 +265,7 @@ class Supervisor:
         if not bench.at_rest:
             self._latch_end()  # written down first: either process may be killed before it is carried out
         bench.tell("end")
-        while not bench.wait(LOOK_S):
+        while not bench.wait(POLL_INTERVAL_S):
             systemd.alive()
             if ending.s > ENDS_WITHIN_S / 2:
                 web.end_soon()
@@ -326,8 +326,8 @@ class Supervisor:
         notified, since, beaten = Elapsed(), Elapsed(), Elapsed()
         while not self._waker.ending:
             since.restart()
-            self._waker.wait(LOOK_S)
-            if since.s > LOOK_S + LATE_S and self._bench is not None:
+            self._waker.wait(POLL_INTERVAL_S)
+            if since.s > POLL_INTERVAL_S + LATE_S and self._bench is not None:
                 self._bench.excuse()
             self._look_after_bench()
             if self._bench is not None and beaten.s > BEAT_S:

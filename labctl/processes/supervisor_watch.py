@@ -20,7 +20,7 @@ from procedures.execution.signals import ENDING
 
 log = get_logger()
 
-LOOK_S = 0.5
+POLL_INTERVAL_S = 0.5
 
 
 def is_stopped(pid: int) -> bool:
@@ -32,14 +32,14 @@ def unheard_end(pid: int) -> bool:
     """Return whether a process that stands still was asked to end by a signal that it could not hear yet."""
     if not is_stopped(pid):
         return False
-    ending, asked = sum(1 << (number - 1) for number in ENDING), 0
+    ending, signals = sum(1 << (number - 1) for number in ENDING), 0
     for status in _statuses(pid):
         waiting, of_thread, blocked = (
             int(status.get(each, "0"), 16) & ending for each in ("ShdPnd", "SigPnd", "SigBlk")
         )
         in_handler = blocked if blocked != ending else 0  # a thread of a library may block them all, a handler its own
-        asked |= waiting | of_thread | in_handler
-    return bool(asked)
+        signals |= waiting | of_thread | in_handler
+    return bool(signals)
 
 
 class SupervisorWatch:
@@ -60,7 +60,7 @@ class SupervisorWatch:
         self._over.set()
 
     def _look(self) -> None:
-        while not self._over.wait(LOOK_S):
+        while not self._over.wait(POLL_INTERVAL_S):
             if unheard_end(self._pid):
                 log.error("supervisor.stands_still", supervisor_pid=self._pid, asked_to_end=True)
                 self._end()

@@ -40,5 +40,5 @@ def alive() -> None:
 
 def period_s() -> int:
     """Return how often to say so: a third of what the service manager waits, in whole seconds."""
-    asked = os.environ.get("WATCHDOG_USEC", "")
-    return max(int(asked) // 3_000_000, 1) if asked.isdigit() else 30
+    watchdog_us = os.environ.get("WATCHDOG_USEC", "")
+    return max(int(watchdog_us) // 3_000_000, 1) if watchdog_us.isdigit() else 30

@@ -74,12 +74,12 @@ def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:
     upload, read_only = request.max_upload_mib * MIB, ReadOnlyAccess(request.acts_at) if request.read_only else None
     if not request.asks_for_keys:
         return AccessPolicy(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload, read_only=read_only)
-    asked = (
+    policy = (
         "--require-keys"
         if is_loopback(request.host)
         else f"--host {request.host}: this address can be reached from other computers"
     )
-    require_an_api_key(store, asked)
+    require_an_api_key(store, policy)
     return AccessPolicy(keys=True, upload_bytes=upload, read_only=read_only)
 
 
@@ -104,9 +104,9 @@ def _stop_for(settings: WebSettings) -> None:
     def say(text: str) -> None:
         log.critical("stop.not_stopped", text=text)
 
-    found = stop_bench(place, stop, say)
-    if not found.stands:
-        say(not_stopped_text(f"bench {found.bench}: {found.text}"))
+    outcome = stop_bench(place, stop, say)
+    if not outcome.stands:
+        say(not_stopped_text(f"bench {outcome.bench}: {outcome.text}"))
 
 
 def _keys_of(store: Store, settings: WebSettings) -> KeyMemory:

@@ -46,9 +46,9 @@ def decimate(recording: Recording) -> Recording:
     """Return a recording's valid readings averaged down to `FASTEST_HZ`, output in the recording's own unit."""
     numbers, dataset, texts = decimated_columns(recording)
     for axis in recording.info.axes:
-        unit = recording.info.output.get(axis)
-        if unit is not None:
-            numbers[f"gyro_{axis}"] = unit.offset + unit.scale * numbers[f"gyro_{axis}"]
+        output_unit = recording.info.output.get(axis)
+        if output_unit is not None:
+            numbers[f"gyro_{axis}"] = output_unit.offset + output_unit.scale * numbers[f"gyro_{axis}"]
     for name in ("run", "mounting", VERIFICATION, RECORDING, OWN_DATASET):
         if name in numbers:
             texts[name] = np.rint(numbers.pop(name)).astype(np.int64)

@@ -119,9 +119,9 @@ def with_pieces(points: Recording, pieces_of: Callable[[int], Recording]) -> Rec
     for row in range(len(points)):
         kept = {name: values[row : row + 1] for name, values in columns.items()}
         if kept["duration_s"][0] > longest_s:
-            found = pieces_of(int(kept["dataset"][0]))
-            if len(found) > 1:
-                kept = {n: found.columns[n] if n in found.columns else v.repeat(len(found)) for n, v in kept.items()}
+            pieces = pieces_of(int(kept["dataset"][0]))
+            if len(pieces) > 1:
+                kept = {n: pieces.columns[n] if n in pieces.columns else v.repeat(len(pieces)) for n, v in kept.items()}
         rows.append(kept)
     joined = {name: np.concatenate([kept[name] for kept in rows]) for name in columns} if rows else columns
     return Recording(points.info, joined, points.environment)

@@ -36,5 +36,5 @@ class Recording:
     def gyro_dps(self, axis: str) -> NDArray[np.float64]:
         """Return the output of one axis as a rate, (n,) deg/s, by its nominal scale factor and offset."""
         raw = np.asarray(self.columns[f"gyro_{axis}"], dtype=np.float64)
-        output = next((unit for name, unit in self.info.output.items() if name == axis), None)
+        output = next((output_unit for name, output_unit in self.info.output.items() if name == axis), None)
         return raw if output is None else (raw - output.offset) / output.scale

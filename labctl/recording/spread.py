@@ -28,10 +28,10 @@ def white_std(values: NDArray[np.float64]) -> float:
 
 def white_stds(sets: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return `white_std` of each data set, (m,), in the same figures: sets of one length are computed together."""
-    found = np.empty(len(sets))
+    stds = np.empty(len(sets))
     for numbers, rows in of_one_length(sets):
-        found[numbers] = _white_std_of_rows(rows)
-    return found
+        stds[numbers] = _white_std_of_rows(rows)
+    return stds
 
 
 def of_one_length(sets: Sequence[NDArray[np.float64]]) -> Iterator[tuple[list[int], NDArray[np.float64]]]:

@@ -81,15 +81,15 @@ def accelerometer_of_files(
             _over_temperature(over_temperature, rests), readings, lambda: solve_even(readings, rests, over_temperature)
         )
     if earlier is None:
-        found = calibrate_accelerometer(readings, rests)
-        answer = _response(found, rests, adequacy_of(found, rests))
-        return _with_alignment(answer, readings, lambda: solve(readings, (rests, found)))
+        accelerometer = calibrate_accelerometer(readings, rests)
+        answer = _response(accelerometer, rests, adequacy_of(accelerometer, rests))
+        return _with_alignment(answer, readings, lambda: solve(readings, (rests, accelerometer)))
     known = earlier.known()
     fewer = by_fewer_poses(readings, rests, known)
-    worth = adequacy_of(fewer.found, rests, known.whitened)
-    answer = _response(fewer.found, rests, worth).model_copy(update={
+    worth = adequacy_of(fewer.accelerometer, rests, known.whitened)
+    answer = _response(fewer.accelerometer, rests, worth).model_copy(update={
         "verdict": "adequate" if fewer.agrees else "unexplained", "earlier": earlier.answer(fewer.p_value),
-        "text": [*_size_text(fewer.found, worth), earlier.text(fewer)],
+        "text": [*_size_text(fewer.accelerometer, worth), earlier.text(fewer)],
     })  # fmt: skip
     return _with_alignment(answer, readings, lambda: solve_with_earlier(readings, rests, earlier, fewer))
 
@@ -164,73 +164,77 @@ def _with_alignment(
     if not readings.gyro_dps.any():
         return answer
     try:
-        found = alignment_json(solved().alignment)
+        alignment = alignment_json(solved().alignment)
     except NotEnoughData as error:
         return answer.model_copy(update={"text": [*answer.text, f"Alignment of the gyro triad: unknown: {error}"]})
-    return answer.model_copy(update={"alignment": found, "text": [*answer.text, alignment_text(found)]})
+    return answer.model_copy(update={"alignment": alignment, "text": [*answer.text, alignment_text(alignment)]})
 
 
-def _over_temperature(found: OverTemperature, rests: Rests) -> AccelerometerResponse:
+def _over_temperature(fitted: OverTemperature, rests: Rests) -> AccelerometerResponse:
     """Return a calibration over temperature as a response."""
-    begin = len(found.reference.covariance)
+    begin = len(fitted.reference.covariance)
 
     def terms(values: NDArray[np.float64], first: int) -> dict[str, list[Estimate]]:
         places = first + np.arange(values.size).reshape(values.shape)
         return {
-            a: [_estimate(value, found, place) for value, place in zip(values[:, i], places[:, i], strict=True)]
+            a: [_estimate(value, fitted, place) for value, place in zip(values[:, i], places[:, i], strict=True)]
             for i, a in enumerate(AXES)
         }
 
-    low, high = found.range_c
-    answer = _response(found.reference, rests, found.adequacy)
-    said = (
-        f"Over {low:.1f} to {high:.1f} deg C ({found.temperatures} temperatures), about {found.reference_c:g} deg C: "
-        f"bias to the power {len(found.bias_g)}, scale factors to the power {len(found.scale_factor)}; constants would "
-        f"leave {found.constant_g:.2g} g."
+    low, high = fitted.range_c
+    answer = _response(fitted.reference, rests, fitted.adequacy)
+    sentence = (
+        f"Over {low:.1f} to {high:.1f} deg C ({fitted.temperatures} temperatures), about {fitted.reference_c:g} deg C: "
+        f"bias to the power {len(fitted.bias_g)}, scale factors to the power {len(fitted.scale_factor)}; constants "
+        f"would leave {fitted.constant_g:.2g} g."
     )
     return answer.model_copy(update={
-        "text": [*answer.text, said],
+        "text": [*answer.text, sentence],
         "temperature": AccelerometerTemperature(
-            reference_c=found.reference_c, range_c=found.range_c, temperatures=found.temperatures,
-            bias_g=terms(found.bias_g, begin), scale_factor=terms(found.scale_factor, begin + found.bias_g.size),
-            covariance=found.covariance.tolist(), constant_g=found.constant_g,
+            reference_c=fitted.reference_c, range_c=fitted.range_c, temperatures=fitted.temperatures,
+            bias_g=terms(fitted.bias_g, begin), scale_factor=terms(fitted.scale_factor, begin + fitted.bias_g.size),
+            covariance=fitted.covariance.tolist(), constant_g=fitted.constant_g,
         ),
     })  # fmt: skip
 
 
-def _estimate(value: float, found: Accelerometer | OverTemperature, place: int) -> Estimate:
+def _estimate(value: float, fitted: Accelerometer | OverTemperature, place: int) -> Estimate:
     """Return a value with the standard uncertainty that stands at a place of the covariance."""
-    return Estimate(value=float(value), u=float(found.u[place]), degrees_of_freedom=float(found.u_freedom[place]))
+    return Estimate(value=float(value), u=float(fitted.u[place]), degrees_of_freedom=float(fitted.u_freedom[place]))
 
 
-def _response(found: Accelerometer, rests: Rests, worth: Adequacy) -> AccelerometerResponse:
-    errors = {f"{AXES[i]}{AXES[j]}": _estimate(found.errors[i, j], found, 3 + k) for k, (i, j) in enumerate(UPPER)}
+def _response(accelerometer: Accelerometer, rests: Rests, worth: Adequacy) -> AccelerometerResponse:
+    errors = {
+        f"{AXES[i]}{AXES[j]}": _estimate(accelerometer.errors[i, j], accelerometer, 3 + k)
+        for k, (i, j) in enumerate(UPPER)
+    }
     return AccelerometerResponse(
         verdict=worth.verdict,
-        bias_g={a: _estimate(found.bias_g[i], found, i) for i, a in enumerate(AXES)},
+        bias_g={a: _estimate(accelerometer.bias_g[i], accelerometer, i) for i, a in enumerate(AXES)},
         scale_factor={a: errors[a + a] for a in AXES},
         misalignment={name: each for name, each in errors.items() if name[0] != name[1]},
-        covariance=found.covariance.tolist(), gravity_g=found.gravity_g,
-        rests=len(rests), left_out=int((~found.used).sum()), poses=different_poses(found.up),
-        before_g=worth.before_g, residual_g=found.residual_g, heldout_g=worth.heldout_g, expected_g=worth.expected_g,
+        covariance=accelerometer.covariance.tolist(), gravity_g=accelerometer.gravity_g,
+        rests=len(rests), left_out=int((~accelerometer.used).sum()), poses=different_poses(accelerometer.up),
+        before_g=worth.before_g, residual_g=accelerometer.residual_g, heldout_g=worth.heldout_g,
+        expected_g=worth.expected_g,
         noise_density_m_s2={
             a: float(STANDARD_GRAVITY * np.sqrt(rests.density[i])) for i, a in enumerate(AXES)
         },
-        text=list(_text(found, worth)),
+        text=list(_text(accelerometer, worth)),
     )  # fmt: skip
 
 
-def _size_text(found: Accelerometer, worth: Adequacy) -> Iterator[str]:
-    worst = float(np.sqrt(np.diag(found.covariance)[:3]).max())
-    yield f"Accelerometer: bias with u up to {worst:.2g} g; local gravity {found.gravity_g:.6g} g."
+def _size_text(accelerometer: Accelerometer, worth: Adequacy) -> Iterator[str]:
+    worst = float(np.sqrt(np.diag(accelerometer.covariance)[:3]).max())
+    yield f"Accelerometer: bias with u up to {worst:.2g} g; local gravity {accelerometer.gravity_g:.6g} g."
     yield (
         f"Size of gravity: off by {worth.before_g:.2g} g before, {worth.heldout_g:.2g} g after, in held-out rests; "
         f"the noise of their means lets expect {worth.expected_g:.2g} g."
     )
 
 
-def _text(found: Accelerometer, worth: Adequacy) -> Iterator[str]:
-    yield from _size_text(found, worth)
+def _text(accelerometer: Accelerometer, worth: Adequacy) -> Iterator[str]:
+    yield from _size_text(accelerometer, worth)
     if worth.verdict == "unexplained":
         yield (
             f"that is {worth.heldout_g / worth.expected_g:.1f} times as much: the bias drifted, the unit moved in its "

@@ -40,13 +40,15 @@ class _Found:
     values: dict[tuple[str, Result], tuple[float, float | None]]
 
 
-def set_check_gyro(store: Store, serial: str, asked: CheckGyroRequest, at: datetime) -> CheckGyroResponse:
+def set_check_gyro(store: Store, serial: str, request: CheckGyroRequest, at: datetime) -> CheckGyroResponse:
     """Make a unit a check gyro, or end that. Raises NotFound, NotEnoughData for a unit without a version."""
-    unit = store.units.get(serial).serial
-    temperature_c = _temperature(store, unit, asked.temperature_c) if asked.marked else None
-    act: Literal["mark", "unmark"] = "mark" if asked.marked else "unmark"
-    store.check_gyros.add(CheckGyroRow(unit, act, temperature_c, asked.chart_from, asked.reason, asked.by, at))
-    return check_gyro(store, unit)
+    stored_serial = store.units.get(serial).serial
+    temperature_c = _temperature(store, stored_serial, request.temperature_c) if request.marked else None
+    act: Literal["mark", "unmark"] = "mark" if request.marked else "unmark"
+    store.check_gyros.add(
+        CheckGyroRow(stored_serial, act, temperature_c, request.chart_from, request.reason, request.by, at)
+    )
+    return check_gyro(store, stored_serial)
 
 
 def list_check_gyros(store: Store) -> list[CheckGyroResponse]:
@@ -60,21 +62,21 @@ def check_gyro(store: Store, serial: str, temperature_c: float | None = None) ->
     Raises NotFound; NotEnoughData for a unit without a version.
     """
     compute(UNNAMED)
-    unit = store.units.get(serial).serial
-    mark = next((row for row in store.check_gyros.all() if row.serial == unit), None)
+    stored_serial = store.units.get(serial).serial
+    mark = next((row for row in store.check_gyros.all() if row.serial == stored_serial), None)
     chosen = temperature_c if temperature_c is not None else mark.temperature_c if mark else None
-    at_c = _temperature(store, unit, chosen)
+    at_c = _temperature(store, stored_serial, chosen)
     first = mark.chart_from if mark else None
-    results, left_out = _results(store, unit, at_c, first)
+    results, left_out = _results(store, stored_serial, at_c, first)
     charts = list(_charts(results))
     newest = [
         (chart, judgements[-1]) for chart, judgements in charts if chart.points[-1].recording == results[-1].row.id
     ]
     out = [(chart, one) for chart, one in newest if one.state == "out"]
     return CheckGyroResponse(
-        serial=unit, marked=mark is not None, temperature_c=at_c, chart_from=first, alarm=bool(out),
+        serial=stored_serial, marked=mark is not None, temperature_c=at_c, chart_from=first, alarm=bool(out),
         charts=[chart for chart, _ in charts], left_out=left_out,
-        text=list(_text(unit, at_c, results, newest)),
+        text=list(_text(stored_serial, at_c, results, newest)),
     )  # fmt: skip
 
 
@@ -89,12 +91,14 @@ def alarms(store: Store) -> int:
     return count
 
 
-def _temperature(store: Store, serial: str, given: float | None) -> float:
-    if given is not None:
+def _temperature(store: Store, serial: str, temperature_c: float | None) -> float:
+    if temperature_c is not None:
         low, high = POSSIBLE["temperature_c"]
-        if not low <= given <= high:  # also true for NaN
-            raise BadInput(f"temperature_c = {given} deg C: give a temperature between {low:g} and {high:g} deg C")
-        return given
+        if not low <= temperature_c <= high:  # also true for NaN
+            raise BadInput(
+                f"temperature_c = {temperature_c} deg C: give a temperature between {low:g} and {high:g} deg C"
+            )
+        return temperature_c
     versions = store.calibrations.of_unit(serial)
     if not versions:
         raise NotEnoughData(f"unit {serial} has no version; fit one with `labctl fit {serial}`")

@@ -113,6 +113,6 @@ def fixed_of(request: FixedCoefficients | None) -> Fixed | None:
         request.source or request.file,
         request.reference_temperature_c,
         request.argument,
-        {str(axis): unit for axis, unit in request.output.items()},
+        {str(axis): output_unit for axis, output_unit in request.output.items()},
         request.only_of_model,
     )

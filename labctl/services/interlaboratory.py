@@ -78,7 +78,7 @@ def _side(store: Store, serial: str, version: int) -> _Side:
     return _Side(row, calibration, described, () if calibration.bench is None else calibration.bench.standards)
 
 
-def _temperature(sides: tuple[_Side, _Side], given: float | None) -> float:
+def _temperature(sides: tuple[_Side, _Side], temperature_c: float | None) -> float:
     ranges = [side.calibration.temperature_c for side in sides]
     ranges_known = [each for each in ranges if all(math.isfinite(end) for end in each)]
     low, high = (
@@ -90,10 +90,12 @@ def _temperature(sides: tuple[_Side, _Side], given: float | None) -> float:
             f"the versions have no temperature in common: {ranges[0][0]:g} to {ranges[0][1]:g} and {ranges[1][0]:g} to "
             f"{ranges[1][1]:g} deg C; measure at a common temperature"
         )
-    if given is not None:
-        if not low <= given <= high:
-            raise BadInput(f"{given:g} deg C is outside {low:g} to {high:g} deg C, which both have; give one inside")
-        return given
+    if temperature_c is not None:
+        if not low <= temperature_c <= high:
+            raise BadInput(
+                f"{temperature_c:g} deg C is outside {low:g} to {high:g} deg C, which both have; give one inside"
+            )
+        return temperature_c
     return (low + high) / 2 if math.isfinite(low) and math.isfinite(high) else ROOM_C
 
 
@@ -185,9 +187,9 @@ def _text(results: Sequence[ComparedResult], shared: Sequence[str]) -> Iterator[
         )
 
 
-def pair_of(given: str) -> tuple[str, int]:
+def pair_of(text: str) -> tuple[str, int]:
     """Return serial number and version of "SERIAL:VERSION". Raises BadInput."""
-    serial, colon, version = given.rpartition(":")
+    serial, colon, version = text.rpartition(":")
     if not colon or not serial or not version.isascii() or not version.isdecimal():
-        raise BadInput(f"{given!r} is not a version; write SERIAL:VERSION, such as FOG-0001:2")
+        raise BadInput(f"{text!r} is not a version; write SERIAL:VERSION, such as FOG-0001:2")
     return serial, int(version)

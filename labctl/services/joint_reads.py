@@ -54,7 +54,7 @@ class JointReads(Generic[KeyT, ValueT]):
 
     async def _answer(self, joined: Mapping[KeyT, asyncio.Future[ValueT | None]]) -> None:
         try:
-            found = await self._read(list(joined))
+            answers = await self._read(list(joined))
         except Exception as error:  # noqa: BLE001  it is raised in the requests
             for waiting in joined.values():
                 if not waiting.done():
@@ -62,7 +62,7 @@ class JointReads(Generic[KeyT, ValueT]):
             return
         for key, waiting in joined.items():
             if not waiting.done():
-                waiting.set_result(found.get(key))
+                waiting.set_result(answers.get(key))
 
 
 def _retrieved(waiting: asyncio.Future[Any]) -> None:

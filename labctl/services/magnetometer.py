@@ -44,8 +44,8 @@ class Source:
     @property
     def text(self) -> str:
         """What was read, in one line."""
-        given = "" if self.field_ut is None else f", field {self.field_ut:g} uT"
-        return f"columns {', '.join(self.columns)} in {self.unit}{given}{self.levels}"
+        field_text = "" if self.field_ut is None else f", field {self.field_ut:g} uT"
+        return f"columns {', '.join(self.columns)} in {self.unit}{field_text}{self.levels}"
 
     @property
     def levels(self) -> str:
@@ -84,7 +84,7 @@ def magnetometer_of_file(path: Path, source: Source, serial: str | None = None) 
         raise BadInput(f"--columns {','.join(columns)}: name three columns, of x, y and z")
     readings = UNITS_UT[unit] * numbers_of(path, read_table(path), columns, "the three columns")
     result = calibrate_magnetometer(str(path), readings, field_ut)
-    return _response(result, given=field_ut is not None)
+    return _response(result, has_field=field_ut is not None)
 
 
 def _of_recording(path: Path, source: Source, serial: str | None) -> MagnetometerResponse:
@@ -109,8 +109,10 @@ def _of_recording(path: Path, source: Source, serial: str | None) -> Magnetomete
         raise BadRecording(
             f"{path}: the field at t_s = {readings.t_s[row]:.6g} is not a number; mark such readings with valid = 0"
         )
-    found = calibrate_magnetometer(recording.info.serial, field, source.field_ut, _rests(readings))
-    return _with_alignment(_response(found, given=source.field_ut is not None), readings, field, found, source)
+    magnetometer = calibrate_magnetometer(recording.info.serial, field, source.field_ut, _rests(readings))
+    return _with_alignment(
+        _response(magnetometer, has_field=source.field_ut is not None), readings, field, magnetometer, source
+    )
 
 
 def _rests(readings: PoseReadings) -> NDArray[np.int64] | None:
@@ -122,44 +124,49 @@ def _rests(readings: PoseReadings) -> NDArray[np.int64] | None:
 
 
 def _with_alignment(
-    answer: MagnetometerResponse, readings: PoseReadings, field: NDArray[np.float64], found: Magnetometer,
+    answer: MagnetometerResponse, readings: PoseReadings, field: NDArray[np.float64], magnetometer: Magnetometer,
     source: Source,
 ) -> MagnetometerResponse:  # fmt: skip
     try:
         solved = solved_of(readings, source.earlier, over_temperature=source.temperature is not None)
-        aligned = align_field(readings, solved, field, found)
+        aligned = align_field(readings, solved, field, magnetometer)
     except NotEnoughData as error:
-        said = f"Alignment of the magnetometer: unknown: {error}"
-        return answer.model_copy(update={"text": [said, *answer.text]})
+        sentence = f"Alignment of the magnetometer: unknown: {error}"
+        return answer.model_copy(update={"text": [sentence, *answer.text]})
     angles = ", ".join(
         f"{value:.2f} +- {expanded:.2f}"
         for value, expanded in zip(np.degrees(aligned.angles_rad), np.degrees(aligned.expanded_rad[:3]), strict=True)
     )
-    said = (
+    sentence = (
         f"Magnetometer turned from the accelerometer's axes about x, y, z by {angles} deg (U, 95.45 %{source.levels}); "
         f"the field dips by {np.degrees(aligned.dip_rad):.1f} deg."
     )
     # the last sentence is that of the verdict, which a refusal of an export cites
-    return answer.model_copy(update={"alignment": _alignment(aligned), "text": [said, *answer.text]})
+    return answer.model_copy(update={"alignment": _alignment(aligned), "text": [sentence, *answer.text]})
 
 
-def _alignment(found: FieldAlignment) -> FieldAlignmentJson:
-    values = np.degrees(np.append(found.angles_rad, found.dip_rad))
-    u = np.degrees(found.u_rad)
+def _alignment(alignment: FieldAlignment) -> FieldAlignmentJson:
+    values = np.degrees(np.append(alignment.angles_rad, alignment.dip_rad))
+    u = np.degrees(alignment.u_rad)
     each: list[AccelerometerCoefficient] = [
-        {"value": float(values[i]), "u": float(u[i]), "unit": "deg", "degrees_of_freedom": float(found.u_freedom[i])}
+        {
+            "value": float(values[i]),
+            "u": float(u[i]),
+            "unit": "deg",
+            "degrees_of_freedom": float(alignment.u_freedom[i]),
+        }
         for i in range(len(values))
     ]
     return {
         "axes": dict(zip(AXES, each, strict=False)),
         "dip": each[-1],
-        "covariance_deg2": (found.covariance * np.degrees(1.0) ** 2).tolist(),
-        "place_deg": float(np.degrees(found.place_rad)), "rests": found.rests, "moves": found.moves,
+        "covariance_deg2": (alignment.covariance * np.degrees(1.0) ** 2).tolist(),
+        "place_deg": float(np.degrees(alignment.place_rad)), "rests": alignment.rests, "moves": alignment.moves,
         "definition": ALIGNMENT,
     }  # fmt: skip
 
 
-def _response(result: Magnetometer, *, given: bool) -> MagnetometerResponse:
+def _response(result: Magnetometer, *, has_field: bool) -> MagnetometerResponse:
 
     def estimate(value: float, place: int) -> Estimate:
         freedom = float(result.u_freedom[place])
@@ -167,20 +174,20 @@ def _response(result: Magnetometer, *, given: bool) -> MagnetometerResponse:
 
     hard = {axis: estimate(result.hard_iron_ut[i], i) for i, axis in enumerate(AXES)}
     soft = {f"{AXES[i]}{AXES[j]}": estimate(result.soft_iron[i, j], 3 + k) for k, (i, j) in enumerate(PLACES)}
-    field = Estimate(value=result.field_ut, u=None) if given else estimate(result.field_ut, 9)
+    field = Estimate(value=result.field_ut, u=None) if has_field else estimate(result.field_ut, 9)
     return MagnetometerResponse(
         verdict=result.verdict, hard_iron_ut=hard, soft_iron=soft,
         field_ut=field,
         covariance=result.covariance.tolist(), readings=len(result.used), left_out=int((~result.used).sum()),
         before_ut=result.before_ut, residual_ut=result.residual_ut, heldout_ut=result.heldout_ut,
         noise_ut=result.noise_ut, repetition=result.repetition, heading_error_deg=result.heading_error_deg,
-        largest_gap_deg=result.largest_gap_deg, text=list(_text(result, given=given)),
+        largest_gap_deg=result.largest_gap_deg, text=list(_text(result, has_field=has_field)),
     )  # fmt: skip
 
 
-def _text(result: Magnetometer, *, given: bool) -> Iterator[str]:
+def _text(result: Magnetometer, *, has_field: bool) -> Iterator[str]:
     worst = float(result.u[:3].max())
-    size = "given" if given else "by the readings, with a soft iron of determinant 1"
+    size = "given" if has_field else "by the readings, with a soft iron of determinant 1"
     yield f"Magnetometer: hard iron with u up to {worst:.2g} uT; field {result.field_ut:.4g} uT, {size}."
     yield (
         f"Size of the field: scatter {result.before_ut:.3g} uT before, {result.heldout_ut:.2g} uT after, of readings "

@@ -95,13 +95,13 @@ def solved_of(readings: PoseReadings, earlier: Earlier | None, *, over_temperatu
     return solve(readings)
 
 
-def solve_even(readings: PoseReadings, rests: Rests, found: OverTemperature) -> Solved:
+def solve_even(readings: PoseReadings, rests: Rests, over_temperature: OverTemperature) -> Solved:
     """Return the calibration of both triads by an accelerometer over temperature. Raises NotEnoughData as `solve`.
 
     What a gyro's scale factors change with the temperature is scatter of the turns, and in the uncertainty by that.
     """
-    even, means = at_reference(readings, rests, found)
-    return solve(even, (means, found.reference))
+    even, means = at_reference(readings, rests, over_temperature)
+    return solve(even, (means, over_temperature.reference))
 
 
 def solve_with_earlier(readings: PoseReadings, rests: Rests, earlier: Earlier, fewer: ByFewer) -> Solved:
@@ -115,4 +115,4 @@ def solve_with_earlier(readings: PoseReadings, rests: Rests, earlier: Earlier, f
             f"{fewer.p_value:.1g}, limit {DISAGREE:g}), by which the turns are compared; lay the unit down in at least "
             f"{MIN_POSES} poses and calibrate it without the earlier version"
         )
-    return solve(readings, (rests, fewer.found))
+    return solve(readings, (rests, fewer.accelerometer))

@@ -44,30 +44,32 @@ QUANTITIES: Mapping[str, RoomQuantity] = {
 }  # fmt: skip
 
 
-def add_readings(store: Store, asked: RoomEnvironmentRequest, at: datetime) -> RoomEnvironmentResponse:
+def add_readings(store: Store, request: RoomEnvironmentRequest, at: datetime) -> RoomEnvironmentResponse:
     """Enter readings; all or none. Raises BadInput for a unit or a value that cannot be, and for a time to come."""
     rows = []
-    for record in asked.readings:
+    for record in request.readings:
         measured_at = record.measured_at or at
         if measured_at > at + AHEAD:
             raise BadInput(f"measured_at {measured_at.isoformat()} is a time to come; correct the clock of the logger")
         for value in record.values:
-            unit, converted = _converted(value)
-            rows.append(RoomReading(measured_at, asked.bench, value.quantity, unit, converted, asked.source))
-    store.room_environment.add(rows, at, asked.by)
-    return environment(store, min(row.measured_at for row in rows), max(row.measured_at for row in rows), asked.bench)
+            unit_symbol, converted = _converted(value)
+            rows.append(RoomReading(measured_at, request.bench, value.quantity, unit_symbol, converted, request.source))
+    store.room_environment.add(rows, at, request.by)
+    return environment(store, min(row.measured_at for row in rows), max(row.measured_at for row in rows), request.bench)
 
 
-def _converted(given: RoomValue) -> tuple[str, float]:
-    known = QUANTITIES[given.quantity]
-    if given.unit != known.unit and given.unit not in known.other:
+def _converted(entered: RoomValue) -> tuple[str, float]:
+    known = QUANTITIES[entered.quantity]
+    if entered.unit != known.unit and entered.unit not in known.other:
         accepted = ", ".join([known.unit, *known.other])
-        raise BadInput(f"{given.quantity} {given.value:g} {given.unit}: the unit is not accepted; give {accepted}")
-    value = given.value if given.unit == known.unit else known.other[given.unit](given.value)
+        raise BadInput(
+            f"{entered.quantity} {entered.value:g} {entered.unit}: the unit is not accepted; give {accepted}"
+        )
+    value = entered.value if entered.unit == known.unit else known.other[entered.unit](entered.value)
     if not (math.isfinite(value) and known.low <= value <= known.high):
         raise BadInput(
-            f"{given.quantity} {given.value:g} {given.unit} is outside {known.low:g} to {known.high:g} {known.unit}; "
-            "correct the value or its unit"
+            f"{entered.quantity} {entered.value:g} {entered.unit} is outside {known.low:g} to {known.high:g} "
+            f"{known.unit}; correct the value or its unit"
         )
     return known.unit, value
 

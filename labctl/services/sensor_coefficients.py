@@ -13,8 +13,8 @@ from labctl.fitting.numeric.degrees_of_freedom import student_factor
 
 def coefficients_of(answer: AccelerometerResponse | MagnetometerResponse) -> list[SensorCoefficientResponse]:
     """Return every coefficient of a result with its standard uncertainty, those of the alignment last."""
-    found = _of_force(answer) if isinstance(answer, AccelerometerResponse) else _of_field(answer)
-    return list(found)
+    coefficients = _of_force(answer) if isinstance(answer, AccelerometerResponse) else _of_field(answer)
+    return list(coefficients)
 
 
 def _of_force(answer: AccelerometerResponse) -> Iterator[SensorCoefficientResponse]:
@@ -40,16 +40,16 @@ def _over_temperature(law: AccelerometerTemperature) -> Iterator[SensorCoefficie
     terms: Sequence[tuple[str, str, Mapping[str, Sequence[Estimate]]]] = (
         ("bias", "g", law.bias_g), ("scale factor", "1", law.scale_factor)
     )  # fmt: skip
-    for name, unit, by_axis in terms:
+    for name, unit_symbol, by_axis in terms:
         for axis in sorted(by_axis):
             for power, each in enumerate(by_axis[axis], start=1):
-                per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
+                per = f"{unit_symbol}/K" + (f"^{power}" if power > 1 else "")
                 yield _estimated(f"{name} {axis}, power {power} of temperature", per, each)
 
 
-def _named(name: str, unit: str, values: Mapping[str, Estimate]) -> Iterator[SensorCoefficientResponse]:
+def _named(name: str, unit_symbol: str, values: Mapping[str, Estimate]) -> Iterator[SensorCoefficientResponse]:
     for place in sorted(values, key=lambda name: (len(set(name)), name)):  # xx, yy, zz, xy: also of a stored result
-        yield _estimated(f"{name} {place}", unit, values[place])
+        yield _estimated(f"{name} {place}", unit_symbol, values[place])
 
 
 def _turned(what: str, axes: Mapping[str, AccelerometerCoefficient]) -> Iterator[SensorCoefficientResponse]:
@@ -61,12 +61,14 @@ def _of(name: str, each: AccelerometerCoefficient) -> SensorCoefficientResponse:
     return _stated(name, each["unit"], each["value"], each["u"], each.get("degrees_of_freedom"))
 
 
-def _estimated(name: str, unit: str, each: Estimate) -> SensorCoefficientResponse:
-    return _stated(name, unit, each.value, each.u, each.degrees_of_freedom)
+def _estimated(name: str, unit_symbol: str, each: Estimate) -> SensorCoefficientResponse:
+    return _stated(name, unit_symbol, each.value, each.u, each.degrees_of_freedom)
 
 
-def _stated(name: str, unit: str, value: float, u: float | None, freedom: float | None) -> SensorCoefficientResponse:
+def _stated(
+    name: str, unit_symbol: str, value: float, u: float | None, freedom: float | None
+) -> SensorCoefficientResponse:
     return SensorCoefficientResponse(
-        name=name, unit=unit, value=value, u=u, degrees_of_freedom=freedom,
+        name=name, unit=unit_symbol, value=value, u=u, degrees_of_freedom=freedom,
         expanded=None if u is None else student_factor(freedom) * u,
     )  # fmt: skip

@@ -63,40 +63,40 @@ class VersionFile:
     etag: str
 
 
-def keep_accelerometer(store: Store, serial: str, asked: AccelerometerRequest, at: datetime) -> AccelerometerVersion:
+def keep_accelerometer(store: Store, serial: str, request: AccelerometerRequest, at: datetime) -> AccelerometerVersion:
     """Keep a result as a unit's next version. Raises BadInput for one that contradicts itself; VersionTaken."""
-    return AccelerometerVersion.model_validate(_kept(store, serial, "accelerometer", asked, at))
+    return AccelerometerVersion.model_validate(_kept(store, serial, "accelerometer", request, at))
 
 
-def keep_magnetometer(store: Store, serial: str, asked: MagnetometerRequest, at: datetime) -> MagnetometerVersion:
+def keep_magnetometer(store: Store, serial: str, request: MagnetometerRequest, at: datetime) -> MagnetometerVersion:
     """Keep a result as a unit's next version. Raises BadInput for one that contradicts itself; VersionTaken."""
-    return MagnetometerVersion.model_validate(_kept(store, serial, "magnetometer", asked, at))
+    return MagnetometerVersion.model_validate(_kept(store, serial, "magnetometer", request, at))
 
 
 def _kept(
-    store: Store, serial: str, sensor: SensorName, asked: AccelerometerRequest | MagnetometerRequest, at: datetime
+    store: Store, serial: str, sensor: SensorName, request: AccelerometerRequest | MagnetometerRequest, at: datetime
 ) -> dict[str, object]:
     if re.fullmatch(SERIAL_PATTERN, serial) is None:
         raise BadInput(
             f"serial number {serial[:80]!r}: give 1 to 64 characters: a letter or digit, then also . _ + # - and spaces"
         )
-    result = asked.result.model_dump(mode="json")
-    problem = _problem(_estimates(asked.result), asked.result.covariance) or _not_json(result)
-    if problem is None and isinstance(asked.result, AccelerometerResponse) and asked.result.temperature is not None:
+    result = request.result.model_dump(mode="json")
+    problem = _problem(_estimates(request.result), request.result.covariance) or _not_json(result)
+    if problem is None and isinstance(request.result, AccelerometerResponse) and request.result.temperature is not None:
         problem = _problem(
-            _over_temperature(asked.result, asked.result.temperature), asked.result.temperature.covariance
+            _over_temperature(request.result, request.result.temperature), request.result.temperature.covariance
         )
     if problem is not None:
         raise BadInput(f"result of the {sensor}: {problem}; send what `labctl {sensor} FILE --json` prints, unchanged")
-    data = asked.data.model_dump(mode="json")
-    new = NewSensorVersion(serial, sensor, asked.result.verdict, data, result, asked.by)
+    data = request.data.model_dump(mode="json")
+    new = NewSensorVersion(serial, sensor, request.result.verdict, data, result, request.by)
     return _fields(store.sensor_versions.add(new, at), whole=True)
 
 
 def list_versions(store: Store, serial: str) -> list[SensorVersionResponse]:
     """Return every version of a unit's accelerometer and magnetometer, newest first. Raises NotFound."""
-    unit = store.units.get(serial).serial
-    return [_answer(row) for row in store.sensor_versions.of_unit(unit)]
+    stored_serial = store.units.get(serial).serial
+    return [_answer(row) for row in store.sensor_versions.of_unit(stored_serial)]
 
 
 def one_accelerometer(store: Store, serial: str, version: int | None = None) -> AccelerometerVersion:

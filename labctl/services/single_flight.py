@@ -10,7 +10,7 @@ from weakref import WeakValueDictionary
 from labctl.progress import Cancelled, Progress, progress, reporting_to
 
 #: A thread that waits for another's result looks this often whether its own caller still wants it, s.
-LOOK_S = 0.1
+POLL_INTERVAL_S = 0.1
 
 
 class _Flight:
@@ -33,7 +33,7 @@ class _Flight:
         with self._guard:
             self._wanted_by.append(show_progress)
         try:
-            while not self._lock.acquire(timeout=LOOK_S):
+            while not self._lock.acquire(timeout=POLL_INTERVAL_S):
                 show_progress(self._stage)
             try:
                 with reporting_to(self._report):
@@ -67,9 +67,9 @@ _flights_guard = threading.Lock()
 
 
 @contextmanager
-def single_flight(asked: str) -> Iterator[None]:
+def single_flight(key: str) -> Iterator[None]:
     """Allow one thread of this process at a time to work at the same question. Raises Cancelled."""
     with _flights_guard:
-        flight = _flights.setdefault(asked, _Flight())
+        flight = _flights.setdefault(key, _Flight())
     with flight.turn():
         yield

@@ -93,12 +93,12 @@ def batches(store: Store) -> list[BatchResponse]:
     return [BatchResponse(batch=row.batch, units=row.units) for row in store.units.batches()]
 
 
-def set_batch(store: Store, asked: BatchRequest, at: datetime) -> BatchResponse:
+def set_batch(store: Store, request: BatchRequest, at: datetime) -> BatchResponse:
     """State the batch of some units, all or none. Raises NotFound for a unit that is absent."""
-    store.units.set_batch(list(dict.fromkeys(asked.serials)), asked.batch, asked.supplier, asked.by, at)
+    store.units.set_batch(list(dict.fromkeys(request.serials)), request.batch, request.supplier, request.by, at)
     of_batch = PageRequest("", 1, None)
-    total = store.units.page(of_batch, UnitFilter(at, batch=asked.batch)).total
-    return BatchResponse(batch=asked.batch, units=total)
+    total = store.units.page(of_batch, UnitFilter(at, batch=request.batch)).total
+    return BatchResponse(batch=request.batch, units=total)
 
 
 def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]:
@@ -132,15 +132,15 @@ def _over_floor(errors: Sequence[FitError]) -> VersionErrors:
 
 
 def _answer(
-    found: Unit, held: UnitHoldings, errors: VersionErrors, act: CertificationRow | None, now: datetime,
+    unit: Unit, held: UnitHoldings, errors: VersionErrors, act: CertificationRow | None, now: datetime,
     notices: list[str],
 ) -> UnitResponse:  # fmt: skip
     return UnitResponse(
-        serial=found.serial,
-        model=found.model,
-        technology=found.technology,
-        batch=found.batch,
-        supplier=found.supplier,
+        serial=unit.serial,
+        model=unit.model,
+        technology=unit.technology,
+        batch=unit.batch,
+        supplier=unit.supplier,
         recordings=held.recordings,
         calibrations=held.versions,
         newest_errors=errors,

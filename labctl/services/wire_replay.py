@@ -143,16 +143,18 @@ def _response(path: Path, session: Session, begun_s: float) -> ReplayResponse:
 
 def _different(session: Session, recorded: SessionResult) -> list[str]:
     """Return what of the result differs from the session."""
-    result, said = session.result, []
+    result, differences = session.result, []
     if left := session.replay.not_sent():
-        said.append("requests that the session made and this replay did not: " + ", ".join(left))
+        differences.append("requests that the session made and this replay did not: " + ", ".join(left))
     pairs = {
         "state of the campaign": (recorded.state, result.state),
         "end": (recorded.ended_by, result.ended_by),
         "readings": (_readings(recorded.readings), _readings(result.readings)),
     }
-    said += [f"{name}: {was} in the session, {now} in this replay" for name, (was, now) in pairs.items() if was != now]
-    return said + [f"said only by this replay: {line}" for line in result.said if line not in recorded.said]
+    differences += [
+        f"{name}: {was} in the session, {now} in this replay" for name, (was, now) in pairs.items() if was != now
+    ]
+    return differences + [f"said only by this replay: {line}" for line in result.said if line not in recorded.said]
 
 
 def _readings(digest: ReadingsDigest | None) -> str:

@@ -137,7 +137,7 @@ class StopLatch:
             return LatchState()
         except OSError as error:
             return _unreadable(f"the latch {self._path} cannot be read: {error.strerror}")
-        asked: dict[str, StopRequest] = {}
+        requests: dict[str, StopRequest] = {}
         done: set[str] = set()
         back: set[str] = set()
         stands: set[str] = set()
@@ -148,18 +148,18 @@ class StopLatch:
                 entry = json.loads(line)
                 if "stop" in entry:
                     stop = StopRequest(**entry["stop"])
-                    asked[stop.id] = stop
+                    requests[stop.id] = stop
                 done.update(entry.get("carried_out", ()))
                 back.update(entry.get("taken_back", ()))
                 stands.update(entry.get("at_rest", ()))
             except (ValueError, TypeError, AttributeError):
                 torn = f"torn-{crc32(line):08x}"
-                asked[torn] = _unnamed(torn, "a line of the latch cannot be read; it may have been a stop")
+                requests[torn] = _unnamed(torn, "a line of the latch cannot be read; it may have been a stop")
         for marked in _marked(done, is_set=bool(lines[0].strip())):
-            asked[marked] = _unnamed(marked, "asked for while the disk was full")
-        still = tuple(stop for stop in asked.values() if stop.id not in done)
-        held = tuple(stop for stop in asked.values() if stop.id not in back and (stop.holds or stop.id not in done))
-        return LatchState(still, held, frozenset(asked), frozenset(stands))
+            requests[marked] = _unnamed(marked, "asked for while the disk was full")
+        still = tuple(stop for stop in requests.values() if stop.id not in done)
+        held = tuple(stop for stop in requests.values() if stop.id not in back and (stop.holds or stop.id not in done))
+        return LatchState(still, held, frozenset(requests), frozenset(stands))
 
     def _append(self, entry: dict[str, object]) -> None:
         """Add a line, on the disk when this returns."""

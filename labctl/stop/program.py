@@ -30,7 +30,7 @@ class WrongUse(Exception):
 
 
 @dataclass(frozen=True)
-class Asked:
+class StopArguments:
     """What the command line asks for."""
 
     bench: str | None = None
@@ -48,10 +48,10 @@ def main(words: Sequence[str]) -> int:
     parser.add_argument("--by", metavar="NAME", help="who stops; default: the user who is logged in")
     parser.add_argument("--reason", metavar="TEXT", default=WHY, help="reason, for the audit trail")
     parser.add_argument("--json", action="store_true", dest="as_json", help="print one JSON document")
-    return run(Asked(**vars(parser.parse_args(words))))
+    return run(StopArguments(**vars(parser.parse_args(words))))
 
 
-def run(request: Asked) -> int:
+def run(request: StopArguments) -> int:
     """Stop what was asked for, print the result; returns the exit status."""
     try:
         results = stop_all(request)
@@ -88,7 +88,7 @@ def _print(result: StopResult, *, quiet: bool) -> None:
         )
 
 
-def stop_all(request: Asked) -> list[StopResult]:
+def stop_all(request: StopArguments) -> list[StopResult]:
     """Stop every bench that is meant, all at the same time. Raises WrongUse."""
     document = None if request.bench is None else _document(request.bench)
     places = [place for place in _places(request.database) if document is None or _is(place, document)]
@@ -157,7 +157,7 @@ def _table(document: dict[str, Any]) -> tuple[Any, ...] | None:
     return None if not address or str(address).startswith("sim://") else (address, section.get("tcp_port", 502))
 
 
-def _unknown(request: Asked, document: dict[str, Any], stop: StopRequest) -> StopResult:
+def _unknown(request: StopArguments, document: dict[str, Any], stop: StopRequest) -> StopResult:
     """Stop a bench that no process of this user has driven, at its instruments."""
     name = document["name"]
     if _table(document) is None and "table" in document:

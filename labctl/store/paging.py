@@ -64,9 +64,9 @@ def newest_rows(
     """
     newest = sa.select(number).where(matching).order_by(number.desc())
     if request.search and request.limit is not None:
-        found = list(connection.scalars(newest))
-        beyond = [each for each in found if request.after is None or each < request.after]
-        return number.in_(beyond[: rows_to_read(request)]), len(found)
+        numbers = list(connection.scalars(newest))
+        beyond = [each for each in numbers if request.after is None or each < request.after]
+        return number.in_(beyond[: rows_to_read(request)]), len(numbers)
     chosen = newest.limit(rows_to_read(request))
     if request.after is not None:
         chosen = chosen.where(number < request.after)

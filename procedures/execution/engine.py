@@ -161,21 +161,21 @@ class Engine:
         """After the data set of step `index`, skip the others that are fitted where enough is measured."""
         if self._sufficiency is None or self._enough or index in self._executor.not_needed:
             return
-        found = self._sufficiency.ask()
-        for event in found.events:
+        answer = self._sufficiency.ask()
+        for event in answer.events:
             self._recorder.event(event)
-        if found.enough and self._executor.skip_fitted_after(index, found.enough):
-            self._enough = found.enough
-            self._recorder.event(Event("enough", f"{found.enough}; the data sets that are left are skipped"))
+        if answer.enough and self._executor.skip_fitted_after(index, answer.enough):
+            self._enough = answer.enough
+            self._recorder.event(Event("enough", f"{answer.enough}; the data sets that are left are skipped"))
 
     def _concluded(self) -> list[str]:
         """Return what all data sets say of the uncertainty that the campaign was to reach."""
         if self._sufficiency is None:
             return []
-        found = self._sufficiency.conclude(self._enough)
-        for event in found.events:
+        answer = self._sufficiency.conclude(self._enough)
+        for event in answer.events:
             self._recorder.event(event)
-        return [found.enough] if found.enough else []
+        return [answer.enough] if answer.enough else []
 
     def _failed(self, error: InstrumentError | ProcedureError) -> tuple[CampaignState, str]:
         """Return how a step ends that fails. One that fails after a request to end has been stopped by another thread.

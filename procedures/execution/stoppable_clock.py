@@ -12,7 +12,7 @@ from procedures.contracts.control import Control
 from procedures.contracts.errors import Aborted, Interrupted
 
 #: How long the bench's thread sleeps at most before it looks for a stop, s of real time.
-LOOK_S = 0.1
+POLL_INTERVAL_S = 0.1
 
 
 class StoppableClock:
@@ -24,7 +24,7 @@ class StoppableClock:
 
     def __init__(self, clock: ScaledClock, control: Control) -> None:
         self._clock, self._control = clock, control
-        self._slice_s = LOOK_S * clock.speed
+        self._slice_s = POLL_INTERVAL_S * clock.speed
 
     def now_s(self) -> float:
         return self._clock.now_s()
@@ -36,23 +36,23 @@ class StoppableClock:
         return self._clock.wall_s(duration_s)
 
     @property
-    def stands_in_stalls(self) -> bool:
-        """Whether the clock stands still while a thread that attends is late."""
-        return self._clock.stands_in_stalls
+    def pauses_in_stalls(self) -> bool:
+        """Whether the clock stands still while a registered thread is late."""
+        return self._clock.pauses_in_stalls
 
     @property
-    def look_every_s(self) -> float:
-        """How often a thread that attends reads the clock, s of real time."""
-        return self._clock.look_every_s
+    def heartbeat_interval_s(self) -> float:
+        """How often a registered thread reads the clock, s of real time."""
+        return self._clock.heartbeat_interval_s
 
     @property
     def latency_s(self) -> float:
         """Clock time that bytes may take from one process to the other."""
         return self._clock.latency_s
 
-    def attending(self) -> AbstractContextManager[Callable[[], None]]:
+    def registered(self) -> AbstractContextManager[Callable[[], None]]:
         """Make the clock wait for this thread, as the clock itself does."""
-        return self._clock.attending()
+        return self._clock.registered()
 
     def sleep(self, duration_s: float) -> None:
         until_s = self._clock.now_s() + duration_s

@@ -51,9 +51,9 @@ class ReadingCounts:
         for k in np.argsort(-absent, kind="stable"):
             if missing <= 0 or absent[k] < 1:
                 break
-            found = min(int(absent[k]), missing)
-            self.gaps.append(Gap(float(edges_s[k]), float(edges_s[k + 1]), found))
-            missing -= found
+            readings = min(int(absent[k]), missing)
+            self.gaps.append(Gap(float(edges_s[k]), float(edges_s[k + 1]), readings))
+            missing -= readings
         if missing > 0:
             self.gaps.append(Gap(float(edges_s[0]), float(t_s[-1]), missing))
 

@@ -115,8 +115,8 @@ def _between(device: str, value_c: float, limits_c: tuple[float, float], title: 
     return WatchedValue(device, value_c, low_c, high_c, "deg C", title, text, not low_c <= value_c <= high_c)
 
 
-def _at_most(device: str, value: float, limit: float, unit: str, title: str, text: str) -> WatchedValue:
-    return WatchedValue(device, value, -math.inf, limit, unit, title, text, value > limit)
+def _at_most(device: str, value: float, limit: float, unit_symbol: str, title: str, text: str) -> WatchedValue:
+    return WatchedValue(device, value, -math.inf, limit, unit_symbol, title, text, value > limit)
 
 
 def _chamber_limits(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
@@ -132,17 +132,17 @@ def _unit_air(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     margin_c = guards.rules.chamber_margin_c
     if now.chamber_c is None:
         return
-    for name, unit in guards.limits.gyros.items():
+    for name, limits in guards.limits.gyros.items():
         text = f"the air is beyond what unit {name} may be exposed to"
-        limits_c = unit.min_c - margin_c, unit.max_c + margin_c
+        limits_c = limits.min_c - margin_c, limits.max_c + margin_c
         yield _between(guards.chamber, now.chamber_c, limits_c, f"air, limits of {name}", text)
 
 
 def _unit_temperature(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     margin_c = guards.rules.gyro_margin_c
     for name, temperature_c in now.gyro_c.items():
-        unit = guards.limits.gyros[name]
-        limits_c, text = (unit.min_c - margin_c, unit.max_c + margin_c), "its own thermometer"
+        limits = guards.limits.gyros[name]
+        limits_c, text = (limits.min_c - margin_c, limits.max_c + margin_c), "its own thermometer"
         yield _between(name, temperature_c, limits_c, text, text)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from instruments.clock import Clock, SystemClock, attending, stands_in_stalls
+from instruments.clock import Clock, SystemClock, pauses_in_stalls, registered
 from procedures.contracts.journal import Event
 
 PERIOD_S = 0.1
@@ -51,7 +51,7 @@ class HostStalls:
     def __init__(self, clock: Clock, wall: Clock | None = None) -> None:
         self._wall = wall or SystemClock()
         self._clock = clock
-        real = clock.wall_s(2 * LONG_S) > clock.wall_s(LONG_S) and not stands_in_stalls(clock)
+        real = clock.wall_s(2 * LONG_S) > clock.wall_s(LONG_S) and not pauses_in_stalls(clock)
         self.speed = LONG_S / clock.wall_s(LONG_S) if real else 0.0  #: clock seconds in one of real time; 0: no stalls
         self._lock = threading.Lock()
         self._looked_s: float | None = None
@@ -66,7 +66,7 @@ class HostStalls:
         A clock that stands still in stalls waits for this thread instead.
         """
         if not self.speed:
-            with attending(self._clock):
+            with registered(self._clock):
                 yield
             return
         ended = threading.Event()
@@ -82,14 +82,14 @@ class HostStalls:
     @contextmanager
     def lateness(self) -> Iterator[Lateness]:
         """Measure how late this computer runs while the block runs; 0 where the clock stands still in stalls."""
-        found, ended = Lateness(self._wall), threading.Event()
+        lateness, ended = Lateness(self._wall), threading.Event()
         if not self.speed:
-            yield found
+            yield lateness
             return
-        thread = threading.Thread(target=found.watch, args=(ended,), name="lateness", daemon=True)
+        thread = threading.Thread(target=lateness.watch, args=(ended,), name="lateness", daemon=True)
         thread.start()
         try:
-            yield found
+            yield lateness
         finally:
             ended.set()
             thread.join()

@@ -43,9 +43,9 @@ def nominal_outputs(
         axis = channel.name.removeprefix(PREFIX)
         nominal = output.get(axis, {})
         usual = RATE_UNITS.get(str(nominal.get("unit", channel.unit)), 1.0)
-        unit, scale = str(nominal.get("unit", channel.unit)), float(nominal.get("scale", usual))
+        unit_symbol, scale = str(nominal.get("unit", channel.unit)), float(nominal.get("scale", usual))
         by_axis[axis] = Nominal(
-            channel, float(nominal.get("offset", 0.0)), scale, unit in RATE_UNITS or "scale" in nominal
+            channel, float(nominal.get("offset", 0.0)), scale, unit_symbol in RATE_UNITS or "scale" in nominal
         )
     return by_axis
 

@@ -66,7 +66,7 @@ def earlier_times(done: Sequence[DoneStep], stated_c_per_min: float) -> EarlierT
     `stated_c_per_min` is the ramp of the chamber by its bench file.
     """
     ways = list(_ways(done))
-    found = EarlierTimes(
+    times = EarlierTimes(
         len({each.campaign for each in done}),
         _usual(done, Home),
         _usual(done, CheckHome),
@@ -74,8 +74,8 @@ def earlier_times(done: Sequence[DoneStep], stated_c_per_min: float) -> EarlierT
         _moves([(way_c, took_s) for way_c, took_s in ways if way_c > 0], stated_c_per_min),
         _moves([(-way_c, took_s) for way_c, took_s in ways if way_c < 0], stated_c_per_min),
     )
-    known = (found.home_s, found.check_home_s, found.mount_s, found.heating, found.cooling)
-    return found if any(each is not None for each in known) else None
+    known = (times.home_s, times.check_home_s, times.mount_s, times.heating, times.cooling)
+    return times if any(each is not None for each in known) else None
 
 
 def _usual(done: Sequence[DoneStep], kind: type[Home | CheckHome | Mount]) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
@@ -150,6 +151,13 @@ class Recipe(Table):
             raise PydanticCustomError("too_short", "Tuple should have at least 1 item after validation, not 0")
         return value
 
+    @property
+    def motion(self) -> Literal["rates", "turns", "profile"]:
+        """What moves the units, as the head of a recording of it states."""
+        if self.turns is not None:
+            return "turns"
+        return "profile" if self.profiles else "rates"
+
 
 def shipped_recipes() -> dict[str, Path]:
     """Return the recipes that come with labctl, by name."""
@@ -180,9 +188,16 @@ def read_recipe(source: str | Path) -> Recipe:
 def parse_recipe(text: str, *, source: str = "recipe") -> Recipe:
     """Read a recipe from TOML text; `source` names it in errors. Raises RecipeError."""
     try:
-        return Recipe.model_validate(parse_toml(text))
+        document = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise RecipeError(f"{source}: not TOML: {error}; correct it") from error
+    return validated_recipe(document, source=source)
+
+
+def validated_recipe(document: Mapping[str, object], *, source: str = "recipe") -> Recipe:
+    """Return the recipe that a document describes; `source` names it in errors. Raises RecipeError."""
+    try:
+        return Recipe.model_validate(document)
     except ValidationError as error:
         raise RecipeError(f"{source}: {_complaints(error)}") from error
 

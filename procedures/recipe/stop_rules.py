@@ -43,11 +43,11 @@ class StopRules(Table):
         return self
 
 
-def outside(name: str, asked: Ends | None, measured: tuple[float, ...], unit: str) -> str:
+def outside(name: str, range_: Ends | None, measured: tuple[float, ...], unit_symbol: str) -> str:
     """Return by how much a range asks for more than a recipe measures, in words; empty where it does not."""
-    if asked is None or not measured or (min(measured) <= asked[0] and asked[1] <= max(measured)):
+    if range_ is None or not measured or (min(measured) <= range_[0] and range_[1] <= max(measured)):
         return ""
     return (
-        f"stop.{name} = [{asked[0]:g}, {asked[1]:g}] {unit} goes beyond what the recipe measures, {min(measured):g} to "
-        f"{max(measured):g} {unit}; narrow stop.{name}, or measure there too"
+        f"stop.{name} = [{range_[0]:g}, {range_[1]:g}] {unit_symbol} goes beyond what the recipe measures, "
+        f"{min(measured):g} to {max(measured):g} {unit_symbol}; narrow stop.{name}, or measure there too"
     )

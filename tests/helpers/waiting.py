@@ -9,7 +9,7 @@ from typing import Any
 
 WAIT_S = 60.0  #: for the next event
 QUIET_S = 0.2  #: without an event: time to check
-LOOK_S = 0.002  #: between two checks of what reports nothing
+POLL_INTERVAL_S = 0.002  #: between two checks of what reports nothing
 ASK_S = 0.05  #: between two requests to another process
 
 
@@ -40,10 +40,10 @@ def wait_until(
 def eventually(holds: Callable[[], Any]) -> None:
     """Return once a condition on another thread, which reports nothing, holds; AssertionError after WAIT_S."""
     never = threading.Event()
-    for _ in range(round(WAIT_S / LOOK_S)):
+    for _ in range(round(WAIT_S / POLL_INTERVAL_S)):
         if holds():
             return
-        never.wait(LOOK_S)
+        never.wait(POLL_INTERVAL_S)
     raise AssertionError(f"not in {WAIT_S:g} s")
 
 

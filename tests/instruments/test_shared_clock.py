@@ -15,12 +15,12 @@ import pytest
 
 from instruments import shared_clock
 from instruments.bench_config import BenchFile, SimulationSettings, read_bench
-from instruments.clock import ScaledClock, SystemClock, VirtualClock, attending
+from instruments.clock import ScaledClock, SystemClock, VirtualClock, registered
 from instruments.shared_clock import (
     DOUBTED_S,
     GIVEN_UP_S,
+    HEARTBEATS,
     LATE_CLOCK_S,
-    LOOKS,
     SIZE,
     THREADS,
     ClockFile,
@@ -37,10 +37,10 @@ from tests.helpers.virtual_wall import VirtualWall
 from tests.helpers.waiting import eventually
 
 SPEED = 30.0
-#: What is counted of a stall: until a thread is late, and between two looks before and after.
+#: What is counted of a stall: until a thread is late, and between two heartbeats before and after.
 LATE_S = LATE_CLOCK_S / SPEED
-LOOK_EVERY_S = LATE_S / LOOKS
-COUNTED_S = LATE_S + 2 * LOOK_EVERY_S
+HEARTBEAT_INTERVAL_S = LATE_S / HEARTBEATS
+COUNTED_S = LATE_S + 2 * HEARTBEAT_INTERVAL_S
 
 
 class Rig:
@@ -54,25 +54,25 @@ class Rig:
         self.simulator = SharedClock(self.file, owns=True, wall=self.wall)
         self.driver = SharedClock(ClockFile(self.file.path, lambda _: self.held_up), wall=self.wall)
         # both from one thread, in which a test also reads the clocks: their places are those of other threads
-        self.looks = {"simulator": self.attend(self.simulator), "driver": self.attend(self.driver)}
+        self.heartbeats = {"simulator": self.register(self.simulator), "driver": self.register(self.driver)}
 
-    def attend(self, clock: SharedClock) -> Callable[[], None]:
+    def register(self, clock: SharedClock) -> Callable[[], None]:
         place = self.file.take_place(self.wall.now_s())
         self._stack.callback(self.file.leave_place, place)
 
-        def look() -> None:
+        def heartbeat() -> None:
             clock.now_s()
-            self.file.look(place, self.wall.now_s())
+            self.file.heartbeat(place, self.wall.now_s())
 
-        return look
+        return heartbeat
 
     def run(self, duration_s: float, *, without: str = "") -> None:
-        """Let real time pass while every thread looks as it should, except those of one process."""
-        for _ in range(round(duration_s / LOOK_EVERY_S)):
-            self.wall.pass_s(LOOK_EVERY_S)
-            for name, look in self.looks.items():
+        """Let real time pass while every thread gives its heartbeat, except those of one process."""
+        for _ in range(round(duration_s / HEARTBEAT_INTERVAL_S)):
+            self.wall.pass_s(HEARTBEAT_INTERVAL_S)
+            for name, heartbeat in self.heartbeats.items():
                 if name != without:
-                    look()
+                    heartbeat()
 
     @property
     def both_s(self) -> tuple[float, float]:
@@ -109,7 +109,7 @@ def test_the_clock_of_both_stands_still_while_one_is_late(rig: Rig, late: str) -
 def test_a_computer_that_stands_still_counts_for_neither(rig: Rig) -> None:
     rig.run(1.0)
     rig.wall.pass_s(3.0)
-    rig.looks["driver"]()
+    rig.heartbeats["driver"]()
     rig.wall.pass_s(0.01)
     rig.run(1.0)
     assert rig.both_s == pytest.approx((2 * SPEED, 2 * SPEED), abs=SPEED * (COUNTED_S + 0.01))
@@ -132,8 +132,8 @@ def test_a_sleep_lasts_through_a_stall(rig: Rig) -> None:
 
     def halted(_: threading.Condition) -> None:
         rig.wall.pass_s(stalls.pop() if stalls else 0.0)
-        for look in rig.looks.values():
-            look()
+        for heartbeat in rig.heartbeats.values():
+            heartbeat()
 
     rig.wall.meanwhile[name] = halted
     rig.driver.sleep(SPEED * 0.3)
@@ -190,9 +190,9 @@ def test_a_process_that_has_ended_is_not_waited_for(rig: Rig) -> None:
 
 def test_places_are_given_back(rig: Rig) -> None:
     for _ in range(2 * THREADS):
-        with rig.driver.attending():
+        with rig.driver.registered():
             pass
-    for _ in range(THREADS - rig.file.attending):
+    for _ in range(THREADS - rig.file.registered):
         rig.file.take_place(rig.wall.now_s())
     with pytest.raises(OSError, match=f"more than {THREADS} threads"):
         rig.file.take_place(rig.wall.now_s())
@@ -240,20 +240,20 @@ def test_another_file_is_none_of_a_clock(tmp_path: Path, caplog: pytest.LogCaptu
     assert "clock.not_shared" in caplog.text
 
 
-def test_a_campaign_attends_and_has_no_stalls(rig: Rig) -> None:
+def test_a_campaign_is_registered_and_has_no_stalls(rig: Rig) -> None:
     clock = stoppable(rig.driver, Control())
     stalls = HostStalls(clock, wall := VirtualClock())
-    before = rig.file.attending
+    before = rig.file.registered
 
     def watch() -> int:
         with stalls.watching():
             wall.sleep(100.0)
             assert stalls.total_clock_s() == 0.0
             assert stalls.news() is None
-            return rig.file.attending
+            return rig.file.registered
 
-    with ThreadPoolExecutor(1) as pool:  # the threads of the rig attend already
+    with ThreadPoolExecutor(1) as pool:  # the threads of the rig are registered already
         assert pool.submit(watch).result() == before + 1
-    assert rig.file.attending == before
-    with attending(VirtualClock()) as look:
-        look()
+    assert rig.file.registered == before
+    with registered(VirtualClock()) as heartbeat:
+        heartbeat()

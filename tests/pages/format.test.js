@@ -121,6 +121,6 @@ test("only a result with its expanded uncertainty has the sign ±", () => {
     .filter((name) => name.endsWith(".js") && /[`"'][^`"']*±/.test(readFileSync(`${folder}/${name}`, "utf8")))
     .sort();
   // the text itself; the heading of a column of such texts; where a line may break in one
-  assert.deepEqual(signed, ["core/format.js", "explore/suspects.js", "unit/sensors.js"]);
+  assert.deepEqual(signed, ["core/format.js", "explore/verdict_card.js", "unit/sensors.js"]);
   assert.equal(format.scatterText(0.01234), "s = 0.012");
 });

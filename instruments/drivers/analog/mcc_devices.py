@@ -160,12 +160,12 @@ class UldaqDevice:
         settings, uldaq = self._settings, self._uldaq
         if settings.host is not None:
             return uldaq.get_net_daq_device_descriptor(settings.host, settings.tcp_port, None, REPLY_S)
-        found = uldaq.get_daq_device_inventory(uldaq.InterfaceType(Interface.USB))
-        names = ", ".join(f"{each.product_name} {each.unique_id}" for each in found) or "none"
+        inventory = uldaq.get_daq_device_inventory(uldaq.InterfaceType(Interface.USB))
+        names = ", ".join(f"{each.product_name} {each.unique_id}" for each in inventory) or "none"
         if settings.device:
-            meant = [each for each in found if settings.device in (each.unique_id, each.product_name)]
+            meant = [each for each in inventory if settings.device in (each.unique_id, each.product_name)]
         else:
-            meant = list(found)
+            meant = list(inventory)
         if not meant:
             wanted = settings.device or "of Measurement Computing"
             raise NotFound(

@@ -26,21 +26,21 @@ class LibraryChamber(SetpointChamber):
 
         Raises WrongInstrument for another serial number, InstrumentError.
         """
-        said = self._instrument.identity()
-        refuse_other_serial(self.name, said, self._names.serial, holds_serial=bool(self._names.identity))
+        identity = self._instrument.identity()
+        refuse_other_serial(self.name, identity, self._names.serial, holds_serial=bool(self._names.identity))
         self._read_air()
-        return f"{self._names.instrument} of {self._names.library} {said}".strip()
+        return f"{self._names.instrument} of {self._names.library} {identity}".strip()
 
     def make_safe(self) -> float:
         """Control the chamber to its safe set point, and off where the bench file says so; returns the value read back.
 
         Raises as `set_temperature_c` does.
         """
-        found = super().make_safe()
+        report = super().make_safe()
         if self._names.safe_state == "off":
             self._instrument.call(self._names.stop)
             self._has_controlled = False
-        return found
+        return report
 
     def _controller_limits(self) -> tuple[float, float]:
         return -float("inf"), float("inf")  # the library refuses what is beyond its own
@@ -60,8 +60,8 @@ class LibraryChamber(SetpointChamber):
         return self._instrument.number(self._names.temperature)
 
     def _alarms(self) -> tuple[str, ...]:
-        found = self._instrument.get(self._names.alarms) if self._names.alarms else 0
-        return (f"{self._names.alarms} {found}",) if found else ()
+        alarms = self._instrument.get(self._names.alarms) if self._names.alarms else 0
+        return (f"{self._names.alarms} {alarms}",) if alarms else ()
 
     def _profile_runs(self) -> bool:
         return bool(self._names.program) and self._holds(self._names.program, self._names.program_mask)

@@ -65,9 +65,9 @@ class DescribedChamber(TextChamber):
 
     def _write_and_verify(self, rounded_c: float) -> float:
         # the set point that the written text carries: a unit such as deg F has other steps
-        unit = self._described.temperature
-        carried = as_written(self._described.set, SETPOINT, unit.written(rounded_c))
-        carried_c = unit.read(carried)
+        scale = self._described.temperature
+        carried = as_written(self._described.set, SETPOINT, scale.written(rounded_c))
+        carried_c = scale.read(carried)
         if not self.limits.min_c - TINY_C <= carried_c <= self.limits.max_c + TINY_C:
             carried_c -= math.copysign(self.limits.resolution_c, carried_c - rounded_c)
         return super()._write_and_verify(carried_c)

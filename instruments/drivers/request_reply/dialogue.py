@@ -45,16 +45,16 @@ class Dialogue:
 
         Raises WrongInstrument for a reply that does not fit, and for one without the `serial` number of the bench file.
         """
-        said = self.link.ask(self.request(ask.send), r".*\S.*", "say what it is")[0]
-        found = re.fullmatch(ask.pattern, said)
-        if found is None:
+        reply = self.link.ask(self.request(ask.send), r".*\S.*", "say what it is")[0]
+        match = re.fullmatch(ask.pattern, reply)
+        if match is None:
             raise WrongInstrument(
                 self.link.device,
-                f"{self.link.url} answered {said[:SHOWN]!r} to {self.request(ask.send)!r}, which does not fit the "
+                f"{self.link.url} answered {reply[:SHOWN]!r} to {self.request(ask.send)!r}, which does not fit the "
                 f"pattern {ask.pattern!r} of its description; check the address, or correct [identity]",
             )
-        refuse_other_serial(self.link.device, said, serial, holds_serial=True)
-        return found["text"].strip()
+        refuse_other_serial(self.link.device, reply, serial, holds_serial=True)
+        return match["text"].strip()
 
     def text(self, ask: Ask, what: str) -> str:
         """Return a text."""
@@ -62,23 +62,23 @@ class Dialogue:
 
     def number(self, ask: AskNumber, what: str) -> float:
         """Return a number, in the unit of the instrument; raises MalformedReply where the answer is none."""
-        said = self._answer(ask, what)
+        reply = self._answer(ask, what)
         try:
-            number = float(said)
+            number = float(reply)
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            raise self._malformed(said, what, "a number")
+            raise self._malformed(reply, what, "a number")
         return number
 
     def holds(self, ask: AskState, what: str) -> bool:
         """Return whether a state holds; raises MalformedReply where the answer is neither yes nor no."""
-        said = self._answer(ask, what).strip()
-        found = ask.holds(said)
-        if found is None:
+        reply = self._answer(ask, what).strip()
+        holds = ask.holds(reply)
+        if holds is None:
             rule = f"yes = {ask.yes!r} or no = {ask.no!r}" if ask.yes is not None else "a number as its rule needs"
-            raise self._malformed(said, what, rule)
-        return found
+            raise self._malformed(reply, what, rule)
+        return holds
 
     def alarms(self, ask: AskAlarms) -> tuple[str, ...]:
         """Return the active alarms."""
@@ -118,17 +118,17 @@ class Dialogue:
         return filled(template, {**self._names, **values})
 
     def _answer(self, ask: Ask, what: str) -> str:
-        found = self.link.ask(self.request(ask.send), ask.pattern, what)
-        return str(next(value for value in found.groupdict().values() if value is not None))
+        match = self.link.ask(self.request(ask.send), ask.pattern, what)
+        return str(next(value for value in match.groupdict().values() if value is not None))
 
     def _check(self, request: str, what: str) -> None:
         """Raise RequestRejected where the instrument says that a command was an error."""
         check = self._line.check
         if check is None:
             return
-        said = self.text(check, "say whether a command was an error")
-        if not re.fullmatch(check.passes, said):
-            why = self._line.reasons.get(said, said)
+        reply = self.text(check, "say whether a command was an error")
+        if not re.fullmatch(check.passes, reply):
+            why = self._line.reasons.get(reply, reply)
             raise RequestRejected(
                 self.link.device,
                 f"refused to {what}: {why!r} after {request!r}; check its mode and limits, or correct its description",
@@ -139,19 +139,19 @@ class Dialogue:
         if not self._errors_are_old or check is None:
             return
         for _ in range(MAX_OLD_ERRORS):
-            said = self.text(check, "say what errors it holds")
-            if re.fullmatch(check.passes, said):
+            reply = self.text(check, "say what errors it holds")
+            if re.fullmatch(check.passes, reply):
                 self._errors_are_old = False
                 return
         raise RequestRejected(
             self.link.device,
-            f"holds the error {said!r} however often it is asked; clear it at the instrument, or correct check in "
+            f"holds the error {reply!r} however often it is asked; clear it at the instrument, or correct check in "
             "the description",
         )
 
-    def _malformed(self, said: str, what: str, wanted: str) -> MalformedReply:
+    def _malformed(self, reply: str, what: str, wanted: str) -> MalformedReply:
         return MalformedReply(
             self.link.device,
-            f"answered {said[:SHOWN]!r} to the request to {what}, which is not {wanted}; correct the description, or "
+            f"answered {reply[:SHOWN]!r} to the request to {what}, which is not {wanted}; correct the description, or "
             "check cable and line settings",
         )

@@ -14,8 +14,8 @@ class NewportXpsSettings(DescribedTableSettings):
 
     @model_validator(mode="before")
     @classmethod
-    def _described(cls, given: object) -> object:
-        return _with_format(given, "newport-xps")
+    def _described(cls, document: object) -> object:
+        return _with_format(document, "newport-xps")
 
 
 class AerotechEnsembleSettings(DescribedTableSettings):

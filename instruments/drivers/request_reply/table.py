@@ -56,8 +56,8 @@ class DescribedTable:
     def achievable_dps(self, rate_dps: float) -> float:
         """Get the rate that the command carries for `rate_dps`, deg/s, rounded as it is written; raises LimitError."""
         self.limits.require_rate(self.name, rate_dps)
-        unit, motion = self._described.turning, self._described.motion
-        number = unit.written(abs(rate_dps))
+        scale, motion = self._described.turning, self._described.motion
+        number = scale.written(abs(rate_dps))
         written = as_written(motion, "rate", as_written(motion, "speed", number))
         if rate_dps != 0 and written == 0:
             raise LimitError(
@@ -65,7 +65,7 @@ class DescribedTable:
                 f"rate {rate_dps:g} deg/s is 0 as {self._described.motion_key} of its description writes it; ask "
                 "for a higher rate, or give more decimals in the description",
             )
-        return math.copysign(unit.read(written), rate_dps) if rate_dps else 0.0
+        return math.copysign(scale.read(written), rate_dps) if rate_dps else 0.0
 
     def home(self) -> None:
         """Turn the table to its home position; the angle is 0 deg there.

@@ -46,9 +46,9 @@ def split(data: bytes) -> tuple[list[Packet], bytes, int]:
     packets, at, damaged = [], 0, 0
     in_damage = False
     while len(data) - at >= HEADER.size:
-        number, protocol, length, unit, function, kind, _, backlog, status, info = HEADER.unpack_from(data, at)
+        number, protocol, length, unit_id, function, kind, _, backlog, status, info = HEADER.unpack_from(data, at)
         size = 6 + length
-        is_packet = (protocol, unit, function, kind) == (0, UNIT, FUNCTION, TYPE)
+        is_packet = (protocol, unit_id, function, kind) == (0, UNIT, FUNCTION, TYPE)
         if not is_packet or not HEADER.size <= size <= MAX_BYTES or length % 2:
             damaged += not in_damage
             in_damage, at = True, at + 1

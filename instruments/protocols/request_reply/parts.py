@@ -102,9 +102,9 @@ class AskState(Ask):
 
     @model_validator(mode="after")
     def _one_rule(self) -> AskState:
-        given = [self.yes is not None or self.no is not None]
-        given += [each is not None for each in (self.any_set, self.none_set, self.below)]
-        if sum(given) != 1 or (self.yes is None) != (self.no is None):
+        rules = [self.yes is not None or self.no is not None]
+        rules += [each is not None for each in (self.any_set, self.none_set, self.below)]
+        if sum(rules) != 1 or (self.yes is None) != (self.no is None):
             raise ValueError(
                 f"request {self.send!r}: give one rule for its answer: both yes and no (patterns), or any_set, or "
                 "none_set (bits), or below (a number)"
@@ -207,8 +207,8 @@ class Description(Strict):
     def require_requests(self, numbers: dict[str, Iterable[str]]) -> None:
         """Raise ValueError, with its place, for a request with an unknown value. key -> names of its numbers."""
         for key in type(self).model_fields:
-            given = getattr(self, key)
-            lines = given if isinstance(given, tuple) else (given.send,) if isinstance(given, Ask) else ()
+            request = getattr(self, key)
+            lines = request if isinstance(request, tuple) else (request.send,) if isinstance(request, Ask) else ()
             for line in lines:
                 try:
                     require_template(line, numbers.get(key, ()), self.parameters)

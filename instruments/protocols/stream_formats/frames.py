@@ -80,14 +80,14 @@ class FrameScanner:
 
     def _length_at(self, data: bytes, at: int) -> int | None:
         """Return how long the frame at an offset says it is; 0 where that cannot be, None where it is not there yet."""
-        given = self._layout.length
-        if isinstance(given, int):
-            return given
-        size = 1 if given.type == "u8" else 2
-        where = at + given.at
+        law = self._layout.length
+        if isinstance(law, int):
+            return law
+        size = 1 if law.type == "u8" else 2
+        where = at + law.at
         if where + size > len(data):
             return None
-        length = int.from_bytes(data[where : where + size], self._layout.byte_order) + given.plus
+        length = int.from_bytes(data[where : where + size], self._layout.byte_order) + law.plus
         return length if len(self._sync) < length <= LONGEST_FRAME else 0
 
     def _leading(self, data: bytes, frames: Bytes, at: int) -> int:

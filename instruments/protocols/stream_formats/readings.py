@@ -100,10 +100,10 @@ def stamp_ticks(format_: StreamFormat) -> StampTicks | None:
 
 def pulse_ticks(format_: StreamFormat) -> PulseTicks | None:
     """Return the unit of the pulse field of a format; None for a format without one."""
-    if (given := format_.pulses) is None:
+    if (pulses := format_.pulses) is None:
         return None
-    step = next(step_of(field) for field in format_.fields if field.name == given.field)
-    return PulseTicks(given.field, (given.tick_s or 0.0) * step, given.interval_s)
+    step = next(step_of(field) for field in format_.fields if field.name == pulses.field)
+    return PulseTicks(pulses.field, (pulses.tick_s or 0.0) * step, pulses.interval_s)
 
 
 def whole_numbers(values: NDArray[np.float64], step: float) -> tuple[Whole, NDArray[np.bool_]]:

@@ -38,8 +38,8 @@ class SimulatedAts545(LineDevice):
         }
         if request in values:
             return values[request]()
-        if (given := re.fullmatch(rf"SETP ({NUMBER})", request)) is not None:
-            chamber.set(float(given[1]), t_s)
-        elif (given := re.fullmatch(r"FLOW ([01])", request)) is not None:
-            chamber.run(t_s, on=given[1] == "1")
+        if (match := re.fullmatch(rf"SETP ({NUMBER})", request)) is not None:
+            chamber.set(float(match[1]), t_s)
+        elif (match := re.fullmatch(r"FLOW ([01])", request)) is not None:
+            chamber.run(t_s, on=match[1] == "1")
         return None

@@ -96,18 +96,18 @@ def read_messages(dbc: str) -> dict[str, PackedMessage]:
         if begins := _MESSAGE.match(line):
             message = PackedMessage(int(begins[1]), begins[2], int(begins[3]))
             by_name[message.name] = message
-        elif given := _SIGNAL.match(line):
-            name, start, bits, order, sign, scale, offset, unit = given.groups()
+        elif match := _SIGNAL.match(line):
+            name, start, bits, order, sign, scale, offset, unit_symbol = match.groups()
             message.signals[name] = PackedSignal(
-                name, int(start), int(bits), order == "1", sign == "-", float(scale), float(offset), unit
+                name, int(start), int(bits), order == "1", sign == "-", float(scale), float(offset), unit_symbol
             )
     by_id = {each.id: each for each in by_name.values()}
     for line in dbc.splitlines():
-        if (given := _FLOAT.match(line)) and int(given[1]) in by_id:
-            by_id[int(given[1])].signals[given[2]].float_bits = 32 * int(given[3])
-        elif (given := _TEXTS.match(line)) and int(given[1]) in by_id:
-            texts = re.findall(r'(-?\d+) "([^"]*)"', given[3])
-            by_id[int(given[1])].signals[given[2]].texts = {text: int(raw) for raw, text in texts}
+        if (match := _FLOAT.match(line)) and int(match[1]) in by_id:
+            by_id[int(match[1])].signals[match[2]].float_bits = 32 * int(match[3])
+        elif (match := _TEXTS.match(line)) and int(match[1]) in by_id:
+            texts = re.findall(r'(-?\d+) "([^"]*)"', match[3])
+            by_id[int(match[1])].signals[match[2]].texts = {text: int(raw) for raw, text in texts}
     return by_name
 
 
@@ -119,7 +119,7 @@ class SimulatedCanUnit(SampledUnit):
         self._settings = settings
         self._messages = read_messages(settings.dbc)
         counters = () if settings.counter is None else settings.counter.signals
-        status = {path: _good_value(self._signal(path), given[0]) for path, given in settings.status.items()}
+        status = {path: _good_value(self._signal(path), texts[0]) for path, texts in settings.status.items()}
         self._status, self._counters = status, counters
         names = {path.partition(".")[0] for path in (*settings.signals.values(), *status, *counters)}
         held = {path.partition(".")[0] for name, path in settings.signals.items() if name in settings.hold}
@@ -158,25 +158,25 @@ class SimulatedCanUnit(SampledUnit):
 
     def _cycle(self, index: int, values: dict[str, float]) -> list[bytes]:
         """Return the frames of one cycle; those behind the first come in any order."""
-        given: dict[str, dict[str, float]] = {}
+        by_message: dict[str, dict[str, float]] = {}
         for name, path in self._settings.signals.items():
             if name in values:
                 message, _, signal = path.partition(".")
-                given.setdefault(message, {})[signal] = self._in_its_unit(name, self._signal(path), values[name])
+                by_message.setdefault(message, {})[signal] = self._in_its_unit(name, self._signal(path), values[name])
         for path, value in self._status.items():
             message, _, signal = path.partition(".")
-            given.setdefault(message, {})[signal] = value
+            by_message.setdefault(message, {})[signal] = value
         counter = self._settings.counter
         for path in self._counters:
             message, _, signal = path.partition(".")
-            found, step = self._signal(path), 1 if counter is None else counter.step
-            wrap = (counter.wrap if counter is not None else None) or 1 << found.bits
-            given.setdefault(message, {})[signal] = found.offset + found.scale * (index * step % wrap)
+            signal_law, step = self._signal(path), 1 if counter is None else counter.step
+            wrap = (counter.wrap if counter is not None else None) or 1 << signal_law.bits
+            by_message.setdefault(message, {})[signal] = signal_law.offset + signal_law.scale * (index * step % wrap)
         begins, *others = self._cyclic
         order = [begins, *(others[each] for each in self._rng.permutation(len(others)))]
         if index % max(1, round(RARE_S * self._rate_hz)) == 1:
             order = [*self._rare, *order]
-        frames = [self._messages[name].frame(given.get(name, {})) for name in order]
+        frames = [self._messages[name].frame(by_message.get(name, {})) for name in order]
         return [*frames[:-1], FOREIGN, frames[-1]]
 
     def _in_its_unit(self, name: str, signal: PackedSignal, value: float) -> float:

@@ -28,8 +28,8 @@ class SimulatedEspec(LineDevice):
 
     def __init__(self, setup: InstrumentSetup) -> None:
         super().__init__(ESPEC.syntax, setup.faults)
-        unit = part_of(setup.instrument("chamber"), EspecSettings).unit
-        self._prefix = "" if unit is None else f"{unit},"
+        address = part_of(setup.instrument("chamber"), EspecSettings).unit
+        self._prefix = "" if address is None else f"{address},"
         self.chamber = ChamberState(setup)
         self.is_locked = False
 
@@ -49,17 +49,17 @@ class SimulatedEspec(LineDevice):
         return values[request]() if request in values else self._command(request, t_s)
 
     def _command(self, request: str, t_s: float) -> str:
-        if (given := re.fullmatch(r"KEYPROTECT,(ON|OFF)", request, re.IGNORECASE)) is not None:
-            if given[1].upper() == "ON" and not self.chamber.runs:
+        if (match := re.fullmatch(r"KEYPROTECT,(ON|OFF)", request, re.IGNORECASE)) is not None:
+            if match[1].upper() == "ON" and not self.chamber.runs:
                 return "NA:CONT NOT READY-4"
-            self.is_locked = given[1].upper() == "ON"
+            self.is_locked = match[1].upper() == "ON"
             return f"OK:{request}"
         if self.is_locked:
             return "NA:PROTECT ON"
-        if (given := re.fullmatch(r"TEMP, S(-?\d+\.\d)", request)) is not None:
-            return f"OK:{request}" if self.chamber.set(float(given[1]), t_s) else "NA:DATA OUT OF RANGE"
-        if (given := re.fullmatch(r"MODE,(CONSTANT|STANDBY|OFF)", request)) is not None:
-            self.chamber.run(t_s, on=given[1] == "CONSTANT")
+        if (match := re.fullmatch(r"TEMP, S(-?\d+\.\d)", request)) is not None:
+            return f"OK:{request}" if self.chamber.set(float(match[1]), t_s) else "NA:DATA OUT OF RANGE"
+        if (match := re.fullmatch(r"MODE,(CONSTANT|STANDBY|OFF)", request)) is not None:
+            self.chamber.run(t_s, on=match[1] == "CONSTANT")
             return f"OK:{request}"
         return "NA:CMD ERR"
 
@@ -120,13 +120,13 @@ class SimulatedAscii2(LineDevice):
             values = (chamber.setpoint_c, chamber.air_c(t_s), *self.UNUSED)
             return " ".join([*(ascii2.number(value) for value in values), self._channels()])
         pattern = re.escape(self._unit) + r"E (-?\d+\.\d)(?: \d+\.\d){6} ([01]{32})"
-        if (given := re.fullmatch(pattern, request)) is None:
+        if (match := re.fullmatch(pattern, request)) is None:
             return f"'{request}' is an unknown command."
-        self.others = given[2]
+        self.others = match[2]
         on = self.others[self._start] == "1"
         if on != chamber.runs:
             chamber.run(t_s, on=on)
-        return "0" if chamber.setpoint_c == float(given[1]) or chamber.set(float(given[1]), t_s) else "6"
+        return "0" if chamber.setpoint_c == float(match[1]) or chamber.set(float(match[1]), t_s) else "6"
 
     def _channels(self) -> str:
         channels = list(self.others)
@@ -166,5 +166,5 @@ class SimulatedThermotron(LineDevice):
         if request in ("RUNM", "STOP"):
             self.chamber.run(t_s, on=request == "RUNM")
             return True
-        given = re.fullmatch(rf"SETP{self._channel},(-?\d+(?:\.\d+)?)", request)
-        return given is not None and self.chamber.set(float(given[1]), t_s)
+        match = re.fullmatch(rf"SETP{self._channel},(-?\d+(?:\.\d+)?)", request)
+        return match is not None and self.chamber.set(float(match[1]), t_s)

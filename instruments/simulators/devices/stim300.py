@@ -67,9 +67,9 @@ class DeviceSettings(Strict):
 
 def _settings_of(setup: InstrumentSetup) -> DeviceSettings:
     simulation = setup.bench.simulation
-    given = simulation.units.get(setup.gyro_name, {}).get("device", {}) if simulation else {}
+    document = simulation.units.get(setup.gyro_name, {}).get("device", {}) if simulation else {}
     try:
-        return DeviceSettings.model_validate(given)
+        return DeviceSettings.model_validate(document)
     except ValidationError as error:
         wrong = error.errors()[0]
         where = ".".join(str(part) for part in wrong["loc"])

@@ -125,14 +125,14 @@ class ModbusDevice(Replies):
             self._pending = b""  # bytes that never became a request
         self._pending += data
         while self._pending:
-            used, unit, transaction, pdu = self._framer.decode(self._pending)
+            used, unit_id, transaction, pdu = self._framer.decode(self._pending)
             if not used:
                 if len(self._pending) > MAX_FRAME_BYTES or self._cannot_be_a_frame():
                     self._pending = b""
                 return
             self._pending = self._pending[used:]
-            if pdu and unit in self._units:
-                self._reply_to(pdu, unit, transaction, t_s)
+            if pdu and unit_id in self._units:
+                self._reply_to(pdu, unit_id, transaction, t_s)
 
     def _is_whole(self, data: bytes) -> bool:
         return bool(self._framer.decode(data)[3])
@@ -140,12 +140,12 @@ class ModbusDevice(Replies):
     def _cannot_be_a_frame(self) -> bool:
         return not self._rtu and self._pending[2:4].strip(b"\0") != b""  # TCP: the protocol number is 0
 
-    def _reply_to(self, pdu: bytes, unit: int, transaction: int, t_s: float) -> None:
+    def _reply_to(self, pdu: bytes, unit_id: int, transaction: int, t_s: float) -> None:
         if self.faults.trigger(["lost_reply", "silence"], t_s) is not None:
             return
         fault = self.faults.trigger(["modbus_exception"], t_s)
         response = ExceptionResponse(pdu[0], fault.value) if fault else self._respond(pdu, t_s)
-        response.dev_id, response.transaction_id = unit, transaction
+        response.dev_id, response.transaction_id = unit_id, transaction
         frame = bytearray(self._framer.buildFrame(response))
         if self.faults.trigger(["wrong_crc"], t_s) is not None:
             frame[-1 if self._rtu else 2] ^= 0x55  # TCP frames carry no checksum; their protocol number breaks instead

@@ -9,7 +9,7 @@ import tty
 from collections.abc import Callable
 from typing import Any
 
-from instruments.clock import Clock, SystemClock, attending, look_every_s
+from instruments.clock import Clock, SystemClock, heartbeat_interval_s, registered
 
 #: Bytes from the host -> bytes of the instrument; called with b"" when the host sent nothing.
 Exchange = Callable[[bytes], bytes]
@@ -25,7 +25,7 @@ class RealPorts:
 
     def __init__(self, clock: Clock | None = None) -> None:
         self._clock = clock or SystemClock()
-        self._every_s = look_every_s(self._clock)
+        self._every_s = heartbeat_interval_s(self._clock)
         self._closing = threading.Event()
         self._threads: list[threading.Thread] = []
         self._open: list[Any] = []
@@ -98,7 +98,7 @@ class RealPorts:
 
     def _carry_terminal(self, ours: int, exchange: Exchange) -> None:
         waiting = b""
-        with attending(self._clock) as look:
+        with registered(self._clock) as heartbeat:
             while not self._closing.wait(self._every_s):
                 try:
                     received = os.read(ours, BLOCK_BYTES)
@@ -109,14 +109,14 @@ class RealPorts:
                     waiting = waiting[os.write(ours, waiting) :] if waiting else b""
                 except BlockingIOError:
                     waiting = waiting[-BLOCK_BYTES:]  # the terminal is full: a port keeps its last bytes
-                look()
+                heartbeat()
         os.close(ours)
 
     def _carry_connection(self, connection: socket.socket, exchange: Exchange) -> None:
         connection.settimeout(self._every_s)
-        with connection, attending(self._clock) as look:
+        with connection, registered(self._clock) as heartbeat:
             while not self._closing.is_set():
-                look()
+                heartbeat()
                 try:
                     received = connection.recv(BLOCK_BYTES)
                 except TimeoutError:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.positions import AXES, Position
-from instruments.simulators.physics.earth import BodyFrame
+from instruments.simulators.physics.body_kinematics import BodyFrame
 from instruments.standards import Standard
 
 Array = NDArray[np.float64]

@@ -244,9 +244,9 @@ def usual_rate_hz(driver: str) -> float:
 
 def make_unit(driver: str, axes: tuple[str, ...], settings: Mapping[str, object], seed: list[int]) -> UnitTruth:
     """Return one unit of a profile with the deviations of the bench file; raises ValueError for unknown names."""
-    given = dict(settings)
-    given.pop("device", None)  # how its electronics are set is read by the simulated instrument
-    profile = given.pop("profile", DEFAULT_PROFILES.get(driver))
+    remaining = dict(settings)
+    remaining.pop("device", None)  # how its electronics are set is read by the simulated instrument
+    profile = remaining.pop("profile", DEFAULT_PROFILES.get(driver))
     if profile is None:
         raise ValueError(
             f"gyro driver {driver!r} has no profile of a simulated unit; set one in [simulation.units] of the "
@@ -255,15 +255,15 @@ def make_unit(driver: str, axes: tuple[str, ...], settings: Mapping[str, object]
     if not isinstance(profile, str) or profile not in PROFILES:
         raise ValueError(f"simulated unit profile {profile!r} is not known; choose one of {', '.join(PROFILES)}")
     made = PROFILES[profile](axes, np.random.default_rng(seed))
-    ageing = ageing_of(given.pop("ageing", None), len(axes))
+    ageing = ageing_of(remaining.pop("ageing", None), len(axes))
     names = {
         name
         for name in UnitTruth.__dataclass_fields__
         if name not in {"axes", "gain", "offset", "bend", "warm_up", "ageing"}
     }
-    for name in given:
+    for name in remaining:
         if name not in names:
             raise ValueError(
                 f"simulated unit has no setting {name!r}; choose one of {', '.join(sorted({*names, 'ageing'}))}"
             )
-    return UnitTruth(**{**made.__dict__, **given, "ageing": ageing})
+    return UnitTruth(**{**made.__dict__, **remaining, "ageing": ageing})

@@ -18,7 +18,7 @@ from instruments.clock import VIRTUAL_START
 from instruments.positions import Position
 from instruments.simulators.hidden import HiddenEffect, State, hidden_effects
 from instruments.simulators.physics.bench_errors import UPRIGHT, BenchErrors, felt
-from instruments.simulators.physics.earth import BodyFrame, EarthRotation
+from instruments.simulators.physics.body_kinematics import BodyFrame, EarthRotation
 from instruments.simulators.physics.hand_motion import HandMotion
 from instruments.simulators.physics.instability import BiasInstability
 from instruments.simulators.physics.motion import TableMotion

@@ -24,7 +24,7 @@ from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.uncertainty import SurfaceResponse, UncertaintyResponse
 from labctl.answers.verification import VerificationResponse
 from labctl.answers.views import PictureResponse
-from labctl.api.calibration_answer import CalibrationAsked, calibration_answer
+from labctl.api.calibration_answer import CalibrationRequest, calibration_answer
 from labctl.api.computation import execute, follow, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
@@ -82,10 +82,10 @@ async def calibration(
     recorded, by the name of the key.
     What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each.
     """
-    asked = CalibrationAsked(
+    wanted = CalibrationRequest(
         serial, request.method, request.state.caller, if_none_match, version, format, tuple(option or ())
     )
-    return await calibration_answer(service, asked)
+    return await calibration_answer(service, wanted)
 
 
 @router.get("/calibration/state", summary="State of a calibration that was fetched")

@@ -112,14 +112,16 @@ async def import_log(
 ) -> ImportResponse:
     """Take in a file of another format (CSV, Parquet, ULog, ROS bag) by the map of its columns, or by the one that is
     proposed. All of it or nothing; an error lists everything that is wrong as `problems`."""
-    given, options = sent_map(column_map), tuple(option or ())
+    map_document, options = sent_map(column_map), tuple(option or ())
     return await with_files(
         request,
         with_staged,
         file.filename or "",
         file.file,
         modified_ms,
-        lambda path: service.execute(IMPORT_LOG, LogFile(path, given, importer or None, options, _kinds(leave_out))),
+        lambda path: service.execute(
+            IMPORT_LOG, LogFile(path, map_document, importer or None, options, _kinds(leave_out))
+        ),
     )
 
 
@@ -136,14 +138,16 @@ async def preview(
 ) -> LogPreview:
     """The proposed map of a log, or what it becomes by the map that is sent; its first rows, traces, and everything
     that is wrong, in the columns and in single readings. Nothing is stored."""
-    given, options = sent_map(column_map), parsed_options(option or ())
+    map_document, options = sent_map(column_map), parsed_options(option or ())
     return await with_files(
         request,
         with_staged,
         file.filename or "",
         file.file,
         modified_ms,
-        lambda path: service.computation.run(preview_log, path, importer or None, options, given, _kinds(leave_out)),
+        lambda path: service.computation.run(
+            preview_log, path, importer or None, options, map_document, _kinds(leave_out)
+        ),
     )
 
 
@@ -261,11 +265,11 @@ async def allan(
 
 @router.get("/{recording}/orientation", summary="Static bias and angle of a recording", tags=["calibrations"])
 async def orientation(
-    request: Request, recording: int, service: ServiceDep, asked: Annotated[OrientationQuery, Query()]
+    request: Request, recording: int, service: ServiceDep, query: Annotated[OrientationQuery, Query()]
 ) -> OrientationResponse:
     """The angle of one axis from its rate: static bias taken off (Ojeda et al. 2000, eqs. 15 and 16), offset renewed
     at standstill; of a record at rest, the drift between declared stops (Weiss)."""
-    return await while_connected(request, service, orientation_of_recording, recording, asked.version, asked)
+    return await while_connected(request, service, orientation_of_recording, recording, query.version, query)
 
 
 @router.get("/{recording}/file", summary="Download the recording", response_class=StreamingResponse)

@@ -58,9 +58,9 @@ def file(
     device_id: Annotated[int | None, Query(ge=1, description="Device id of the sensor at the autopilot.")] = None,
 ) -> Response:
     """The same bytes as `--export` of the command that fitted it; 400 for what the format cannot express."""
-    found = version_file(service.store, serial, sensor, version, format, instance, device_id)
-    headers = {"ETag": f'"{found.etag}"', "Content-Disposition": f'attachment; filename="{found.name}"'}
-    return Response(found.content, media_type=found.media_type, headers=headers)
+    export = version_file(service.store, serial, sensor, version, format, instance, device_id)
+    headers = {"ETag": f'"{export.etag}"', "Content-Disposition": f'attachment; filename="{export.name}"'}
+    return Response(export.content, media_type=export.media_type, headers=headers)
 
 
 @command_route(router, KEEP_ACCELEROMETER, "Keep a calibration of the accelerometer")

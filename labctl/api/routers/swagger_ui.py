@@ -46,5 +46,5 @@ def file(name: str) -> Response:
         return Response(START, media_type="text/javascript")
     if name not in FILES:
         raise NotFound(f"there is no file {name!r}; open api-docs")
-    found = resources.files("fastapi_offline") / "static" / name
-    return Response(found.read_bytes(), media_type=FILES[name], headers={"Cache-Control": "max-age=86400"})
+    path = resources.files("fastapi_offline") / "static" / name
+    return Response(path.read_bytes(), media_type=FILES[name], headers={"Cache-Control": "max-age=86400"})

@@ -55,10 +55,11 @@ class SigningKey:
         """Raise BadInput where the certificate is not valid at an aware time."""
         first, last = self.certificate.not_valid_before_utc, self.certificate.not_valid_after_utc
         if not first <= at <= last:
-            said = "has expired" if at > last else "is not valid yet"
+            problem = "has expired" if at > last else "is not valid yet"
             raise BadInput(
-                f"{self.where}: its certificate ({self.signatory.subject}) {said}: it is valid from {first:%Y-%m-%d} "
-                f"to {last:%Y-%m-%d}, and today is {at:%Y-%m-%d}; nothing was signed; name a valid certificate"
+                f"{self.where}: its certificate ({self.signatory.subject}) {problem}: it is valid "
+                f"from {first:%Y-%m-%d} to {last:%Y-%m-%d}, and today is {at:%Y-%m-%d}; nothing was signed; "
+                "name a valid certificate"
             )
 
     def sign(self, data: bytes) -> bytes:
@@ -182,8 +183,8 @@ def _of_token(uri: TokenUri, settings: SigningSettings) -> SigningKey:
             x509.load_der_x509_certificate(certificate[Attribute.VALUE]) for certificate in certificates
         ]
     except (PKCS11Error, RuntimeError, KeyError, OSError, ValueError) as error:
-        said = " ".join(str(error).split()) or type(error).__name__
-        raise BadInput(f"{place_text}: {said}; check token, object, module and PIN") from error
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BadInput(f"{place_text}: {reason}; check token, object, module and PIN") from error
     own_certificates = read_certificates(Path(settings.certificate)) if settings.certificate else token_certificates
     if not own_certificates:
         raise BadInput(
@@ -195,8 +196,8 @@ def _of_token(uri: TokenUri, settings: SigningSettings) -> SigningKey:
         try:
             return _signed_by_token(key, digest, data)
         except PKCS11Error as error:
-            said = " ".join(str(error).split()) or type(error).__name__
-            raise BadInput(f"{place_text}: {said}; nothing was signed; check the token") from error
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise BadInput(f"{place_text}: {reason}; nothing was signed; check the token") from error
 
     return SigningKey(place_text, own_certificates[0], tuple(own_certificates[1:]), sign, session.close)
 

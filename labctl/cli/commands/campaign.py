@@ -222,11 +222,11 @@ def design(
     from labctl.services.read_access import open_readable
 
     with one_clear_line():
-        given: dict[str, Any] = {"model": model, "u_dps": u_dps, "hours": hours, "prior": prior or []}
-        given |= {"type_prior": type_prior}
-        given |= {"like": None if like is None else own_text(like), "effects": names_in(effects)}
-        given |= {"rates_dps": pair("--rates", rates), "temperatures_c": pair("--temperatures", temperatures)}
-        request = DesignRequest.model_validate(given)
+        options: dict[str, Any] = {"model": model, "u_dps": u_dps, "hours": hours, "prior": prior or []}
+        options |= {"type_prior": type_prior}
+        options |= {"like": None if like is None else own_text(like), "effects": names_in(effects)}
+        options |= {"rates_dps": pair("--rates", rates), "temperatures_c": pair("--temperatures", temperatures)}
+        request = DesignRequest.model_validate(options)
         with open_readable(database) as store:
             answer = design_campaign(store, request, None if bench is None else load_bench(bench))
         out.write_text(answer.recipe_toml, encoding="utf-8")
@@ -269,14 +269,14 @@ def start(
 
     with one_clear_line():
         timing = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}
-        given: dict[str, Any] = {name: value for name, value in timing.items() if value is not None}
+        options: dict[str, Any] = {name: value for name, value in timing.items() if value is not None}
         if clear_confirmed_by is not None:
-            given |= {"confirmed_by": clear_confirmed_by, "checks": list(BENCH_CHECKS)}
+            options |= {"confirmed_by": clear_confirmed_by, "checks": list(BENCH_CHECKS)}
         if hide:
-            given["hide"] = hide
+            options["hide"] = hide
         if no_fit:
-            given["fit"] = False
-        request = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **given})
+            options["fit"] = False
+        request = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **options})
         start_at = simulated_start(simulated_from)
         order = CampaignStart(request, bench=bench, speed=speed, seed=seed, simulated_start=start_at, wire_log=wire_log)
         with open_commands(database, campaign_terminal(quiet=as_json)) as commands:

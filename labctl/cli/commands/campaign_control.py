@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from labctl.answers.campaigns import CampaignResponse
 
 #: How long an abort is followed until the bench is safe, and how often it is read, s.
-SAFE_WITHIN_S, LOOK_S = 120.0, 0.2
+SAFE_WITHIN_S, POLL_INTERVAL_S = 120.0, 0.2
 
 
 def watch(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
@@ -100,7 +100,7 @@ def _at_its_end(database: str | None, answer: CampaignResponse) -> CampaignRespo
     clock = SystemClock()
     until_s = clock.now_s() + SAFE_WITHIN_S
     while not answer.ended and clock.now_s() < until_s:
-        clock.sleep(LOOK_S)
+        clock.sleep(POLL_INTERVAL_S)
         answer = current_status(database, answer.id)
     return answer
 

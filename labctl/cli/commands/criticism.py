@@ -137,8 +137,8 @@ def improve(
     from labctl.services.commands.requests import ToNewestOrVersion
     from labctl.services.effects import as_lines
 
-    def names(given: list[str] | None) -> list[str]:
-        return [name.strip() for text in given or [] for name in text.split(",") if name.strip()]
+    def names(values: list[str] | None) -> list[str]:
+        return [name.strip() for text in values or [] for name in text.split(",") if name.strip()]
 
     with one_clear_line():
         request = ImproveRequest(

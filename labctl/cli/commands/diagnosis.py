@@ -81,8 +81,8 @@ def diagnose(
     from labctl.store.connection.location import is_url
 
     with one_clear_line():
-        given = {"version": version, "recordings": recording_numbers(recording), "at": at, "time_zone": time_zone}
-        request = DiagnosisRequest.model_validate(given if hours is None else {**given, "hours": hours})
+        options = {"version": version, "recordings": recording_numbers(recording), "at": at, "time_zone": time_zone}
+        request = DiagnosisRequest.model_validate(options if hours is None else {**options, "hours": hours})
         printer = DiagnosisPrinter(quiet=as_json)
         url = diagnosis_service_url(database, serial, bench)
         if end:

@@ -45,8 +45,8 @@ def add(
 
     with one_clear_line():
         values = [
-            RoomValue.model_validate({"quantity": quantity, "value": value, "unit": unit})
-            for quantity, value, unit in (
+            RoomValue.model_validate({"quantity": quantity, "value": value, "unit": unit_symbol})
+            for quantity, value, unit_symbol in (
                 ("temperature", temperature_c, "deg C"),
                 ("humidity", humidity_pct, "%"),
                 ("pressure", pressure_hpa, "hPa"),

@@ -94,14 +94,14 @@ class JobOptions:
     as_json: Json = False
     database: Database = None
 
-    def carry_out(self, kind: Literal["fit", "criticise"], **asked: Any) -> None:
+    def carry_out(self, kind: Literal["fit", "criticise"], **changes: Any) -> None:
         """Begin a job and follow it to its end. Exits with status 1 where a unit failed, 2 for bad input."""
         from labctl.answers.fleet import FleetJobRequest
 
         with one_clear_line():
             request = FleetJobRequest(
                 kind=kind, type=self.type_, batch=self.batch, supplier=self.supplier, search=self.search,
-                engine=self.engine, source=self.source, again=self.again, **asked,
+                engine=self.engine, source=self.source, again=self.again, **changes,
             )  # fmt: skip
             _carry_out(self.database, request, as_json=self.as_json)
 

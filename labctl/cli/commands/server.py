@@ -189,9 +189,9 @@ def stop(
     Without options: every bench that this user has driven on this computer. What was stopped moves again only when a
     person starts or resumes a campaign, or runs `labctl bench clear`.
     """
-    from labctl.stop.program import Asked, run
+    from labctl.stop.program import StopArguments, run
 
-    raise typer.Exit(run(Asked(bench, database, by, reason, as_json)))
+    raise typer.Exit(run(StopArguments(bench, database, by, reason, as_json)))
 
 
 def simulator(

@@ -54,16 +54,16 @@ def units(
         now = SystemClock().utc()
         with open_readonly(database) as store:
             page = list_units(store, now, PageRequest(search, limit), within, calibration, verdict, batch)
-    found = page.rows
+    rows = page.rows
     if as_json:
-        print_json(found)
+        print_json(rows)
         return
-    if not found:
+    if not rows:
         chosen = due_within or calibration or verdict or batch or search
         nothing = "no such unit is there" if chosen else "no unit has been measured or imported yet"
         console.print("no unit is due" if due_within else nothing)
         return
-    _print_units(found, page.total)
+    _print_units(rows, page.total)
 
 
 def _print_units(units: list[UnitResponse], total: int) -> None:

@@ -42,13 +42,13 @@ def simulated_gyro(demo: DemoRunner) -> None:
     campaign = demo.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
     demo.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])
     before = criticise_unit(demo.store, SERIAL, None, None, [])
-    found = _diagnose(demo)
-    named = list(found.rounds[-1].named)
-    after = _improve(demo, SERIAL, named[0], found.rounds[-1].recordings)
+    diagnosis = _diagnose(demo)
+    named = list(diagnosis.rounds[-1].named)
+    after = _improve(demo, SERIAL, named[0], diagnosis.rounds[-1].recordings)
     demo.say(f"(hidden effect: {', '.join(HIDDEN)})")
     demo.figures["hidden"] = {
         "hidden": list(HIDDEN), "verdict": before.verdict, "named_at_first": [*before.named], "named": [*named],
-        "experiments": sum(each.came == "measured" for each in found.rounds), "hours": found.spent_hours,
+        "experiments": sum(each.came == "measured" for each in diagnosis.rounds), "hours": diagnosis.spent_hours,
         "verdict_after": after.verdict,
     }  # fmt: skip
 

@@ -45,9 +45,9 @@ def print_fit(answer: FitResponse) -> None:
             continue
         rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
         for name, entry in coefficients.items():
-            (value, *_), (u, *_), unit = _at_nodes(entry)
+            (value, *_), (u, *_), unit_symbol = _at_nodes(entry)
             shown = rounded_to_uncertainty(value, u)
-            rows.add_row(name, unit, shown.value + shown.power, shown.u + shown.power if shown.u else "-")
+            rows.add_row(name, unit_symbol, shown.value + shown.power, shown.u + shown.power if shown.u else "-")
         console.print(rows)
     for effect, quantities in answer.shapes.items():
         rows = table(effect, "quantity", "unit", "value", "u", numbers=2)
@@ -147,8 +147,8 @@ def print_certifications(rows: Sequence[CertificationResponse], waiting: Sequenc
     if not rows:
         console.print("nothing has been certified yet")
     for row in rows:
-        said = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {_persons(row)}: {row.reason}"
-        console.print(said, soft_wrap=True)
+        line = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {_persons(row)}: {row.reason}"
+        console.print(line, soft_wrap=True)
         if row.act == "certify":
             console.print(f"  verdict: {_verdict(row)}", soft_wrap=True)
         _print_objections(row)

@@ -65,11 +65,11 @@ def _time(seconds: float) -> str:
 
 def print_job(answer: FleetJobResponse) -> None:
     """Print how a job stands, and what it has cost."""
-    said = [f"{answer.done} done", f"{answer.skipped} skipped", f"{answer.failed} failed"]
+    counts = [f"{answer.done} done", f"{answer.skipped} skipped", f"{answer.failed} failed"]
     if answer.waiting:
-        said.append(f"{answer.waiting} left")
+        counts.append(f"{answer.waiting} left")
     console.print(f"fleet job {answer.id} ({answer.kind}, {answer.engine}): {answer.state}", style="bold")
-    console.print(f"  {answer.units} units: {', '.join(said)}")
+    console.print(f"  {answer.units} units: {', '.join(counts)}")
     if answer.processor_s_per_unit is not None:
         console.print(
             f"  processor time {answer.processor_s:.1f} s, {answer.processor_s_per_unit:.3g} s per unit computed"

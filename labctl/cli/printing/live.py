@@ -80,8 +80,8 @@ def _progress(state: LiveState) -> str:
     return "; ".join(parts)
 
 
-def _with_unit(value: float, unit: str) -> str:
-    return f"{value:.2g}" if unit == "1" else f"{value:.2g} {unit}"
+def _with_unit(value: float, unit_symbol: str) -> str:
+    return f"{value:.2g}" if unit_symbol == "1" else f"{value:.2g} {unit_symbol}"
 
 
 def print_live(answer: LiveResponse) -> None:

@@ -57,16 +57,16 @@ def _print_extent(answer: AccelerometerResponse | MagnetometerResponse) -> None:
 
     if isinstance(answer, AccelerometerResponse):
         density = max(answer.noise_density_m_s2.values())
-        said = (
+        extent = (
             f"{answer.rests - answer.left_out} of {answer.rests} rests used, in {answer.poses} poses; white noise up "
             f"to {density:.2g} m/s2/sqrt(Hz)"
         )
     else:
-        said = (
+        extent = (
             f"{answer.readings - answer.left_out} of {answer.readings} readings used; from any direction to the "
             f"nearest measured one: up to {answer.largest_gap_deg:.0f} deg"
         )
-    console.print(said, style="dim")
+    console.print(extent, style="dim")
 
 
 def _print_verdict(answer: AccelerometerResponse | MagnetometerResponse) -> None:

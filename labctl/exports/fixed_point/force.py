@@ -97,11 +97,11 @@ class FixedForce:
 
         Half a unit each, and what the correction of the output makes of it.
         """
-        unit = self.fixed.full_scale_dps / 2.0**Q31
+        lsb_dps = self.fixed.full_scale_dps / 2.0**Q31
         linear, square = np.abs(self.force.known_per_g).sum(axis=1), np.abs(self.force.known_per_g2)
         of_force = 2.0 ** -(Q16 + 1) * (linear + square * (2 * MAX_G + 1))
         most = 3 * MAX_G * (linear > 0) + MAX_G**2 * (square > 0)
-        added = of_force + most * unit * 2.0 ** -(self.shift + 1) + unit / 2
+        added = of_force + most * lsb_dps * 2.0 ** -(self.shift + 1) + lsb_dps / 2
         gain = 1.0 if self.is_direct else 1.0 + self.fixed.steepest
         return float(gain * added.max())
 

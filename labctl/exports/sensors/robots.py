@@ -22,45 +22,45 @@ def lower_triangle(errors: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(lower + 0.0, dtype=np.float64)  # no minus before a zero
 
 
-def kalibr(found: AccelerometerParameters, head: Sequence[str]) -> str:
+def kalibr(parameters: AccelerometerParameters, head: Sequence[str]) -> str:
     """Return Kalibr's keys of the model scale-misalignment: reading = M force + bias (IccScaledMisalignedImu)."""
-    offset = ", ".join(f"{value:.6g}" for value in found.offset)
+    offset = ", ".join(f"{value:.6g}" for value in parameters.offset)
     notes = [
         "The keys of the file that Kalibr writes with --imu-models scale-misalignment: reading = M force + bias.",
         "M is lower triangular: the x axis is the accelerometer's own, the y axis lies in the plane of its x and y.",
         f"LOST bias: Kalibr estimates it over time; here x, y, z = {offset} m/s2.",
         "accelerometer_random_walk is not in this file: rests of seconds do not tell it.",
     ]
-    if found.gyro_turned_rad is not None:
+    if parameters.gyro_turned_rad is not None:
         notes.append("LOST gyroscopes: C_gyro_i is by lower triangular axes, and needs the M of the gyro beside it.")
-    notes += _lost_temperature(found)
+    notes += _lost_temperature(parameters)
     body = ["model: scale-misalignment", "accelerometers:", "  M:"]
-    body += ["  - [" + ", ".join(f"{value:.12g}" for value in row) + "]" for row in lower_triangle(found.errors)]
-    body.append(f"accelerometer_noise_density: {found.noise_density_m_s2:.9e}  # m/s^2/sqrt(Hz), the largest axis")
+    body += ["  - [" + ", ".join(f"{value:.12g}" for value in row) + "]" for row in lower_triangle(parameters.errors)]
+    body.append(f"accelerometer_noise_density: {parameters.noise_density_m_s2:.9e}  # m/s^2/sqrt(Hz), the largest axis")
     return commented([*map(plain, head), *notes]) + "\n".join(body) + "\n"
 
 
-def ros(found: AccelerometerParameters, head: Sequence[str]) -> str:
+def ros(parameters: AccelerometerParameters, head: Sequence[str]) -> str:
     """Return the file that the node apply_calib of imu_calib reads: corrected = SM reading - bias, in m/s2."""
-    matrix = found.matrix
+    matrix = parameters.matrix
     notes = ["For the node apply_calib of the ROS package imu_calib: corrected = SM reading - bias, m/s2."]
-    notes += _lost_temperature(found) + _transform(found)
+    notes += _lost_temperature(parameters) + _transform(parameters)
     body = [
         "SM: [" + ", ".join(f"{value:.12g}" for value in matrix.ravel()) + "]",
-        "bias: [" + ", ".join(f"{value:.12g}" for value in matrix @ found.offset) + "]",
+        "bias: [" + ", ".join(f"{value:.12g}" for value in matrix @ parameters.offset) + "]",
     ]
     return commented([*map(plain, head), *notes]) + "\n".join(body) + "\n"
 
 
-def _transform(found: AccelerometerParameters) -> list[str]:
+def _transform(parameters: AccelerometerParameters) -> list[str]:
     """Return the static transform from the accelerometer's frame to the gyro's, as a command of tf2_ros."""
-    if found.gyro_turned_rad is None:
+    if parameters.gyro_turned_rad is None:
         return []
     return [
         "LOST gyro triad; for rates that labctl's matrix has not corrected, which has this turn in it:",
-        command_of(found.gyro_turned_rad, "gyro"),
+        command_of(parameters.gyro_turned_rad, "gyro"),
     ]
 
 
-def _lost_temperature(found: AccelerometerParameters) -> list[str]:
-    return [] if found.temperature is None else [found.temperature.lost(found.gravity_g, bias=True)]
+def _lost_temperature(parameters: AccelerometerParameters) -> list[str]:
+    return [] if parameters.temperature is None else [parameters.temperature.lost(parameters.gravity_g, bias=True)]

@@ -64,9 +64,9 @@ def command_of(turned_rad: Array, child: str) -> str:
     return f"ros2 run tf2_ros static_transform_publisher {turn} --frame-id {PARENT} --child-frame-id {child}"
 
 
-def tf2(found: Parameters, head: Sequence[str]) -> str:
+def tf2(parameters: Parameters, head: Sequence[str]) -> str:
     """Return a shell script of one command. Raises BadInput where the alignment is unknown."""
-    rotation_rad, child, use = _turn("tf2", found)
+    rotation_rad, child, use = _turn("tf2", parameters)
     notes = [
         f"Rotation from {PARENT} (parent) to {child} (child); it turns a vector of the child into the parent's axes.",
         use,
@@ -75,9 +75,9 @@ def tf2(found: Parameters, head: Sequence[str]) -> str:
     return commented([*map(plain, head), *notes]) + command_of(rotation_rad, child) + "\n"
 
 
-def urdf(found: Parameters, head: Sequence[str]) -> str:
+def urdf(parameters: Parameters, head: Sequence[str]) -> str:
     """Return two links and the fixed joint between them. Raises BadInput where the alignment is unknown."""
-    rotation_rad, child, use = _turn("urdf", found)
+    rotation_rad, child, use = _turn("urdf", parameters)
     notes = [
         *map(plain, head),
         "rpy: angles in rad about the fixed axes x, then y, then z of the parent (roll, pitch, yaw).", use, OFFSET,
@@ -94,11 +94,13 @@ def urdf(found: Parameters, head: Sequence[str]) -> str:
     )
 
 
-def _turn(name: str, found: Parameters) -> tuple[Array, str, str]:
+def _turn(name: str, parameters: Parameters) -> tuple[Array, str, str]:
     """Return the rotation vector, the frame that is turned, and what the transform is for."""
-    is_force = isinstance(found, AccelerometerParameters)
+    is_force = isinstance(parameters, AccelerometerParameters)
     child, use = ("gyro", RATES) if is_force else ("magnetometer", FIELD)
-    rotation_rad = found.gyro_turned_rad if isinstance(found, AccelerometerParameters) else found.turned_rad
+    rotation_rad = (
+        parameters.gyro_turned_rad if isinstance(parameters, AccelerometerParameters) else parameters.turned_rad
+    )
     if rotation_rad is None:
         raise BadInput(
             f"--export {name}: the alignment of the {child} is unknown; calibrate by the recording of a unit that was "

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.channel_functions import channel_options
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.data.earth import turning_size_dps
+from labctl.fitting.data.earth_rate import turning_size_dps
 from labctl.fitting.data.joined import trend_t_s
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
 from labctl.fitting.models.error_model import ErrorModel, expand

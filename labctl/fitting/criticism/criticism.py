@@ -19,12 +19,13 @@ from labctl.fitting.criticism.model_comparison import Comparison, compare_models
 from labctl.fitting.criticism.output_lattice import steps_of
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.criticism.residuals import Residuals, residuals_of
+from labctl.fitting.criticism.rivals import FAR
 from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.slow_process import slow_process, with_hypothesis, without_harm
 from labctl.fitting.criticism.suspects import MIN_CAUSE, Suspect, is_only_shape, suspects_of, without_shapes
 from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, family_or_hint, with_family
-from labctl.fitting.criticism.verdict import FAR, Verdict
+from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import leaning_rates
@@ -190,24 +191,24 @@ def criticise(
     family, hint = family_or_hint(fit_data, forward, verdict)
     verdict = with_family(verdict, family)
     named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family, hint=hint)
-    found = _checked(named, forward, full=full)
-    if not full or found.beside_missing is None:
-        return found
+    criticism = _checked(named, forward, full=full)
+    if not full or criticism.beside_missing is None:
+        return criticism
     report_stage("listing suspects and residuals")
-    suspects = tuple(suspects_of(comparison, found.beside_missing, fit_data, forward, refined_term, base))
-    verdict, suspects = _without_weak_names(found, suspects, forward), without_shapes(suspects, forward)
+    suspects = tuple(suspects_of(comparison, criticism.beside_missing, fit_data, forward, refined_term, base))
+    verdict, suspects = _without_weak_names(criticism, suspects, forward), without_shapes(suspects, forward)
     suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return replace(
-        found,
+        criticism,
         verdict=verdict,
-        advice=tuple(each for each in found.advice if each["effect"] in verdict.named),
-        family=_with_time_constants(found.family, fit_data, forward),
-        hint=_with_time_constants(found.hint, fit_data, forward),
+        advice=tuple(each for each in criticism.advice if each["effect"] in verdict.named),
+        family=_with_time_constants(criticism.family, fit_data, forward),
+        hint=_with_time_constants(criticism.hint, fit_data, forward),
         direct_rms_dps=_direct_rms_dps(fit_data, model),
         suspects=suspects,
         not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),
         explained=_explained(initial, seen),
-        views=views_of(found.beside_missing, found.residuals, recording, catalogue),
+        views=views_of(criticism.beside_missing, criticism.residuals, recording, catalogue),
     )
 
 
@@ -235,25 +236,25 @@ def best_shapes(
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
 
 
-def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
+def _checked(criticism: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
     """Return a criticism with advice on what it names, and at rest without names that this refutes."""
-    comparison, verdict = found.comparison, found.verdict
+    comparison, verdict = criticism.comparison, criticism.verdict
     if comparison is None:
-        return found
-    verdict = with_quantization(verdict, found.data, found.residuals)
-    slow = slow_process(comparison, found.residuals)
-    family = found.family
+        return criticism
+    verdict = with_quantization(verdict, criticism.data, criticism.residuals)
+    slow = slow_process(comparison, criticism.residuals)
+    family = criticism.family
     members = () if family is None else family.terms
     others = [group for group in verdict.groups if group[0] not in {term.effect for term in members}]
     leaders = [term for group in others if (term := _to_check(comparison, verdict, group)) is not None]
-    advice = advice_for(found.fit_data, forward, leaders, members) if full or slow is not None else ()
+    advice = advice_for(criticism.fit_data, forward, leaders, members) if full or slow is not None else ()
     advice = advice if family is None else (family.advice, *advice)
     verdict = with_hypothesis(without_harm(verdict, advice, slow, comparison), comparison, slow)
     advice = (*advice, NO_CORRECTION) if verdict.named == (QUANTIZATION,) else advice
     # two members were tried as one response, by stretches left out: the second is not the wrong shape of the first
     advice = advice if family is None else (*advice, *family.advice_beside)
     kept = tuple(each for each in advice if each["effect"] in verdict.named)
-    return replace(found, verdict=verdict, advice=kept, slow=slow, family=family if LAG in verdict.named else None)
+    return replace(criticism, verdict=verdict, advice=kept, slow=slow, family=family if LAG in verdict.named else None)
 
 
 def _reduced(recording: Recording, static: StaticRecord | None, *, is_decimated: bool, full: bool) -> ReducedRecording:
@@ -298,13 +299,13 @@ def _with_time_constants(
     return family.with_shapes(after.shapes)
 
 
-def _without_weak_names(found: Criticism, suspects: Sequence[Suspect], forward: ErrorModel) -> Verdict:
+def _without_weak_names(criticism: Criticism, suspects: Sequence[Suspect], forward: ErrorModel) -> Verdict:
     """Return the verdict, or "adequate" where noise may leave the residual, and what is named is no cause of it.
 
     That is weak evidence for effects that hardly lower the error, although it is above the noise floor. Another shape
     of an effect that the model has is not named beside other effects.
     """
-    verdict = found.verdict
+    verdict = criticism.verdict
     if verdict.form not in {"missing", "ambiguous"}:
         return verdict
     listed = {each.candidate.id for each in suspects}  # a shape that fits worse is not
@@ -316,9 +317,9 @@ def _without_weak_names(found: Criticism, suspects: Sequence[Suspect], forward: 
     named = [each for each in suspects if each.candidate.id in verdict.named]
     weak = all(each.candidate.log_bf < FAR and each.share_removed < MIN_CAUSE for each in named)
     weak = weak and set(verdict.named) <= listed | shapes
-    error = found.base.error if found.base is not None else None
+    error = criticism.base.error if criticism.base is not None else None
     above = error is not None and (error.rms_dps or 0.0) > (error.noise_floor_dps or np.inf)
-    if named and weak and above and (found.lack_of_fit[1] or 0.0) >= BY_CHANCE:
+    if named and weak and above and (criticism.lack_of_fit[1] or 0.0) >= BY_CHANCE:
         further = tuple(group for group in groups if not set(group) <= shapes)
         return Verdict("adequate", further=further)
     return replace(verdict, groups=groups)  # what was ambiguous stays so: fewer names are no more certain
@@ -350,7 +351,7 @@ def _leaning(data: ReducedRecording, fit_data: FitData, forward: ErrorModel) -> 
     """
     if not any(len(fit_data.angle_columns(axis)) for axis in fit_data.outputs):
         return data
-    angles = {axis: found.angles_rad for axis, found in solve_axes(fit_data, forward).nuisance.items()}
+    angles = {axis: fitted.angles_rad for axis, fitted in solve_axes(fit_data, forward).nuisance.items()}
     return replace(data, nodes=data.nodes.with_rates(leaning_rates(data.nodes, angles)))
 
 
@@ -376,8 +377,8 @@ def _too_little(data: ReducedRecording, model: ErrorModel) -> str | None:
 def _explained(first: Comparison, data: ReducedRecording) -> float:
     """Return the share of the excess chi2 of the raw `data` that the base explains, 0 to 1."""
     excess = raw = 0.0
-    for axis, found in first.axes.items():
-        freedom = found.rows - found.base_columns
-        excess += max(found.best.chi2 - freedom, 0.0)
-        raw += float(np.sum(data.error_dps(axis)[0] ** 2 / (first.white_var[axis] + found.best.noise.size_dps**2)))
+    for axis, compared in first.axes.items():
+        freedom = compared.rows - compared.base_columns
+        excess += max(compared.best.chi2 - freedom, 0.0)
+        raw += float(np.sum(data.error_dps(axis)[0] ** 2 / (first.white_var[axis] + compared.best.noise.size_dps**2)))
     return float(np.clip(1.0 - excess / max(raw, 1e-12), 0.0, 1.0))

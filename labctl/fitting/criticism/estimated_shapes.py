@@ -46,12 +46,12 @@ class CandidateEstimates:
     overlap: NDArray[np.float64]  #: (K, K) correlation of the regressors beside the model
 
 
-def candidate_estimates(found: Criticism) -> Mapping[str, CandidateEstimates]:
+def candidate_estimates(criticism: Criticism) -> Mapping[str, CandidateEstimates]:
     """Return the estimates by output axis; none where there was too little for a verdict.
 
     The noise is that beside all that was found missing; columns that the model absorbs are left out.
     """
-    comparison = found.beside_missing
+    comparison = criticism.beside_missing
     if comparison is None:
         return {}
     return {

@@ -12,28 +12,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from labctl.answers.recording_head import Motion
 from labctl.fitting.criticism.criticism import Criticism
-from labctl.fitting.criticism.joint_evidence import AxisForecast, Outcomes, forecast_axis
+from labctl.fitting.criticism.joint_evidence import AxisForecast, Fitted, Outcomes, forecast_axis
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
 from labctl.fitting.criticism.planned_addition import may_be_joined, with_planned
-from labctl.fitting.criticism.ranking import Candidate, are_exact
+from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.criticism.verdict import (
-    ALIKE,
-    ENOUGH,
-    FAR,
-    INDISTINGUISHABLE_CHI2,
-    LEAD,
-    MIN_CHANCE,
-    by_chance,
-    has_as_simple_a_shape,
-    refines_base,
-)
+from labctl.fitting.criticism.rivals import LEAD, Pair, cannot_be_distinguished
+from labctl.fitting.criticism.verdict import ENOUGH, has_as_simple_a_shape, refines_base
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
@@ -75,7 +68,7 @@ class OpenQuestion:
         """The ids of the effects that may be missing, likeliest first."""
         return tuple(name for name in self.ids if name != NOTHING)
 
-    def may_join(self, motion: str) -> bool:
+    def may_join(self, motion: Motion) -> bool:
         """Return whether a recording of a motion can be fitted together with those that were criticised."""
         return may_be_joined(self.comparison.data.info.motion, motion)
 
@@ -102,21 +95,21 @@ class Forecast:
     distinguished: tuple[str, ...]  #: ids of the effects that fall behind the likeliest one, where that is the truth
 
 
-def open_question(found: Criticism) -> OpenQuestion | None:
+def open_question(criticism: Criticism) -> OpenQuestion | None:
     """Return what a criticism leaves open: its first group of effects that cannot be distinguished; None for none.
 
     Beside an adequate model: whether effects are missing for which there is some evidence, but not enough to say so.
     """
-    group = found.verdict.indistinguishable
-    if found.beside_missing is None:
+    group = criticism.verdict.indistinguishable
+    if criticism.beside_missing is None:
         return None
-    if found.verdict.form == "adequate":
-        return _whether_any(found.beside_missing)
+    if criticism.verdict.form == "adequate":
+        return _whether_any(criticism.beside_missing)
     if not group:
         return None
-    comparison = found.beside_missing
-    others = [names[0] for names in found.verdict.groups if names != group]
-    terms = [found.verdict.terms[name] for name in others if name in found.verdict.terms]
+    comparison = criticism.beside_missing
+    others = [names[0] for names in criticism.verdict.groups if names != group]
+    terms = [criticism.verdict.terms[name] for name in others if name in criticism.verdict.terms]
     if terms:
         model = comparison.model.with_added(terms)
         comparison = compare_beside(comparison, model)
@@ -242,51 +235,66 @@ def _over_axes(per_axis: NDArray[np.float64]) -> Array:
     return np.asarray(logsumexp(np.vstack([joint, per_axis - np.log(2.0 * axes)]), axis=0))
 
 
+@dataclass(frozen=True)
+class _ForeseenPair(Pair):
+    """A leader and a rival in one outcome of a planned recording."""
+
+    question: OpenQuestion
+    axes: Mapping[str, AxisForecast]
+    outcomes: Mapping[str, Outcomes]
+    k: int  #: number of the outcome
+    signal: Mapping[str, Fitted]  #: of the leader, by axis
+
+    @cached_property
+    def _reproduced(self) -> list[tuple[float, int]]:
+        """The part of the signal on each axis, in chi2, that the rival reproduces, and its further directions."""
+        return [
+            self.axes[axis].reproduced(each, self.rival.id, self.outcomes[axis], self.k)
+            for axis, each in self.signal.items()
+        ]
+
+    @property
+    def share(self) -> float:
+        return sum(part for part, _ in self._reproduced) / self.leader_gain
+
+    @property
+    def further_directions(self) -> int:
+        return sum(more for _, more in self._reproduced)
+
+    @property
+    def further_gain(self) -> float:
+        of_rival = (each.fitted(self.rival.id, self.k) for each in self.outcomes.values())
+        return sum(each.size for each in of_rival if each is not None) - self.leader_gain
+
+    @property
+    def further_nats(self) -> float:
+        return sum(
+            self.axes[axis].further_nats(each, self.rival.id, self.outcomes[axis], self.k)
+            for axis, each in self.signal.items()
+        )
+
+    @property
+    def has_as_simple_a_shape(self) -> bool:
+        return (self.leader.id, self.rival.id) in self.question.simple
+
+
 def _named_alone(
     question: OpenQuestion, axes: Mapping[str, AxisForecast], outcomes: Mapping[str, Outcomes],
     log_bf: Array, k: int,
 ) -> int | None:  # fmt: skip
-    """Return the number of the cause that the verdict names alone in outcome `k`; None where it names none, or more.
-
-    The rules are those of the verdict (`verdict.alias_group`).
-    """
+    """Return the number of the cause that the verdict names alone in outcome `k`; None where it names none, or more."""
     h = int(np.argmax(log_bf))
     if log_bf[h] < ENOUGH:
         return None
     leader = question.candidates[h]
-    fitted = {axis: outcomes[axis].fitted(leader.id, k) for axis in axes}
-    size = sum(each.size for each in fitted.values() if each is not None)
-    if size <= 0:
+    on_axes = {axis: outcomes[axis].fitted(leader.id, k) for axis in axes}
+    signal = {axis: each for axis, each in on_axes.items() if each is not None}
+    gain = sum(each.size for each in signal.values())
+    if gain <= 0:
         return None
-    of_leader = {axis: each for axis, each in fitted.items() if each is not None}
-    for j, rival in enumerate(question.candidates):
-        if question.nodes[j] == question.nodes[h] or rival.id == NOTHING:
-            continue
-        parts = [axes[axis].reproduced(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items()]
-        share, directions = sum(part for part, _ in parts) / size, sum(more for _, more in parts)
-        contained = (1.0 - share) * size < INDISTINGUISHABLE_CHI2
-        same = share > ALIKE and directions <= 0 and not are_exact(leader, rival)
-        alike = same or (log_bf[j] > log_bf[h] - FAR and contained)
-        known = log_bf[j] > log_bf[h] - LEAD or (log_bf[j] > 0 and bool(alike))
-        if contained and directions > 0:
-            if _is_random(rival):
-                known = known or _has_shifts(rival, outcomes, k, size, directions)
-            elif (leader.id, rival.id) not in question.simple:
-                further = (
-                    axes[axis].further_nats(each, rival.id, outcomes[axis], k) for axis, each in of_leader.items()
-                )
-                known = known and sum(further) < LEAD
-        if known:
-            return None
-    return int(question.nodes[h])
-
-
-def _is_random(rival: Candidate) -> bool:
-    """Return whether a rival has a coefficient for each run or mounting."""
-    return rival.id in CATALOGUE and CATALOGUE[rival.id].is_random
-
-
-def _has_shifts(rival: Candidate, outcomes: Mapping[str, Outcomes], k: int, size: float, more: int) -> bool:
-    """Return whether the shifts of runs or mountings beyond the leader are not 0."""
-    fitted = (outcomes[axis].fitted(rival.id, k) for axis in outcomes)
-    return by_chance(sum(each.size for each in fitted if each is not None) - size, more) < MIN_CHANCE
+    rivals = (
+        _ForeseenPair(leader, rival, float(log_bf[h]), float(log_bf[j]), gain, question, axes, outcomes, k, signal)
+        for j, rival in enumerate(question.candidates)
+        if question.nodes[j] != question.nodes[h] and rival.id != NOTHING
+    )
+    return None if any(map(cannot_be_distinguished, rivals)) else int(question.nodes[h])

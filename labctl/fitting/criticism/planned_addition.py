@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.recording_head import Motion
 from labctl.errors import BadInput
 from labctl.fitting.criticism.candidates import base_rows
 from labctl.fitting.criticism.reduction import ReducedRecording
@@ -24,9 +25,6 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import RECORDING, WITHIN_S
-
-#: The motion of a recording whose rate changes within data sets.
-CHANGING = "profile"
 
 Columns = Mapping[str, NDArray[np.generic]]
 
@@ -66,9 +64,9 @@ def with_planned(measured: ReducedRecording, planned: ReducedRecording, model: E
     return _with_predicted(together, len(measured), model)
 
 
-def may_be_joined(measured: str, planned: str) -> bool:
+def may_be_joined(measured: Motion, planned: Motion) -> bool:
     """Return whether a recording and a planned one can be fitted together, by their motions."""
-    return {measured, planned} <= WITH_TABLE_RATE or {measured, planned} == {CHANGING}
+    return {measured, planned} <= WITH_TABLE_RATE or measured == planned == "profile"
 
 
 def _refuse_between_nodes(together: ReducedRecording, model: ErrorModel) -> None:
@@ -141,16 +139,16 @@ def _joined_channels(one: ReducedRecording, two: ReducedRecording) -> Channels:
 def _joined_history(
     first: TemperatureHistory, second: TemperatureHistory, counted: Mapping[str, int], shift_s: float
 ) -> TemperatureHistory:
-    courses = {
-        number + counted["run"]: replace(course, begin_s=course.begin_s + shift_s)
-        for number, course in second.courses.items()
+    profiles = {
+        number + counted["run"]: replace(profile, begin_s=profile.begin_s + shift_s)
+        for number, profile in second.profiles.items()
     }
     numbers = {
         name: (*first.numbers(name), *(number + counted[name] for number in second.numbers(name))) for name in counted
     }
     low, high = zip(first.span_c, second.span_c, strict=True)
     return TemperatureHistory(
-        {**first.courses, **courses}, numbers, max(first.rate_dps, second.rate_dps), (min(low), max(high)),
+        {**first.profiles, **profiles}, numbers, max(first.rate_dps, second.rate_dps), (min(low), max(high)),
         first.thermometer and second.thermometer, first.middle_s,
     )  # fmt: skip
 

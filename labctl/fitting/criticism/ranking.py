@@ -38,7 +38,7 @@ def log_size_prior(option: CandidateShape, axis_evidence: AxisEvidence, index: i
     least = np.maximum(np.abs(values) - SPARE_U * np.sqrt(np.maximum(np.diag(covariance), 0.0)), 0.0)
     if _is_beyond_all(option, least) or _has_wrong_sign(option, float(values[0]), float(least[0]), technology):
         return -np.inf
-    size = float(max(s for s, unit in zip(least, option.units, strict=True) if unit == option.units[0]))
+    size = float(max(s for s, unit_symbol in zip(least, option.units, strict=True) if unit_symbol == option.units[0]))
     largest = largest_plausible(option.term.effect, technology)
     if largest is None or not size > 0:
         return 0.0
@@ -67,7 +67,7 @@ def _has_wrong_sign(option: CandidateShape, value: float, least: float, technolo
 
 
 def _is_beyond_all(option: CandidateShape, least: Array) -> bool:
-    return any(size > LARGEST.get(unit, np.inf) for size, unit in zip(least, option.units, strict=True))
+    return any(size > LARGEST.get(unit_symbol, np.inf) for size, unit_symbol in zip(least, option.units, strict=True))
 
 
 #: From this evidence on, nats, a candidate that has none at a physical size is listed as not physical.

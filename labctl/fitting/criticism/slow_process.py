@@ -18,7 +18,8 @@ from labctl.fitting.criticism.advice import MIN_GAIN_AT_REST
 from labctl.fitting.criticism.channel_functions import TIMES
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.residuals import Residuals
-from labctl.fitting.criticism.verdict import ENOUGH, FAR, Verdict
+from labctl.fitting.criticism.rivals import FAR
+from labctl.fitting.criticism.verdict import ENOUGH, Verdict
 from labctl.fitting.numeric.arrays import Array
 
 #: Correlation of neighbouring data sets from which on a residual is slow: it goes on longer than the data sets last.

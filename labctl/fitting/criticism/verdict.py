@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from scipy.special import chdtrc
 
 from labctl.answers.criticism import Remainder
 from labctl.answers.fitted_model import Coefficient
@@ -19,8 +18,9 @@ from labctl.fitting.criticism.channel_functions import TIMES
 from labctl.fitting.criticism.evidence.further_coefficients import further_nats
 from labctl.fitting.criticism.evidence.gains import reproduced_and_size, solve_option
 from labctl.fitting.criticism.model_comparison import Comparison
-from labctl.fitting.criticism.ranking import Candidate, are_exact
-from labctl.fitting.effects import CATALOGUE, Term
+from labctl.fitting.criticism.ranking import Candidate
+from labctl.fitting.criticism.rivals import FAR, LEAD, Pair, cannot_be_distinguished
+from labctl.fitting.effects import Term
 from labctl.fitting.effects.derived import with_derived
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
@@ -31,14 +31,6 @@ Hypothesis = Literal["temperature_not_logged"]
 ENOUGH = 4.5
 #: The same beside a cause that was found already: two at once are rarer than one.
 ENOUGH_NEXT = 7.0
-#: A lead of less than this over another candidate leaves both.
-LEAD = 3.0
-#: A rival that leaves less than this of the leader's signal (chi2) cannot be distinguished from it ...
-INDISTINGUISHABLE_CHI2 = 7.0
-#: A lead from which on the evidence alone decides against a rival with more coefficients.
-FAR = 12.0
-#: ... nor one with no more coefficients that reproduces more than this share of it.
-ALIKE = 0.995
 #: A smooth function of a channel counts as unexplained only when no effect explains this share of it.
 EXPLAINED = 0.90
 #: The same for time, which is never a cause.
@@ -50,8 +42,6 @@ MIN_SHARE = 0.3
 NEAR_END = 0.9
 #: Columns that are the same up to rounding have the same evidence within this.
 SAME = 0.02
-#: Further coefficients that noise makes so large with less than this probability are not 0.
-MIN_CHANCE = 1e-3
 #: At most this many effects in a group of an ambiguous answer, beside exact aliases of the first and of the last.
 MOST = 4
 #: A channel of which another explains more than this share cannot be distinguished from it.
@@ -197,33 +187,40 @@ def _alike(comparison: Comparison, leader: Candidate, *, physical: bool) -> list
         if not rival.smooth
         and rival.physical == physical
         and rival.id != leader.id
-        and _cannot_be_distinguished(comparison, leader, rival)
+        and cannot_be_distinguished(_pair(comparison, leader, rival))
     ]
 
 
-def _cannot_be_distinguished(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
-    """Return whether the data leave a rival beside the leader.
+@dataclass(frozen=True)
+class _MeasuredPair(Pair):
+    """A leader and a rival of a comparison."""
 
-    A rival that is the leader with more coefficients is judged by what is known of these: it is out where they are
-    next to nothing, by the same odds as any other, `LEAD`, unless it has a shape with no more coefficients than the
-    leader that is not far behind. One with a coefficient for each run or mounting stays in as well where noise hardly
-    makes them so large, whatever its evidence: the price of so many coefficients hides small shifts.
-    """
-    known = rival.log_bf > leader.log_bf - LEAD or (
-        rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival)
-    )
-    kind = CATALOGUE.get(rival.id)
-    is_random = kind is not None and kind.is_random
-    more = _directions(comparison, rival) - _directions(comparison, leader)
-    if not (known or is_random) or more <= 0:
-        return known
-    if (1.0 - overlap(comparison, leader, rival)) * leader.gain >= INDISTINGUISHABLE_CHI2:
-        return known
-    if is_random:
-        return known or by_chance(rival.gain - leader.gain, more) < MIN_CHANCE
-    nats = sum(_further_nats(comparison, axis, i, rival.option[axis]) for axis, i in leader.option.items())
-    is_in = nats < LEAD or rival.log_bf > leader.log_bf or has_as_simple_a_shape(comparison, leader, rival)
-    return known and is_in
+    comparison: Comparison
+
+    @property
+    def share(self) -> float:
+        return overlap(self.comparison, self.leader, self.rival)
+
+    @property
+    def further_directions(self) -> int:
+        return _directions(self.comparison, self.rival) - _directions(self.comparison, self.leader)
+
+    @property
+    def further_gain(self) -> float:
+        return self.rival.gain - self.leader.gain
+
+    @property
+    def further_nats(self) -> float:
+        of_axes = self.leader.option.items()
+        return sum(_further_nats(self.comparison, axis, i, self.rival.option[axis]) for axis, i in of_axes)
+
+    @property
+    def has_as_simple_a_shape(self) -> bool:
+        return has_as_simple_a_shape(self.comparison, self.leader, self.rival)
+
+
+def _pair(comparison: Comparison, leader: Candidate, rival: Candidate) -> Pair:
+    return _MeasuredPair(leader, rival, leader.log_bf, rival.log_bf, leader.gain, comparison)
 
 
 def has_as_simple_a_shape(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
@@ -238,11 +235,6 @@ def has_as_simple_a_shape(comparison: Comparison, leader: Candidate, rival: Cand
         is_simple = evidence.dimensions <= evidence.dimensions[best]
         behind += float(evidence.log_bf[best] - np.max(evidence.log_bf, initial=-np.inf, where=is_rival & is_simple))
     return behind < FAR
-
-
-def by_chance(gain: float, directions: int) -> float:
-    """Return the probability that noise removes so much chi2 in so many directions."""
-    return float(chdtrc(directions, max(gain, 0.0)))
 
 
 def _further_nats(comparison: Comparison, axis: str, simple: int, wider: int) -> float:
@@ -276,18 +268,6 @@ def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
             or (c is not first and overlap(comparison, first, c) > CONFOUNDED)
         )
     )
-
-
-def _is_indistinguishable(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
-    """Return whether a rival reproduces the leader's signal, without the evidence deciding against it.
-
-    A rival with more coefficients can follow any signal: it only counts while its evidence is not far behind.
-    """
-    share = overlap(comparison, leader, rival)
-    same = share > ALIKE and _directions(comparison, rival) <= _directions(comparison, leader)
-    if same and not are_exact(leader, rival):
-        return True
-    return rival.log_bf > leader.log_bf - FAR and (1.0 - share) * leader.gain < INDISTINGUISHABLE_CHI2
 
 
 def _directions(comparison: Comparison, candidate: Candidate) -> int:
@@ -351,7 +331,7 @@ def coefficients_of(comparison: Comparison, candidate: Candidate) -> dict[str, d
         values, covariance = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
         u = np.sqrt(np.diag(covariance))
         by_axis[axis] = with_derived({
-            name: {"value": float(value), "u": float(error), "unit": unit}
-            for name, unit, value, error in zip(option.names, option.units, values, u, strict=True)
+            name: {"value": float(value), "u": float(error), "unit": unit_symbol}
+            for name, unit_symbol, value, error in zip(option.names, option.units, values, u, strict=True)
         })  # fmt: skip
     return by_axis

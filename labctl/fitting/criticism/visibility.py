@@ -116,8 +116,8 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
             sizes[option.units[best]] = min(size, sizes.get(option.units[best], np.inf))
     if share < MIN_VISIBLE:
         return EffectVisibility(effect_id, False, share, why="schedule", experiment=CATALOGUE[effect_id].experiment)
-    unit = next(iter(sizes), "")  # of the lowest order that is visible
-    return EffectVisibility(effect_id, True, share, sizes.get(unit), unit)
+    unit_symbol = next(iter(sizes), "")  # of the lowest order that is visible
+    return EffectVisibility(effect_id, True, share, sizes.get(unit_symbol), unit_symbol)
 
 
 def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> list[NotTestable]:

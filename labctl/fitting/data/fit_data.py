@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.channels import Argument, Channels, channels_of
 from labctl.fitting.data.covered import Covered, covered_by_means, covered_by_readings
-from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.earth_rate import up_rate_dps
 from labctl.fitting.data.mean_noise import white_var_of
 from labctl.fitting.data.mounting_angles import AngleColumns, angle_columns, placed_rad
 from labctl.fitting.data.noise_floor import NoiseFloor, noise_floor_of

@@ -15,6 +15,7 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.recording_head import Motion
 from labctl.errors import BadInput
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.temperature.channel import with_temperature
@@ -30,7 +31,7 @@ APART_S = 3600.0
 #: What must be the same in all of them: the document of a calibration says it once, or a fit takes it from the head.
 SAME = ("serial", "axes", "output", "latitude_deg", "tilt_deg", "tilt_azimuth_deg", "table_axis")
 #: Motions whose recordings have a rate of the table at each data set, and so go together.
-WITH_TABLE_RATE = frozenset({"rates", "rest"})
+WITH_TABLE_RATE: frozenset[Motion] = frozenset({"rates", "rest"})
 
 Rows = dict[str, NDArray[np.generic]]
 

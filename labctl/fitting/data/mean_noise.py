@@ -70,5 +70,5 @@ def response_dps(rates: Mapping[str, Array], output_dps: Array) -> Array:
 
 
 def _scale(points: Recording, axis: str) -> float:
-    output = next((unit for name, unit in points.info.output.items() if name == axis), None)
+    output = next((output_unit for name, output_unit in points.info.output.items() if name == axis), None)
     return abs(output.scale) if output else 1.0

@@ -196,7 +196,7 @@ def _history(channels: Channels, temperature_c: NDArray[np.float64], rate: Array
         yield np.column_stack(
             [direction, direction * temperature_c[:, 1], direction * temperature_c[:, 2], direction * rate]
         )
-    if channels.history.courses and (not np.any(rate) or _is_on_ramps(channels)):
+    if channels.history.profiles and (not np.any(rate) or _is_on_ramps(channels)):
         lags = np.column_stack([channels.history.lag_k(channels.columns, tau) for tau in LAGS_S])
         states = [channels.history.hysteresis_state(channels.columns, width) for width in WIDTHS_K]
         yield np.column_stack([lags, *states])

@@ -56,11 +56,11 @@ def leaning_mountings(shares: Mapping[str, float]) -> list[LeaningMounting]:
     weights = np.array(list(shares.values()))
     information = (up * weights[:, None]).T @ up
     gains = weights[:, None] * (up @ np.linalg.pinv(information, rcond=SINGULAR, hermitian=True))
-    found = []
+    leaning = []
     for position, direction, gain in zip(positions, up, gains, strict=True):
         across = np.linalg.svd(direction[None, :])[2][1:]
-        found.append(LeaningMounting(position.is_tilted, across, gain))
-    return found
+        leaning.append(LeaningMounting(position.is_tilted, across, gain))
+    return leaning
 
 
 def undetermined(positions: Iterable[str]) -> str:

@@ -74,5 +74,5 @@ def _stem(symbol: str) -> str:
 def _names(equation: Equation) -> list[str]:
     """Return the names that an equation and its lines use, each once, in order."""
     texts = ("e[a]", equation.error, *(part for line in equation.where for part in line))
-    found = [node for text in texts for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)]
-    return list(dict.fromkeys(node.id for node in found))
+    nodes = [node for text in texts for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)]
+    return list(dict.fromkeys(node.id for node in nodes))

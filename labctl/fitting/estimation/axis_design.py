@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.earth import turning_columns
+from labctl.fitting.data.earth_rate import turning_columns
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.mounting_angles import AngleColumns
 from labctl.fitting.data.shifts import Shift, shifts_of

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size, with_prior
+from labctl.fitting.data.earth_rate import turning_columns, turning_size_dps, with_known_size, with_prior
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.mounting_angles import leaning_rates
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
@@ -245,7 +245,7 @@ def _axis_fit(design: AxisDesign, solution: Solution, late: TimeErrors | None = 
     return AxisFit(
         tuple(owner for owner, _, _ in names),
         tuple(name for _, name, _ in names),
-        tuple(unit for _, _, unit in names),
+        tuple(unit_symbol for _, _, unit_symbol in names),
         values.reshape(len(names), -1),
         sum((part.covariance for part in parts), covariance),
         parts,

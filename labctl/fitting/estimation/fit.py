@@ -12,7 +12,7 @@ from labctl.answers.fitted_model import AxisNoiseJson, FitEnvironment, LegErrorJ
 from labctl.errors import LabctlError, NotEnoughData
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.data.covered import Covered
-from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
+from labctl.fitting.data.earth_rate import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import mountings_of
 from labctl.fitting.data.noise_floor import AxisNoise, correlation_times

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Argument, Channels
-from labctl.fitting.data.earth import with_prior
+from labctl.fitting.data.earth_rate import with_prior
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Reference, kind_of
 from labctl.fitting.estimation.requirements import require_channels
@@ -231,10 +231,11 @@ def _of_axis(
     return held
 
 
-def _check(quantity: str, coefficient: HeldCoefficient, unit: str, model: ErrorModel) -> None:
-    if coefficient.unit and coefficient.unit != unit:
+def _check(quantity: str, coefficient: HeldCoefficient, unit_symbol: str, model: ErrorModel) -> None:
+    if coefficient.unit and coefficient.unit != unit_symbol:
         raise BadInput(
-            f"{quantity}: the unit of this coefficient is {unit!r}, not {coefficient.unit!r}; write value and u in it"
+            f"{quantity}: the unit of this coefficient is {unit_symbol!r}, not {coefficient.unit!r}; write value and u "
+            "in it"
         )
     term = next(term for term in model.terms if term.effect == coefficient.effect)
     if kind_of(term).parameters:

@@ -236,14 +236,14 @@ def _of_shifts(repeatability: Mapping[str, list[RepeatabilityJson]]) -> Iterator
         for line in lines:
             if not line["freedom"]:
                 continue
-            unit = "" if line["unit"] == "1" else f" {line['unit']}"
+            unit_symbol = "" if line["unit"] == "1" else f" {line['unit']}"
             if not line["seen"]:
-                yield f"Axis {axis}: no {line['term']}, beyond the noise; at most {line['high']:.2g}{unit}."
+                yield f"Axis {axis}: no {line['term']}, beyond the noise; at most {line['high']:.2g}{unit_symbol}."
                 continue
             values = [shift["value"] for shift in line["shifts"]]
-            size = f"{line['value']:.2g}{unit} (95 %: {line['low']:.2g} to {line['high']:.2g})"
+            size = f"{line['value']:.2g}{unit_symbol} (95 %: {line['low']:.2g} to {line['high']:.2g})"
             yield (
-                f"Axis {axis}: shifts of up to {max(values) - min(values):.2g}{unit} between the recordings "
+                f"Axis {axis}: shifts of up to {max(values) - min(values):.2g}{unit_symbol} between the recordings "
                 f"({_probability(line['p_value'])}) are {line['term']}: standard deviation {size}. These shifts are "
                 "neither a drift nor part of the calibration."
             )

@@ -90,13 +90,13 @@ def coefficient_names(model: ErrorModel, axis: str, owners: Sequence[str], names
     places = [f"@{round(node)}" for node in nodes]
     if len(set(places)) < len(places):
         places = [f"@{node:.1f}" for node in nodes]
-    found = []
+    listed = []
     for owner, name in zip(owners, names, strict=True):
         if owner in model.steady or not places:
-            found += [f"{axis}.{name}", *([""] * (len(places) - 1))]
+            listed += [f"{axis}.{name}", *([""] * (len(places) - 1))]
         else:
-            found += [f"{axis}.{name}{place}" for place in places]
-    return found
+            listed += [f"{axis}.{name}{place}" for place in places]
+    return listed
 
 
 def with_coefficient_prior(

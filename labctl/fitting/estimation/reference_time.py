@@ -38,11 +38,11 @@ class TimeErrors:
 
     def parts(self, along: NDArray[np.float64]) -> tuple[ErrorPart, ...]:
         """Return the parts of a covariance; `along` (k, 1 + j) is the change of the coefficients by each."""
-        found = (
+        parts = (
             ErrorPart(TIME_COMMON_U_S.removesuffix("_u_s"), self.common_u_s, "s", along[:, :1]),
             ErrorPart(TIME_U_S.removesuffix("_u_s"), self.own_u_s, "s", along[:, 1:]),
         )
-        return tuple(part for part in found if part.u > 0 or (part is found[0] and self.is_common_stated))
+        return tuple(part for part in parts if part.u > 0 or (part is parts[0] and self.is_common_stated))
 
 
 def time_errors(data: FitData, axis: str) -> TimeErrors | None:

@@ -89,12 +89,12 @@ def coefficients_json(model: ErrorModel, fit: AxisFit) -> Coefficients:
     u = none_for_nan(fit.u)
     if isinstance(model.temperature, LagrangeTable):
         tables: dict[str, CoefficientTable] = {
-            name: {"value": values.tolist(), "u": us, "unit": unit}
-            for name, unit, values, us in zip(fit.names, fit.units, fit.values, u, strict=True)
+            name: {"value": values.tolist(), "u": us, "unit": unit_symbol}
+            for name, unit_symbol, values, us in zip(fit.names, fit.units, fit.values, u, strict=True)
         }
         return {"temperature_c": list(model.temperature.nodes_c), **with_derived_tables(tables)}
     plain: dict[str, Coefficient] = {
-        name: {"value": float(values[0]), "u": us[0], "unit": unit}
-        for name, unit, values, us in zip(fit.names, fit.units, fit.values, u, strict=True)
+        name: {"value": float(values[0]), "u": us[0], "unit": unit_symbol}
+        for name, unit_symbol, values, us in zip(fit.names, fit.units, fit.values, u, strict=True)
     }
     return {**with_derived(plain)}

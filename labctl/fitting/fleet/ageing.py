@@ -67,17 +67,17 @@ def ageing_of(units: Sequence[UnitCoefficients]) -> tuple[CoefficientAgeing, ...
     names = dict.fromkeys(name for own in several.values() for unit in own for name in unit.names)
     of_unit = {name: next((u.units[u.names.index(name)] for u in units if u.units and name in u.names), "")
                for name in names}  # fmt: skip
-    found = []
+    ageings = []
     for name in names:
         slopes = _slopes(several, name)
         if len(slopes.values) >= MIN_UNITS:
-            found.append(_ageing(name, of_unit[name], slopes))
-    if not found:
+            ageings.append(_ageing(name, of_unit[name], slopes))
+    if not ageings:
         raise NotEnoughData(
             f"{len(several)} units of the type were calibrated more than once on known days; at least {MIN_UNITS} are "
             "needed: calibrate units of the type again"
         )
-    return tuple(found)
+    return tuple(ageings)
 
 
 def _slopes(histories: dict[str, list[UnitCoefficients]], name: str) -> _Slopes:
@@ -104,7 +104,7 @@ def _slopes(histories: dict[str, list[UnitCoefficients]], name: str) -> _Slopes:
     return slopes
 
 
-def _ageing(name: str, unit: str, slopes: _Slopes) -> CoefficientAgeing:
+def _ageing(name: str, unit_symbol: str, slopes: _Slopes) -> CoefficientAgeing:
     y, variance = np.array(slopes.values), np.array(slopes.variances)
     ones: NDArray[np.float64] = np.ones((len(y), 1))
     fitted, tau = robust_fit(y, variance, ones)
@@ -113,7 +113,7 @@ def _ageing(name: str, unit: str, slopes: _Slopes) -> CoefficientAgeing:
     spread = reml(y[kept], variance[kept], ones[kept])
     u_mean = float(np.sqrt(spread.covariance[0, 0]))
     return CoefficientAgeing(
-        name, unit, float(spread.values[0]), u_mean, spread.tau, spread.low, spread.high,
+        name, unit_symbol, float(spread.values[0]), u_mean, spread.tau, spread.low, spread.high,
         float(np.hypot(spread.tau, u_mean)), float(kept.sum() - 1), int(kept.sum()),
         (min(slopes.years), max(slopes.years)),
         tuple(serial for serial, is_kept in zip(slopes.serial_numbers, kept.tolist(), strict=True) if not is_kept),

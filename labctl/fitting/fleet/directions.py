@@ -36,8 +36,8 @@ def kind_of_coefficient(name: str) -> str:
 def directions_of(table: UnitTable) -> tuple[Direction, ...]:
     """Return the kinds of coefficients of which a table of units has several."""
     places: dict[tuple[str, str], list[int]] = {}
-    for k, (name, unit) in enumerate(zip(table.names, table.units, strict=True)):
-        places.setdefault((kind_of_coefficient(name), unit), []).append(k)
+    for k, (name, unit_symbol) in enumerate(zip(table.names, table.units, strict=True)):
+        places.setdefault((kind_of_coefficient(name), unit_symbol), []).append(k)
     directions = []
     for (kind, _), own in places.items():
         if len(own) > 1:

@@ -102,11 +102,11 @@ class Levels:
 
     def _enough(self) -> dict[str, tuple[NDArray[np.int64], int]]:
         """Return factor -> the levels with enough units in and beside them, and the number of all levels."""
-        found = {}
+        levels = {}
         for factor, level in self._table.level.items():
             count = np.bincount(level[level >= 0], minlength=len(self._table.levels[factor]))
-            found[factor] = (np.flatnonzero((count >= MIN_UNITS) & (count.sum() - count >= MIN_BESIDE)), len(count))
-        return found
+            levels[factor] = (np.flatnonzero((count >= MIN_UNITS) & (count.sum() - count >= MIN_BESIDE)), len(count))
+        return levels
 
     def column(self, level: Level) -> Array:
         """Return the regressor of a level, (n,): 1 in it, 0 beside it; of the date the years from their mean."""

@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Argument
 from labctl.fitting.data.covered import Covered
-from labctl.fitting.data.earth import turning_size_dps
+from labctl.fitting.data.earth_rate import turning_size_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.shifts import KINDS
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
@@ -142,11 +142,11 @@ def contradiction(data: FitData, model: ErrorModel, axis: str, prior: Coefficien
     if scatter.white_var is None or len(data) <= int(seen.sum()):
         return 1.0
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
-    found = solve(left[:, seen], y, scatter)
+    solution = solve(left[:, seen], y, scatter)
     turned = values[seen, None] * right[seen] * np.where(size > 0, size, 0.0)  # (r, c + b): coefficients to directions
     mean, covariance = _expected(design, model, axis, prior, beside[1])
-    off = found.values - turned @ mean
-    spread = found.covariance + turned @ covariance @ turned.T
+    off = solution.values - turned @ mean
+    spread = solution.covariance + turned @ covariance @ turned.T
     root = np.sqrt(np.diag(spread))
     chi2 = float(off / root @ np.linalg.solve(spread / np.outer(root, root), off / root))
     return float(chdtrc(len(off), chi2))

@@ -55,8 +55,10 @@ def reml(y: Array, variance: Array, columns: NDArray[np.float64]) -> RemlEstimat
     losses = np.array([loss(tau) for tau in grid.tolist()])
     best = int(np.argmin(losses))
     ends = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, len(grid) - 1)]))
-    found = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 1e-7 * ends[1]})
-    tau, least = (float(found.x), float(found.fun)) if found.fun <= losses[best] else (float(grid[best]), losses[best])
+    minimum = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 1e-7 * ends[1]})
+    tau, least = (
+        (float(minimum.x), float(minimum.fun)) if minimum.fun <= losses[best] else (float(grid[best]), losses[best])
+    )
     low, high = _interval(loss, tau, float(least), float(grid[0]), 4.0 * MAX_SHARE)
     values, covariance, chi2 = weighted_fit(y, variance + (tau * scale) ** 2, columns)
     predictive = _predictive(loss, low, high, float(least))

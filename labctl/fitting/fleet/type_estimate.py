@@ -51,7 +51,7 @@ class _Shared:
 class _Settled:
     """A coefficient with its groups, beside which its spread is estimated without outliers."""
 
-    found: RobustFit
+    fit: RobustFit
     spread: RemlEstimate
     t: Array  #: (n,) distance of each unit from what the others expect of it, Student's t
     freedom: int  #: of it
@@ -71,8 +71,8 @@ def estimate(table: UnitTable) -> TypeEstimate:
     for k in range(len(table.names)):
         own = [each for each in shared if k in each.direction.places]
         taken = {each.shift.level: levels.column(each.shift.level) for each in own}
-        found = select_shifts(table.values[:, k], table.variance[:, k], levels, tests, taken)
-        each = _settled(table, k, found, level)
+        fit = select_shifts(table.values[:, k], table.variance[:, k], levels, tests, taken)
+        each = _settled(table, k, fit, level)
         settled.append(each)
         effects += _own_effects(table, k, each, 1 + len(taken))
         spreads += _group_spreads(table, k, each)
@@ -87,11 +87,11 @@ def estimate(table: UnitTable) -> TypeEstimate:
 
 def _shared(table: UnitTable, direction: Direction, levels: Levels, tests: int) -> Iterator[_Shared]:
     """Yield the levels that shift a direction as a whole: the mean more clearly than any member, and all alike."""
-    found = select_shifts(direction.values, direction.variance, levels, tests, {})
-    if not found.shifts:
+    fit = select_shifts(direction.values, direction.variance, levels, tests, {})
+    if not fit.shifts:
         return
     own = [select_shifts(table.values[:, k], table.variance[:, k], levels, tests, {}).shifts for k in direction.places]
-    for shift in found.shifts:
+    for shift in fit.shifts:
         clearest = max((s.t for each in own for s in each if s.level == shift.level), default=0.0)
         if shift.t >= clearest and _are_alike(table, direction, levels.column(shift.level)):
             yield _Shared(direction, shift)
@@ -119,14 +119,14 @@ def _with_each_group(wanted: NDArray[np.bool_], columns: NDArray[np.float64]) ->
     return np.asarray(wanted | np.any(columns[:, lost] != 0.0, axis=1))
 
 
-def _settled(table: UnitTable, k: int, found: RobustFit, level: float) -> _Settled:
+def _settled(table: UnitTable, k: int, fit: RobustFit, level: float) -> _Settled:
     """Return the spread beside the shifts that were found, without the units that are too far out for it.
 
     A unit is judged by the spread of the others (externally studentised), at `level` on each side.
     """
-    y, variance, columns = table.values[:, k], table.variance[:, k], found.columns
+    y, variance, columns = table.values[:, k], table.variance[:, k], fit.columns
     p = columns.shape[1]
-    t = (y - found.fitted) / np.sqrt(variance + found.tau**2)
+    t = (y - fit.fitted) / np.sqrt(variance + fit.tau**2)
     wanted = np.abs(t) <= -float(stdtrit(max(ROBUST_SHARE * len(y) - p, MIN_FREEDOM), level))
     kept = np.ones(len(y), dtype=bool)
     for _ in range(ROUNDS):
@@ -139,7 +139,7 @@ def _settled(table: UnitTable, k: int, found: RobustFit, level: float) -> _Settl
         wanted = np.abs(t) <= -float(stdtrit(freedom, level))
         if np.array_equal(wanted, kept):
             break
-    return _Settled(found, spread, t, freedom, ~kept)
+    return _Settled(fit, spread, t, freedom, ~kept)
 
 
 def _studentised(
@@ -157,7 +157,7 @@ def _studentised(
 
 def _coefficient(table: UnitTable, k: int, settled: _Settled) -> CoefficientPopulation:
     spread, kept = settled.spread, ~settled.is_out
-    u_mean, freedom = float(np.sqrt(spread.covariance[0, 0])), int(kept.sum()) - settled.found.columns.shape[1]
+    u_mean, freedom = float(np.sqrt(spread.covariance[0, 0])), int(kept.sum()) - settled.fit.columns.shape[1]
     return CoefficientPopulation(
         table.names[k], table.units[k], float(spread.values[0]), u_mean, student_factor(freedom) * u_mean, spread.tau,
         spread.low, spread.high, spread.predictive, float(np.sqrt(np.median(table.variance[kept, k]))), int(kept.sum()),
@@ -166,7 +166,7 @@ def _coefficient(table: UnitTable, k: int, settled: _Settled) -> CoefficientPopu
 
 def _own_effects(table: UnitTable, k: int, settled: _Settled, first: int) -> Iterator[GroupEffect]:
     """Yield the groups that one coefficient shows alone; their columns begin at `first`."""
-    for i, shift in enumerate(settled.found.shifts, start=first):
+    for i, shift in enumerate(settled.fit.shifts, start=first):
         value, variance = settled.spread.values[i], settled.spread.covariance[i, i]
         yield _effect(table, (k,), shift, float(value), float(np.sqrt(variance)))
 
@@ -174,10 +174,10 @@ def _own_effects(table: UnitTable, k: int, settled: _Settled, first: int) -> Ite
 def _shared_effect(table: UnitTable, shared: _Shared, levels: Levels) -> GroupEffect:
     """Return a shift of a whole direction, with the spread of the direction beside it."""
     direction = shared.direction
-    found = select_shifts(direction.values, direction.variance, levels, 1, {})
+    fit = select_shifts(direction.values, direction.variance, levels, 1, {})
     columns = np.column_stack([np.ones(len(direction.values)), levels.column(shared.shift.level)])
-    size = np.sqrt(direction.variance + found.tau**2)
-    clipped = found.fitted + np.clip(direction.values - found.fitted, -6.0 * size, 6.0 * size)
+    size = np.sqrt(direction.variance + fit.tau**2)
+    clipped = fit.fitted + np.clip(direction.values - fit.fitted, -6.0 * size, 6.0 * size)
     spread = reml(clipped, direction.variance, columns)
     return _effect(
         table, direction.places, shared.shift, float(spread.values[1]), float(np.sqrt(spread.covariance[1, 1]))
@@ -200,12 +200,12 @@ def _group_spreads(table: UnitTable, k: int, settled: _Settled) -> Iterator[Grou
     kept = ~settled.is_out
     total = table.variance[kept, k] + settled.spread.tau**2
     level = {factor: each[kept] for factor, each in table.level.items()}
-    for factor, between, chi2, n in heterogeneity(table.values[kept, k], total, settled.found.columns[kept], level):
+    for factor, between, chi2, n in heterogeneity(table.values[kept, k], total, settled.fit.columns[kept], level):
         yield GroupSpread(factor, table.names[k], between, n, float(chdtrc(n - 1, chi2)))
 
 
 def _outliers(table: UnitTable, k: int, settled: _Settled) -> Iterator[OutlierUnit]:
-    expected = settled.found.columns @ settled.spread.values
+    expected = settled.fit.columns @ settled.spread.values
     for i in np.flatnonzero(settled.is_out).tolist():
         t = float(settled.t[i])
         yield OutlierUnit(
@@ -224,7 +224,7 @@ def _correlation(table: UnitTable, settled: Sequence[_Settled]) -> NDArray[np.fl
     k, tau = len(settled), np.array([each.spread.tau for each in settled])
     residual = np.column_stack(
         [
-            np.where(each.is_out, 0.0, table.values[:, i] - each.found.columns @ each.spread.values)
+            np.where(each.is_out, 0.0, table.values[:, i] - each.fit.columns @ each.spread.values)
             for i, each in enumerate(settled)
         ]
     )
@@ -232,8 +232,8 @@ def _correlation(table: UnitTable, settled: Sequence[_Settled]) -> NDArray[np.fl
     joint = (residual.T @ residual / len(table) - table.covariance.mean(axis=0)) / np.outer(size, size)
     share = np.maximum(tau**2 / np.maximum(tau**2 + table.variance.mean(axis=0), 1e-300), 1e-6)
     weight = np.outer(share, share) * (1.0 - np.eye(k))  # what is seen worse counts less
-    by_chance, found = float(weight.sum()) / len(table), float(np.sum((weight * joint) ** 2))
-    kept = max(1.0 - by_chance / found, 0.0) if found > 0 else 0.0
+    by_chance, observed = float(weight.sum()) / len(table), float(np.sum((weight * joint) ** 2))
+    kept = max(1.0 - by_chance / observed, 0.0) if observed > 0 else 0.0
     shrunk = np.clip(kept * joint, -0.99, 0.99)
     shrunk[np.diag_indices(k)] = 1.0
     values, vectors = np.linalg.eigh((shrunk + shrunk.T) / 2)

@@ -174,7 +174,7 @@ def _units_of(axes: Mapping[str, AxisSums], candidate: _Candidate) -> int:
 def _candidates(axes: Mapping[str, AxisSums], evidence: Mapping[str, ShapeEvidence]) -> list[_Candidate]:
     """Return every effect over its shapes and axes, the likeliest first: on all of its axes, or on one of them."""
     effects = dict.fromkeys(shape.effect for sums in axes.values() for shape in sums.shapes)
-    found = []
+    candidates = []
     for effect in effects:
         best, per_axis, gain = {}, [], 0.0
         for axis, sums in axes.items():
@@ -186,8 +186,8 @@ def _candidates(axes: Mapping[str, AxisSums], evidence: Mapping[str, ShapeEviden
             per_axis.append(float(np.logaddexp.reduce(values) - np.log(np.isfinite(values).sum())))
             gain += float(evidence[axis].gain[best[axis]])
         if per_axis:
-            found.append(_Candidate(effect, _over_axes(per_axis), best, gain))
-    return sorted(found, key=lambda c: -c.log_bf)
+            candidates.append(_Candidate(effect, _over_axes(per_axis), best, gain))
+    return sorted(candidates, key=lambda c: -c.log_bf)
 
 
 def _over_axes(per_axis: Sequence[float]) -> float:
@@ -238,10 +238,10 @@ def _sizes(sums: AxisSums, axis: str, shape: int, ratio: float) -> list[MeanSize
     shaped = sums.shapes[shape]
     return [
         MeanSize(
-            axis, name, unit, float(values[i]), float(np.sqrt(variance[i])), float(np.sqrt(spread_var[i])),
+            axis, name, unit_symbol, float(values[i]), float(np.sqrt(variance[i])), float(np.sqrt(spread_var[i])),
             float(values[i] / np.sqrt(variance[i])), float(ratio / np.sqrt(mean_weight[i])),
         )
-        for i, (name, unit) in enumerate(zip(shaped.names, shaped.units, strict=True))
+        for i, (name, unit_symbol) in enumerate(zip(shaped.names, shaped.units, strict=True))
     ]  # fmt: skip
 
 
@@ -317,18 +317,18 @@ def _by_bench(
     sums: TypeSums, axis: str, key: tuple[str, str, tuple[str, ...]], ratio: float
 ) -> tuple[tuple[BenchSize, ...], str | None]:
     """Return the first coefficient of a shape by bench, and the only bench whose units show it."""
-    found = []
+    effects = []
     for bench, axes in sums.benches.items():
         if not bench or axis not in axes or key not in axes[axis].places:
             continue
         shape = axes[axis].places[key]
         size = _sizes(axes[axis], axis, shape, ratio)[0]
-        found.append(BenchSize(bench, int(axes[axis].units[shape]), size.mean, size.u_mean))
-    showing = [each for each in found if abs(each.mean) > LEAD * each.u_mean]
-    if len(found) < 2 or len(showing) != 1:
-        return tuple(found), None
-    weight = np.array([each.u_mean**-2.0 for each in found])
-    means = np.array([each.mean for each in found])
+        effects.append(BenchSize(bench, int(axes[axis].units[shape]), size.mean, size.u_mean))
+    showing = [each for each in effects if abs(each.mean) > LEAD * each.u_mean]
+    if len(effects) < 2 or len(showing) != 1:
+        return tuple(effects), None
+    weight = np.array([each.u_mean**-2.0 for each in effects])
+    means = np.array([each.mean for each in effects])
     chi2 = float(weight @ (means - np.average(means, weights=weight)) ** 2)
-    differs = float(chdtrc(len(found) - 1, chi2)) < BENCH_LEVEL
-    return tuple(found), showing[0].bench if differs else None
+    differs = float(chdtrc(len(effects) - 1, chi2)) < BENCH_LEVEL
+    return tuple(effects), showing[0].bench if differs else None

@@ -91,11 +91,11 @@ def coefficients_of(result: FitResult, target: Target) -> Iterator[LiveCoefficie
     """Yield the coefficients of a fit in poses, axis by axis, with U and its limit."""
     for axis in AXES:
         axis_fit = result.fitted.axes[axis]
-        for name, value, u, unit in zip(
+        for name, value, u, unit_symbol in zip(
             axis_fit.names, axis_fit.values[:, 0], axis_fit.u[:, 0], axis_fit.units, strict=True
         ):
             limit = target.u if name.startswith(_LIMITED) else target.bias_dps if name == "bias" else None
-            yield LiveCoefficient(axis, name, float(value), NORMAL_K * float(u), unit, limit)
+            yield LiveCoefficient(axis, name, float(value), NORMAL_K * float(u), unit_symbol, limit)
 
 
 def left_out_of(result: FitResult) -> tuple[str, ...]:

@@ -134,8 +134,10 @@ def _freedom(
     def part(noise: NDArray[np.float64]) -> Array:
         return np.asarray(np.einsum("pi,ij,pj->p", weights, noise, weights))
 
-    found = [by_place, *([np.eye(len(total))] if variances[1] > 0 else [])]
-    scatter = scatter_by_variances(np.array([part(each) for each in found]), information_of(jacobian, total, found))
+    components = [by_place, *([np.eye(len(total))] if variances[1] > 0 else [])]
+    scatter = scatter_by_variances(
+        np.array([part(each) for each in components]), information_of(jacobian, total, components)
+    )
     return combined_freedom(part(total), [(part(noise), freedom) for noise, freedom in estimated], scatter)
 
 

@@ -247,9 +247,9 @@ def largest_gap(field: NDArray[np.float64]) -> tuple[Array, float]:
     z, turn = 1 - 2 * k / DIRECTIONS, np.pi * (1 + np.sqrt(5)) * k
     wide = np.sqrt(1 - z**2)
     sphere = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), z])
-    unit = field / np.linalg.norm(field, axis=1)[:, None]
+    directions = field / np.linalg.norm(field, axis=1)[:, None]
     nearest = np.full(DIRECTIONS, -1.0)
-    for part in np.array_split(unit, max(len(unit) // 2000, 1)):
+    for part in np.array_split(directions, max(len(directions) // 2000, 1)):
         nearest = np.maximum(nearest, (sphere @ part.T).max(axis=1))
     worst = int(np.argmin(nearest))
     return sphere[worst], float(np.degrees(np.arccos(np.clip(nearest[worst], -1, 1))))

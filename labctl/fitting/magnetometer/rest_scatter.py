@@ -53,11 +53,11 @@ def scatter_of(jacobian: NDArray[np.float64], distance: Array, places: Places) -
     from scipy.optimize import minimize
 
     problem = _Problem.of(jacobian, distance, places)
-    found = minimize(
+    minimum = minimize(
         lambda logs: problem.negative_log_likelihood(np.exp(logs)), np.array(START), method="Powell",
         bounds=[LOG_RATIO] * 2, options={"xtol": TOLERANCE, "ftol": 1e-8},
     )  # fmt: skip
-    return problem.scatter(np.exp(found.x))
+    return problem.scatter(np.exp(minimum.x))
 
 
 @dataclass(frozen=True)

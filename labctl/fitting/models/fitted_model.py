@@ -138,7 +138,7 @@ class FittedModel:
 
 
 def _axis_json(fit: AxisFit) -> AxisFitJson:
-    found: AxisFitJson = {
+    document: AxisFitJson = {
         "effects": list(fit.effects),
         "names": list(fit.names),
         "units": list(fit.units),
@@ -146,8 +146,8 @@ def _axis_json(fit: AxisFit) -> AxisFitJson:
         "covariance": none_for_nan(fit.covariance),
     }
     if fit.parts:
-        found["parts"] = [part.to_json() for part in fit.parts]
-    return found
+        document["parts"] = [part.to_json() for part in fit.parts]
+    return document
 
 
 def _with_free_amplitude(term: Term) -> Term:

@@ -41,8 +41,8 @@ def rounded_to_uncertainty(value: float, uncertainty: float | None) -> Rounded:
     if not has_u:
         return Rounded(f"{float(f'{value / 10.0**exponent:.{DIGITS}g}'):.12g}", None, exponent)
     place = int(f"{u:.1e}".split("e")[1]) - exponent - 1  # of the second significant digit
-    decimals, unit = min(max(-place, 0), MAX_DECIMALS), 10.0 ** max(place, 0)
-    texts = [f"{round(number / 10.0**exponent / unit) * unit:.0f}" if place > 0 else
+    decimals, last_digit = min(max(-place, 0), MAX_DECIMALS), 10.0 ** max(place, 0)
+    texts = [f"{round(number / 10.0**exponent / last_digit) * last_digit:.0f}" if place > 0 else
              f"{number / 10.0**exponent:.{decimals}f}" for number in (value, u)]  # fmt: skip
     return Rounded(texts[0], texts[1], exponent)
 

@@ -48,10 +48,10 @@ def components(
     """
     from scipy.optimize import minimize
 
-    unit = np.array([max(start, 1e-18), float(np.diag(covariance + start * by_first).mean())])
+    scale = np.array([max(start, 1e-18), float(np.diag(covariance + start * by_first).mean())])
 
     def negative_log_likelihood(variances: Array) -> float:
-        first, second = np.append(variances, 0.0)[:2] * unit
+        first, second = np.append(variances, 0.0)[:2] * scale
         total = covariance + first * by_first + second * np.eye(len(residual))
         return negative_log_restricted_likelihood(jacobian, residual, total) + information(first)
 
@@ -59,7 +59,7 @@ def components(
     both = minimize(negative_log_likelihood, np.append(alone.x, 0.1), method="L-BFGS-B", bounds=[(0.0, None)] * 2)
     demanded = float(alone.fun - both.fun) > DEMANDED
     first, second = both.x if demanded else (alone.x[0], 0.0)
-    return float(first * unit[0]), float(second * unit[1])
+    return float(first * scale[0]), float(second * scale[1])
 
 
 def negative_log_restricted_likelihood(

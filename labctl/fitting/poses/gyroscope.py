@@ -112,10 +112,10 @@ class _Noises:
         stays in every equation while one that came out small is made up for by the second variance: on average that is
         too much.
         """
-        found = self.accelerometer
-        k = int(np.count_nonzero(found.used))
-        freedom = found.freedom
-        white, scatter = float(self.white_g2[found.used].mean()), found.residual_g**2 * k
+        variances = self.accelerometer
+        k = int(np.count_nonzero(variances.used))
+        freedom = variances.freedom
+        white, scatter = float(self.white_g2[variances.used].mean()), variances.residual_g**2 * k
         typical = float(self.white_g2.mean())
 
         def sizes(pose_g2: float) -> float:

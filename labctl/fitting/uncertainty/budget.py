@@ -75,7 +75,7 @@ class Budget:
         }  # fmt: skip
 
 
-def budget_of(result: str, unit: str, lines: Sequence[BudgetLine], value: float | None = None) -> Budget:
+def budget_of(result: str, unit_symbol: str, lines: Sequence[BudgetLine], value: float | None = None) -> Budget:
     """Return a budget of independent lines.
 
     Each line is one source at this place; what its inputs have in common is included in it. A line of type A that is
@@ -83,13 +83,13 @@ def budget_of(result: str, unit: str, lines: Sequence[BudgetLine], value: float 
     """
     stated_lines = [line for line in lines if line.contribution is not None]
     if any(line.contribution is None and line.kind == "A" and line.is_stated for line in lines):
-        return Budget(result, unit, value, tuple(lines), None, None, None, None)
+        return Budget(result, unit_symbol, value, tuple(lines), None, None, None, None)
     sizes = [line.contribution or 0.0 for line in stated_lines]
     combined = combined_u(np.array(sizes))
     freedom = effective_freedom(sizes, [line.freedom for line in stated_lines])
     k = coverage_factor(sizes, [line.distribution for line in stated_lines], freedom)
     expanded = half_width(k * combined, sum(line.uncorrected for line in stated_lines))
-    return Budget(result, unit, value, tuple(lines), combined, freedom, k, expanded)
+    return Budget(result, unit_symbol, value, tuple(lines), combined, freedom, k, expanded)
 
 
 def without_repeatability(lines: Sequence[BudgetLine]) -> float | None:

@@ -90,9 +90,9 @@ SLOPE_HELD_OUT = (
 
 
 def coefficient_line(
-    fitted: FittedModel, law: CoefficientFunction, temperature_c: float, evidence: AxisEvidence | None, unit: str
+    fitted: FittedModel, law: CoefficientFunction, temperature_c: float, evidence: AxisEvidence | None, unit_symbol: str
 ) -> BudgetLine:
-    """Return the line of the fitted coefficients: their uncertainty in the result of the law, in `unit`."""
+    """Return the line of the fitted coefficients: their uncertainty in the result of the law, in `unit_symbol`."""
     u = u_of_fit(law, fitted, temperature_c)
     held = fitted.model.held
     reason = PUBLISHED if u is None else BY_COVARIANCE
@@ -102,7 +102,7 @@ def coefficient_line(
     estimated = [name for name, owner in zip(fit.names, fit.effects, strict=True) if not held.of(law.axis, owner, name)]
     count = len(estimated) * fit.values.shape[1]
     freedom = max(len(evidence.model_error.rate_dps) - count, 1) if evidence else None
-    return BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom, why=reason)
+    return BudgetLine("coefficients", "fit", "A", "normal", u, unit_symbol, 1.0, u, freedom, why=reason)
 
 
 def model_line(

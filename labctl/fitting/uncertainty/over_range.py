@@ -150,10 +150,10 @@ def least_u(data: FitData, preset: Preset, over: Range) -> LargestU:
             at = rate_vector_uncertainty(exported, {axis: rate_dps}, temperature_c, evidence={}, name=NAME, bench=bench)
             return _of_known(at.budgets[axis].lines)
 
-        found = _largest(exported, over, budget)
+        largest = _largest(exported, over, budget)
     except LabctlError as error:
         return LargestU(None, why=str(error))
-    return replace(found, u_dps=None if found.u_dps is None else MARGIN * found.u_dps)
+    return replace(largest, u_dps=None if largest.u_dps is None else MARGIN * largest.u_dps)
 
 
 #: Said of a fit whose lack of fit cannot be seen.
@@ -209,12 +209,12 @@ def unreachable_below(info: RecordingInfo, over: Range, powered_runs: int) -> La
                 sheet.freedom,
             )
         ]  # fmt: skip
-    found = []
+    unreachable = []
     for axis in info.axes:
         for rate, temperature_c in over.places:
             lines = [source.lines[0] for source in standard_lines(bench, _of_ideal(rate))]
-            found.append(_placed(_of_known([*lines, *later]), axis, rate, temperature_c))
-    return max(found, key=lambda each: each.u_dps or 0.0)
+            unreachable.append(_placed(_of_known([*lines, *later]), axis, rate, temperature_c))
+    return max(unreachable, key=lambda each: each.u_dps or 0.0)
 
 
 def not_near(rates_dps: Array, temperatures_c: Array, over: Range) -> str:
@@ -253,14 +253,14 @@ def _of_known(lines: Iterable[BudgetLine]) -> Budget:
 
 def _largest(fitted: FittedModel, over: Range, budget: Callable[[str, float, float], Budget]) -> LargestU:
     """Return the place with the largest U; where it is unknown somewhere, the first such place."""
-    found: list[LargestU] = []
+    largest: list[LargestU] = []
     for rate_dps, temperature_c in over.places:
         for axis in fitted.axes:
             place = _placed(budget(axis, rate_dps, temperature_c), axis, rate_dps, temperature_c)
             if place.u_dps is None:
                 return place
-            found.append(place)
-    return max(found, key=lambda each: each.u_dps or 0.0)
+            largest.append(place)
+    return max(largest, key=lambda each: each.u_dps or 0.0)
 
 
 def _placed(budget: Budget, axis: str, rate_dps: float, temperature_c: float) -> LargestU:
@@ -270,10 +270,10 @@ def _placed(budget: Budget, axis: str, rate_dps: float, temperature_c: float) ->
     return LargestU(budget.expanded, axis, rate_dps, temperature_c, reason, parts)
 
 
-def _with_noise(found: LargestU, result: FitResult) -> LargestU:
+def _with_noise(largest: LargestU, result: FitResult) -> LargestU:
     """Return it with the noise of one data set more about its axis."""
-    noise = result.noise.get(found.axis)
+    noise = result.noise.get(largest.axis)
     if noise is None:
-        return found
+        return largest
     drift_dps, white_dps = noise["drift_dps"] or 0.0, noise["white_dps"] or 0.0
-    return replace(found, noise_dps=math.hypot(white_dps, drift_dps, (noise["per_rate"] or 0.0) * found.rate_dps))
+    return replace(largest, noise_dps=math.hypot(white_dps, drift_dps, (noise["per_rate"] or 0.0) * largest.rate_dps))

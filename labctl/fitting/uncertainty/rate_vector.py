@@ -125,9 +125,11 @@ def _require_numbers(rates_dps: Mapping[str, float], temperature_c: float) -> No
             f"rate about {', '.join(sorted(strange))}: a unit has the body axes x, y and z; name one of them"
         )
     numbers = [(f"rate_dps about {axis}", rate, "deg/s") for axis, rate in rates_dps.items()]
-    for name, value, unit in [*numbers, ("temperature_c", temperature_c, "deg C")]:
+    for name, value, unit_symbol in [*numbers, ("temperature_c", temperature_c, "deg C")]:
         if not abs(value) <= LARGEST:  # also false for NaN
-            raise BadInput(f"{name} = {value} {unit}: give a number between {-LARGEST:g} and {LARGEST:g} {unit}")
+            raise BadInput(
+                f"{name} = {value} {unit_symbol}: give a number between {-LARGEST:g} and {LARGEST:g} {unit_symbol}"
+            )
 
 
 @dataclass(frozen=True)
@@ -253,7 +255,7 @@ class _Place:
                 for quantity in (of_fixture, "tilt", "mounting_repeatability"):
                     columns[quantity].append(each)
         none = np.zeros(len(self.outputs))
-        return {quantity: np.column_stack(found or [none]) for quantity, found in columns.items()}
+        return {quantity: np.column_stack(stacked or [none]) for quantity, stacked in columns.items()}
 
     def _shown_by(self, axis: str) -> Array:
         """Return how a rate about a body axis that nothing knows shows in the corrected rates, (n,)."""

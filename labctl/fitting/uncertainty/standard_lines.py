@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labctl.fitting.data.channels import BODY_AXES
-from labctl.fitting.data.earth import EARTH_RATE_DPS
+from labctl.fitting.data.earth_rate import EARTH_RATE_DPS
 from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, AngleGains, separates_any
 from labctl.fitting.data.tilted_mountings import TILTED
 from labctl.fitting.numeric.arrays import Array

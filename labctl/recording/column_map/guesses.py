@@ -51,8 +51,8 @@ def time_unit(values: Array, temperature_c: Array | None = None) -> Guess:
     dates = [name for name in possible if name in _DATES]
     if dates:
         return Guess(dates[0], f"{values[0]:.0f} is {_date(values, dates[0])}, and {_rate(step, dates[0])}")
-    if asked := [name for name in _ASKED if _is_possible(name, values, step, temperature_c)]:
-        return Guess("", f"in {asked[0]}, of LabVIEW, it would begin {_date(values, asked[0])}")
+    if candidates := [name for name in _ASKED if _is_possible(name, values, step, temperature_c)]:
+        return Guess("", f"in {candidates[0]}, of LabVIEW, it would begin {_date(values, candidates[0])}")
     if len(possible) == 1:
         return Guess(possible[0], f"steps of {step:.6g} are {_rate(step, possible[0])}")
     return Guess("", "; or ".join(f"in {name} it is {_rate(step, name)}" for name in possible))

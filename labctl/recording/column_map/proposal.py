@@ -210,17 +210,17 @@ def _is_counter(target: str, column: RawColumn) -> bool:
 def _guess_force(columns: dict[str, MappedColumn], sources_by_target: dict[str, RawColumn], guesses: list[str]) -> None:
     """Fill in the unit of the accelerometer by gravity; without one its columns are left out."""
     names = [f"accel_{axis}_g" for axis in "xyz"]
-    given = [name for name in names if name in columns]
-    if not given or all(columns[name].unit or sources_by_target[name].unit for name in given):
+    present = [name for name in names if name in columns]
+    if not present or all(columns[name].unit or sources_by_target[name].unit for name in present):
         return
     unit, scale = "", None
-    if len(given) == len(names):
+    if len(present) == len(names):
         force = np.column_stack([sources_by_target[name].values for name in names])
         unit, scale, evidence = force_unit(force, _still(sources_by_target, len(force)))
         if unit:
             scaled = f", {scale:g} words per g" if scale else ""
             guesses.append(f"accelerometer: unit taken for {unit}{scaled} ({evidence})")
-    for name in given:
+    for name in present:
         if unit:
             columns[name] = columns[name].model_copy(update={"unit": unit, "scale": scale})
         else:

@@ -198,10 +198,10 @@ def read(path: Path, options: ULogOptions) -> RawTable:
 def _read(path: Path, options: ULogOptions) -> RawTable:
     log, unread = _parsed(path)
     data = {(each.name, each.multi_id): each.data for each in log.data_list}
-    found = sorted(key for key in data if key[0] in TOPICS)
-    rawest = next((topic for topic in TOPICS if any(name == topic for name, _ in found)), None)
+    topics = sorted(key for key in data if key[0] in TOPICS)
+    rawest = next((topic for topic in TOPICS if any(name == topic for name, _ in topics)), None)
     topic: str | None = options.topic or rawest
-    listed = ", ".join(f"{name} {instance}" for name, instance in found)
+    listed = ", ".join(f"{name} {instance}" for name, instance in topics)
     if topic is None:
         names = ", ".join(sorted({name for name, _ in data})[:12])
         raise BadRecording(

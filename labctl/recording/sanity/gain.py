@@ -130,7 +130,7 @@ def _sign(where: str, gain: float, do: str) -> Finding:
 
 
 def _output_unit(summary: Summary, axis: str) -> OutputUnit:
-    return next((unit for name, unit in summary.info.output.items() if name == axis), OutputUnit())
+    return next((output_unit for name, output_unit in summary.info.output.items() if name == axis), OutputUnit())
 
 
 def _turned(position: str) -> str:

@@ -47,22 +47,24 @@ def check_database(
     """
     location = database or default_database()
     chain_anchor = None if anchor is None else _anchor(anchor)
-    found = check(location, chain_anchor=chain_anchor, keys=[read_public_key(path) for path in keys], progress=progress)
+    checked = check(
+        location, chain_anchor=chain_anchor, keys=[read_public_key(path) for path in keys], progress=progress
+    )
     return CheckResponse(
-        ok=not found.findings,
+        ok=not checked.findings,
         database=location,
-        blocks=found.blocks,
-        calibrations=found.calibrations,
-        audit_rows=found.audit_rows,
-        manifests=found.manifests,
-        not_sealed=found.not_sealed,
-        signed=found.signed,
+        blocks=checked.blocks,
+        calibrations=checked.calibrations,
+        audit_rows=checked.audit_rows,
+        manifests=checked.manifests,
+        not_sealed=checked.not_sealed,
+        signed=checked.signed,
         verified=bool(keys),
-        keys=list(found.keys),
-        anchor=None if found.head is None else str(found.head),
-        remarks=list(found.remarks),
+        keys=list(checked.keys),
+        anchor=None if checked.head is None else str(checked.head),
+        remarks=list(checked.remarks),
         kept_readings=[each.text for each in kept_beside(location)],
-        findings=[DamageResponse(part=each.part, text=each.text) for each in found.findings],
+        findings=[DamageResponse(part=each.part, text=each.text) for each in checked.findings],
     )
 
 

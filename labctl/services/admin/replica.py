@@ -19,16 +19,16 @@ class ReplicaWatch:
     def tick(self) -> None:
         """Ask the database. Raises StoreError where it does not answer."""
         asked_s = self._clock.now_s()
-        found = replica(self._store)
-        self._known = None if found is None else (found, asked_s)
+        state = replica(self._store)
+        self._known = None if state is None else (state, asked_s)
 
     def state(self) -> ReplicaResponse | None:
         """Return how old the data are now; None where the database is no replica, or has not answered yet."""
         if self._known is None:
             return None
-        found, asked_s = self._known
-        age_s = None if found.age_s is None else round(found.age_s + self._clock.now_s() - asked_s, 1)
-        return found.model_copy(update={"age_s": age_s})
+        known, asked_s = self._known
+        age_s = None if known.age_s is None else round(known.age_s + self._clock.now_s() - asked_s, 1)
+        return known.model_copy(update={"age_s": age_s})
 
 
 def replica(store: Store) -> ReplicaResponse | None:

@@ -123,9 +123,9 @@ def _found(
             yield DescribedCheckResponse(what=each.what, answer=each.answer, problem=each.problem)
 
 
-def _complaint(place: tuple[str | int, ...], message: str, kind: str, given: object) -> str:
+def _complaint(place: tuple[str | int, ...], message: str, kind: str, document: object) -> str:
     place_text = ".".join(str(part) for part in place) or "the whole file"
-    value = "" if kind == "missing" or not place else f" (is {shown(given)})"
+    value = "" if kind == "missing" or not place else f" (is {shown(document)})"
     return f"{place_text}: {message.removeprefix('Value error, ')}{value}"
 
 

@@ -23,12 +23,12 @@ Reported = Mapping[str, Mapping[str, str]]
 _REPORTED = TypeAdapter(dict[str, dict[str, str]])
 
 
-def reported_of(bench: BenchFile, said: Reported) -> dict[str, dict[str, str]]:
+def reported_of(bench: BenchFile, reported: Reported) -> dict[str, dict[str, str]]:
     """Return device -> what it says of itself, with the USB adapter of each device on a serial port."""
     identities: dict[str, dict[str, str]] = {}
     for name, section in bench.sections.items():
         adapter = adapter_of(section.port)
-        if identity := dict(said.get(name, {})) | ({ADAPTER: adapter} if adapter else {}):
+        if identity := dict(reported.get(name, {})) | ({ADAPTER: adapter} if adapter else {}):
             identities[name] = identity
     return identities
 

@@ -17,7 +17,7 @@ SLOW_SHARE, SLOW_FOR_S = 0.9, PacedClock.WINDOW_S
 #: Another speed is logged again once it differs by this factor.
 CHANGED = 1.5
 #: From one comparison of the speeds to the next, s of real time.
-LOOK_S = 1.0
+POLL_INTERVAL_S = 1.0
 
 
 def asked_speed(clock: Clock) -> float | None:
@@ -42,9 +42,9 @@ class PaceWatch:
         self._logged: float | None = None  #: the speed that was logged last
 
     def look(self) -> None:
-        """Compare the speeds, at most every `LOOK_S`."""
+        """Compare the speeds, at most every `POLL_INTERVAL_S`."""
         now_s = self._wall.now_s()
-        if self._asked is None or now_s - self._looked_s < LOOK_S:
+        if self._asked is None or now_s - self._looked_s < POLL_INTERVAL_S:
             return
         self._looked_s = now_s
         reached = reached_speed(self._clock)

@@ -152,8 +152,8 @@ def _rates(readings: Readings, outputs: Mapping[str, Nominal]) -> Rates:
     return np.column_stack([output.rate_dps(readings.raw[output.channel.name]) for output in outputs.values()])
 
 
-def _said(asked: str, moved_units: list[str]) -> str:
-    return f"unit {asked} was to be turned; {' and '.join(moved_units) or 'nothing'} moved"
+def _said(expected_unit: str, moved_units: list[str]) -> str:
+    return f"unit {expected_unit} was to be turned; {' and '.join(moved_units) or 'nothing'} moved"
 
 
 def _unit(bench: BenchFile, name: str, moved_units: list[str], moved: Mapping[str, list[str]]) -> WiggleUnit:

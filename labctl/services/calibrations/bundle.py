@@ -61,8 +61,8 @@ def write_bundle(store: Store, file: Path, options: BundleOptions, at: datetime)
             _add(archive, MANIFEST, content)
             if signer is not None:
                 signature = signer.sign(signed_digest(content)).hex()
-                said = {"fingerprint": signer.public.fingerprint, "signature": signature}
-                _add(archive, SIGNATURE, json.dumps(said).encode())
+                signature_document = {"fingerprint": signer.public.fingerprint, "signature": signature}
+                _add(archive, SIGNATURE, json.dumps(signature_document).encode())
         part.chmod(0o644)
         part.replace(file)
     finally:

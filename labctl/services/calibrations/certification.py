@@ -75,10 +75,10 @@ def release(store: Store, serial: str, version: int, request: ReleaseRequest, at
     Raises NotFound where nothing waits, ReleaseRefused for the first person and without a key, CertificationRefused.
     """
     key = key_of_person(f"releasing {serial} version {version}")
-    asked = waiting_request(store, store.units.get(serial).serial, version, key)
-    first = CertifyRequest(by=asked.by, reason=asked.reason, due_days=asked.due_days, override=asked.override)
-    second = Release(request.by, key, request.reason, asked.id)
-    return put_in_force(store, serial, version, first, at, asked.by_key, second)
+    waiting = waiting_request(store, store.units.get(serial).serial, version, key)
+    first = CertifyRequest(by=waiting.by, reason=waiting.reason, due_days=waiting.due_days, override=waiting.override)
+    second = Release(request.by, key, request.reason, waiting.id)
+    return put_in_force(store, serial, version, first, at, waiting.by_key, second)
 
 
 def put_in_force(
@@ -131,17 +131,17 @@ def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: 
         for row in reversed(store.certificates.of_unit(known))
         if row.version == version and row.number not in before
     ]
-    found = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
-    return certification_response(row).model_copy(update=found)
+    changes = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
+    return certification_response(row).model_copy(update=changes)
 
 
 def refusal(known: AssessmentResponse) -> str:
     """Return in one message why a version is not certified, and what to do; of wrong data only the first is said."""
     data = [each for each in known.objections if each["what"] == "data"]
-    said = [each for each in known.objections if each not in data[1:]]
+    others = [each for each in known.objections if each not in data[1:]]
     more = f" (and {len(data) - 1} more in its data)" if len(data) > 1 else ""
-    objections = "; ".join(each["text"] for each in said)
-    todo = "; ".join(dict.fromkeys(each["do"] for each in said))
+    objections = "; ".join(each["text"] for each in others)
+    todo = "; ".join(dict.fromkeys(each["do"] for each in others))
     return (
         f"certification of version {known.version} of {known.serial} is refused: {objections}{more}. To do: {todo}. "
         "To certify it nevertheless:"

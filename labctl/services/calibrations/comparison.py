@@ -63,9 +63,9 @@ def worse_than_before(before: Errors, after: Errors) -> list[Finding]:
     return findings
 
 
-def _of_change(said: str, first: float, second: float) -> Finding:
+def _of_change(text: str, first: float, second: float) -> Finding:
     return Finding(
-        "worse", "likely", "change", said, second, "deg/s", f"less than {first:.4g} deg/s", "keep the model unchanged"
+        "worse", "likely", "change", text, second, "deg/s", f"less than {first:.4g} deg/s", "keep the model unchanged"
     )
 
 

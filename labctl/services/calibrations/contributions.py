@@ -19,14 +19,14 @@ Found = Callable[[float, float], Mapping[str, RateUncertainty]]
 
 
 def contributions_over(
-    rates_dps: list[float], temperatures_c: list[float], found: Found
+    rates_dps: list[float], temperatures_c: list[float], budgets_at: Found
 ) -> dict[str, ContributionsOverJson]:
     """Return axis -> lines over the rate at the middle temperature, and over the temperature at the fastest rate."""
     middle_c = temperatures_c[len(temperatures_c) // 2]
     fastest_dps = max(rates_dps, key=abs)
     rates, warm = _between(rates_dps), _between(temperatures_c)
-    over_rate = [found(rate, middle_c) for rate in rates]
-    over_temperature = [found(fastest_dps, each) for each in warm]
+    over_rate = [budgets_at(rate, middle_c) for rate in rates]
+    over_temperature = [budgets_at(fastest_dps, each) for each in warm]
     return {
         axis: ContributionsOverJson(
             temperature_c=middle_c,

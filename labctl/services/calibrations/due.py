@@ -16,14 +16,14 @@ _UNITS = {"h": 1 / 24, "d": 1.0, "w": 7.0}
 _SPAN = re.compile(r"(\d{1,6})([hdw])", re.ASCII)
 
 
-def interval_days(store: Store, serial: str, version: int, given: int | None) -> tuple[int | None, DueSource | None]:
+def interval_days(store: Store, serial: str, version: int, days: int | None) -> tuple[int | None, DueSource | None]:
     """Return how many days a certification is valid, and who says so; None where no interval is given.
 
     What the user gives goes before the recipe of the version's campaign, that before `$LABCTL_DUE_DAYS`; 0 given by
     the user means no date. Raises NotFound, BadInput for a variable that is no number of days.
     """
-    if given is not None:
-        return (given or None), "user"
+    if days is not None:
+        return (days or None), "user"
     if (of_recipe := _of_recipe(store, serial, version)) is not None:
         return of_recipe, "recipe"
     if (usual := _of_environment()) is not None:

@@ -136,11 +136,11 @@ def _results(
         store, unit.model, request.model, request.effects, without=serial,
         groups={"batch": unit.batch, "supplier": unit.supplier}, on=measured_at(measured.rows[-1].info),
     )  # fmt: skip
-    found = fit_recording_with_prior(
+    with_prior = fit_recording_with_prior(
         source, request.model, request.effects, known.prior, known.argument, covered=measured.covered
     )
-    stated = known.to_json(is_used=found.is_used, p_value=found.p_value)
-    return found.result, found.evidence, {"type_prior": stated}
+    stated = known.to_json(is_used=with_prior.is_used, p_value=with_prior.p_value)
+    return with_prior.result, with_prior.evidence, {"type_prior": stated}
 
 
 def several(recordings: tuple[int, ...]) -> dict[str, list[int]]:

@@ -203,23 +203,23 @@ def _between_stops(
     return [60.0 * float(angle_deg[b] - angle_deg[a]) / float(t_s[b] - t_s[a]) for a, b in legs if b > a]
 
 
-def _axis(source: _Source, asked: str | None) -> str:
+def _axis(source: _Source, axis_name: str | None) -> str:
     axes = [axis for axis in get_args(Axis) if f"gyro_{axis}" in source.columns]
-    if asked is None and len(axes) == 1:
+    if axis_name is None and len(axes) == 1:
         return axes[0]
-    if asked is None or asked not in axes:
+    if axis_name is None or axis_name not in axes:
         text = ", ".join(axes) or "none"
         raise BadInput(
-            f"{source.what}: axis {asked or 'not named'}; name an axis that the data have a column for ({text})"
+            f"{source.what}: axis {axis_name or 'not named'}; name an axis that the data have a column for ({text})"
         )
-    return asked
+    return axis_name
 
 
 def _rate_dps(source: _Source, axis: str, calibration: Calibration | None) -> tuple[Array, str]:
     """Return the rate about an axis at every row, deg/s, and what has to be said of the calibration."""
     if calibration is None:
-        unit = source.units.get(axis, OutputUnit())
-        return (_column(source, f"gyro_{axis}") - unit.offset) / unit.scale, ""
+        output_unit = source.units.get(axis, OutputUnit())
+        return (_column(source, f"gyro_{axis}") - output_unit.offset) / output_unit.scale, ""
     if axis not in calibration.axes:
         raise BadInput(
             f"{source.what}: the calibration has axes {', '.join(calibration.axes)}, not {axis}; name one of these axes"

@@ -74,13 +74,13 @@ def _noise(store: Store, document: bytes, wanted: Mapping[str, str]) -> dict[str
 def noise_options(axes: Sequence[AllanJson]) -> dict[str, str]:
     """Return the noise figures of a unit's axes as options of a format; without those that an axis lacks."""
     options: dict[str, str] = {}
-    for name, figures, unit in (
+    for name, figures, unit_symbol in (
         (WHITE, [axis["N"] for axis in axes], DPS_RTHZ_PER_DEG_RTH),
         (WALK, [axis["K"] for axis in axes], DPS_S_RTHZ_PER_DEG_H_RTH),
     ):
         values = [figure["value"] for figure in figures]
         if values and all(value is not None and value > 0 for value in values):
-            options[name] = ",".join(f"{value * unit:.9e}" for value in values if value is not None)
+            options[name] = ",".join(f"{value * unit_symbol:.9e}" for value in values if value is not None)
     shortest = [axis["tau_s"][0] for axis in axes if axis["tau_s"]]
     if shortest and shortest[0]:
         options[RATE] = f"{1 / shortest[0]:.9g}"

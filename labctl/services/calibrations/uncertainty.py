@@ -88,11 +88,11 @@ def uncertainty_answer(
     """
     known = _Known.of(calibration)
     vector = None if len(rate_dps) == 1 else known.at_vector(_vector(rate_dps), temperature_c)
-    found = known.at(rate_dps[0], temperature_c) if vector is None else known.of_vector(vector)
+    by_axis = known.at(rate_dps[0], temperature_c) if vector is None else known.of_vector(vector)
     coefficients = coefficient_budgets(
         known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench
     )
-    budgets = {axis: one.budget.to_json() for axis, one in found.items()}
+    budgets = {axis: one.budget.to_json() for axis, one in by_axis.items()}
     response = calibration.document.get("response", {})
     return UncertaintyResponse(
         serial=calibration.serial,
@@ -102,7 +102,7 @@ def uncertainty_answer(
         coverage_factor=COVERAGE,
         coverage=COVERAGE_PROBABILITY,
         inside=is_inside(calibration, rate_dps, temperature_c),
-        axes={axis: _response(one) for axis, one in found.items()},
+        axes={axis: _response(one) for axis, one in by_axis.items()},
         budget=budgets,
         coefficients={
             axis: {
@@ -127,14 +127,14 @@ def _vector(rate_dps: Sequence[float]) -> dict[str, float]:
     return dict(zip(BODY_AXES, rate_dps, strict=True))
 
 
-def _vector_response(found: RateVectorUncertainty) -> VectorUncertainty:
+def _vector_response(uncertainty: RateVectorUncertainty) -> VectorUncertainty:
     return VectorUncertainty(
-        rates_dps=dict(found.rates_dps),
-        outputs=list(found.outputs),
-        covariance_dps2=none_for_nan(found.covariance),
-        expanded_dps={axis: budget.expanded for axis, budget in found.budgets.items()},
-        aligned_covariance_dps2=none_for_nan(found.aligned_covariance),
-        aligned_expanded_dps={axis: budget.expanded for axis, budget in found.aligned_budgets.items()},
+        rates_dps=dict(uncertainty.rates_dps),
+        outputs=list(uncertainty.outputs),
+        covariance_dps2=none_for_nan(uncertainty.covariance),
+        expanded_dps={axis: budget.expanded for axis, budget in uncertainty.budgets.items()},
+        aligned_covariance_dps2=none_for_nan(uncertainty.aligned_covariance),
+        aligned_expanded_dps={axis: budget.expanded for axis, budget in uncertainty.aligned_budgets.items()},
     )
 
 
@@ -144,12 +144,12 @@ def over_any_axis(calibration: Calibration) -> dict[str, AnyAxisUncertainty]:
     Nothing where the document states none: an older version of labctl made it, or no uncertainty is defined.
     """
     stated = calibration.document.get("uncertainty")
-    found = {}
+    by_output = {}
     for axis, bound in stated["axes"].items() if stated is not None else ():
         if (vector := bound.get("vector")) is not None:
             cross = bound.get("cross_rates")
-            found[axis] = AnyAxisUncertainty.model_validate({**vector, "cross_rates": cross})
-    return found
+            by_output[axis] = AnyAxisUncertainty.model_validate({**vector, "cross_rates": cross})
+    return by_output
 
 
 @single_threaded
@@ -157,8 +157,8 @@ def uncertainty_grid(calibration: Calibration) -> UncertaintyGrid:
     """Return the uncertainty about each axis on a small grid over the validity. Raises BadInput, NotEnoughData."""
     covered, known = Covered(calibration.rate_dps, calibration.temperature_c), _Known.of(calibration)
     rates, temperatures = covered.rates(known.evidence), covered.temperatures()
-    found = [[known.at(rate, at_c) for rate in rates] for at_c in temperatures]
-    axes = {axis: [[_response(place[axis]) for place in row] for row in found] for axis in found[0][0]}
+    grid = [[known.at(rate, at_c) for rate in rates] for at_c in temperatures]
+    axes = {axis: [[_response(place[axis]) for place in row] for row in grid] for axis in grid[0][0]}
     over = contributions_over(rates, temperatures, known.at)
     return UncertaintyGrid(rate_dps=rates, temperature_c=temperatures, axes=axes, contributions=over)
 
@@ -196,7 +196,7 @@ def budgets_at(
     known = _Known.of(calibration)
     if isinstance(rate_dps, Mapping):
         return known.at_vector(rate_dps, temperature_c).budgets
-    return {axis: found.budget for axis, found in known.at(rate_dps, temperature_c).items()}
+    return {axis: uncertainty.budget for axis, uncertainty in known.at(rate_dps, temperature_c).items()}
 
 
 def coefficients_at(calibration: Calibration, temperature_c: float) -> dict[str, dict[str, Budget]]:
@@ -245,8 +245,8 @@ class _Known:
             self.fitted, rates_dps, temperature_c, evidence=self.evidence, name=self.name, bench=self.bench
         )
 
-    def of_vector(self, found: RateVectorUncertainty) -> dict[str, RateUncertainty]:
-        return {axis: of_budget(budget, self.evidence.get(axis)) for axis, budget in found.budgets.items()}
+    def of_vector(self, uncertainty: RateVectorUncertainty) -> dict[str, RateUncertainty]:
+        return {axis: of_budget(budget, self.evidence.get(axis)) for axis, budget in uncertainty.budgets.items()}
 
     def at(self, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
         return rate_uncertainty(
@@ -254,7 +254,7 @@ class _Known:
         )
 
 
-def _response(found: RateUncertainty) -> AxisUncertainty:
-    known = asdict(found)
+def _response(uncertainty: RateUncertainty) -> AxisUncertainty:
+    known = asdict(uncertainty)
     known.pop("budget")
     return AxisUncertainty.model_validate(known)

@@ -46,8 +46,8 @@ class StatusCache:
         pending = self._found.get(what)
         if pending is None:
             pending = self._found[what] = asyncio.ensure_future(asyncio.to_thread(look))
-        found: T = await asyncio.shield(pending)  # one who leaves does not end it for the others
-        return found
+        status: T = await asyncio.shield(pending)  # one who leaves does not end it for the others
+        return status
 
 
 class Bell:

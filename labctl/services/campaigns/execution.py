@@ -163,9 +163,9 @@ def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: S
 def answers_noted(store: Store, prepared: Prepared) -> Callable[[str], None]:
     """Return a function that writes an answer given at this terminal into the audit trail."""
 
-    def note(said: str) -> None:
+    def note(text: str) -> None:
         at, subject = prepared.clock.utc(), f"campaign {prepared.id}"
-        store.audit.record(at, "campaign confirm", subject, {"reason": said})
+        store.audit.record(at, "campaign confirm", subject, {"reason": text})
 
     return note
 

@@ -8,7 +8,7 @@ from datetime import datetime
 
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
-from instruments.clock import VIRTUAL_START, Clock, PacedClock, attending
+from instruments.clock import VIRTUAL_START, Clock, PacedClock, registered
 from instruments.configuration import configuration_of
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
@@ -166,7 +166,7 @@ def prepare(
     refuse_bad(store, standards_of(bench_file), today, bench_file.name)
     bench = opened or open_bench(bench_file, clock, wire=wire)
     try:
-        with attending(clock):
+        with registered(clock):
             identities = _identities(bench, clock)
         plan = make_plan(recipe, _limits(bench, bench_file, times_on_bench(store, bench_file)), clip=clip)
         bench_file = _with_reported(store, bench_file, identities)
@@ -253,13 +253,6 @@ def _units(
     )
 
 
-def _motion(recipe: Recipe) -> str:
-    """Return what moves the units in a recipe."""
-    if recipe.turns is not None:
-        return "turns"
-    return "profile" if recipe.profiles else "rates"
-
-
 def _conventions(identity: GyroIdentity, bench: BenchFile) -> dict[str, str]:
     """Return the conventions that the bench file states for the figures of a unit's data sheet."""
     stated = next((unit.datasheet_conventions for unit in bench.gyros if unit.serial == identity.serial), {})
@@ -283,7 +276,7 @@ def _unit(
             "model": identity.model,
             "axes": gyro.axes,
             "kind": "samples",
-            "motion": _motion(recipe),
+            "motion": recipe.motion,
             "rate_reference": None if table is None or recipe.turns is not None else table.limits.reference,
             "turn_common_u": None if recipe.turns is None else recipe.turns.common_u,
             "started_at": clock.utc(),
@@ -294,7 +287,7 @@ def _unit(
             "technology": identity.technology or None,
             "datasheet": dict(identity.datasheet),
             "datasheet_conventions": _conventions(identity, bench),
-            "output": {axis: dict(unit) for axis, unit in identity.output.items()},
+            "output": {axis: dict(output_unit) for axis, output_unit in identity.output.items()},
             "standards": standards,
             "thermometer": temperature_instrument(bench),
             "configuration": configuration_of(identity.reported),

@@ -61,13 +61,13 @@ def _stopped(
 
 def _row(location: str, campaign: int) -> tuple[bool, CampaignRow | None]:
     """Return whether the database has answered in time, and the campaign, where it knows it."""
-    found: list[CampaignRow | None] = []
+    rows: list[CampaignRow | None] = []
 
     def read() -> None:
         with suppress(LabctlError), open_store(location, write=False) as store:
-            found.append(next(iter(store.campaigns.some([campaign])), None))
+            rows.append(next(iter(store.campaigns.some([campaign])), None))
 
     thread = threading.Thread(target=read, name="campaign-row", daemon=True)
     thread.start()
     thread.join(DATABASE_S)
-    return bool(found), found[0] if found else None
+    return bool(rows), rows[0] if rows else None

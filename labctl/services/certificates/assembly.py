@@ -165,11 +165,11 @@ def _method(facts: Facts) -> Method:
     )
 
 
-def _standard(given: Standard) -> StandardUsed:
+def _standard(standard: Standard) -> StandardUsed:
     return StandardUsed(
-        quantity=given.quantity, name=given.name, u=given.standard_u, unit=given.unit_name,
-        certificate=given.certificate, issued_by=given.issued_by, calibrated=given.calibrated, due=given.due,
-        traceability=given.traceability,
+        quantity=standard.quantity, name=standard.name, u=standard.standard_u, unit=standard.unit_name,
+        certificate=standard.certificate, issued_by=standard.issued_by, calibrated=standard.calibrated,
+        due=standard.due, traceability=standard.traceability,
     )  # fmt: skip
 
 

@@ -82,20 +82,20 @@ def environment_of_room(spans: Sequence[RoomSpan], ordered: RoomConditions) -> t
     """Return the environment of the room: what was recorded while the campaign ran, else what the order states."""
     recorded = {each.quantity: (each.low, each.high) for each in spans}
     return tuple(
-        Condition(name=name, unit=unit, low=found[0], high=found[1])
-        for quantity, (name, unit, stated) in ROOM.items()
-        if (found := recorded.get(quantity) or getattr(ordered, stated)) is not None
+        Condition(name=name, unit=unit_symbol, low=limits[0], high=limits[1])
+        for quantity, (name, unit_symbol, stated) in ROOM.items()
+        if (limits := recorded.get(quantity) or getattr(ordered, stated)) is not None
     )
 
 
 def environment(points: Recording) -> tuple[Condition, ...]:
     """Return the least and the largest mean of each condition that was logged."""
-    found = []
-    for column, (name, unit) in CONDITIONS.items():
+    conditions = []
+    for column, (name, unit_symbol) in CONDITIONS.items():
         values = np.asarray(points.columns.get(column, []), dtype=np.float64)
         if (values := values[np.isfinite(values)]).size:
-            found.append(Condition(name=name, unit=unit, low=float(values.min()), high=float(values.max())))
-    return tuple(found)
+            conditions.append(Condition(name=name, unit=unit_symbol, low=float(values.min()), high=float(values.max())))
+    return tuple(conditions)
 
 
 def results(store: Store, row: CalibrationRecord, calibration: Calibration) -> Results:
@@ -106,7 +106,7 @@ def results(store: Store, row: CalibrationRecord, calibration: Calibration) -> R
     rates, temperatures = places_of(calibration)
     errors = errors_on_grid(store, row, rates, temperatures)
     has_temperature = bool(np.isfinite(calibration.temperature_c).all())
-    found, unknown = list[tuple[ResultPoint, Budget]](), dict[tuple[str, str], int]()
+    points_and_budgets, unknown = list[tuple[ResultPoint, Budget]](), dict[tuple[str, str], int]()
     for i, temperature in enumerate(temperatures):
         for j, rate in enumerate(rates):
             for axis, u in uncertainty_of(calibration, rate, temperature).items():
@@ -119,10 +119,10 @@ def results(store: Store, row: CalibrationRecord, calibration: Calibration) -> R
                     axis=axis, temperature_c=temperature if has_temperature else None, rate_dps=rate,
                     error_dps=errors[axis][i][j], expanded_dps=expanded, k=k,
                 )  # fmt: skip
-                found.append((point, u.budget))
-    found.sort(key=lambda each: calibration.axes.index(each[0].axis))
-    points = tuple(point for point, _ in found)
-    largest = max(found, key=lambda each: each[0].expanded_dps, default=None)
+                points_and_budgets.append((point, u.budget))
+    points_and_budgets.sort(key=lambda each: calibration.axes.index(each[0].axis))
+    points = tuple(point for point, _ in points_and_budgets)
+    largest = max(points_and_budgets, key=lambda each: each[0].expanded_dps, default=None)
     without = frozenset(calibration.axes) - {point.axis for point in points}
     return Results(points, None if largest is None else _largest(*largest), unknown, without, _any_axis(calibration))
 
@@ -131,12 +131,13 @@ def _any_axis(calibration: Calibration) -> tuple[AnyAxisResult, ...]:
     """Return the largest U of each output where the item turns about any axis."""
     return tuple(
         AnyAxisResult(
-            output=output, reach_dps=found.reach_dps, expanded_dps=found.bound_dps,
-            aligned_expanded_dps=found.aligned_bound_dps,
-            across=() if found.cross_rates is None else tuple(found.cross_rates["about"]),
-            per_dps_across=None if found.cross_rates is None else found.cross_rates["per_dps"], why=found.why,
+            output=output, reach_dps=uncertainty.reach_dps, expanded_dps=uncertainty.bound_dps,
+            aligned_expanded_dps=uncertainty.aligned_bound_dps,
+            across=() if uncertainty.cross_rates is None else tuple(uncertainty.cross_rates["about"]),
+            per_dps_across=None if uncertainty.cross_rates is None else uncertainty.cross_rates["per_dps"],
+            why=uncertainty.why,
         )
-        for output, found in over_any_axis(calibration).items()
+        for output, uncertainty in over_any_axis(calibration).items()
     )  # fmt: skip
 
 
@@ -165,7 +166,7 @@ def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
     tables: Mapping[str, Coefficients] = calibration.document["coefficients"]
     reference_c = calibration.fitted.model.reference.temperature_c
     budgets = _Budgets(calibration)
-    found: list[CoefficientResult] = []
+    results: list[CoefficientResult] = []
     for axis, table in tables.items():
         nodes = table.get("temperature_c")
         at = nodes if isinstance(nodes, list) else [None]
@@ -177,13 +178,13 @@ def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
             u_listed = u if isinstance(u, list) else [u]
             for where, value, of_fit in zip(at, listed, u_listed, strict=True):
                 whole = budgets.u_of(axis, name, value, reference_c if where is None else where)
-                found.append(
+                results.append(
                     CoefficientResult(
                         axis=axis, name=name, temperature_c=where, value=value, unit=entry["unit"],
                         u=of_fit if whole is None else whole, has_standards=whole is not None,
                     )
                 )  # fmt: skip
-    return (*found, *_response(calibration))
+    return (*results, *_response(calibration))
 
 
 def _response(calibration: Calibration) -> Iterator[CoefficientResult]:

@@ -115,7 +115,7 @@ def accelerometer_result(
     ratio, relative_u = used / ordered.gravity_m_s2, ordered.gravity_u_m_s2 / ordered.gravity_m_s2
     freedom = _freedom_of(result)
     u = np.sqrt(np.diag(np.array(result.covariance)))
-    found = [
+    coefficients = [
         _coefficient(f"bias {axis}", STANDARD_GRAVITY * result.bias_g[axis].value, "m/s^2", (STANDARD_GRAVITY * u[i],
                      result.bias_g[axis].degrees_of_freedom or freedom), 0.0)
         for i, axis in enumerate(AXES)
@@ -126,9 +126,9 @@ def accelerometer_result(
         value = ratio * (identity + was.value) - identity
         named = f"scale factor {AXES[i]}" if i == j else f"misalignment {name}"
         fit = ratio * u[place], was.degrees_of_freedom or freedom
-        found.append(_coefficient(named, value, "1", fit, (identity + value) * relative_u))
-    found += [] if result.alignment is None else _aligned("gyro triad", result.alignment["axes"])
-    found += [] if result.temperature is None else _over_temperature(result.temperature, ratio, freedom)
+        coefficients.append(_coefficient(named, value, "1", fit, (identity + value) * relative_u))
+    coefficients += [] if result.alignment is None else _aligned("gyro triad", result.alignment["axes"])
+    coefficients += [] if result.temperature is None else _over_temperature(result.temperature, ratio, freedom)
     reference = SensorReference(
         quantity="local gravity", value=ordered.gravity_m_s2, u=ordered.gravity_u_m_s2, unit="m/s^2",
         traceability=ordered.traceability.strip(),
@@ -146,7 +146,7 @@ def accelerometer_result(
     )
     formula = FORCE if result.alignment is None else f"{FORCE}; {ALIGNED}"
     notes = (formula, holds_for, NOT_FORCE if result.temperature is None else NOT_FORCE_WARM)
-    return _result("accelerometer", version, ordered, included_by, reference, found, notes, [converted])
+    return _result("accelerometer", version, ordered, included_by, reference, coefficients, notes, [converted])
 
 
 def _aligned(what: str, axes: Mapping[str, AccelerometerCoefficient]) -> list[SensorCoefficient]:
@@ -164,19 +164,19 @@ def _aligned(what: str, axes: Mapping[str, AccelerometerCoefficient]) -> list[Se
 
 def _over_temperature(law: AccelerometerTemperature, ratio: float, freedom: float) -> list[SensorCoefficient]:
     """Return the coefficients of temperature; the uncertainty of gravity is too small a share of them to count."""
-    found = []
+    coefficients = []
     u = iter(np.sqrt(np.diag(np.array(law.covariance)))[ACCELEROMETER_PARAMETERS:].tolist())
-    for name, unit, terms, factor in (
+    for name, unit_symbol, terms, factor in (
         ("bias", "m/s^2", law.bias_g, STANDARD_GRAVITY), ("scale factor", "1", law.scale_factor, ratio)
     ):  # fmt: skip
         for power in range(1, len(terms[AXES[0]]) + 1):
-            per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
+            per = f"{unit_symbol}/K" + (f"^{power}" if power > 1 else "")
             for axis in AXES:
                 was = terms[axis][power - 1]
                 fit = factor * next(u), was.degrees_of_freedom or freedom
                 named = f"{name} {axis}, power {power} of temperature"
-                found.append(_coefficient(named, factor * was.value, per, fit, 0.0))
-    return found
+                coefficients.append(_coefficient(named, factor * was.value, per, fit, 0.0))
+    return coefficients
 
 
 def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetometer, included_by: str) -> SensorResult:
@@ -194,7 +194,7 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
     stated, u_stated = ordered.field_ut, ordered.field_u_ut
     ratio = 1.0 if stated is None else stated / used
     freedom = max((result.readings - result.left_out) / result.repetition - PARAMETERS, 1.0)
-    found = [
+    coefficients = [
         _coefficient(f"hard iron {axis}", result.hard_iron_ut[axis].value, "uT", (math.sqrt(covariance[i, i]),
                      result.hard_iron_ut[axis].degrees_of_freedom or freedom), 0.0)
         for i, axis in enumerate(AXES)
@@ -208,12 +208,12 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
             by[-1] = -value / used
         of_fit = math.sqrt(max(float(by @ covariance @ by), 0.0))
         of_field = 0.0 if stated is None or u_stated is None else value * u_stated / stated
-        found.append(
+        coefficients.append(
             _coefficient(
                 f"soft iron {AXES[i]}{AXES[j]}", value, "1", (of_fit, was.degrees_of_freedom or freedom), of_field
             )
         )
-    found += [] if result.alignment is None else _aligned("magnetometer", result.alignment["axes"])
+    coefficients += [] if result.alignment is None else _aligned("magnetometer", result.alignment["axes"])
     reference = SensorReference(
         quantity="size of the local field", value=used if stated is None else stated, unit="uT",
         u=None if stated is None else u_stated,
@@ -224,7 +224,9 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
         f"nearest that was measured: up to {result.largest_gap_deg:.0f}°."
     )
     formula = FIELD if result.alignment is None else f"{FIELD}; {FIELD_ALIGNED}"
-    return _result("magnetometer", version, ordered, included_by, reference, found, (formula, holds_for, NOT_FIELD))
+    return _result(
+        "magnetometer", version, ordered, included_by, reference, coefficients, (formula, holds_for, NOT_FIELD)
+    )
 
 
 def _freedom_of(result: AccelerometerResponse) -> float:
@@ -236,23 +238,23 @@ def _freedom_of(result: AccelerometerResponse) -> float:
 
 
 def _coefficient(
-    name: str, value: float, unit: str, of_fit: tuple[float, float | None], of_reference: float
+    name: str, value: float, unit_symbol: str, of_fit: tuple[float, float | None], of_reference: float
 ) -> SensorCoefficient:
     """Return a coefficient with U: `of_fit` is the standard uncertainty of the fit, and its degrees of freedom."""
     u, freedom = of_fit
-    lines = [BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom)]
+    lines = [BudgetLine("coefficients", "fit", "A", "normal", u, unit_symbol, 1.0, u, freedom)]
     if of_reference:
         size = abs(of_reference)
-        lines.append(BudgetLine("reference", "reference", "B", "normal", size, unit, 1.0, size, is_common=True))
-    budget = budget_of(name, unit, lines, value)
+        lines.append(BudgetLine("reference", "reference", "B", "normal", size, unit_symbol, 1.0, size, is_common=True))
+    budget = budget_of(name, unit_symbol, lines, value)
     combined, expanded, k = budget.combined or 0.0, budget.expanded or 0.0, budget.k or 0.0  # every line is known
-    return SensorCoefficient(name=name, value=value, u=combined, expanded=expanded, k=k, unit=unit)
+    return SensorCoefficient(name=name, value=value, u=combined, expanded=expanded, k=k, unit=unit_symbol)
 
 
 def _result(
     sensor: SensorName, version: AccelerometerVersion | MagnetometerVersion, ordered: OrderedSensor, included_by: str,
     reference: SensorReference, coefficients: Sequence[SensorCoefficient], notes: tuple[str, str, str],
-    found: Sequence[str] = (),
+    findings: Sequence[str] = (),
 ) -> SensorResult:  # fmt: skip
     formula, holds_for, not_stated = notes
     first = ordered.performed_from
@@ -263,5 +265,5 @@ def _result(
         files=tuple(f"{each.name} ({each.sha256})" for each in version.data.files),
         performed_from=first, performed_until=ordered.performed_until or first, included_by=included_by,
         formula=formula, reference=reference, coefficients=tuple(coefficients), verdict=version.verdict,
-        found=(*version.summary, *found), holds_for=holds_for, not_stated=not_stated,
+        found=(*version.summary, *findings), holds_for=holds_for, not_stated=not_stated,
     )  # fmt: skip

@@ -35,11 +35,11 @@ def signing_key(at: datetime) -> Iterator[SigningKey | None]:
         yield key
 
 
-def _opened(given: SigningSettings) -> SigningKey:
+def _opened(settings: SigningSettings) -> SigningKey:
     with libraries("signing"):
         from labctl.certificates.signing.keys import open_signing_key  # noqa: PLC0415  only where a key is set
 
-        return open_signing_key(given)
+        return open_signing_key(settings)
 
 
 def show_signing_key() -> SigningKeyResponse:

@@ -51,7 +51,7 @@ class CommandContext:
 class CampaignControl(Protocol):
     """Control over benches and their campaigns, by the process that executes the command."""
 
-    def bench_of(self, asked: CampaignStart, /) -> BenchFile:
+    def bench_of(self, request: CampaignStart, /) -> BenchFile:
         """Return the bench that a start is for. Raises Conflict where the service has none."""
         ...
 
@@ -62,7 +62,7 @@ class CampaignControl(Protocol):
         """
         ...
 
-    def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, asked: RequestT, /) -> ResponseT:
+    def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, request: RequestT, /) -> ResponseT:
         """Have an act carried out by the process that has the bench. Raises LabctlError."""
         ...
 
@@ -103,15 +103,15 @@ class ServiceBench(Protocol):
 class Foreground(Protocol):
     """What an act may use in a process without a service: a campaign runs here and now, until it is over."""
 
-    def run_campaign(self, asked: CampaignStart) -> CampaignResponse:
+    def run_campaign(self, request: CampaignStart) -> CampaignResponse:
         """Run a campaign."""
         ...
 
-    def resume_campaign(self, asked: CampaignResume) -> CampaignResponse:
+    def resume_campaign(self, request: CampaignResume) -> CampaignResponse:
         """Resume a campaign and run it."""
         ...
 
-    def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+    def schedule(self, context: CommandContext, request: CampaignStart) -> ScheduledResponse:
         """Enter a campaign into the schedule of a bench."""
         ...
 
@@ -129,6 +129,6 @@ class BenchAct(Generic[RequestT, ResponseT]):
     in_foreground: Callable[[Foreground, CommandContext, RequestT], ResponseT]  #: where no service runs
     wait_s: float = WRITES_S  #: how long another process of the service waits for it
 
-    def execute(self, context: CommandContext, asked: RequestT) -> ResponseT:
+    def execute(self, context: CommandContext, request: RequestT) -> ResponseT:
         """Have it carried out by the process that controls the bench. Raises LabctlError."""
-        return context.control.perform(self, context, asked)
+        return context.control.perform(self, context, request)

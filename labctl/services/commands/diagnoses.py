@@ -15,8 +15,8 @@ from labctl.services.diagnosis import begin
 from procedures.contracts.campaign_state import ENDED, CampaignState
 
 
-def _start(context: CommandContext, asked: ToUnit[DiagnosisRequest]) -> DiagnosisResponse:
-    return begin.begin(context.store, asked.serial, asked.body, context.control.own_bench(), context.now())
+def _start(context: CommandContext, request: ToUnit[DiagnosisRequest]) -> DiagnosisResponse:
+    return begin.begin(context.store, request.serial, request.body, context.control.own_bench(), context.now())
 
 
 def _refuse_elsewhere(context: CommandContext, diagnosis: int) -> None:
@@ -30,42 +30,42 @@ def _refuse_elsewhere(context: CommandContext, diagnosis: int) -> None:
         raise Conflict(f"diagnosis {diagnosis} is not carried out here; {advice}")
 
 
-def _confirm(context: CommandContext, asked: ToDiagnosis[ConfirmExperimentRequest]) -> DiagnosisResponse:
-    return begin.answer_experiment(context.store, asked.diagnosis, asked.body, context.now())
+def _confirm(context: CommandContext, request: ToDiagnosis[ConfirmExperimentRequest]) -> DiagnosisResponse:
+    return begin.answer_experiment(context.store, request.diagnosis, request.body, context.now())
 
 
-def _stop(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
+def _stop(context: CommandContext, request: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
     """Write the stop down first: else the end of the campaign would be taken for that of the experiment."""
-    _refuse_elsewhere(context, asked.diagnosis)
-    answer = begin.stop(context.store, asked.diagnosis, asked.body.text, context.now())
-    _abort_campaign(context, asked)
+    _refuse_elsewhere(context, request.diagnosis)
+    answer = begin.stop(context.store, request.diagnosis, request.body.text, context.now())
+    _abort_campaign(context, request)
     return answer
 
 
-def _resume(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
+def _resume(context: CommandContext, request: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
     """Resume the campaign first: else its end would be taken for that of the experiment."""
-    _refuse_elsewhere(context, asked.diagnosis)
+    _refuse_elsewhere(context, request.diagnosis)
     if (
-        campaign := begin.open_campaign(context.store, asked.diagnosis)
+        campaign := begin.open_campaign(context.store, request.diagnosis)
     ) is not None and campaign.state is CampaignState.ABORTED:
-        body = ResumeRequest(by=asked.body.by or "a person", reason=asked.body.reason)
+        body = ResumeRequest(by=request.body.by or "a person", reason=request.body.reason)
         RESUME.execute(context, CampaignResume(campaign.id, body))
-    return begin.resume(context.store, asked.diagnosis, asked.body.text, context.now())
+    return begin.resume(context.store, request.diagnosis, request.body.text, context.now())
 
 
-def _end(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
-    _refuse_elsewhere(context, asked.diagnosis)
-    answer = begin.end(context.store, asked.diagnosis, asked.body.text, context.now())
-    _abort_campaign(context, asked)
+def _end(context: CommandContext, request: ToDiagnosis[ReasonRequest]) -> DiagnosisResponse:
+    _refuse_elsewhere(context, request.diagnosis)
+    answer = begin.end(context.store, request.diagnosis, request.body.text, context.now())
+    _abort_campaign(context, request)
     return answer
 
 
-def _abort_campaign(context: CommandContext, asked: ToDiagnosis[ReasonRequest]) -> None:
+def _abort_campaign(context: CommandContext, request: ToDiagnosis[ReasonRequest]) -> None:
     """End the campaign that a diagnosis runs, in the safe state, or take it out of the schedule."""
-    begin.withdraw_start(context.store, asked.diagnosis, context.now())
-    campaign = begin.open_campaign(context.store, asked.diagnosis)
+    begin.withdraw_start(context.store, request.diagnosis, context.now())
+    campaign = begin.open_campaign(context.store, request.diagnosis)
     if campaign is not None and campaign.state not in ENDED:
-        ABORT.execute(context, ToCampaign(campaign.id, asked.body))
+        ABORT.execute(context, ToCampaign(campaign.id, request.body))
 
 
 _DIAGNOSIS = "/api/diagnoses/{diagnosis}"

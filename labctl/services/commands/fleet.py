@@ -19,14 +19,14 @@ class ToFleetJob(Addressed):
     body: FleetCancelRequest
 
 
-def _start(context: CommandContext, asked: FleetJobRequest) -> FleetJobResponse:
-    jobs.refuse_other_engine(asked.engine)
-    jobs.refuse_other_source(asked.source)
-    return jobs.begin(context.store, asked, context.now())
+def _start(context: CommandContext, request: FleetJobRequest) -> FleetJobResponse:
+    jobs.refuse_other_engine(request.engine)
+    jobs.refuse_other_source(request.source)
+    return jobs.begin(context.store, request, context.now())
 
 
-def _cancel(context: CommandContext, asked: ToFleetJob) -> FleetJobResponse:
-    return jobs.cancel(context.store, asked.job, asked.body, context.now())
+def _cancel(context: CommandContext, request: ToFleetJob) -> FleetJobResponse:
+    return jobs.cancel(context.store, request.job, request.body, context.now())
 
 
 START_FLEET_JOB = Command(

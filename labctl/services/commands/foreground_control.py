@@ -52,29 +52,29 @@ class ForegroundControl:
         self._database = database
         self._open_terminal = open_terminal
 
-    def bench_of(self, asked: CampaignStart) -> BenchFile:
+    def bench_of(self, request: CampaignStart) -> BenchFile:
         """Return the bench that a start names, or the shipped one that fits its recipe."""
-        return load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
+        return load_bench(request.bench or bench_for(load_recipe(request.body.recipe)))
 
     def own_bench(self) -> BenchFile | None:
         """Return None: each campaign names its bench."""
         return None
 
-    def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, asked: RequestT) -> ResponseT:
+    def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, request: RequestT) -> ResponseT:
         """Carry out an act in this process."""
-        return act.in_foreground(self, context, asked)
+        return act.in_foreground(self, context, request)
 
-    def run_campaign(self, asked: CampaignStart) -> CampaignResponse:
+    def run_campaign(self, request: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
-        request = StartRequest(
-            recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, hide=asked.body.hide, fit=asked.body.fit,
-            speed=asked.speed, seed=asked.seed, simulated_start=asked.simulated_start,
-            confirmed_by=asked.body.confirmed_by, checks=asked.body.checks,
+        start_request = StartRequest(
+            recipe=request.body.recipe, bench=request.bench, clip=request.body.clip, hide=request.body.hide, fit=request.body.fit,
+            speed=request.speed, seed=request.seed, simulated_start=request.simulated_start,
+            confirmed_by=request.body.confirmed_by, checks=request.body.checks,
         )  # fmt: skip
         with self._open_terminal() as terminal:
             answer = run_here(
-                self._database, request, terminal.observe, terminal.attend, terminal.say, terminal.ask_clear,
-                wire_log=asked.wire_log,
+                self._database, start_request, terminal.observe, terminal.attend, terminal.say, terminal.ask_clear,
+                wire_log=request.wire_log,
             )  # fmt: skip
         return self._with_drafts(answer)
 
@@ -92,11 +92,11 @@ class ForegroundControl:
             make_drafts(store, answer.id, DraftsRequest(), at)
             return with_drafts(store, answer)
 
-    def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+    def schedule(self, context: CommandContext, request: CampaignStart) -> ScheduledResponse:
         """Enter a campaign into the schedule of a bench; a service that holds this bench and database starts it."""
         options: dict[str, object] = {
-            "--speed": asked.speed, "--seed": asked.seed, "--simulated-start": asked.simulated_start,
-            "--wire-log": asked.wire_log,
+            "--speed": request.speed, "--seed": request.seed, "--simulated-start": request.simulated_start,
+            "--wire-log": request.wire_log,
         }  # fmt: skip
         for option, value in options.items():
             if value is not None:
@@ -104,17 +104,17 @@ class ForegroundControl:
                     f"{option} {value}: only the service that runs scheduled starts sets this option; leave the "
                     "option out"
                 )
-        bench = self.bench_of(asked)
-        answer = queue.add_start(context.store, asked.body, bench, context.now())
+        bench = self.bench_of(request)
+        answer = queue.add_start(context.store, request.body, bench, context.now())
         note = "; ".join(filter(None, (queue.NO_SERVICE.format(bench=bench.name), answer.note)))
         return answer.model_copy(update={"note": note})
 
-    def resume_campaign(self, asked: CampaignResume) -> CampaignResponse:
+    def resume_campaign(self, request: CampaignResume) -> CampaignResponse:
         """Resume a campaign in this process and run it until it is over."""
         with self._open_terminal() as terminal:
             answer = resume_here(
-                self._database, asked.campaign, asked.bench, asked.speed, asked.body, terminal.observe, terminal.attend,
-                asked.wire_log,
+                self._database, request.campaign, request.bench, request.speed, request.body, terminal.observe,
+                terminal.attend, request.wire_log,
             )  # fmt: skip
         return self._with_drafts(answer)
 

@@ -66,84 +66,84 @@ from labctl.services.schedule import queue
 from labctl.services.units import set_batch
 
 
-def _import_recording(context: CommandContext, asked: RecordingFolder) -> ImportResponse:
-    with importers.as_interchange(asked.folder, importers.INTERCHANGE, leave_out=asked.leave_out) as folder:
+def _import_recording(context: CommandContext, request: RecordingFolder) -> ImportResponse:
+    with importers.as_interchange(request.folder, importers.INTERCHANGE, leave_out=request.leave_out) as folder:
         return transfer.import_folder(context.store, folder, context.now())
 
 
-def _import_log(context: CommandContext, asked: LogFile) -> ImportResponse:
+def _import_log(context: CommandContext, request: LogFile) -> ImportResponse:
     with importers.as_interchange(
-        asked.path, asked.importer, asked.options, asked.column_map, leave_out=asked.leave_out
+        request.path, request.importer, request.options, request.column_map, leave_out=request.leave_out
     ) as folder:
         return transfer.import_folder(context.store, folder, context.now())
 
 
-def _import_example(context: CommandContext, asked: ExampleRequest) -> ImportResponse:
-    return transfer.import_folder(context.store, examples.example(asked.name), context.now())
+def _import_example(context: CommandContext, request: ExampleRequest) -> ImportResponse:
+    return transfer.import_folder(context.store, examples.example(request.name), context.now())
 
 
-def _simulate_recording(context: CommandContext, asked: SimulatedRequest) -> SimulatedRecordingResponse:
-    return examples.add_simulated(context.store, asked, context.now())
+def _simulate_recording(context: CommandContext, request: SimulatedRequest) -> SimulatedRecordingResponse:
+    return examples.add_simulated(context.store, request, context.now())
 
 
-def _fit(context: CommandContext, asked: ToUnit[FitRequest]) -> FitResponse:
-    return fitting.fit_unit(context.store, asked.serial, asked.body, context.now())
+def _fit(context: CommandContext, request: ToUnit[FitRequest]) -> FitResponse:
+    return fitting.fit_unit(context.store, request.serial, request.body, context.now())
 
 
-def _improve(context: CommandContext, asked: ToNewestOrVersion[ImproveRequest]) -> ImproveResponse:
-    change = asked.body.model_copy(update={"version": asked.version})
-    return revision.improve_unit(context.store, asked.serial, change, context.now())
+def _improve(context: CommandContext, request: ToNewestOrVersion[ImproveRequest]) -> ImproveResponse:
+    change = request.body.model_copy(update={"version": request.version})
+    return revision.improve_unit(context.store, request.serial, change, context.now())
 
 
 def _certify(
-    context: CommandContext, asked: ToVersion[CertifyRequest]
+    context: CommandContext, request: ToVersion[CertifyRequest]
 ) -> CertificationResponse | ReleaseRequestResponse:
-    return certification.certify(context.store, asked.serial, asked.version, asked.body, context.now())
+    return certification.certify(context.store, request.serial, request.version, request.body, context.now())
 
 
-def _release(context: CommandContext, asked: ToVersion[ReleaseRequest]) -> CertificationResponse:
-    return certification.release(context.store, asked.serial, asked.version, asked.body, context.now())
+def _release(context: CommandContext, request: ToVersion[ReleaseRequest]) -> CertificationResponse:
+    return certification.release(context.store, request.serial, request.version, request.body, context.now())
 
 
-def _revoke(context: CommandContext, asked: ToVersion[RevokeRequest]) -> CertificationResponse:
-    return certification.revoke(context.store, asked.serial, asked.version, asked.body, context.now())
+def _revoke(context: CommandContext, request: ToVersion[RevokeRequest]) -> CertificationResponse:
+    return certification.revoke(context.store, request.serial, request.version, request.body, context.now())
 
 
-def _issue_certificate(context: CommandContext, asked: ToVersion[CertificateRequest]) -> CertificateResponse:
-    return certificates.issue(context.store, asked.serial, asked.version, asked.body, context.now())
+def _issue_certificate(context: CommandContext, request: ToVersion[CertificateRequest]) -> CertificateResponse:
+    return certificates.issue(context.store, request.serial, request.version, request.body, context.now())
 
 
-def _withdraw_certificate(context: CommandContext, asked: WithdrawRequest) -> CertificateResponse:
-    return certificates.withdraw(context.store, asked, context.now())
+def _withdraw_certificate(context: CommandContext, request: WithdrawRequest) -> CertificateResponse:
+    return certificates.withdraw(context.store, request, context.now())
 
 
-def _cancel_start(context: CommandContext, asked: ToStart) -> ScheduledResponse:
-    return queue.cancel_start(context.store, asked.start, context.now())
+def _cancel_start(context: CommandContext, request: ToStart) -> ScheduledResponse:
+    return queue.cancel_start(context.store, request.start, context.now())
 
 
-def _make_drafts(context: CommandContext, asked: ToCampaign[DraftsRequest]) -> DraftsResponse:
-    return make_drafts(context.store, asked.campaign, asked.body, context.now())
+def _make_drafts(context: CommandContext, request: ToCampaign[DraftsRequest]) -> DraftsResponse:
+    return make_drafts(context.store, request.campaign, request.body, context.now())
 
 
-def _clear_bench(context: CommandContext, asked: ToBench[ClearRequest]) -> BenchStatus:
-    return clear_bench(context.store, asked.bench, asked.body, context.now())
+def _clear_bench(context: CommandContext, request: ToBench[ClearRequest]) -> BenchStatus:
+    return clear_bench(context.store, request.bench, request.body, context.now())
 
 
-def _create_key(context: CommandContext, asked: KeyRequest) -> NewKeyResponse:
-    return api_keys.create_key(context.store, asked, context.now())
+def _create_key(context: CommandContext, request: KeyRequest) -> NewKeyResponse:
+    return api_keys.create_key(context.store, request, context.now())
 
 
-def _revoke_key(context: CommandContext, asked: ToKey[ReasonRequest]) -> KeyResponse:
-    return api_keys.revoke_key(context.store, asked.name, asked.body.reason, context.now())
+def _revoke_key(context: CommandContext, request: ToKey[ReasonRequest]) -> KeyResponse:
+    return api_keys.revoke_key(context.store, request.name, request.body.reason, context.now())
 
 
-def _set_batch(context: CommandContext, asked: BatchRequest) -> BatchResponse:
-    return set_batch(context.store, asked, context.now())
+def _set_batch(context: CommandContext, request: BatchRequest) -> BatchResponse:
+    return set_batch(context.store, request, context.now())
 
 
-def _note_backup(context: CommandContext, asked: BackupNote) -> NoContent:
-    detail = {"bytes": asked.bytes, "sha256": asked.sha256}
-    context.store.audit.record(context.now(), "backup", asked.file, detail)
+def _note_backup(context: CommandContext, request: BackupNote) -> NoContent:
+    detail = {"bytes": request.bytes, "sha256": request.sha256}
+    context.store.audit.record(context.now(), "backup", request.file, detail)
     return NoContent()
 
 

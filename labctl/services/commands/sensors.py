@@ -9,12 +9,12 @@ from labctl.services.commands.requests import ToUnit
 from labctl.services.sensor_versions import keep_accelerometer, keep_magnetometer
 
 
-def _accelerometer(context: CommandContext, asked: ToUnit[AccelerometerRequest]) -> AccelerometerVersion:
-    return keep_accelerometer(context.store, asked.serial, asked.body, context.now())
+def _accelerometer(context: CommandContext, request: ToUnit[AccelerometerRequest]) -> AccelerometerVersion:
+    return keep_accelerometer(context.store, request.serial, request.body, context.now())
 
 
-def _magnetometer(context: CommandContext, asked: ToUnit[MagnetometerRequest]) -> MagnetometerVersion:
-    return keep_magnetometer(context.store, asked.serial, asked.body, context.now())
+def _magnetometer(context: CommandContext, request: ToUnit[MagnetometerRequest]) -> MagnetometerVersion:
+    return keep_magnetometer(context.store, request.serial, request.body, context.now())
 
 
 _UNIT = "/api/units/{serial}/sensors"

@@ -36,9 +36,9 @@ class ServiceControl:
         """Return this service's bench. Raises Conflict without one."""
         return self.bench_runner().bench
 
-    def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, asked: RequestT) -> ResponseT:
+    def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, request: RequestT) -> ResponseT:
         """Carry out an act on this service's bench."""
-        return act.in_service(self, context, asked)
+        return act.in_service(self, context, request)
 
     def live_control(self) -> LiveControl:
         """Return the control over live calibrations. Raises Conflict in a process that does not drive the bench."""

@@ -18,32 +18,32 @@ from labctl.services.commands.requests import ToFinding, ToStandard, ToUnit
 from labctl.services.standards import register
 
 
-def _add(context: CommandContext, asked: StandardRequest) -> StandardResponse:
-    return register.add_standard(context.store, asked, context.now())
+def _add(context: CommandContext, request: StandardRequest) -> StandardResponse:
+    return register.add_standard(context.store, request, context.now())
 
 
-def _certificate(context: CommandContext, asked: ToStandard[StandardCertificateRequest]) -> StandardResponse:
-    return register.add_certificate(context.store, asked.label, asked.body, context.now())
+def _certificate(context: CommandContext, request: ToStandard[StandardCertificateRequest]) -> StandardResponse:
+    return register.add_certificate(context.store, request.label, request.body, context.now())
 
 
-def _check(context: CommandContext, asked: ToStandard[StandardCheckRequest]) -> StandardResponse:
-    return register.add_check(context.store, asked.label, asked.body, context.now())
+def _check(context: CommandContext, request: ToStandard[StandardCheckRequest]) -> StandardResponse:
+    return register.add_check(context.store, request.label, request.body, context.now())
 
 
-def _bad(context: CommandContext, asked: ToStandard[StandardBadRequest]) -> StandardResponse:
-    return register.mark_bad(context.store, asked.label, asked.body, context.now())
+def _bad(context: CommandContext, request: ToStandard[StandardBadRequest]) -> StandardResponse:
+    return register.mark_bad(context.store, request.label, request.body, context.now())
 
 
-def _withdraw(context: CommandContext, asked: ToFinding[WithdrawFindingRequest]) -> StandardResponse:
-    return register.withdraw_finding(context.store, asked.label, asked.finding, asked.body, context.now())
+def _withdraw(context: CommandContext, request: ToFinding[WithdrawFindingRequest]) -> StandardResponse:
+    return register.withdraw_finding(context.store, request.label, request.finding, request.body, context.now())
 
 
-def _check_gyro(context: CommandContext, asked: ToUnit[CheckGyroRequest]) -> CheckGyroResponse:
-    return check_gyros.set_check_gyro(context.store, asked.serial, asked.body, context.now())
+def _check_gyro(context: CommandContext, request: ToUnit[CheckGyroRequest]) -> CheckGyroResponse:
+    return check_gyros.set_check_gyro(context.store, request.serial, request.body, context.now())
 
 
-def _environment(context: CommandContext, asked: RoomEnvironmentRequest) -> RoomEnvironmentResponse:
-    return room_environment.add_readings(context.store, asked, context.now())
+def _environment(context: CommandContext, request: RoomEnvironmentRequest) -> RoomEnvironmentResponse:
+    return room_environment.add_readings(context.store, request, context.now())
 
 
 _STANDARD = "/api/standards/{label}"

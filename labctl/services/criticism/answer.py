@@ -36,8 +36,8 @@ DATA_FIRST = {"certain": "The data are wrong", "likely": "Check the data"}
 
 def with_warnings(answer: CriticismResponse, warnings: list[DataWarning]) -> CriticismResponse:
     """Return an answer that says first what is wrong with the data: a verdict on wrong data means nothing."""
-    said = [f"{DATA_FIRST[warning.severity]}: {warning.text}." for warning in warnings]
-    return answer.model_copy(update={"warnings": [*warnings, *answer.warnings], "text": [*said, *answer.text]})
+    warnings_text = [f"{DATA_FIRST[warning.severity]}: {warning.text}." for warning in warnings]
+    return answer.model_copy(update={"warnings": [*warnings, *answer.warnings], "text": [*warnings_text, *answer.text]})
 
 
 #: Up to this many noise floors an error counts as noise: a model does not follow drift, and points that are measured
@@ -54,77 +54,77 @@ HISTORY = frozenset({"t_s", "power_s"})
 
 
 def answer_of(
-    serial: str, version: int, recordings: Sequence[int], found: Criticism, experiments: list[Experiment]
+    serial: str, version: int, recordings: Sequence[int], criticism: Criticism, experiments: list[Experiment]
 ) -> CriticismResponse:
     """Return the answer of a criticism."""
-    verdict, base = found.verdict, found.base
+    verdict, base = criticism.verdict, criticism.base
     return CriticismResponse(
         serial=serial,
         version=version,
         recording=recordings[-1],
         recordings=list(recordings),
         verdict=verdict.form,
-        text=[*sentences(found, experiments), *(base.joint["text"] if base and base.joint else ())],
+        text=[*sentences(criticism, experiments), *(base.joint["text"] if base and base.joint else ())],
         joint=base.joint if base else None,
         error={
             "rms_dps": base.error.rms_dps if base else None,
             "heldout_rms_dps": base.error.heldout_rms_dps if base else None,
-            "noise_floor_dps": found.floor.rms_dps,
-            "noise_floor_source": found.floor.source,
-            "explained": found.explained,
-            "direct_form_rms_dps": found.direct_rms_dps,
+            "noise_floor_dps": criticism.floor.rms_dps,
+            "noise_floor_source": criticism.floor.source,
+            "explained": criticism.explained,
+            "direct_form_rms_dps": criticism.direct_rms_dps,
         },
-        noise=_noise(found),
-        lack_of_fit=_lack_of_fit(found),
-        where=where_it_fails(found.data, found.residuals) if found.comparison else [],
-        suspects=[_suspect(suspect, found) for suspect in found.suspects],
+        noise=_noise(criticism),
+        lack_of_fit=_lack_of_fit(criticism),
+        where=where_it_fails(criticism.data, criticism.residuals) if criticism.comparison else [],
+        suspects=[_suspect(suspect, criticism) for suspect in criticism.suspects],
         named=list(verdict.named),
         depends_on=list(verdict.depends_on),
         confounded_with=list(verdict.confounded),
         remainder=verdict.remainder,
-        thermal_response=found.family.to_json() if found.family is not None else None,
-        thermal_hint=found.hint.hint_json() if found.hint is not None else None,
+        thermal_response=criticism.family.to_json() if criticism.family is not None else None,
+        thermal_hint=criticism.hint.hint_json() if criticism.hint is not None else None,
         not_physical=list(verdict.not_physical),
         named_axes={name: list(axes) for name, axes in verdict.axes.items()},
         further=[list(group) for group in verdict.further],
-        not_testable=list(found.not_testable),
+        not_testable=list(criticism.not_testable),
         experiments=experiments,
-        worst=worst_data_sets(found.data, found.residuals) if found.comparison else [],
-        maps=residual_maps(found.data, found.residuals) if found.comparison else [],
-        readings_left_out=found.data.left_out,
-        views=found.views,
+        worst=worst_data_sets(criticism.data, criticism.residuals) if criticism.comparison else [],
+        maps=residual_maps(criticism.data, criticism.residuals) if criticism.comparison else [],
+        readings_left_out=criticism.data.left_out,
+        views=criticism.views,
         hypothesis=verdict.hypothesis,
-        slow_process=found.slow,
-        output_steps=dict(found.data.steps),
-        advice=list(found.advice),
+        slow_process=criticism.slow,
+        output_steps=dict(criticism.data.steps),
+        advice=list(criticism.advice),
     )
 
 
-def _noise(found: Criticism) -> CriticisedNoise:
-    static = found.data.static.to_json() if found.data.static is not None else None
-    largest = max(found.floor.axes.values(), key=lambda noise: noise.drift.drift_dps)
-    known = [noise.white_dps for noise in found.floor.axes.values() if noise.white_dps is not None]
+def _noise(criticism: Criticism) -> CriticisedNoise:
+    static = criticism.data.static.to_json() if criticism.data.static is not None else None
+    largest = max(criticism.floor.axes.values(), key=lambda noise: noise.drift.drift_dps)
+    known = [noise.white_dps for noise in criticism.floor.axes.values() if noise.white_dps is not None]
     if not known:
         return {"white_dps": None, "drift_dps": None, "drift_tau_s": None, "vs_datasheet": None, "static": static}
     return {
         "white_dps": float(np.sqrt(np.mean(np.square(known)))),
         "drift_dps": largest.drift.drift_dps,
         **correlation_times(largest.drift),
-        "vs_datasheet": found.drift_over_datasheet,
+        "vs_datasheet": criticism.drift_over_datasheet,
         "static": static,
     }
 
 
-def _lack_of_fit(found: Criticism) -> LackOfFit:
-    statistic, p_value = found.lack_of_fit
+def _lack_of_fit(criticism: Criticism) -> LackOfFit:
+    statistic, p_value = criticism.lack_of_fit
     return {"statistic": statistic, "p_value": p_value}
 
 
-def _suspect(suspect: Suspect, found: Criticism) -> SuspectJson:
+def _suspect(suspect: Suspect, criticism: Criticism) -> SuspectJson:
     candidate = suspect.candidate
     kind = kind_of(candidate.term) if candidate.term is not None else CATALOGUE[candidate.id]
     after = suspect.after.error if suspect.after else None
-    technology = found.data.info.technology or ""
+    technology = criticism.data.info.technology or ""
     return {
         "effect": candidate.id,
         "probability": suspect.probability,
@@ -153,41 +153,43 @@ def _shape(suspect: Suspect) -> dict[str, float]:
     return dict(term.parameters) if term else {}
 
 
-def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[str]:
+def sentences(criticism: Criticism, experiments: Sequence[Experiment] = ()) -> list[str]:
     """Return the verdict in words, one sentence each, the answer first; what to do next is the first experiment."""
-    verdict = found.verdict
-    family = [] if found.family is None else [found.family.sentence]
-    family += [] if found.hint is None else [found.hint.hint]
-    first = not_logged(found) or doubtful(found) or _first(found)
-    said = [first, *family, *what_to_log(found), *coarse_steps(found)]
+    verdict = criticism.verdict
+    family = [] if criticism.family is None else [criticism.family.sentence]
+    family += [] if criticism.hint is None else [criticism.hint.hint]
+    first = not_logged(criticism) or doubtful(criticism) or _first(criticism)
+    answer_text = [first, *family, *what_to_log(criticism), *coarse_steps(criticism)]
     if verdict.remainder is not None and verdict.groups:
-        said.append(_remainder(verdict))
+        answer_text.append(_remainder(verdict))
     if verdict.form == "unexplained" and verdict.confounded:
-        said.append(
+        answer_text.append(
             f"This schedule cannot distinguish {verdict.depends_on[0]} from {_list(verdict.confounded)}: confounded."
         )
-    if _leg(found) and (verdict.groups or verdict.form == "unexplained"):
-        said.append(
+    if _leg(criticism) and (verdict.groups or verdict.form == "unexplained"):
+        answer_text.append(
             "Since the temperature only rises in this recording, an error that grows with time cannot be "
             "distinguished from one that grows with temperature."
         )
     if verdict.form == "ambiguous" and verdict.indistinguishable:
-        said += to_distinguish(verdict.indistinguishable, experiments)
-    said += advice_sentences(found.advice)
+        answer_text += to_distinguish(verdict.indistinguishable, experiments)
+    answer_text += advice_sentences(criticism.advice)
     if verdict.not_physical and verdict.groups:
-        technology = found.data.info.technology or "this technology"
-        said.append(f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}.")
-    said += _further(found)
-    if found.data.info.rate_reference == "demanded":
-        said.append(UNMEASURED)
-    if verdict.form == "adequate" and found.has_large_drift:
-        said.append(
-            f"The drift is larger than specified: {found.drift_over_datasheet:.1f} times the value expected from the "
-            "data sheet."
+        technology = criticism.data.info.technology or "this technology"
+        answer_text.append(
+            f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}."
         )
-    if found.data.left_out:
-        said.append(f"{found.data.left_out} readings far outside their data set were left out.")
-    return said
+    answer_text += _further(criticism)
+    if criticism.data.info.rate_reference == "demanded":
+        answer_text.append(UNMEASURED)
+    if verdict.form == "adequate" and criticism.has_large_drift:
+        answer_text.append(
+            f"The drift is larger than specified: {criticism.drift_over_datasheet:.1f} times the value expected from "
+            "the data sheet."
+        )
+    if criticism.data.left_out:
+        answer_text.append(f"{criticism.data.left_out} readings far outside their data set were left out.")
+    return answer_text
 
 
 def _remainder(verdict: Verdict) -> str:
@@ -203,46 +205,48 @@ def _remainder(verdict: Verdict) -> str:
     )
 
 
-def _further(found: Criticism) -> list[str]:
+def _further(criticism: Criticism) -> list[str]:
     """Return what else could be tried beside an adequate model, and what it would be worth."""
-    names = {name for group in found.verdict.further for name in group}
-    fits = [suspect.after for suspect in found.suspects if suspect.candidate.id in names]
+    names = {name for group in criticism.verdict.further for name in group}
+    fits = [suspect.after for suspect in criticism.suspects if suspect.candidate.id in names]
     after = [fit.error.rms_dps for fit in fits if fit is not None and fit.error.rms_dps is not None]
-    if not names or found.base is None:
+    if not names or criticism.base is None:
         return []
-    worth = f": at best the error falls from {found.base.error.rms_dps:.4g} to {min(after):.4g} deg/s" if after else ""
+    worth = (
+        f": at best the error falls from {criticism.base.error.rms_dps:.4g} to {min(after):.4g} deg/s" if after else ""
+    )
     return [f"Further suspected effects, too small to be distinguished from noise{worth}: {_list(sorted(names))}."]
 
 
-def _leg(found: Criticism) -> bool:
+def _leg(criticism: Criticism) -> bool:
     """Return whether temperatures only rose, and the verdict names what such a schedule cannot tell from time."""
-    kinds = [CATALOGUE[name] for name in found.verdict.named if name in CATALOGUE]
-    of_time = any(HISTORY & set(kind.needs) for kind in kinds) or bool(HISTORY & set(found.verdict.depends_on[:1]))
-    if not of_time and "temperature_c" not in found.verdict.depends_on[:1]:
+    kinds = [CATALOGUE[name] for name in criticism.verdict.named if name in CATALOGUE]
+    of_time = any(HISTORY & set(kind.needs) for kind in kinds) or bool(HISTORY & set(criticism.verdict.depends_on[:1]))
+    if not of_time and "temperature_c" not in criticism.verdict.depends_on[:1]:
         return False
-    return has_one_rising_leg(found.data)
+    return has_one_rising_leg(criticism.data)
 
 
 def _list(names: Sequence[str]) -> str:
     return ", ".join(names)
 
 
-def _adequate(found: Criticism) -> str:
-    floor, left = found.floor.rms_dps, found.base.error.rms_dps if found.base else None
+def _adequate(criticism: Criticism) -> str:
+    floor, left = criticism.floor.rms_dps, criticism.base.error.rms_dps if criticism.base else None
     if not floor or left is None or left <= AT_FLOOR * floor:
         return "Adequate: no effect is missing, the residual is noise."
     return (
         f"Adequate: no effect is missing that this recording can detect; the residual is {left / floor:.1f} times the "
-        f"noise floor, and depends on no recorded channel.{drifts(found)}"
+        f"noise floor, and depends on no recorded channel.{drifts(criticism)}"
     )
 
 
-def _first(found: Criticism) -> str:
-    verdict = found.verdict
-    words = [" or ".join(map(_word, group)) + _on_axes(group, found) for group in verdict.groups]
+def _first(criticism: Criticism) -> str:
+    verdict = criticism.verdict
+    words = [" or ".join(map(_word, group)) + _on_axes(group, criticism) for group in verdict.groups]
     match verdict.form:
         case "adequate":
-            return _adequate(found)
+            return _adequate(criticism)
         case "missing":
             return f"Missing: {' and '.join(words)}."
         case "ambiguous":
@@ -261,10 +265,10 @@ def _first(found: Criticism) -> str:
             return f"Too little data for a verdict: {verdict.reason}."
 
 
-def _on_axes(group: tuple[str, ...], found: Criticism) -> str:
+def _on_axes(group: tuple[str, ...], criticism: Criticism) -> str:
     """Return on which axes an effect was found, where it is not on all."""
-    axes = found.verdict.axes.get(group[0], ())
-    all_axes = found.data.info.axes
+    axes = criticism.verdict.axes.get(group[0], ())
+    all_axes = criticism.data.info.axes
     return f" on {_list(axes)}" if axes and len(axes) < len(all_axes) else ""
 
 

@@ -17,7 +17,7 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.error_per_turn import AT_REST_DPS, MIN_RATE_DPS, bias_at_rest, turn_errors
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.channels import Channels, body_rates
-from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
+from labctl.fitting.data.earth_rate import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows
 from labctl.fitting.models.fitted_model import FittedModel

@@ -75,18 +75,18 @@ def _with_undistinguished(
         return answer
     added = [each for each in row.answer["model"]["effects"] if each not in before.answer["model"]["effects"]]
     groups = {suspect["effect"]: suspect["alias_group"] for suspect in earlier.suspects}
-    found: list[Undistinguished] = []
+    undistinguished: list[Undistinguished] = []
     for effect in added:
         others = [each for each in groups.get(effect, ()) if each in earlier.named and each not in added]
         if effect in earlier.named and others:
-            found.append({"effect": effect, "others": others})
-    said = [
+            undistinguished.append({"effect": effect, "others": others})
+    sentences = [
         f"These data do not show that the cause is {each['effect']}, which version {row.version} contains: "
         f"{' or '.join(each['others'])} would explain them as well (criticism of version {before.version})."
-        for each in found
+        for each in undistinguished
     ]
     first, *rest = answer.text
-    return answer.model_copy(update={"undistinguished": found, "text": [first, *said, *rest]})
+    return answer.model_copy(update={"undistinguished": undistinguished, "text": [first, *sentences, *rest]})
 
 
 def residuals_unit(

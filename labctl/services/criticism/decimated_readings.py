@@ -72,11 +72,11 @@ def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decim
             return {row.id: read_recording_of(second_store, row) for row in wanted}
 
     with closing(Forked(read)) as forked:
-        found: dict[int, ReadRecording] = {}
+        readings: dict[int, ReadRecording] = {}
 
         def decimated(row: RecordingRow) -> ReadRecording:
-            if row.id not in found:
-                found.update(forked.result() if forked.is_forked else {row.id: read_recording_of(store, row)})
-            return found[row.id]
+            if row.id not in readings:
+                readings.update(forked.result() if forked.is_forked else {row.id: read_recording_of(store, row)})
+            return readings[row.id]
 
         yield decimated

@@ -84,8 +84,8 @@ def evaluate(
     laws, law_test = proposed_laws(criticised)
     if law_test is not None:
         law_test = {**law_test, "toml": _recipe_for_laws(store, recordings, criticised)}
-    said = [*criticism.text, *held_sentences(model)]
-    criticism = criticism.model_copy(update={"text": said, "laws": laws, "law_test": law_test})
+    text = [*criticism.text, *held_sentences(model)]
+    criticism = criticism.model_copy(update={"text": text, "laws": laws, "law_test": law_test})
     return (
         with_warnings(criticism.model_copy(update={"applied": applied}), warnings),
         ResidualsResponse(

@@ -9,16 +9,16 @@ from labctl.fitting.criticism import Breaking, Criticism, Law, breaking, coeffic
 from labctl.progress import report_stage
 
 
-def proposed_laws(found: Criticism) -> tuple[list[ProposedLaw], LawTest | None]:
+def proposed_laws(criticism: Criticism) -> tuple[list[ProposedLaw], LawTest | None]:
     """Return laws for what has no name, and where the two likeliest differ most; none beside a name."""
-    if found.verdict.form != "unexplained":
+    if criticism.verdict.form != "unexplained":
         return [], None
     report_stage("searching a law")
-    laws = laws_of(found)
-    return [_law(law, found) for law in laws], _test(breaking(laws, found), found)
+    laws = laws_of(criticism)
+    return [_law(law, criticism) for law in laws], _test(breaking(laws, criticism), criticism)
 
 
-def _law(law: Law, found: Criticism) -> ProposedLaw:
+def _law(law: Law, criticism: Criticism) -> ProposedLaw:
     coefficients = coefficients_of_law(law)
     return {
         "formulas": list(law.formulas),
@@ -32,7 +32,7 @@ def _law(law: Law, found: Criticism) -> ProposedLaw:
         "log_bayes_factor": law.evidence,
         "rms_after_dps": law.fit.error.rms_dps,
         "heldout_rms_after_dps": law.fit.error.heldout_rms_dps,
-        "follows": consequences(law, found),
+        "follows": consequences(law, criticism),
     }
 
 
@@ -42,10 +42,10 @@ def _sum(terms: Sequence[tuple[float, str]]) -> str:
     return " ".join([first.removeprefix("+ ").replace("- ", "-", 1), *others])
 
 
-def _test(place: Breaking | None, found: Criticism) -> LawTest | None:
+def _test(place: Breaking | None, criticism: Criticism) -> LawTest | None:
     if place is None:
         return None
-    floor_dps = found.floor.rms_dps
+    floor_dps = criticism.floor.rms_dps
     at = f"{place.rate_dps:.4g} deg/s" + (
         "" if place.temperature_c is None else f" and {place.temperature_c:.3g} deg C"
     )

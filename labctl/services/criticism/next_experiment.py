@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import tomli_w
+from pydantic import ValidationError
 
 from instruments.bench_config import BenchFile
 from labctl.answers.criticism import Experiment
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import Criticism, Forecast, OpenQuestion, forecast, open_question, reduce_recording
+from labctl.log import get_logger
 from labctl.services.planning.attendance import visits_s
 from labctl.services.planning.loading import bench_for, limits_of, load_bench
 from labctl.services.simulation.walks import walked
@@ -21,7 +23,9 @@ from procedures.contracts.steps import Mount
 from procedures.experiments import Block, all_blocks
 from procedures.planning.plan import Plan, make_plan
 from procedures.planning.step_writer import MOUNTING_S
-from procedures.recipe.recipe import Recipe, recipe_document
+from procedures.recipe.recipe import Recipe, recipe_document, validated_recipe
+
+log = get_logger()
 
 #: At most so many experiments are given: what a bench cannot do leaves others to try.
 SHOWN = 12
@@ -115,8 +119,8 @@ def recipe_for_laws(store: Store, rows: Sequence[RecordingRow], criticism: Criti
 
     Laws that agree at the rates of the recordings differ there. `rows` are the recordings that were criticised.
     """
-    base = _recipe_of(store, rows, criticism)
-    if base is None or criticism.data.info.motion != "rates":
+    base = _recipe_of(store, rows, criticism) if criticism.data.info.motion == "rates" else None
+    if base is None:
         return ""
     recipe, bench, done = base
     for each in plans_of(recipe, bench):
@@ -130,6 +134,9 @@ def ranked_experiments(
 ) -> list[Foreseen]:
     """Return the experiments that are made of a recipe, can be run on a bench and answer something, best first.
 
+    One that cannot be forecast beside the recordings is left out; the log has its reason. An error of the code is no
+    such reason and is raised.
+
     One that was `done` already is left out: what it did not say then, although it was expected to, the shapes of the
     catalogue do not describe well enough to be asked again.
     """
@@ -138,12 +145,12 @@ def ranked_experiments(
     foreseen, known = [], [_what(each) for each in done]
     for each in plans_of(recipe, bench):
         plan = each.plan
-        motion = "profile" if plan.recipe.profiles else "rates"
-        if _what(plan.recipe) in known or not question.may_join(motion):
+        if _what(plan.recipe) in known or not question.may_join(plan.recipe.motion):
             continue
         try:
             expected = forecast(question, reduce_recording(walked(plan, bench), outliers=False))
-        except (LabctlError, ValueError):
+        except (LabctlError, np.linalg.LinAlgError) as error:
+            log.debug("experiment.left_out", block=each.block.id, reason=str(error))
             continue
         person_h = len(visits_s(plan, bench)) * MOUNTING_S / 3600
         mountings = max(sum(isinstance(step, Mount) for step in plan.steps) - 1, 0)
@@ -162,6 +169,7 @@ def _what(recipe: Recipe) -> dict[str, object]:
 def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
     """Yield every installed experiment that can be made of a recipe and run on a bench, short ones also longer.
 
+    One that makes no recipe, or is beyond the limits of the bench, is left out; the log has its reason.
     An experiment looks for an effect, so it does not end where U of a model without that effect is small enough.
     """
     limits, recipe = limits_of(bench, driven=True), recipe.model_copy(update={"stop": None})
@@ -177,8 +185,8 @@ def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
             if plan.expected_s < 3600 * LONGEST_TO_REPEAT_H:
                 longer = plan.recipe.model_copy(update={"repeats": LONGER * plan.recipe.repeats})
                 yield Planned(block, make_plan(longer, limits), f"{block.text}; rates {LONGER} times as often")
-        except (LabctlError, ProcedureError, ValueError):  # not on this bench
-            continue
+        except (LabctlError, ProcedureError) as error:
+            log.debug("experiment.left_out", block=block.id, reason=str(error))
 
 
 def _described(foreseen: Foreseen, question: OpenQuestion, recipe: Recipe, of: int) -> Experiment:
@@ -246,14 +254,14 @@ def _recipe_of(
             try:
                 recipes.append(Recipe.model_validate(dict(campaign.recipe)))
                 bench = BenchFile.model_validate(dict(campaign.bench))
-            except ValueError:
+            except ValidationError:  # written by another version
                 continue
     if recipes and bench is not None:
         return max(recipes, key=_points), bench, recipes
     try:
         recipe = _recipe_like(criticism)
         return recipe, load_bench(bench_for(recipe)), recipes
-    except (LabctlError, ProcedureError, ValueError):
+    except (LabctlError, ProcedureError):  # no recipe, or no bench for it
         return None
 
 
@@ -273,7 +281,7 @@ def _recipe_like(criticism: Criticism) -> Recipe:
     history = data.nodes.history
     each = 1 < len(history.numbers("mounting")) <= len(history.numbers("run"))
     lasted = data.nodes.durations_s().reshape(len(data), -1).sum(axis=1)
-    return Recipe.model_validate(
+    return validated_recipe(
         {
             "name": data.info.serial,
             "temperatures_c": levels[:: max(len(levels) // 12, 1)].tolist(),

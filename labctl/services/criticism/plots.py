@@ -15,20 +15,20 @@ from labctl.store import Store
 
 def pictures_unit(store: Store, serial: str, version: int | None, recording: int | None) -> list[PictureResponse]:
     """Return the pictures of a version's criticism and of its unit's ladder. Raises NotFound, BadInput."""
-    said, steps = criticise_unit(store, serial, version, recording), ladder(store, serial)
-    compared = drawn_comparison(store, serial, said.version, said.recording)
+    criticism, steps = criticise_unit(store, serial, version, recording), ladder(store, serial)
+    compared = drawn_comparison(store, serial, criticism.version, criticism.recording)
 
     def work() -> PicturesResponse:
         from labctl.plots import pictures_of  # noqa: PLC0415  a service starts without a drawing library
 
-        found = [
+        pictures = [
             PictureResponse(
                 id=picture.id, title=picture.title, how_to_read=picture.caption, effects=list(picture.effects),
                 figure=json.loads(picture.figure.to_json()),
             )
-            for picture in pictures_of(said, steps, compared)
+            for picture in pictures_of(criticism, steps, compared)
         ]  # fmt: skip
-        return PicturesResponse(pictures=found)
+        return PicturesResponse(pictures=pictures)
 
-    numbers = "\n".join(answer.model_dump_json() for answer in (said, steps, compared) if answer is not None)
+    numbers = "\n".join(answer.model_dump_json() for answer in (criticism, steps, compared) if answer is not None)
     return cached(PicturesResponse, {"numbers": hashlib.sha256(numbers.encode()).hexdigest()}, work).pictures

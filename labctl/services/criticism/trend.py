@@ -102,7 +102,7 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
     limit = limit_dps if limit_dps is not None else _stated(reference)
     leaves = list(_leaving(lines, points, limit)) if limit and lines else []
     drawn = _drawn(points, leaves)
-    drifts = [_drift(axis, figure, unit, line, points, drawn) for axis, figure, unit, line in lines]
+    drifts = [_drift(axis, figure, unit_symbol, line, points, drawn) for axis, figure, unit_symbol, line in lines]
     return TrendResponse(
         serial=serial, version=reference.version, limit_dps=limit, points=points, drifts=drifts, leaves=leaves,
         undated=[row.id for row in undated],
@@ -225,10 +225,10 @@ def _lines(points: Sequence[TrendPoint]) -> Iterator[tuple[str, str, str, TrendL
                 )
         if point.rms_dps is not None:
             series.setdefault(("all", "error", "deg/s"), []).append((years, point.rms_dps, 0.0))
-    for (axis, figure, unit), rows in series.items():
+    for (axis, figure, unit_symbol), rows in series.items():
         time, values, u = np.array(rows).T
         if (line := trend_line(time, values, u)) is not None:
-            yield axis, figure, unit, line
+            yield axis, figure, unit_symbol, line
 
 
 def _drawn(points: Sequence[TrendPoint], leaves: Sequence[Leaving]) -> Array:
@@ -253,12 +253,12 @@ def _course(line: TrendLine, points: Sequence[TrendPoint], years: Array) -> Drif
 
 
 def _drift(
-    axis: str, what: str, unit: str, line: TrendLine, points: Sequence[TrendPoint], years: Array
+    axis: str, what: str, unit_symbol: str, line: TrendLine, points: Sequence[TrendPoint], years: Array
 ) -> Drift:  # fmt: skip
     has_freedom = line.freedom > 0
     half = line.factor * line.u_slope
     return Drift(
-        axis=axis, what=what, unit=f"{unit}/year" if unit != "1" else "1/year", points=line.freedom + 2,
+        axis=axis, what=what, unit=f"{unit_symbol}/year" if unit_symbol != "1" else "1/year", points=line.freedom + 2,
         per_year=line.slope, u=line.u_slope if has_freedom else None,
         low=line.slope - half if has_freedom else None, high=line.slope + half if has_freedom else None,
         repeatability=line.repeatability, significant=has_freedom and abs(line.slope) > half,

@@ -66,7 +66,8 @@ def trend_point(
     measured = FromReadings(store, (row,)) if has_readings else kept
     again = _values(compared.point(measured), axis, quantity) if has_readings else None
     numbers = [
-        figure_number(name, unit, value, again[name][0] if again else None) for name, (value, unit) in drawn.items()
+        figure_number(name, unit_symbol, value, again[name][0] if again else None)
+        for name, (value, unit_symbol) in drawn.items()
     ]
     sets = [each.number for each in store.recordings.data_sets(recording) if each.state == "complete" and each.n]
     of, by = ("", "") if quantity in {"as_found", "as_left"} else (

@@ -74,14 +74,14 @@ def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFil
     if choice is None:
         raise _nothing(problem, goal, tried)
     tilted = tilted_choice(problem, goal, tried) if ramps else None
-    found = _Found(problem, goal, tried, choice, tilted, posed.bench.units_at_once)
-    answer = _answer(found, posed.bench, posed.known, posed.like)
+    outcome = _Found(problem, goal, tried, choice, tilted, posed.bench.units_at_once)
+    answer = _answer(outcome, posed.bench, posed.known, posed.like)
     if posed.of_type is None:
         return answer
     without = chosen(search(replace(problem, prior=None, evaluated={}), goal, ramps=ramps), goal)
     return answer.model_copy(update={"type_prior": DesignPrior(
         type=posed.of_type.type, model=posed.of_type.model, units=posed.of_type.prior.units,
-        without=None if without is None else found.designed(without),
+        without=None if without is None else outcome.designed(without),
     )})  # fmt: skip
 
 
@@ -196,9 +196,9 @@ def _base_and_span(
 def _refuse_beyond(base: Recipe, span: Span, limits: BenchLimits) -> None:
     """Raise PlanRefused for a range that the bench or a unit cannot have."""
     allowed = base.guards.max_rate_error_fraction
-    asked = [(f"rates {span.rate_dps:g} deg/s", limits.rate_complaint(span.rate_dps, allowed))]
-    asked += [(f"temperatures {c:g} deg C", limits.temperature_complaint(c)) for c in (span.low_c, span.high_c)]
-    if beyond := [f"{name}: {text}" for name, text in asked if text]:
+    complaints = [(f"rates {span.rate_dps:g} deg/s", limits.rate_complaint(span.rate_dps, allowed))]
+    complaints += [(f"temperatures {c:g} deg C", limits.temperature_complaint(c)) for c in (span.low_c, span.high_c)]
+    if beyond := [f"{name}: {text}" for name, text in complaints if text]:
         raise PlanRefused(base.name, beyond, "Give --rates LOW,HIGH or --temperatures LOW,HIGH within the limits.")
 
 
@@ -244,8 +244,8 @@ def _nothing(problem: Problem, goal: Goal, tried: list[Candidate]) -> BadInput:
     )
 
 
-def _answer(found: _Found, bench: BenchFile, known: Known, like: Recipe | None) -> DesignResponse:
-    problem, goal, choice = found.problem, found.goal, found.choice
+def _answer(outcome: _Found, bench: BenchFile, known: Known, like: Recipe | None) -> DesignResponse:
+    problem, goal, choice = outcome.problem, outcome.goal, outcome.choice
     recipe = choice.recipe
     reference, refused = _reference(problem, like)
     outlook = misalignment_outlook(choice.plan, bench, problem.limits)
@@ -257,31 +257,31 @@ def _answer(found: _Found, bench: BenchFile, known: Known, like: Recipe | None) 
         rates_dps=(-problem.span.rate_dps, problem.span.rate_dps),
         temperatures_c=(problem.span.low_c, problem.span.high_c),
         is_reached=goal.reached_by(choice),
-        chosen=found.designed(choice),
+        chosen=outcome.designed(choice),
         recipe_toml=tomli_w.dumps(recipe_document(recipe)),
         schedule_hash=choice.plan.schedule_hash,
-        decisions=list(decisions(problem, found.tried, choice, goal)),
-        others=[found.designed(each) for each in next_best(found.tried, choice, goal, COMPARED)],
-        reference=None if reference is None else found.designed(reference),
+        decisions=list(decisions(problem, outcome.tried, choice, goal)),
+        others=[outcome.designed(each) for each in next_best(outcome.tried, choice, goal, COMPARED)],
+        reference=None if reference is None else outcome.designed(reference),
         reference_name=REFERENCE if like is None else like.name,
         reference_refused=refused,
         bound=_bound(problem, goal, choice),
-        tilted=None if found.tilted is None else _tilted(found, found.tilted),
-        units_at_once=found.units,
+        tilted=None if outcome.tilted is None else _tilted(outcome, outcome.tilted),
+        units_at_once=outcome.units,
         standards_u_dps=None if outlook is None else outlook.expanded * problem.span.rate_dps,
         assumptions=[*known.sources, _heat_text(problem.flow, bench), _units_text(bench)],
-        tried=len(found.tried),
+        tried=len(outcome.tried),
     )
 
 
-def _tilted(found: _Found, tilted: TiltedChoice) -> TiltedDesign:
+def _tilted(outcome: _Found, tilted: TiltedChoice) -> TiltedDesign:
     return TiltedDesign(
         position=tilted.position,
         is_on_bench=tilted.is_on_bench,
-        best=found.designed(tilted.best),
+        best=outcome.designed(tilted.best),
         recipe_toml=tomli_w.dumps(recipe_document(tilted.best.recipe)),
-        without=None if tilted.without is None else found.designed(tilted.without),
-        bound=_bound(tilted.problem, found.goal, tilted.best),
+        without=None if tilted.without is None else outcome.designed(tilted.without),
+        bound=_bound(tilted.problem, outcome.goal, tilted.best),
     )
 
 

@@ -32,17 +32,17 @@ def evaluated(store: Store | None, request: EvaluateRequest, bench: BenchFile | 
     _refuse_without_levels(like)
     rates = tuple(request.rates_dps or like.rates_dps)
     temperatures = tuple(request.temperatures_c or like.temperatures_c)
-    asked = DesignRequest(
+    design = DesignRequest(
         like=request.recipe, model=request.model, u_dps=request.u_dps, hours=None if request.u_dps else NO_LIMIT_H
     )
-    posed = pose(store, asked, bench)
+    posed = pose(store, design, bench)
     problem = posed.problem
     moved = _moved(like, rates, temperatures)
     fitted = moved.model_copy(update={"fit": FitRules(model=problem.model, effects=problem.effects)})
-    found, why = None, ""
+    campaign, why = None, ""
     try:
-        goal = Goal(request.u_dps, asked.hours)
-        found = designed_campaign(problem.of_recipe(fitted, None, problem.effects), goal, posed.bench.units_at_once)
+        goal = Goal(request.u_dps, design.hours)
+        campaign = designed_campaign(problem.of_recipe(fitted, None, problem.effects), goal, posed.bench.units_at_once)
     except (LabctlError, ProcedureError, ValueError) as error:
         why = str(error)
     return EvaluateResponse(
@@ -54,7 +54,7 @@ def evaluated(store: Store | None, request: EvaluateRequest, bench: BenchFile | 
         allowed_temperatures_c=allowed_temperatures(problem.limits),
         use_rates_dps=(-problem.span.rate_dps, problem.span.rate_dps),
         use_temperatures_c=(problem.span.low_c, problem.span.high_c),
-        evaluated=found,
+        evaluated=campaign,
         why=why,
         recipe_toml=tomli_w.dumps(recipe_document(moved)),
     )

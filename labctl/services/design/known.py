@@ -73,9 +73,9 @@ def known_noise(store: Store | None, bench: BenchFile, axes: Sequence[str], prio
 
 
 def _white(gyro: GyroSettings, earlier: Sequence[_Earlier]) -> tuple[float, str]:
-    found = [each.white_dps_rthz for each in earlier if each.white_dps_rthz is not None]
-    if found:
-        value, source = _rms(found), f"from {_named(earlier)}"
+    densities = [each.white_dps_rthz for each in earlier if each.white_dps_rthz is not None]
+    if densities:
+        value, source = _rms(densities), f"from {_named(earlier)}"
     elif stated := _stated(gyro, "angle_random_walk_dps_rthz"):
         value, source = stated, "from the data sheet in the bench file"
     else:
@@ -139,8 +139,8 @@ def _duration_s(store: Store, row: CalibrationRecord) -> float:
         recording = None if number is None else store.recordings.get(number)
         if recording is not None and recording.campaign is not None:
             acquire = dict(store.campaigns.get(recording.campaign).recipe).get("acquire")
-            if isinstance(acquire, Mapping) and isinstance(found := acquire.get("duration_s"), int | float):
-                return float(found)
+            if isinstance(acquire, Mapping) and isinstance(duration_s := acquire.get("duration_s"), int | float):
+                return float(duration_s)
     return USUAL_DURATION_S
 
 

@@ -83,7 +83,7 @@ def next_best(candidates: Sequence[Candidate], choice: Candidate, goal: Goal, nu
     hours and U.
     """
     others = [each for each in candidates if type(each.scheme) is not type(choice.scheme)]
-    found = [each for each in (chosen(others, goal),) if each is not None]
+    alternatives = [each for each in (chosen(others, goal),) if each is not None]
     front = _front([each for each in candidates if each.missed_k <= COVERED_K] or candidates)
     place = next((n for n, each in enumerate(front) if each.hours >= choice.hours), len(front))
     near = sorted(
@@ -91,9 +91,9 @@ def next_best(candidates: Sequence[Candidate], choice: Candidate, goal: Goal, nu
         key=lambda each: abs(front.index(each) - place),
     )
     for each in near:
-        if len(found) < number and each not in found and _differs(each, [choice, *found]):
-            found.append(each)
-    return sorted(found, key=lambda each: each.hours)
+        if len(alternatives) < number and each not in alternatives and _differs(each, [choice, *alternatives]):
+            alternatives.append(each)
+    return sorted(alternatives, key=lambda each: each.hours)
 
 
 def _differs(candidate: Candidate, others: Sequence[Candidate]) -> bool:
@@ -182,10 +182,10 @@ def soaks(problem: Problem, temperatures: int) -> list[Soak]:
     rules, flow = problem.base.soak, problem.flow
     way_c = (problem.span.high_c - problem.span.low_c) / max(temperatures - 1, 1) * math.pi / 2  # the widest step
     settled_s = flow.settling_s(way_c, rules.max_drift_c, rules.drift_window_s)
-    found = []
+    soaks_of_holds = []
     for least_s in [*HOLDS_S, settled_s]:
         hold_s = math.ceil(least_s / 60.0) * 60.0
         window_s = min(rules.drift_window_s, hold_s)
         expected_c = flow.change_c(way_c, hold_s, window_s)
-        found.append(Soak(hold_s, window_s, round(max(rules.max_drift_c, DRIFT_MARGIN * expected_c), 2)))
-    return found
+        soaks_of_holds.append(Soak(hold_s, window_s, round(max(rules.max_drift_c, DRIFT_MARGIN * expected_c), 2)))
+    return soaks_of_holds

@@ -48,8 +48,8 @@ def tilted_choice(problem: Problem, goal: Goal, tried: list[Candidate]) -> Tilte
     if not is_useful(problem.base.positions, problem.axes, position):
         return None
     having = problem if problem.tilted else problem.with_fixture(position)
-    found = [each for each in tried if is_tilted(each)] if problem.tilted else search_tilted(having, goal)
-    best = chosen(found, goal)
+    candidates = [each for each in tried if is_tilted(each)] if problem.tilted else search_tilted(having, goal)
+    best = chosen(candidates, goal)
     if best is None:
         return None
     without = chosen([each for each in tried if not is_tilted(each)], goal)

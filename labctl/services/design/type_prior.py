@@ -63,10 +63,10 @@ def prior_of_type(
             continue
         population = population_of(units)
         if len(population.table) >= MIN_UNITS:
-            found = next(each for each in units if each.serial_number in population.table.serial_numbers)
+            unit = next(each for each in units if each.serial_number in population.table.serial_numbers)
             chosen = sorted(hashes[serial] for serial in population.table.serial_numbers)
             return TypePrior(
-                type_, name, "output" if found.model.endswith("output") else "rate",
+                type_, name, "output" if unit.model.endswith("output") else "rate",
                 prior_of(population, groups, on), len({each.serial_number for each in population.left_out}),
                 hashlib.sha256("\n".join(chosen).encode()).hexdigest(),
             )  # fmt: skip

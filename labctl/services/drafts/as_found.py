@@ -125,10 +125,10 @@ def _same(entry: _Entry, others: list[_Entry]) -> _Entry | None:
 
 
 def _change(entry: _Entry, before: _Entry) -> CoefficientChange:
-    axis, name, node, value, u, unit = entry
+    axis, name, node, value, u, unit_symbol = entry
     change = value - before[3]
     both = None if u is None or before[4] is None else float(np.hypot(u, before[4]))
     return CoefficientChange(
         axis=axis, coefficient=name, temperature_c=node, in_force=before[3], draft=value, change=change, u=both,
-        unit=unit, significant=None if both is None else abs(change) > COVERAGE * both,
+        unit=unit_symbol, significant=None if both is None else abs(change) > COVERAGE * both,
     )  # fmt: skip

@@ -53,9 +53,9 @@ def limit_text(result: LimitResult) -> str:
     return f"{LIMITS[result.limit]}{axis} {value}, limit {result.at_most_dps:.3g} deg/s"
 
 
-def failure_text(serial: str, recording: int, asked: str, why: str) -> str:
+def failure_text(serial: str, recording: int, options: str, why: str) -> str:
     """Return why a draft could not be made, and how a person makes a calibration of the same recording."""
     return (
         f"no draft of {serial}: {why.rstrip('.')}; inspect recording {recording}, then `labctl fit {serial} "
-        f"--recording {recording} {asked}`"
+        f"--recording {recording} {options}`"
     )

@@ -38,27 +38,27 @@ def figures_of(type_: str) -> FleetTypeResponse:
     return _answer(TypeFigures(type_))
 
 
-def _answer(found: TypeFigures) -> FleetTypeResponse:
+def _answer(figures: TypeFigures) -> FleetTypeResponse:
     edges = (0.0, *RATIO_EDGES)
     missing: dict[str, int] = {}
-    for ids, units in found.named.items():
+    for ids, units in figures.named.items():
         for effect in ids.strip('[]"').replace('"', "").split(", "):
             missing[effect] = missing.get(effect, 0) + units
-    due, total = found.due, sum(found.due.values())
+    due, total = figures.due, sum(figures.due.values())
     return FleetTypeResponse(
-        type=found.type,
-        units=found.units,
+        type=figures.type,
+        units=figures.units,
         error_over_floor=[
-            RatioClass(low=low, high=RATIO_EDGES[i] if i < len(RATIO_EDGES) else None, units=found.ratios.get(i, 0))
+            RatioClass(low=low, high=RATIO_EDGES[i] if i < len(RATIO_EDGES) else None, units=figures.ratios.get(i, 0))
             for i, low in enumerate(edges)
         ],
-        fitted=sum(found.ratios.values()),
-        verdicts=found.verdicts,
-        criticised=sum(found.verdicts.values()),
+        fitted=sum(figures.ratios.values()),
+        verdicts=figures.verdicts,
+        criticised=sum(figures.verdicts.values()),
         missing=dict(sorted(missing.items(), key=lambda item: (-item[1], item[0]))),
         due=FleetDue(
             overdue=due.get("overdue", 0), within_30_days=due.get("30_days", 0), within_90_days=due.get("90_days", 0),
-            later=due.get("later", 0), no_date=due.get("no_date", 0), none_in_force=found.units - total,
+            later=due.get("later", 0), no_date=due.get("no_date", 0), none_in_force=figures.units - total,
         ),
     )  # fmt: skip
 
@@ -69,8 +69,8 @@ def fleet_chart(store: Store, request: FleetChartRequest) -> FleetChartResponse:
     if factor not in FACTORS:
         raise BadInput(f"factor {factor!r}: choose one of {', '.join(FACTORS)}")
     wanted = filter_of(request)
-    known = [FleetChartCoefficient(axis=a, name=n, unit=unit, units=units)
-             for a, n, unit, units in store.fleet_reports.coefficients(wanted)]  # fmt: skip
+    known = [FleetChartCoefficient(axis=a, name=n, unit=unit_symbol, units=units)
+             for a, n, unit_symbol, units in store.fleet_reports.coefficients(wanted)]  # fmt: skip
     chosen = next((each for each in known if each.name == name and axis in {"", each.axis}), None)
     if name and chosen is None:
         raise BadInput(

@@ -52,66 +52,71 @@ class Evidence:
 def population_in(units: Sequence[UnitCoefficients]) -> Compared:
     """Compare the coefficients of units."""
     try:
-        found = population_of(units)
+        population = population_of(units)
     except NotEnoughData as error:
         return Compared(text=[f"{_capital(str(error))}."])
-    groups = [_group(each) for each in found.effects]
+    groups = [_group(each) for each in population.effects]
     outliers = [
         FleetOutlier(serial=each.serial_number, coefficient=each.coefficient, t=each.t, text=each.reason)
-        for each in found.outliers
+        for each in population.outliers
     ]
-    said = [f"{len(found.table)} units were compared."]
-    said += [each.text for each in groups] or ["No batch, bench, supplier or trend differs from the rest of the type."]
+    sentences = [f"{len(population.table)} units were compared."]
+    sentences += [each.text for each in groups] or [
+        "No batch, bench, supplier or trend differs from the rest of the type."
+    ]
     if outliers:
-        said.append(f"{len({each.serial for each in outliers})} units are not like their type.")
-    if found.left_out:
-        first = found.left_out[0]
-        said.append(f"{len(found.left_out)} units were left out, first {first.serial_number}: {first.reason}.")
+        sentences.append(f"{len({each.serial for each in outliers})} units are not like their type.")
+    if population.left_out:
+        first = population.left_out[0]
+        sentences.append(
+            f"{len(population.left_out)} units were left out, first {first.serial_number}: {first.reason}."
+        )
     return Compared(
-        len(found.table),
-        len(found.left_out),
+        len(population.table),
+        len(population.left_out),
         [
             FleetCoefficientFigures.model_validate(
                 {name: getattr(each, name) for name in FleetCoefficientFigures.model_fields}
             )
-            for each in found.coefficients
+            for each in population.coefficients
         ],
         groups,
         outliers[:MAX_OUTLIERS],
-        said,
+        sentences,
     )
 
 
-def _group(found: GroupEffect) -> FleetGroup:
-    named, per = ", ".join(found.coefficients), " per year" if found.factor == DATE else ""
-    by = f"{found.shift:.3g} {found.unit}{per} (u = {found.u:.2g}, {found.units} units, p = {found.p_value:.1g})"
-    if found.factor == DATE:
+def _group(effect: GroupEffect) -> FleetGroup:
+    named, per = ", ".join(effect.coefficients), " per year" if effect.factor == DATE else ""
+    by = f"{effect.shift:.3g} {effect.unit}{per} (u = {effect.u:.2g}, {effect.units} units, p = {effect.p_value:.1g})"
+    if effect.factor == DATE:
         text = f"{named} changes with the date of the measurement by {by}."
-    elif found.is_of_bench:
+    elif effect.is_of_bench:
         text = (
-            f"Bench {found.level} shifts {named} of all units on it by {by}: an error of the bench, not of the units."
+            f"Bench {effect.level} shifts {named} of all units on it by {by}: an error of the bench, not of the units."
         )
     else:
-        text = f"{_capital(found.factor)} {found.level} differs in {named} by {by}."
-    if found.same_as:
-        others = ", ".join(f"{factor} {level}".strip() for factor, level in found.same_as)
+        text = f"{_capital(effect.factor)} {effect.level} differs in {named} by {by}."
+    if effect.same_as:
+        others = ", ".join(f"{factor} {level}".strip() for factor, level in effect.same_as)
         text = f"{text[:-1]}; {others} would explain it as well."
     return FleetGroup(
-        factor=found.factor, level=found.level, coefficients=list(found.coefficients), shift=found.shift, u=found.u,
-        unit=found.unit, units=found.units, p_value=found.p_value, of_bench=found.is_of_bench, text=text,
+        factor=effect.factor, level=effect.level, coefficients=list(effect.coefficients), shift=effect.shift,
+        u=effect.u, unit=effect.unit, units=effect.units, p_value=effect.p_value, of_bench=effect.is_of_bench,
+        text=text,
     )  # fmt: skip
 
 
 def ageing_in(units: Sequence[UnitCoefficients]) -> tuple[list[FleetAgeing], list[str]]:
     """Return the change per year of each coefficient, and a sentence on it."""
     try:
-        found = ageing_of(units)
+        ageings = ageing_of(units)
     except NotEnoughData as error:
         return [], [f"Ageing: {error}."]
     answers = [
-        FleetAgeing.model_validate({name: getattr(each, name) for name in FleetAgeing.model_fields}) for each in found
+        FleetAgeing.model_validate({name: getattr(each, name) for name in FleetAgeing.model_fields}) for each in ageings
     ]
-    return answers, [f"Ageing was evaluated from units with calibrations {_years(found[0].over_years)} apart."]
+    return answers, [f"Ageing was evaluated from units with calibrations {_years(ageings[0].over_years)} apart."]
 
 
 def _years(over: tuple[float, float]) -> str:
@@ -129,36 +134,36 @@ def evidence_in(store: Store, type_: str, model: str, *, whole: bool) -> Evidenc
             sums.merge(part)
         else:
             not_current += part.units
-    found = judged(sums)
-    said = [f"What the model of the type is missing was judged by the criticisms of {sums.units} units."]
-    if found.reason:
-        said = [f"What the model is missing: {found.reason}; `labctl fleet criticise` does it."]
+    evidence = judged(sums)
+    sentences = [f"What the model of the type is missing was judged by the criticisms of {sums.units} units."]
+    if evidence.reason:
+        sentences = [f"What the model is missing: {evidence.reason}; `labctl fleet criticise` does it."]
     if not_current:
-        said.append(
+        sentences.append(
             f"The criticisms of {not_current} units do not count, as others that were added to them were made again, "
             "or an older program made them; `labctl fleet criticise --again` makes all again."
         )
-    missing = [_missing(each) for each in found.named]
-    said += [each.text for each in missing]
-    if not missing and not found.reason:
-        said.append("No effect is named for the type by all units together.")
-    return Evidence(sums.units, missing, said)
+    missing = [_missing(each) for each in evidence.named]
+    sentences += [each.text for each in missing]
+    if not missing and not evidence.reason:
+        sentences.append("No effect is named for the type by all units together.")
+    return Evidence(sums.units, missing, sentences)
 
 
-def _missing(found: TypeEffect) -> FleetMissing:
+def _missing(effect: TypeEffect) -> FleetMissing:
     sizes = [
         FleetSize(axis=s.axis, name=s.name, unit=s.unit, mean=s.mean, u_mean=s.u_mean, spread=s.spread)
-        for s in found.sizes
+        for s in effect.sizes
     ]
     size = "; ".join(f"{s.axis}.{s.name} {s.mean:.3g} {s.unit} (u = {s.u_mean:.2g})" for s in sizes[:3])
-    who = "The type is missing" if found.of_bench is None else f"Bench {found.of_bench} adds to all its units"
+    who = "The type is missing" if effect.of_bench is None else f"Bench {effect.of_bench} adds to all its units"
     text = (
-        f"{who} {' or '.join(found.group)}: {size}; the Bayes factor of all units together is "
-        f"e^{found.log_bayes_factor:.0f}, while single units show {found.rms_unit_z:.1f} standard uncertainties."
+        f"{who} {' or '.join(effect.group)}: {size}; the Bayes factor of all units together is "
+        f"e^{effect.log_bayes_factor:.0f}, while single units show {effect.rms_unit_z:.1f} standard uncertainties."
     )
     return FleetMissing(
-        effects=list(found.group), log_bayes_factor=found.log_bayes_factor, common=found.is_common, sizes=sizes,
-        rms_unit_z=found.rms_unit_z, of_bench=found.of_bench, text=text,
+        effects=list(effect.group), log_bayes_factor=effect.log_bayes_factor, common=effect.is_common, sizes=sizes,
+        rms_unit_z=effect.rms_unit_z, of_bench=effect.of_bench, text=text,
     )  # fmt: skip
 
 

@@ -23,28 +23,28 @@ MAX_VERSIONS = 20_000
 def fleet_report(store: Store, request: FleetReportRequest, now: datetime) -> FleetReportResponse:
     """Return the report on the units of a type, computed when something of it changed. Raises BadInput."""
     type_ = _the_type(store, request, now)
-    asked = request.model_copy(update={"type": type_})
+    of_type = request.model_copy(update={"type": type_})
     question = {
-        "fleet": asked.model_dump(mode="json"), "state": store.fleet_reports.state(filter_of(asked), asked.model),
+        "fleet": of_type.model_dump(mode="json"), "state": store.fleet_reports.state(filter_of(of_type), of_type.model),
     }  # fmt: skip
-    found = cached(FleetReportResponse, question, lambda: _computed(store, asked, now))
-    figures = next(iter(type_figures(store, asked, now)), None)  # they change with the date alone
-    return found if figures is None else found.model_copy(update={"figures": figures})
+    report = cached(FleetReportResponse, question, lambda: _computed(store, of_type, now))
+    figures = next(iter(type_figures(store, of_type, now)), None)  # they change with the date alone
+    return report if figures is None else report.model_copy(update={"figures": figures})
 
 
 def _the_type(store: Store, request: FleetReportRequest, now: datetime) -> str:
     """Return the type that is asked for, or the only one that there is. Raises BadInput."""
-    found = [each.type for each in store.fleet_reports.types(filter_of(request), now)]
-    if request.type or len(found) == 1:
-        if request.type and request.type not in found:
+    types = [each.type for each in store.fleet_reports.types(filter_of(request), now)]
+    if request.type or len(types) == 1:
+        if request.type and request.type not in types:
             others = [each.type for each in store.fleet_reports.types(FleetFilter(), now)]
             raise BadInput(
                 f"no unit of type {request.type!r} matches; the units of this database are of "
                 f"{_listed(others) or 'no type: import them'}"
             )
-        return request.type or found[0]
+        return request.type or types[0]
     raise BadInput(
-        f"a report is on the units of one type, and these are of {len(found)} ({_listed(found)}); name one with --type"
+        f"a report is on the units of one type, and these are of {len(types)} ({_listed(types)}); name one with --type"
     )
 
 

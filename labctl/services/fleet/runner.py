@@ -28,7 +28,7 @@ TRIES = 3
 #: Units that are read at a time.
 UNITS_AT_ONCE = 200
 #: How long a result is waited for before a cancel is looked for, s.
-LOOK_S = 1.0
+POLL_INTERVAL_S = 1.0
 #: A process without a sign of life for so long has left its job.
 LEFT_AFTER = timedelta(seconds=60)
 Report = Callable[[], None]
@@ -122,7 +122,7 @@ class JobRun:
             self._fill(left)
             if not self._under_way:
                 return _Ending("done")
-            finished, _ = wait(list(self._under_way), timeout=LOOK_S, return_when=FIRST_COMPLETED)
+            finished, _ = wait(list(self._under_way), timeout=POLL_INTERVAL_S, return_when=FIRST_COMPLETED)
             for future in sorted(finished, key=Future.cancelled):  # those that were lost recall all that is under way
                 if future in self._under_way:
                     self._take_in(future)
@@ -136,11 +136,11 @@ class JobRun:
             page = self._store.fleet.units(self._job.id, request, "waiting")
             for row in page.rows:
                 task = self._task(row.serial)
-                found = skipped(self._store, task)
-                if found is None:
+                result = skipped(self._store, task)
+                if result is None:
                     yield task
                 else:
-                    self._store.fleet.keep(self._job.id, self._request.kind, found, task.at)
+                    self._store.fleet.keep(self._job.id, self._request.kind, result, task.at)
             after = page.next_after
             if after is None:
                 return
@@ -161,7 +161,7 @@ class JobRun:
             except TooBusy:
                 self._again.append(task.serial)
                 if not self._under_way:
-                    self._clock.sleep(LOOK_S)
+                    self._clock.sleep(POLL_INTERVAL_S)
                 return
             self._under_way[under_way.future] = task, under_way
             if self._tries[task.serial]:

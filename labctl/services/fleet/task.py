@@ -112,8 +112,8 @@ def _question(store: Store, task: FleetTask) -> str:
 
 
 def _fit_question(store: Store, request: FleetJobRequest, rows: tuple[RecordingRow, ...]) -> str:
-    asked = {"model": request.model, "effects": request.effects, "accepted": request.accept_warnings}
-    return _digest({"fit": asked, **readings_question(store, rows)})
+    settings = {"model": request.model, "effects": request.effects, "accepted": request.accept_warnings}
+    return _digest({"fit": settings, **readings_question(store, rows)})
 
 
 def _criticism_question(store: Store, calibration: CalibrationRecord, rows: tuple[RecordingRow, ...]) -> str:
@@ -135,16 +135,16 @@ def _fitted(store: Store, task: FleetTask) -> Outcome:
     from labctl.recording.info import measured_at  # noqa: PLC0415  loaded by a worker, not by each command
     from labctl.services.calibrations.fitting import fitted_unit  # noqa: PLC0415  as above
 
-    asked = task.request
+    job = task.request
     request = FitRequest(
-        model=asked.model or None, effects=list(asked.effects), accept_warnings=asked.accept_warnings
+        model=job.model or None, effects=list(job.effects), accept_warnings=job.accept_warnings
     )  # fmt: skip
     fitted = fitted_unit(store, task.serial, request, task.at)
     version = store.calibrations.next_version(task.serial)
     new = fitted.build(version)
     error = new.answer["error"]
     result = FleetResult(
-        task.serial, "done", _fit_question(store, asked, fitted.rows), version, rms_dps=_finite(error["rms_dps"]),
+        task.serial, "done", _fit_question(store, job, fitted.rows), version, rms_dps=_finite(error["rms_dps"]),
         noise_floor_dps=_finite(error["noise_floor_dps"]),
     )  # fmt: skip
     measured = measured_at(fitted.rows[-1].info)
@@ -174,8 +174,8 @@ def _criticised(store: Store, task: FleetTask) -> Outcome:
 
     calibration = _newest(store, task)
     rows = chosen_rows(store, task.serial, None)
-    found: list[Criticism] = []
-    answer = criticise_seen(store, calibration, rows, found.append)
+    criticisms: list[Criticism] = []
+    answer = criticise_seen(store, calibration, rows, criticisms.append)
     result = FleetResult(
         task.serial, "done", _criticism_question(store, calibration, rows), calibration.version,
         rms_dps=_finite(answer.error["rms_dps"]), noise_floor_dps=_finite(answer.error["noise_floor_dps"]),
@@ -185,7 +185,7 @@ def _criticised(store: Store, task: FleetTask) -> Outcome:
     estimates = UnitEstimates(
         store.units.get(task.serial).model, calibration.model,
         "" if campaign is None else store.campaigns.get(campaign).bench_name,
-        {axis: packed(each) for axis, each in candidate_estimates(found[0]).items()},
+        {axis: packed(each) for axis, each in candidate_estimates(criticisms[0]).items()},
     )  # fmt: skip
     return Outcome(result, estimates=estimates)
 

@@ -140,9 +140,9 @@ class UdpFeed(SocketFeed):
         return datagram
 
 
-def feed_of(given: str, topic: str) -> LineFeed:
+def feed_of(address: str, topic: str) -> LineFeed:
     """Return the feed that --lines names: -, or as `network_feed`. Raises BadInput."""
-    return DescriptorFeed(0, "standard input") if given == "-" else network_feed(given, topic)
+    return DescriptorFeed(0, "standard input") if address == "-" else network_feed(address, topic)
 
 
 def network_feed(address: str, topic: str) -> LineFeed:

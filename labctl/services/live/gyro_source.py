@@ -67,7 +67,7 @@ class GyroSource:
             "sample_rate_hz": gyro.sample_rate_hz, "max_rate_dps": gyro.limits.max_rate_dps,
             "technology": identity.technology or None, "datasheet": dict(identity.datasheet),
             "datasheet_conventions": conventions,
-            "output": {axis: dict(unit) for axis, unit in identity.output.items()},
+            "output": {axis: dict(output_unit) for axis, output_unit in identity.output.items()},
             "configuration": configuration_of(identity.reported),
             "standards": standards_of(self._bench_file), "notes": "turned by hand, live",
         })  # fmt: skip
@@ -91,15 +91,15 @@ class GyroSource:
 
     def _columns(self, readings: Readings) -> dict[str, NDArray[np.generic]]:
         begun_s = self._first_s or 0.0
-        found: dict[str, NDArray[np.generic]] = {"t_s": readings.t_s - begun_s}
+        columns: dict[str, NDArray[np.generic]] = {"t_s": readings.t_s - begun_s}
         if readings.device_s is not None:
-            found[DEVICE_S] = readings.device_s
+            columns[DEVICE_S] = readings.device_s
         if readings.arrival_s is not None:
-            found[ARRIVAL_S] = readings.arrival_s - begun_s
+            columns[ARRIVAL_S] = readings.arrival_s - begun_s
         for channel in self._gyro.channels:
             if channel.name in BY_NAME:
-                found[channel.name] = channel.value(readings.raw[channel.name])
-        return found | {"valid": readings.valid.astype(np.int64)}
+                columns[channel.name] = channel.value(readings.raw[channel.name])
+        return columns | {"valid": readings.valid.astype(np.int64)}
 
     def ask(self, request: PoseRequest | None) -> None:
         """Have the simulated person of a simulated bench do it; at a real one a person reads it."""

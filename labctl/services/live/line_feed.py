@@ -52,13 +52,13 @@ class DescriptorFeed:
             )
 
     def take(self) -> bytes | None:
-        found = b""
-        while len(found) < MAX_BYTES and select.select([self._descriptor], [], [], 0)[0]:
+        received = b""
+        while len(received) < MAX_BYTES and select.select([self._descriptor], [], [], 0)[0]:
             data = os.read(self._descriptor, 1 << 16)
             if not data:
-                return found or None
-            found += data
-        return found
+                return received or None
+            received += data
+        return received
 
     def close(self) -> None:
         """Leave it open: the process has it from its parent."""
@@ -105,15 +105,15 @@ class TcpFeed(SocketFeed):
         self._socket.setblocking(False)
 
     def take(self) -> bytes | None:
-        found = b""
-        while self._socket is not None and len(found) < MAX_BYTES:
+        received = b""
+        while self._socket is not None and len(received) < MAX_BYTES:
             try:
                 data = self._socket.recv(1 << 16)
             except BlockingIOError:
-                return found
+                return received
             except OSError:  # reset by the sender: what it sent before is kept
                 data = b""
             if not data:
-                return found or None
-            found += data
-        return found
+                return received or None
+            received += data
+        return received

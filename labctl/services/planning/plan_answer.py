@@ -57,7 +57,7 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
     if not shares or not stated:
         return None
     now = _expanded(bench, shares)
-    found = []
+    outlooks = []
     for what, table, wider in _wider(plan.recipe):
         try:
             other = make_plan(wider, limits)
@@ -70,9 +70,9 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
             turned=what, expanded=expanded, mountings=len(then) - len(shares),
             more_s=other.expected_s - plan.expected_s, recipe_toml=table,
         )  # fmt: skip
-        found.append(more)
+        outlooks.append(more)
     return MisalignmentOutlook(
-        expanded=now, further=sorted(found, key=lambda each: (each.expanded, each.more_s)),
+        expanded=now, further=sorted(outlooks, key=lambda each: (each.expanded, each.more_s)),
         not_stated=[each for each in counted if each not in stated],
     )  # fmt: skip
 
@@ -131,10 +131,10 @@ def _wider(recipe: Recipe) -> Iterator[tuple[str, str, Recipe]]:
 
 def _toml(name: str, table: Indexing | Inverted) -> str:
     """Return a table of a recipe as TOML, a line for each key."""
-    given = table.model_dump(exclude_defaults=True)
+    document = table.model_dump(exclude_defaults=True)
     lines = [
         f"{key} = [{', '.join(f'{each:g}' for each in value)}]" if isinstance(value, tuple) else f"{key} = {value:g}"
-        for key, value in given.items()
+        for key, value in document.items()
     ]
     return "\n".join([f"[{name}]", *lines])
 
@@ -193,17 +193,17 @@ def _guessed(plan: Plan, bench: BenchFile, earlier: EarlierTimes | None) -> list
     """Return the figures of the expected time that neither a file nor an earlier campaign states, in words."""
     known = earlier or EarlierTimes(0)
     taken = {type(step) for step in plan.steps if step.expected_s}
-    found: list[str] = []
+    guesses: list[str] = []
     if Home in taken and known.home_s is None:
-        found.append(f"homing takes {HOMING_S:g} s")
+        guesses.append(f"homing takes {HOMING_S:g} s")
     if CheckHome in taken and known.check_home_s is None:
-        found.append(f"a check for missed steps takes {CHECK_S:g} s")
+        guesses.append(f"a check for missed steps takes {CHECK_S:g} s")
     if MoveChamber in taken and bench.air_tau_s is None and known.heating is None and known.cooling is None:
-        found.append(
+        guesses.append(
             f"the air of the chamber follows a ramp with a time constant of {USUAL_AIR_TAU_S:g} s; state air_tau_s in "
             "[chamber] of the bench file"
         )
     mounts = [step.expected_s for step in plan.steps if isinstance(step, Mount) and step.expected_s]
     if mounts and (known.mount_s is None or plan.recipe.turns is not None):
-        found.append(f"a person takes {mounts[0] / 60:g} min to mount the units")
-    return found
+        guesses.append(f"a person takes {mounts[0] / 60:g} min to mount the units")
+    return guesses

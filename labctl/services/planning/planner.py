@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from labctl.store import Store
 
 #: What a plan could find is worked out by walking through it second by second; a longer one is refused.
-LONGEST_LOOK_S = 14 * 86_400.0
+MAX_VISIBILITY_S = 14 * 86_400.0
 
 
 def list_recipes(store: Store, bench: BenchFile | None) -> list[RecipeResponse]:
@@ -77,10 +77,10 @@ def plan_steps(
     earlier = times_on_bench(store, on)
     plan = make_plan(recipe, limits_of(on, driven=True, earlier=earlier), clip=request.clip)
     check(plan, on)
-    if request.visibility and plan.expected_s > LONGEST_LOOK_S:
+    if request.visibility and plan.expected_s > MAX_VISIBILITY_S:
         raise BadInput(
             f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days, but the effects that a plan can "
-            f"detect are computed only up to {LONGEST_LOOK_S / 86_400:.0f} days; leave visibility out, or "
+            f"detect are computed only up to {MAX_VISIBILITY_S / 86_400:.0f} days; leave visibility out, or "
             "shorten the plan"
         )
     answer = plan_answer(plan, on, look if request.visibility else None, start, earlier)

@@ -6,7 +6,7 @@ import numpy as np
 
 from labctl.answers.inspection import RecordingInspection
 from labctl.fitting.data.covered import Covered, covered_by
-from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.earth_rate import up_rate_dps
 from labctl.recording import Recording
 from labctl.recording.verification import is_marked
 

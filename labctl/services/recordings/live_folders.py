@@ -88,9 +88,9 @@ class KeptReadings:
     @property
     def text(self) -> str:
         """What it is, and the command that imports it, in one line."""
-        unit = f" of {self.serial}" if self.serial else ""
+        of_unit = f" of {self.serial}" if self.serial else ""
         return (
-            f"{self.readings} readings{unit} that a live calibration left are in no recording; import them with "
+            f"{self.readings} readings{of_unit} that a live calibration left are in no recording; import them with "
             f"`labctl import {shlex.quote(str(self.folder))}`, then remove the folder"
         )
 

@@ -42,9 +42,9 @@ def points_of(
         return to_points(store.recordings.samples(row.id))
 
     def pieces_of(dataset: int) -> Recording:
-        found = None if pieces is None else pieces().get(dataset)
-        if found is not None:
-            return found
+        kept = None if pieces is None else pieces().get(dataset)
+        if kept is not None:
+            return kept
         compute(UNNAMED)
         info = points.info.model_copy(update={"kind": "samples"})
         return to_points(Recording(info, store.recordings.dataset(row.id, dataset)))
@@ -82,8 +82,8 @@ def with_steps(
     columns = dict(points.columns)
     numbers, dataset = np.asarray(numbers_of_sets), np.asarray(columns["dataset"], dtype=np.int64)
     for axis, u_dps in quantisation_dps.items():
-        unit = next((unit for name, unit in points.info.output.items() if name == axis), None)
-        scale = abs(unit.scale) if unit else 1.0
+        output_unit = next((output_unit for name, output_unit in points.info.output.items() if name == axis), None)
+        scale = abs(output_unit.scale) if output_unit else 1.0
         columns[f"gyro_{axis}{QUANTISATION}"] = per_reading(dataset, numbers, scale * np.asarray(u_dps))
     return replace(points, columns=columns)
 

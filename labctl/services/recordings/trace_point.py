@@ -48,9 +48,9 @@ def trace_point(store: Store, recording: int, window: TraceWindow, t_s: float) -
             f"the trace of {window.channel} in recording {recording} has no bin at {t_s:g} s; choose one of its points"
         )
     compute(UNNAMED)
-    found = {} if _without_readings(store, recording) else _readings_of_bin(store, shown, window.points, k)
-    values = np.concatenate(list(found.values())) if found else np.zeros(0)
-    sets = sorted(found) or [0, 0]
+    by_dataset = {} if _without_readings(store, recording) else _readings_of_bin(store, shown, window.points, k)
+    values = np.concatenate(list(by_dataset.values())) if by_dataset else np.zeros(0)
+    sets = sorted(by_dataset) or [0, 0]
     rounding = (DOUBLE if shown.raw else SINGLE) * float(np.max(np.abs(values), initial=1e-300))
     again = (
         (float(values.mean()), float(values.min()), float(values.max()), float(len(values)))
@@ -121,7 +121,7 @@ def _readings_of_bin(store: Store, shown: TraceResponse, points: int, k: int) ->
     width = (high - low) / points
     b = _bin_of(np.array([shown.t_s[k]]), low, high, points)[0]
     rows = [row for row in store.recordings.data_sets(shown.recording) if row.state == "complete" and row.n]
-    found = {}
+    by_dataset = {}
     for row in rows:
         if not _reaches(row, low + b * width, low + (b + 1) * width):
             continue
@@ -136,8 +136,8 @@ def _readings_of_bin(store: Store, shown: TraceResponse, points: int, k: int) ->
         inside = (t_s >= low) & (t_s <= high) & np.isfinite(values)
         inside &= _bin_of(t_s, low, high, points) == b
         if inside.any():
-            found[row.number] = values[inside]
-    return found
+            by_dataset[row.number] = values[inside]
+    return by_dataset
 
 
 def _bin_of(t_s: Array, low: float, high: float, points: int) -> NDArray[np.int64]:

@@ -39,8 +39,8 @@ def reproduce_own() -> Findings:
     """Return the paper by the real gyro that comes with labctl and by the simulated unit of the paper."""
     findings = Findings(values=sheet.of_printed()).told("computed")
     findings.add(_of(shipped("osu-fog", OSU), None).told("measured"))
-    unit = simulated("ojeda2000", BENCH, "RD2100, simulated", RD2100)
-    findings.add(_of(unit, None).told("simulated", BUILT_IN.__contains__))
+    simulated_unit = simulated("ojeda2000", BENCH, "RD2100, simulated", RD2100)
+    findings.add(_of(simulated_unit, None).told("simulated", BUILT_IN.__contains__))
     return findings
 
 

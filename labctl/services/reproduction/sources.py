@@ -75,8 +75,8 @@ def of_unit(store: Store, serial: str, recording: int | None) -> Measured:
     rest = None
     if row.kind == "samples" and (number := _longest_rest(store, row.id)) is not None:
         rest = rest_in(store.recordings.dataset(row.id, number), points)
-    said = f"Unit {serial}, recording {row.id}: {row.datasets} data sets ({points.info.model})."
-    return Measured(serial, said, points, rest, row.id)
+    description = f"Unit {serial}, recording {row.id}: {row.datasets} data sets ({points.info.model})."
+    return Measured(serial, description, points, rest, row.id)
 
 
 def _longest_rest(store: Store, recording: int) -> int | None:
@@ -99,8 +99,10 @@ def rest_in(columns: Columns, recording: Recording) -> Rest | None:
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[good]
     rests = {}
     for axis in recording.info.axes:
-        unit = recording.info.output.get(axis, OutputUnit())
-        rests[str(axis)] = (np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[good] - unit.offset) / unit.scale
+        output_unit = recording.info.output.get(axis, OutputUnit())
+        rests[str(axis)] = (
+            np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[good] - output_unit.offset
+        ) / output_unit.scale
     return Rest(t_s - t_s[0], rests)
 
 

@@ -91,13 +91,13 @@ def _tables(measured: Measured, axis: str) -> Findings:
             ("offset", offset, "another unit: its curve is of the same shape, not of the same numbers"),
         ):
             value = float(np.interp(temperature, nodes, values)) if inside else None
-            said = "taken in as it is printed" if is_printed else reason
+            treatment = "taken in as it is printed" if is_printed else reason
             findings.values.append(
                 Value(
                     f"{name}_{temperature:g}",
                     measured.name,
                     value,
-                    said if inside else f"measured from {nodes[0]:.1f} to {nodes[-1]:.1f} deg C only",
+                    treatment if inside else f"measured from {nodes[0]:.1f} to {nodes[-1]:.1f} deg C only",
                 )
             )
     findings.values += _claims(measured.name, nodes, scale, offset)
@@ -113,9 +113,11 @@ def _in_report_units(result: FitResult, recording: Recording, axis: str) -> tupl
     The nominal values are the recording's where its output is in V, else those of the report.
     """
     axis_fit = result.fitted.axes[axis]
-    unit = next((unit for name, unit in recording.info.output.items() if name == axis), OutputUnit())
-    volts = unit.scale if unit.unit == "V" else paper.NOMINAL_MV / 1000.0
-    rest = unit.offset if unit.unit == "V" else paper.REST_V
+    output_unit = next(
+        (output_unit for name, output_unit in recording.info.output.items() if name == axis), OutputUnit()
+    )
+    volts = output_unit.scale if output_unit.unit == "V" else paper.NOMINAL_MV / 1000.0
+    rest = output_unit.offset if output_unit.unit == "V" else paper.REST_V
     rows = dict(zip(axis_fit.names, axis_fit.values, strict=True))
     return (1.0 + rows["scale_factor"]) * volts * 1000.0, rest + rows["bias"] * volts
 

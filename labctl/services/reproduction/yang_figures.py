@@ -72,15 +72,15 @@ def errors(judged: Judged, shown: tuple[NDArray[np.bool_], float]) -> list[Paper
     data, n = judged.data, len(judged.data)
     methods = {"uncompensated": judged.raw, "traditional": judged.traditional, "proposed": judged.proposed}
     at_level = {name: {a: v[at_shown_level] for a, v in method.items()} for name, method in methods.items()}
-    said = f"Rows: axis that is turned; columns: output. Errors after compensation: {judged.how}."
+    note = f"Rows: axis that is turned; columns: output. Errors after compensation: {judged.how}."
     level = f"The {int(at_shown_level.sum())} of {n} data sets at {at_c:.1f} deg C, the level nearest to 25."
     return [
-        _surface(data, judged.raw, "7", "before compensation", f"All {n} data sets. {said}"),
-        _surface(data, judged.proposed, "7", "after compensation, proposed", f"{_drawn(data, judged.proposed)} {said}"),
-        _lines(data.take(at_shown_level), at_level, "8", "uncompensated, traditional, proposed", f"{level} {said}"),
+        _surface(data, judged.raw, "7", "before compensation", f"All {n} data sets. {note}"),
+        _surface(data, judged.proposed, "7", "after compensation, proposed", f"{_drawn(data, judged.proposed)} {note}"),
+        _lines(data.take(at_shown_level), at_level, "8", "uncompensated, traditional, proposed", f"{level} {note}"),
         _lines(
             data.take(at_shown_level), {name: at_level[name] for name in ("traditional", "proposed")}, "9",
-            "traditional and proposed, on their own scale", f"{level} {said}",
+            "traditional and proposed, on their own scale", f"{level} {note}",
         ),
     ]  # fmt: skip
 

@@ -40,8 +40,8 @@ def moment(text: str, zone: ZoneInfo, now: datetime) -> datetime:
     if text == NOW:
         return now
     try:
-        said = datetime.fromisoformat(text)
-        meant = said.replace(tzinfo=zone) if said.tzinfo is None else said.astimezone(zone)
+        instant = datetime.fromisoformat(text)
+        meant = instant.replace(tzinfo=zone) if instant.tzinfo is None else instant.astimezone(zone)
         start = meant.astimezone(UTC)
     except (ValueError, OverflowError) as error:
         raise BadInput(

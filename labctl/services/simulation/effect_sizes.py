@@ -54,15 +54,15 @@ def sizes_on_plan(texts: list[str], plan: Plan, bench: BenchFile, gyro: GyroSett
     return sizes
 
 
-def with_sizes(asked: CampaignRequest, bench: BenchFile) -> CampaignRequest:
+def with_sizes(request: CampaignRequest, bench: BenchFile) -> CampaignRequest:
     """Return a start with sizes in noise units converted to those of the effects, for the first unit of its bench.
 
     Raises BadInput, RecipeError, PlanRefused.
     """
-    if not any(map(is_in_noise_units, asked.hide)):
-        return asked
-    refuse_unless_simulated(bench, asked.hide)
-    plan = make_plan(load_recipe(asked.recipe), limits_of(bench), clip=asked.clip)
+    if not any(map(is_in_noise_units, request.hide)):
+        return request
+    refuse_unless_simulated(bench, request.hide)
+    plan = make_plan(load_recipe(request.recipe), limits_of(bench), clip=request.clip)
     gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": USUAL_RATE_HZ})
-    hide = [f"{name}={size!r}" for name, size in sizes_on_plan(asked.hide, plan, bench, gyro).items()]
-    return asked.model_copy(update={"hide": hide})
+    hide = [f"{name}={size!r}" for name, size in sizes_on_plan(request.hide, plan, bench, gyro).items()]
+    return request.model_copy(update={"hide": hide})

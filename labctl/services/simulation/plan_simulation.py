@@ -193,7 +193,7 @@ class _Walk:
             model=settings.model,
             axes=settings.axes,
             kind="samples",
-            motion="profile" if self._plan.recipe.profiles else "rates",
+            motion=self._plan.recipe.motion,
             started_at=self._clock.utc(),
             latitude_deg=self._bench.latitude_deg,
             sample_rate_hz=self._unit.sample_rate_hz,

@@ -90,17 +90,17 @@ def _is_comparable(entry: Standard, known: RegisteredStandard) -> bool:
 
 def refuse_bad(store: Store, standards: Sequence[Standard], on: date, bench: str) -> None:
     """Raise Conflict where a standard of a bench is bad on a day: nothing that it measures could be certified."""
-    said = [
+    findings_text = [
         finding_text(known, finding)
         for _, known in matched(store, standards)
         if known is not None
         for finding in known.bad
         if overlaps(on, on, finding.bad_from, finding.bad_until)
     ]
-    if said:
+    if findings_text:
         raise Conflict(
-            f"bench {bench}: {'; '.join(said)}. Put another standard on the bench and into its bench file; a finding "
-            "that was wrong is withdrawn by `labctl standards withdraw`"
+            f"bench {bench}: {'; '.join(findings_text)}. Put another standard on the bench and into its bench file; a "
+            "finding that was wrong is withdrawn by `labctl standards withdraw`"
         )
 
 
@@ -157,11 +157,11 @@ def _differences(entry: Standard, known: RegisteredStandard, on: date) -> Iterat
 
 
 def _of_uncertainty(entry: Standard, known: RegisteredStandard, on: date) -> Iterator[str]:
-    label, unit = known.row.label, entry.unit_name
-    if (entry.quantity, unit) != (known.row.quantity, known.row.unit):
+    label, unit_symbol = known.row.label, entry.unit_name
+    if (entry.quantity, unit_symbol) != (known.row.quantity, known.row.unit):
         yield (
-            f"standard {label}: {entry.quantity} in {unit} in the bench file, {known.row.quantity} in {known.row.unit} "
-            "in the register; its uncertainty is not compared. Correct the one that is wrong"
+            f"standard {label}: {entry.quantity} in {unit_symbol} in the bench file, {known.row.quantity} in "
+            f"{known.row.unit} in the register; its uncertainty is not compared. Correct the one that is wrong"
         )
         return
     if not known.in_force:
@@ -169,15 +169,15 @@ def _of_uncertainty(entry: Standard, known: RegisteredStandard, on: date) -> Ite
     stated = max(point.u for point in known.in_force[-1].points)
     if not math.isclose(stated, entry.standard_u, rel_tol=ROUNDING):
         yield (
-            f"standard {label}: u = {entry.standard_u:.3g} {unit} in the bench file, {stated:.3g} {unit} by "
-            f"certificate {known.in_force[-1].number} in the register; the larger one counts. Correct the "
+            f"standard {label}: u = {entry.standard_u:.3g} {unit_symbol} in the bench file, {stated:.3g} {unit_symbol} "
+            f"by certificate {known.in_force[-1].number} in the register; the larger one counts. Correct the "
             "one that is wrong"
         )
     used = _as_used(entry, known, on)
     if used.standard_u > max(stated, entry.standard_u) * (1 + ROUNDING):
         yield (
-            f"standard {label}: u = {used.standard_u:.3g} {unit} on {on} with the uncertainty of its drift, which the "
-            "campaign records and its budgets use; a new calibration of the standard makes it smaller"
+            f"standard {label}: u = {used.standard_u:.3g} {unit_symbol} on {on} with the uncertainty of its drift, "
+            "which the campaign records and its budgets use; a new calibration of the standard makes it smaller"
         )
 
 
@@ -217,8 +217,8 @@ def with_register(store: Store, answer: BenchCheckResponse, bench: BenchFile) ->
     """Return the check of a bench with what the register says of its standards; a bad one is a failed check."""
     standards, on = standards_of(bench), answer.checked_at.date()
     known = [(entry, one) for entry, one in matched(store, standards) if one is not None]
-    said = [text for _, text in differences(store, standards, on)]
-    if not known and not said:
+    differences_text = [text for _, text in differences(store, standards, on)]
+    if not known and not differences_text:
         return answer
     try:
         refuse_bad(store, standards, on, bench.name)
@@ -226,7 +226,7 @@ def with_register(store: Store, answer: BenchCheckResponse, bench: BenchFile) ->
     except Conflict as refused:
         bad = str(refused)
     findings = [FindingResponse(what="register", text=bad, state="bad")] if bad else []
-    findings += [FindingResponse(what="register", text=text, state="doubtful") for text in said]
+    findings += [FindingResponse(what="register", text=text, state="doubtful") for text in differences_text]
     if not findings:
         labels = ", ".join(one.row.label for _, one in known)
         findings = [FindingResponse(what="register", text=f"agrees with the register: {labels}", state="good")]

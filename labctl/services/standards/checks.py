@@ -53,11 +53,11 @@ def limits_answer(limits: Limits) -> ChartLimits:
     return ChartLimits(**asdict(limits), low=limits.low, high=limits.high)
 
 
-def out_text(value: float, unit: str, judgement: Judged) -> str:
+def out_text(value: float, unit_symbol: str, judgement: Judged) -> str:
     """Return by which limits a value is out, in words."""
-    said = "; ".join(
+    values_text = "; ".join(
         f"by {BASES[limit.basis]} {limit.low:.6g} to {limit.high:.6g}"
         for limit in judgement.limits
         if limit.state_of(value) == "out"
     )
-    return f"{value:.6g} {unit} is out of the control limits ({said})"
+    return f"{value:.6g} {unit_symbol} is out of the control limits ({values_text})"

@@ -38,73 +38,76 @@ from labctl.store import (
 WORST_FIRST: tuple[StandardState, ...] = ("bad", "check it", "overdue", "no certificate")
 
 
-def add_standard(store: Store, asked: StandardRequest, at: datetime) -> StandardResponse:
+def add_standard(store: Store, request: StandardRequest, at: datetime) -> StandardResponse:
     """Enter a standard. Raises BadInput for a unit that its quantity has not, Conflict for a label that is taken."""
-    units = next((units for quantity, units in UNITS.items() if quantity == asked.quantity), None)
-    unit = asked.unit or (units[0] if units else None)
-    if unit is None:
-        raise BadInput(f"standard {asked.label}: no usual unit of {asked.quantity!r} is known; give its unit")
-    if units and unit not in units:
+    units = next((units for quantity, units in UNITS.items() if quantity == request.quantity), None)
+    unit_symbol = request.unit or (units[0] if units else None)
+    if unit_symbol is None:
+        raise BadInput(f"standard {request.label}: no usual unit of {request.quantity!r} is known; give its unit")
+    if units and unit_symbol not in units:
         raise BadInput(
-            f"standard {asked.label}: unit {unit!r} is not accepted for {asked.quantity}; give {' or '.join(units)}"
+            f"standard {request.label}: unit {unit_symbol!r} is not accepted for {request.quantity}; give "
+            f"{' or '.join(units)}"
         )
     store.standards.add(
-        StandardRow(asked.label, asked.serial, asked.quantity, unit, asked.description, asked.by, at)
+        StandardRow(request.label, request.serial, request.quantity, unit_symbol, request.description, request.by, at)
     )  # fmt: skip
-    return one_standard(store, asked.label, at.date())
+    return one_standard(store, request.label, at.date())
 
 
-def add_certificate(store: Store, label: str, asked: StandardCertificateRequest, at: datetime) -> StandardResponse:
+def add_certificate(store: Store, label: str, request: StandardCertificateRequest, at: datetime) -> StandardResponse:
     """Enter a certificate.
 
     Raises NotFound; BadInput for a day to come; Conflict for a number of the same laboratory that is there.
     """
     standard = store.standards.get(label)
-    if asked.calibrated > at.date():
-        raise BadInput(f"certificate {asked.number}: calibrated {asked.calibrated} is a day to come; correct the date")
-    alike = [each for each in standard.certificates if each.number == asked.number]
-    if any(same_issuer(each.laboratory, asked.laboratory) for each in alike) and not asked.reason:
+    if request.calibrated > at.date():
+        raise BadInput(
+            f"certificate {request.number}: calibrated {request.calibrated} is a day to come; correct the date"
+        )
+    alike = [each for each in standard.certificates if each.number == request.number]
+    if any(same_issuer(each.laboratory, request.laboratory) for each in alike) and not request.reason:
         raise Conflict(
-            f"certificate {asked.number} of standard {standard.row.label} is in the register; to correct it, send it "
+            f"certificate {request.number} of standard {standard.row.label} is in the register; to correct it, send it "
             "again with the reason (--reason TEXT)"
         )
-    points = tuple(_point(each) for each in asked.points)
+    points = tuple(_point(each) for each in request.points)
     new = StandardCertificate(
-        asked.number, asked.laboratory, asked.calibrated, asked.due, asked.adjusted, asked.traceability, points,
-        asked.reason, asked.by, at,
+        request.number, request.laboratory, request.calibrated, request.due, request.adjusted, request.traceability,
+        points, request.reason, request.by, at,
     )  # fmt: skip
     store.standards.add_certificate(label, new)
     return one_standard(store, label, at.date())
 
 
-def _point(asked: CertifiedPointRequest) -> CertifiedPoint:
-    value = asked.value if asked.correction is None else -asked.correction
-    if asked.u is not None:
-        return CertifiedPoint(asked.nominal, value, asked.u, 1.0)
-    return CertifiedPoint(asked.nominal, value, (asked.expanded or 0.0) / asked.k, asked.k)
+def _point(request: CertifiedPointRequest) -> CertifiedPoint:
+    value = request.value if request.correction is None else -request.correction
+    if request.u is not None:
+        return CertifiedPoint(request.nominal, value, request.u, 1.0)
+    return CertifiedPoint(request.nominal, value, (request.expanded or 0.0) / request.k, request.k)
 
 
-def add_check(store: Store, label: str, asked: StandardCheckRequest, at: datetime) -> StandardResponse:
+def add_check(store: Store, label: str, request: StandardCheckRequest, at: datetime) -> StandardResponse:
     """Enter an intermediate check. Raises NotFound, BadInput for a time to come."""
-    checked_at = asked.checked_at or at
+    checked_at = request.checked_at or at
     if checked_at > at:
         raise BadInput(f"checked_at {checked_at:%Y-%m-%d %H:%M} is a time to come; correct it")
-    new = StandardCheck(checked_at, asked.nominal, asked.value, asked.u, asked.note, asked.by, at)
+    new = StandardCheck(checked_at, request.nominal, request.value, request.u, request.note, request.by, at)
     store.standards.add_check(label, new)
     return one_standard(store, label, at.date())
 
 
-def mark_bad(store: Store, label: str, asked: StandardBadRequest, at: datetime) -> StandardResponse:
+def mark_bad(store: Store, label: str, request: StandardBadRequest, at: datetime) -> StandardResponse:
     """Enter that a standard was found bad. Raises NotFound, BadInput for a first day to come."""
-    if asked.bad_from > at.date():
-        raise BadInput(f"bad_from {asked.bad_from} is a day to come; give the first day on which it was bad")
-    new = StandardFinding(0, "bad", None, asked.bad_from, asked.bad_until, asked.reason, asked.by, at)
+    if request.bad_from > at.date():
+        raise BadInput(f"bad_from {request.bad_from} is a day to come; give the first day on which it was bad")
+    new = StandardFinding(0, "bad", None, request.bad_from, request.bad_until, request.reason, request.by, at)
     store.standards.add_finding(label, new)
     return one_standard(store, label, at.date())
 
 
 def withdraw_finding(
-    store: Store, label: str, number: int, asked: WithdrawFindingRequest, at: datetime
+    store: Store, label: str, number: int, request: WithdrawFindingRequest, at: datetime
 ) -> StandardResponse:
     """Withdraw a finding. Raises NotFound for one that is not there, or is withdrawn."""
     standard = store.standards.get(label)
@@ -114,7 +117,7 @@ def withdraw_finding(
             f"{standard.row.label}` lists its findings"
         )
     store.standards.add_finding(
-        label, StandardFinding(0, "withdraw", number, None, None, asked.reason, asked.by, at)
+        label, StandardFinding(0, "withdraw", number, None, None, request.reason, request.by, at)
     )  # fmt: skip
     return one_standard(store, label, at.date())
 
@@ -126,10 +129,10 @@ def list_standards(store: Store, on: date) -> list[StandardResponse]:
 
 def count_by_state(store: Store, on: date) -> dict[str, int]:
     """Return how many standards are in each state on a day; every state has a number."""
-    found: dict[str, int] = dict.fromkeys(get_args(StandardState), 0)
+    counts: dict[str, int] = dict.fromkeys(get_args(StandardState), 0)
     for each in store.standards.all():
-        found[answer_of(each, on).state] += 1
-    return found
+        counts[answer_of(each, on).state] += 1
+    return counts
 
 
 def one_standard(store: Store, label: str, on: date) -> StandardResponse:
@@ -140,12 +143,12 @@ def one_standard(store: Store, label: str, on: date) -> StandardResponse:
 def answer_of(standard: RegisteredStandard, on: date) -> StandardResponse:
     """Return a standard as an answer."""
     row = standard.row
-    found = dict(_states(standard, on))
-    state: StandardState = min(found, key=WORST_FIRST.index) if found else "valid"
+    states = dict(_states(standard, on))
+    state: StandardState = min(states, key=WORST_FIRST.index) if states else "valid"
     withdrawn = {each.finding: each for each in standard.findings if each.act == "withdraw"}
     return StandardResponse(
         label=row.label, serial=row.serial, quantity=row.quantity, unit=row.unit, description=row.description,
-        state=state, text=[text for texts in found.values() for text in texts],
+        state=state, text=[text for texts in states.values() for text in texts],
         due=due_of(standard),
         certificates=[_certificate(each) for each in standard.in_force],
         predictions=[prediction_answer(nominal, each) for nominal, each in predictions_of(standard, on)],
@@ -184,21 +187,23 @@ def _states(standard: RegisteredStandard, on: date) -> Iterator[tuple[StandardSt
         yield "no certificate", [f"Standard {label} has no certificate; add it with `labctl standards certificate`."]
 
 
-def _certificate(given: StandardCertificate) -> StandardCertificateResponse:
+def _certificate(certificate: StandardCertificate) -> StandardCertificateResponse:
     return StandardCertificateResponse(
-        number=given.number, laboratory=given.laboratory, calibrated=given.calibrated, due=given.due,
-        adjusted=given.adjusted, traceability=given.traceability, reason=given.reason, by=given.by, at=given.at,
+        number=certificate.number, laboratory=certificate.laboratory, calibrated=certificate.calibrated,
+        due=certificate.due, adjusted=certificate.adjusted, traceability=certificate.traceability,
+        reason=certificate.reason, by=certificate.by, at=certificate.at,
         points=[
-            CertifiedPointResponse(nominal=each.nominal, value=each.value, u=each.u, k=each.k) for each in given.points
+            CertifiedPointResponse(nominal=each.nominal, value=each.value, u=each.u, k=each.k)
+            for each in certificate.points
         ],
     )  # fmt: skip
 
 
-def _finding(given: StandardFinding, withdrawn: StandardFinding | None) -> StandardFindingResponse:
-    if given.bad_from is None:
-        raise BadInput(f"finding {given.id} has no first day; check the database with `labctl check`")
-    said = "" if withdrawn is None else f"{withdrawn.by}, {withdrawn.at:%Y-%m-%d}: {withdrawn.reason}"
+def _finding(finding: StandardFinding, withdrawn: StandardFinding | None) -> StandardFindingResponse:
+    if finding.bad_from is None:
+        raise BadInput(f"finding {finding.id} has no first day; check the database with `labctl check`")
+    withdrawal = "" if withdrawn is None else f"{withdrawn.by}, {withdrawn.at:%Y-%m-%d}: {withdrawn.reason}"
     return StandardFindingResponse(
-        number=given.id, bad_from=given.bad_from, bad_until=given.bad_until, reason=given.reason, by=given.by,
-        at=given.at, withdrawn=said,
+        number=finding.id, bad_from=finding.bad_from, bad_until=finding.bad_until, reason=finding.reason, by=finding.by,
+        at=finding.at, withdrawn=withdrawal,
     )  # fmt: skip

@@ -97,20 +97,31 @@ def unit_u(gyro: str, recording: Recording, recipe: Recipe, rules: StopRules, *,
         least = least_u(data, preset, over)
         if missing or least.u_dps is None or least.u_dps > rules.u_dps:
             return _answer(gyro, sets, "at least", least, why=missing)
-    found = largest_u(data, preset, over)
-    if found.u_dps is not None and found.u_dps <= rules.u_dps:
-        return _answer(gyro, sets, "of the fit", found, why=lack_of_fit(data, preset, over, rules.u_dps))
-    return _answer(gyro, sets, "of the fit", found, found.more_sets(rules.u_dps))
+    largest = largest_u(data, preset, over)
+    if largest.u_dps is not None and largest.u_dps <= rules.u_dps:
+        return _answer(gyro, sets, "of the fit", largest, why=lack_of_fit(data, preset, over, rules.u_dps))
+    return _answer(gyro, sets, "of the fit", largest, largest.more_sets(rules.u_dps))
 
 
-def _answer(gyro: str, sets: int, known: Known, found: LargestU, more: int | None = None, why: str = "") -> UnitU:
-    if found.u_dps is None:
-        return UnitU(gyro, sets, "unknown", None, found.axis, found.rate_dps, found.temperature_c, found.why or why)
-    parts = found.parts_dps or {}
+def _answer(gyro: str, sets: int, known: Known, largest: LargestU, more: int | None = None, why: str = "") -> UnitU:
+    if largest.u_dps is None:
+        return UnitU(
+            gyro, sets, "unknown", None, largest.axis, largest.rate_dps, largest.temperature_c, largest.why or why
+        )
+    parts = largest.parts_dps or {}
     total = sum(part**2 for part in parts.values())
     share = parts.get("model", 0.0) ** 2 / total if total else 0.0
     return UnitU(
-        gyro, sets, known, found.u_dps, found.axis, found.rate_dps, found.temperature_c, why, more, model_share=share
+        gyro,
+        sets,
+        known,
+        largest.u_dps,
+        largest.axis,
+        largest.rate_dps,
+        largest.temperature_c,
+        why,
+        more,
+        model_share=share,
     )
 
 

@@ -109,8 +109,8 @@ def lookup_connection(url: str, *, lock_timeout_s: float, read_only: bool = Fals
     address = sa.make_url(url)
     settings = {"plan_cache_mode": "force_generic_plan", "lock_timeout": str(round(1000 * lock_timeout_s))}
     named = {"host": address.host, "port": address.port, "user": address.username, "password": address.password}
-    given = {name: value for name, value in {**named, "dbname": address.database}.items() if value is not None}
-    return {**given, **address.query, **CONNECTION, "options": _options(settings, read_only=read_only)}
+    parameters = {name: value for name, value in {**named, "dbname": address.database}.items() if value is not None}
+    return {**parameters, **address.query, **CONNECTION, "options": _options(settings, read_only=read_only)}
 
 
 def _options(settings: Mapping[str, str], *, read_only: bool) -> str:

@@ -108,7 +108,7 @@ class ServerLookup:
         while True:
             was_open = self._opened is not None
             try:
-                found = await self._asked(keys)
+                rows = await self._asked(keys)
             except StoreError as error:
                 self.close()
                 if not isinstance(error, DatabaseUnreachable) or loop.time() >= end_s:
@@ -121,14 +121,14 @@ class ServerLookup:
                 raise
             else:
                 self._is_away = False
-                return found
+                return rows
 
     async def _asked(self, keys: Sequence[str]) -> Sequence[Any]:
         import psycopg  # noqa: PLC0415  it is an extra
 
         try:
             connection = await self._connected()
-            texts = [_array(keys) if given is None else str(given).encode() for given in self._given]
+            texts = [_array(keys) if fixed is None else str(fixed).encode() for fixed in self._given]
             connection.pgconn.send_query_prepared(_PREPARED, texts, result_format=_BINARY)
             return self._decoded(connection, await _result(connection.pgconn))
         except psycopg.Error as error:
@@ -157,11 +157,11 @@ class ServerLookup:
                 assert kind is not None, f"psycopg has no loader for column {column}"
                 self._loads.append(_processed(kind(result.ftype(column), connection).load, process))
         value_of, loads = result.get_value, tuple(enumerate(self._loads))
-        found = []
+        rows = []
         for n in range(result.ntuples):
             values = [value_of(n, column) for column, _ in loads]
-            found.append(self._row(*[None if values[k] is None else load(values[k]) for k, load in loads]))
-        return found
+            rows.append(self._row(*[None if values[k] is None else load(values[k]) for k, load in loads]))
+        return rows
 
     def close(self) -> None:
         """End the connection."""

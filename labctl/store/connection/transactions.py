@@ -33,7 +33,7 @@ def transaction(
 ) -> Callable[Concatenate[RepositoryT, ArgumentsP], ResultT]:
     """Mark a repository's method as one short transaction.
 
-    Arguments and result travel as JSON, by the types that the method declares (`labctl.processes.call_forms`).
+    Arguments and result travel as JSON, by the types that the method declares (`labctl.processes.rpc_methods`).
     """
     name = method.__qualname__
     TRANSACTIONS[name] = method

@@ -165,12 +165,12 @@ class Audit:
         """Return which of some recordings were made by a simulation in this database, as its act says."""
         a = tables.audit.c
         subjects = {f"recording {number}": number for number in recordings}
-        found: set[int] = set()
+        simulated: set[int] = set()
         with self._database.reading() as connection:
             for some in parts_of(list(subjects)):
                 query = sa.select(a.subject).where(a.action == "simulate", a.subject.in_(some))
-                found |= {subjects[subject] for subject in connection.scalars(query)}
-        return found
+                simulated |= {subjects[subject] for subject in connection.scalars(query)}
+        return simulated
 
     def head(self) -> Head | None:
         """Return how long the trail is and the hash of its last row; None when the head was removed."""

@@ -58,8 +58,8 @@ class Benches:
 
     def unconfirmed(self, name: str) -> str:
         """Return what the last safe state of a bench did not confirm; empty for nothing, or a bench never used."""
-        found = self.get(name)
-        return "" if found is None else found.unconfirmed
+        row = self.get(name)
+        return "" if row is None else row.unconfirmed
 
     @transaction
     def mark(self, name: str, unconfirmed: str, at: datetime) -> None:
@@ -77,10 +77,10 @@ class Benches:
         b = tables.benches
         with self._database.writing() as connection:
             row = connection.execute(_ROWS.where(b.c.name == name)).mappings().one_or_none()
-            found = None if row is None else record_of(BenchRow, row)
-            if found is None or not found.is_unconfirmed:  # a person was quicker
+            record = None if row is None else record_of(BenchRow, row)
+            if record is None or not record.is_unconfirmed:  # a person was quicker
                 return
-            was, attempts = found.unconfirmed, found.attempts + 1
+            was, attempts = record.unconfirmed, record.attempts + 1
             values = {"attempts": attempts, "attempted_at": at}
             values |= {"unconfirmed": unconfirmed} if unconfirmed else {"confirmed_at": at}
             connection.execute(sa.update(b).where(b.c.name == name).values(values))
@@ -92,17 +92,17 @@ class Benches:
     def clear(self, name: str, by: str, reason: str, at: datetime) -> BenchRow:
         """Record that a person has inspected the bench. Raises NotFound, and Conflict when there is nothing to
         clear."""
-        found = self.get(name)
-        if found is None:
+        bench = self.get(name)
+        if bench is None:
             raise NotFound(
                 f"bench {name!r} was never used with this database; `labctl bench status` lists the benches that were"
             )
-        if not found.unconfirmed:
+        if not bench.unconfirmed:
             raise Conflict(f"bench {name}: its safe state is confirmed already; start a campaign")
         b = tables.benches
         with self._database.writing() as connection:
             connection.execute(sa.update(b).where(b.c.name == name).values({**_UNTRIED, "unconfirmed_at": None}))
-            detail = {"reason": reason, "was": found.unconfirmed}
+            detail = {"reason": reason, "was": bench.unconfirmed}
             audit.append(connection, at, "bench clear", f"bench {name}", detail, who=by)
         return next(row for row in self.all() if row.name == name)
 

@@ -19,7 +19,7 @@ from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION
 from labctl.store.paging import parts_of
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement, Release, Withdrawal
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.drafts.marks import mark_fitted
+from labctl.store.repositories.drafts.transitions import mark_fitted
 from labctl.store.repositories.releases import waits
 from labctl.store.repositories.units import SEEN
 from labctl.store.repositories.withdrawals import withdraw_of_version
@@ -224,12 +224,12 @@ class Calibrations:
             .where(newest.c.place <= most)
             .order_by(c.serial, c.version)
         )
-        found: dict[str, list[FitError]] = {}
+        errors: dict[str, list[FitError]] = {}
         with self._database.reading() as connection:
             for some in parts_of(serials):
                 for serial, version, rms_dps, floor_dps in connection.execute(query, {"serials": some}):
-                    found.setdefault(serial, []).append(FitError(version, rms_dps, floor_dps))
-        return found
+                    errors.setdefault(serial, []).append(FitError(version, rms_dps, floor_dps))
+        return errors
 
     def _rows(self, *conditions: sa.ColumnElement[bool]) -> list[CalibrationRecord]:
         c = tables.calibrations.c

@@ -20,7 +20,7 @@ from labctl.store.records import CampaignRow, DoneStepRow, EventRow, NewUnit, St
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
-from labctl.store.repositories.drafts.marks import make_due
+from labctl.store.repositories.drafts.transitions import make_due
 from labctl.store.repositories.imports import new_recording
 from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables

@@ -118,7 +118,7 @@ class Certificates:
         return row
 
     @transaction
-    def withdraw(self, number: str, said: Withdrawal) -> CertificateRow:
+    def withdraw(self, number: str, withdrawal: Withdrawal) -> CertificateRow:
         """Withdraw one certificate; its version stays in force. Raises NotFound, Conflict where it is withdrawn."""
         row = self.get(number)
         again = Conflict(
@@ -126,18 +126,25 @@ class Certificates:
         )
         if row.withdrawal is not None:
             raise again
-        detail: dict[str, Any] = {"number": number, "reason": said.reason, "by": said.by}
+        detail: dict[str, Any] = {"number": number, "reason": withdrawal.reason, "by": withdrawal.by}
         try:
             with self._database.writing() as connection:
                 subject = f"{row.serial} version {row.version}"
-                append(connection, said.at, "certificate withdraw", subject, detail, who=said.by_key or said.by)
+                append(
+                    connection,
+                    withdrawal.at,
+                    "certificate withdraw",
+                    subject,
+                    detail,
+                    who=withdrawal.by_key or withdrawal.by,
+                )
                 x = tables.certifications.c
                 last = sa.select(sa.func.max(x.id)).where(x.serial == row.serial, x.version == row.version)
-                said = replace(said, act=connection.scalar(last))
-                withdraw(connection, number, said, said.at)
+                withdrawal = replace(withdrawal, act=connection.scalar(last))
+                withdraw(connection, number, withdrawal, withdrawal.at)
         except exc.IntegrityError as error:
             raise again from error
-        return replace(row, withdrawal=said)
+        return replace(row, withdrawal=withdrawal)
 
     def of_unit(self, serial: str) -> list[CertificateRow]:
         """Return every certificate of a unit, newest first."""

@@ -36,9 +36,9 @@ class DueUnits:
         x, u = tables.certifications.c, tables.units.c
         is_due = sa.and_(x.id.in_(_newest_act()), x.act == "certify", x.due_at <= until)
         joined = tables.units.join(tables.certifications, x.serial == u.serial)
-        found = sa.select(u.serial).select_from(joined).where(is_due, search_units(request), SEEN)
+        due_units = sa.select(u.serial).select_from(joined).where(is_due, search_units(request), SEEN)
         with self._database.reading() as connection:
-            serials = list(connection.scalars(found.order_by(x.due_at, u.serial_key)))
+            serials = list(connection.scalars(due_units.order_by(x.due_at, u.serial_key)))
             first = serials.index(request.after) + 1 if request.after in serials else 0
             last = None if request.limit is None else first + (rows_to_read(request) or 0)
             page = Page.of(serials[first:last], str, request, len(serials))

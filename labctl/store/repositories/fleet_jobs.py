@@ -192,8 +192,8 @@ class FleetJobs:
     def get(self, job: int) -> FleetJobRow:
         """Return one job. Raises NotFound."""
         with self._database.reading() as connection:
-            found = connection.execute(sa.select(tables.fleet_jobs).where(tables.fleet_jobs.c.id == job))
-            row = found.mappings().first()
+            result = connection.execute(sa.select(tables.fleet_jobs).where(tables.fleet_jobs.c.id == job))
+            row = result.mappings().first()
         if row is None:
             raise NotFound(f"fleet job {job} is not in this database; `labctl fleet jobs` lists the jobs")
         return record_of(FleetJobRow, row)

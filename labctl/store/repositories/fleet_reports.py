@@ -117,8 +117,8 @@ class FleetReports:
             .outerjoin(tables.campaigns, k.id == r.campaign_id)
         )
         ours = sa.select(u.serial).where(_condition(wanted, model))
-        found = sa.join(tables.calibrations, newest_ids, newest_ids.c.id == c.id)
-        which = sa.select(c.id).select_from(found).where(c.serial.in_(ours)).order_by(c.recording_id.desc())
+        with_newest = sa.join(tables.calibrations, newest_ids, newest_ids.c.id == c.id)
+        which = sa.select(c.id).select_from(with_newest).where(c.serial.in_(ours)).order_by(c.recording_id.desc())
         columns = (c.serial, u.batch, u.supplier, k.bench_name, r.info, c.document)
         with self._database.reading() as connection:
             ids = list(connection.scalars(which.limit(most)))
@@ -149,7 +149,7 @@ class FleetReports:
         query = sa.select(f.axis, f.name, f.unit, sa.func.count()).join(tables.units, u.serial == f.serial)
         grouped = query.where(wanted.condition).group_by(f.axis, f.name, f.unit).order_by(f.axis, f.name)
         with self._database.reading() as connection:
-            return [(axis, name, unit, n) for axis, name, unit, n in connection.execute(grouped)]
+            return [(axis, name, unit_symbol, n) for axis, name, unit_symbol, n in connection.execute(grouped)]
 
     def chart(
         self, wanted: FleetFilter, axis: str, name: str, factor: str, spans: int

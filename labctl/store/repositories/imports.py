@@ -129,11 +129,11 @@ class Imports:
             query = sa.select(r.id.label("recording"), r.importing.label("token")).where(r.importing.is_not(None))
             if connection.dialect.name != "sqlite":
                 query = query.where(r.import_sign_at < sa.func.now() - ABANDONED_AFTER)
-            found = records_of(ImportTicket, connection.execute(query))
-        for ticket in found:
+            tickets = records_of(ImportTicket, connection.execute(query))
+        for ticket in tickets:
             with suppress(Conflict):
                 self.discard(self.claim(ticket))
-        return len(found)
+        return len(tickets)
 
     @transaction
     def claim(self, ticket: ImportTicket) -> ImportTicket:

@@ -151,9 +151,9 @@ def _differing(
         return "a column of numbers holds text"
     start = 0
     for block in blocks:
-        found = block_digests({name: values[start : start + block.n] for name, values in raw.items()})
+        digests = block_digests({name: values[start : start + block.n] for name, values in raw.items()})
         start += block.n
-        if differing := [group.replace("_", " ") for group in GROUPS if found[group] != block.digests[group]]:
+        if differing := [group.replace("_", " ") for group in GROUPS if digests[group] != block.digests[group]]:
             return f"the digest of its {' and '.join(differing)} differs"
     if not channels or head is None:
         return ""

@@ -15,11 +15,11 @@ RecordT = TypeVar("RecordT", bound="DataclassInstance")
 ColumnTs = TypeVarTuple("ColumnTs")
 
 
-def records_of(kind: type[RecordT], found: sa.Result[*ColumnTs]) -> list[RecordT]:
+def records_of(kind: type[RecordT], result: sa.Result[*ColumnTs]) -> list[RecordT]:
     """Return the rows of a query as records. Raises TypeError where its columns are not the record's fields."""
-    _check_columns(kind, found.keys())
+    _check_columns(kind, result.keys())
     make: Callable[..., RecordT] = kind
-    return [make(**row) for row in found.mappings()]
+    return [make(**row) for row in result.mappings()]
 
 
 def record_of(kind: type[RecordT], row: sa.RowMapping) -> RecordT:
@@ -30,11 +30,14 @@ def record_of(kind: type[RecordT], row: sa.RowMapping) -> RecordT:
 
 
 def _check_columns(kind: type[RecordT], columns: Iterable[object]) -> None:
-    given, wanted = [str(name) for name in columns], [field.name for field in fields(kind)]
-    missing, unknown = [name for name in wanted if name not in given], [name for name in given if name not in wanted]
+    present, wanted = [str(name) for name in columns], [field.name for field in fields(kind)]
+    missing, unknown = (
+        [name for name in wanted if name not in present],
+        [name for name in present if name not in wanted],
+    )
     if missing or unknown:
-        said = [f"lacks column {', '.join(missing)}"] if missing else []
-        said += [f"has column {', '.join(unknown)}, which is no field of it"] if unknown else []
+        problems = [f"lacks column {', '.join(missing)}"] if missing else []
+        problems += [f"has column {', '.join(unknown)}, which is no field of it"] if unknown else []
         raise TypeError(
-            f"a query for {kind.__name__} {' and '.join(said)}; select one column for each field, and label it so"
+            f"a query for {kind.__name__} {' and '.join(problems)}; select one column for each field, and label it so"
         )

@@ -109,11 +109,11 @@ class ResumePoints:
         """Return the planned data sets that some unit has only in part, although their step was done."""
         d = tables.data_sets.c
         rows = connection.execute(sa.select(d.recording_id, d.planned, d.state).where(d.recording_id.in_(recordings)))
-        found: dict[bool, set[tuple[int, int]]] = {True: set(), False: set()}
+        measured: dict[bool, set[tuple[int, int]]] = {True: set(), False: set()}
         for recording, planned, state in rows:
             if planned is not None:
-                found[state == DataSetState.COMPLETE.value].add((recording, planned))
-        return {planned for _, planned in found[False] - found[True]}
+                measured[state == DataSetState.COMPLETE.value].add((recording, planned))
+        return {planned for _, planned in measured[False] - measured[True]}
 
     def _last_t_s(self, connection: sa.Connection, campaign: int, recordings: list[int]) -> float:
         e, v, d = tables.environment.c, tables.events.c, tables.data_sets.c

@@ -180,14 +180,14 @@ class Units:
         """
         c = tables.units.c
         filtered = sa.true() if wanted is None else wanted.condition
-        found = search_units(request)
-        query = unit_rows().where(found, filtered, SEEN).order_by(c.serial_key).limit(rows_to_read(request))
+        matches = search_units(request)
+        query = unit_rows().where(matches, filtered, SEEN).order_by(c.serial_key).limit(rows_to_read(request))
         if request.after is not None:
             query = query.where(c.serial_key > natural_key(request.after))
         with self._database.reading() as connection:
             units = records_of(Unit, connection.execute(query))
             is_whole = request.after is None and (request.limit is None or len(units) <= request.limit)
-            total = len(units) if is_whole else _count(connection, sa.and_(found, filtered))
+            total = len(units) if is_whole else _count(connection, sa.and_(matches, filtered))
         return Page.of(units, lambda unit: unit.serial, request, total)
 
     def batches(self) -> list[BatchRow]:
@@ -208,8 +208,8 @@ class Units:
         with self._database.writing() as connection:
             stated: dict[str, sa.Row[Any]] = {}
             for some in parts_of(serials):
-                found = sa.select(c.serial, c.batch, c.supplier).where(SEEN, c.serial.in_(some))
-                stated |= {row.serial: row for row in connection.execute(found)}
+                query = sa.select(c.serial, c.batch, c.supplier).where(SEEN, c.serial.in_(some))
+                stated |= {row.serial: row for row in connection.execute(query)}
             if missing := [serial for serial in serials if serial not in stated]:
                 raise NotFound(
                     f"{len(missing)} of {len(serials)} units are not in this database, first {missing[0]!r}; no batch "

@@ -12,7 +12,7 @@ from instruments.clock import VirtualClock
 from instruments.positions import Position
 from instruments.simulation import open_simulation
 from instruments.simulators.physics.bench_errors import BenchErrors, felt
-from instruments.simulators.physics.earth import BodyFrame, EarthRotation
+from instruments.simulators.physics.body_kinematics import BodyFrame, EarthRotation
 from instruments.standards import Standard
 
 ENDS = ("x", "-x", "y", "-y", "z", "-z")

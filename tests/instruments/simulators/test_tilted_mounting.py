@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from instruments.positions import Position
 from instruments.simulators.physics.bench_errors import UPRIGHT, BenchErrors, felt
-from instruments.simulators.physics.earth import BodyFrame, EarthRotation
+from instruments.simulators.physics.body_kinematics import BodyFrame, EarthRotation
 from instruments.standards import Standard
 
 DIRECTIONS = ("x+y+z", "-x+y-z", "3x-4z")

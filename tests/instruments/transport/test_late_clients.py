@@ -24,10 +24,10 @@ class Slow(VirtualClock):
     def __init__(self, step_s: float) -> None:
         super().__init__()
         self.step_s = step_s
-        self.stands_in_stalls = True
-        self.latency_s, self.look_every_s = 0.0, 0.01
+        self.pauses_in_stalls = True
+        self.latency_s, self.heartbeat_interval_s = 0.0, 0.01
 
-    def attending(self) -> Any:
+    def registered(self) -> Any:
         raise NotImplementedError
 
     def now_s(self) -> float:
@@ -66,7 +66,7 @@ def stalled(client: RtuClient, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_bytes_that_came_while_the_time_out_ended_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Slow(2 * TIMEOUT_S)
-    clock.stands_in_stalls = False  # as in real time
+    clock.pauses_in_stalls = False  # as in real time
     client = rtu(clock, Port(looks=0))
     stalled(client, monkeypatch)
     assert client.recv(None) == REPLY

@@ -17,7 +17,7 @@ from scipy.special import roots_genlaguerre
 
 from labctl.fitting.data.channels import BODY_AXES, Channels, body_rates
 from labctl.fitting.data.rate_profile import Response
-from labctl.fitting.data.temperature.history import SPACING_S, TemperatureCourse, TemperatureHistory
+from labctl.fitting.data.temperature.history import SPACING_S, TemperatureHistory, TemperatureProfile
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.effects.base import Column, Reference
 from labctl.fitting.effects.catalogue import EFFECTS
@@ -86,7 +86,7 @@ def channels_of(seed: int, course_c: np.ndarray) -> Channels:
         "mounting": rng.integers(1, 4, ROWS),
     }  # fmt: skip
     history = TemperatureHistory(
-        {1: TemperatureCourse(1000.0, course_c)}, {"run": (1, 2, 3), "mounting": (1, 2, 3)}, 300.0,
+        {1: TemperatureProfile(1000.0, course_c)}, {"run": (1, 2, 3), "mounting": (1, 2, 3)}, 300.0,
         (float(course_c.min()), float(course_c.max())), middle_s=1111.0,
     )  # fmt: skip
     rates = body_rates(rate, position)
@@ -106,7 +106,7 @@ def names_of(channels: Channels, axis: str, effect: Effect, term: Term) -> Names
     """Return what the symbols of the channels and the parameters stand for."""
     columns, history = channels.columns, channels.history
     force = {a: columns[f"accel_{a}_g"] if f"accel_{a}_g" in columns else channels.up(a) for a in BODY_AXES}
-    temperatures = history.courses[1].temperature_c
+    temperatures = history.profiles[1].temperature_c
     at = ((np.asarray(columns["t_s"], dtype=np.float64) - 1000.0) / SPACING_S).astype(int)
     names: Names = {
         **FUNCTIONS, "a": axis, "omega": channels.rates, "omega_t": columns["table_rate_dps"], "f": force,

@@ -78,7 +78,7 @@ def test_the_history_goes_by_the_same_thermometer() -> None:
     recording = by_chamber(at_rest(600, 20.0, 30.0, datasets=10))
     t_s = np.arange(0.0, 600.0, 10.0)
     logged = {"t_s": t_s, "temperature_c": np.full(len(t_s), 99.0), "chamber_c": np.full(len(t_s), 21.0)}
-    warm = history_of(with_temperature(replace(recording, environment=logged))).courses[1].temperature_c
+    warm = history_of(with_temperature(replace(recording, environment=logged))).profiles[1].temperature_c
     assert set(warm.tolist()) == {21.0}
     alone = with_temperature(replace(recording, environment={name: logged[name] for name in ("t_s", "temperature_c")}))
     assert alone.environment is None

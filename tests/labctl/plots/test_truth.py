@@ -11,7 +11,7 @@ import pytest
 from labctl.answers.comparison import ComparisonResponse
 from labctl.answers.criticism import CriticismResponse
 from labctl.fitting.criticism import residual_maps
-from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.earth_rate import up_rate_dps
 from labctl.plots.model_lines import error_over_rate, full_turn
 from labctl.plots.noise import repeats
 from labctl.plots.residual_lines import channels, previous_rate, time

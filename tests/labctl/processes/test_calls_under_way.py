@@ -11,11 +11,11 @@ import pytest
 
 from instruments.clock import WallClock
 from labctl.errors import BenchSilent
-from labctl.processes import bench_calls
-from labctl.processes.bench_calls import BenchCalls
-from labctl.processes.bench_forms import form_of
-from labctl.processes.calls import Caller, CallServer
+from labctl.processes import bench_rpc
+from labctl.processes.bench_methods import method_of
+from labctl.processes.bench_rpc import BenchRpc
 from labctl.processes.held_address import HeldAddress
+from labctl.processes.rpc import RpcClient, RpcServer
 from labctl.processes.supervision import Supervision
 from labctl.services.local_bench import LocalBench
 from labctl.store import Store
@@ -47,12 +47,12 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.store = SlowStore()
         local = LocalBench(cast(Store, self.store), WallClock(), None)
-        self.calls = BenchCalls(
+        self.calls = BenchRpc(
             cast(Store, self.store), local, cast(Supervision, None), cast(HeldAddress, None), WallClock()
         )
-        self.server = CallServer(folder / "calls", self.calls.answer, form_of)
+        self.server = RpcServer(folder / "calls", self.calls.answer, method_of)
         self.server.start()
-        self.caller, self.other = (Caller(folder / "calls", WAIT_S, form_of) for _ in range(2))
+        self.caller, self.other = (RpcClient(folder / "calls", WAIT_S, method_of) for _ in range(2))
         assert self.caller.call("bench.describe") is None  # its connection is kept
         self.answers: list[object] = []
         self.asking = threading.Thread(target=lambda: self.answers.append(self.other.call(RENEW, *RENEWAL)))
@@ -88,7 +88,7 @@ def test_a_call_that_is_under_way_is_answered_before_the_database_is_closed(tmp_
 
 
 def test_a_call_that_does_not_end_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench_calls, "UNDER_WAY_S", 0.05)
+    monkeypatch.setattr(bench_rpc, "UNDER_WAY_S", 0.05)
     bench = Bench(tmp_path)
     bench.end()
     assert bench.store.is_closed

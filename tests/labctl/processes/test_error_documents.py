@@ -11,12 +11,12 @@ from instruments.errors import NoReply
 from instruments.transport.modbus_link import RefusedRegister
 from labctl.errors import DataRefused, LabctlError, NotEnoughData, StoreError, TooBusy
 from labctl.fitting.models.inversion import NotConverged
-from labctl.processes.call_forms import supervisor_form
 from labctl.processes.documents import BadDocument, refusal, value_of
 from labctl.processes.error_documents import KINDS, ErrorDocument, OtherProcessFailed
+from labctl.processes.rpc_methods import supervisor_method
 from procedures.contracts.errors import BadData, GuardTripped, PlanRefused, StepFailed
 
-NOTHING = supervisor_form("address.give_back").result
+NOTHING = supervisor_method("address.give_back").result
 
 
 def crossed(error: BaseException) -> Exception:

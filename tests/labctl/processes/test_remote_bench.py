@@ -15,12 +15,12 @@ import pytest
 from instruments.clock import VirtualClock, WallClock
 from labctl.acting_user import Actor, acting
 from labctl.errors import BenchSilent, Conflict, NotFound
-from labctl.processes.bench_calls import BenchCalls
-from labctl.processes.bench_forms import form_of
-from labctl.processes.calls import CallServer
+from labctl.processes.bench_methods import method_of
+from labctl.processes.bench_rpc import BenchRpc
 from labctl.processes.driver_note import DriverNoteWriter
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
+from labctl.processes.rpc import RpcServer
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.processes.waker import Waker
@@ -46,8 +46,8 @@ def folder(tmp_path: Path) -> Iterator[Path]:
         local = LocalBench(store, WallClock(), BenchRunner(store, BENCH, VirtualClock))
         address = HeldAddress(local.request_stop, local.describe_running)
         supervision = Supervision(settings, store, waker, lambda: False, address)
-        calls = BenchCalls(store, local, supervision, address, WallClock())
-        servers = StopServer(tmp_path / STOP, local.request_stop), CallServer(tmp_path / CALLS, calls.answer, form_of)
+        calls = BenchRpc(store, local, supervision, address, WallClock())
+        servers = StopServer(tmp_path / STOP, local.request_stop), RpcServer(tmp_path / CALLS, calls.answer, method_of)
         DriverNoteWriter(settings, store, local).write(settings)
         for server in servers:
             server.start()

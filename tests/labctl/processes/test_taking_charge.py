@@ -17,7 +17,7 @@ from labctl.processes import supervisor as module
 from labctl.processes.listening import Listening
 from labctl.processes.liveness import Elapsed
 from labctl.processes.settings import BenchSettings, ServeRequest
-from labctl.processes.supervisor import LOOK_S, STARTS_WITHIN_S, Supervisor
+from labctl.processes.supervisor import POLL_INTERVAL_S, STARTS_WITHIN_S, Supervisor
 from labctl.processes.waker import Waker
 from labctl.store import Holder
 
@@ -115,7 +115,7 @@ def test_one_that_never_answers_is_named_after_the_time_in_which_it_must(
     machine, waker = Machine(holder(tmp_path), answers_after=10_000), FakeWaker(VirtualClock())
     with pytest.raises(Conflict, match="another process writes"):
         opened(machine, waker)
-    assert waker.waits == pytest.approx(STARTS_WITHIN_S / LOOK_S, abs=2)
+    assert waker.waits == pytest.approx(STARTS_WITHIN_S / POLL_INTERVAL_S, abs=2)
 
 
 def test_a_command_that_holds_the_database_is_refused_at_once(opened: Callable[[Machine, FakeWaker], object]) -> None:

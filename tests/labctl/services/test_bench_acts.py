@@ -24,7 +24,7 @@ from labctl.api.act_routes import add_act_route
 from labctl.cli.app import app
 from labctl.client import Client
 from labctl.errors import Conflict
-from labctl.processes.bench_calls import BENCH_ACTS
+from labctl.processes.bench_rpc import BENCH_ACTS
 from labctl.service_connection import ServiceRefused
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.status import campaign_status

@@ -17,7 +17,7 @@ from labctl.stop import program
 from labctl.stop.client import StopResult
 from labctl.stop.latch import StopRequest
 from labctl.stop.places import BenchPlace, DriverNote, ProcessId, place_of
-from labctl.stop.program import Asked, main, stop_all
+from labctl.stop.program import StopArguments, main, stop_all
 
 WHY = "stopped from the command line"
 REAL = {"name": "real", "table": {"port": "/dev/ttyUSB7"}}
@@ -83,12 +83,15 @@ def written(tmp_path: Path, text: str) -> str:
 
 
 def test_the_words_of_the_command_are_what_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[Asked] = []
+    asked: list[StopArguments] = []
     monkeypatch.setattr(program, "run", lambda request: asked.append(request) or 1)
     assert main([]) == 1
     main(["--bench", "b", "--database", "d", "--by", "Ada", "--reason", "smoke", "--json"])
-    assert asked == [Asked(None, None, None, WHY, as_json=False), Asked("b", "d", "Ada", "smoke", as_json=True)]
-    assert Asked() == asked[0]
+    assert asked == [
+        StopArguments(None, None, None, WHY, as_json=False),
+        StopArguments("b", "d", "Ada", "smoke", as_json=True),
+    ]
+    assert StopArguments() == asked[0]
 
 
 def test_every_bench_that_stands_is_printed_and_the_status_is_0(location: str, capsys: Any) -> None:
@@ -144,7 +147,7 @@ def test_benches_are_stopped_at_the_same_time_and_reported_in_the_order_of_their
         bench(location, name, driver=me(), registered=False)
     every, begun = threading.Barrier(3, timeout=5.0), list[threading.Thread]()
     stops.meanwhile = lambda: (begun.append(threading.current_thread()), every.wait())
-    results = stop_all(Asked(database=location, by="Ada", reason="smoke"))
+    results = stop_all(StopArguments(database=location, by="Ada", reason="smoke"))
     assert [(result.bench, result.stands) for result in results] == [("a", True), ("b", True), ("c", True)]
     assert all(thread.daemon for thread in begun)  # a second Ctrl-C ends the command
     (request,) = set(stops.requests)
@@ -153,7 +156,7 @@ def test_benches_are_stopped_at_the_same_time_and_reported_in_the_order_of_their
 
 def test_the_age_of_the_command_counts_for_what_it_says_late(location: str, stops: Stops) -> None:
     bench(location, "a", driver=me())
-    stop_all(Asked())
+    stop_all(StopArguments())
     assert stops.ages_s == [pytest.approx(me().age_s, abs=10.0)]
     assert stops.ages_s[0] > 0.0
 
@@ -162,11 +165,11 @@ def test_who_stops_is_the_user_of_the_system_else_its_number(
     location: str, stops: Stops, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench(location, "a", driver=me())
-    stop_all(Asked())
+    stop_all(StopArguments())
     user = pwd.getpwuid(os.getuid()).pw_name
     assert (stops.requests[0].by, stops.requests[0].reason) == (user, f"{WHY} ({user})")
     monkeypatch.setattr(pwd, "getpwuid", lambda number: {}[number])
-    stop_all(Asked())
+    stop_all(StopArguments())
     assert stops.requests[1].by == f"uid {os.getuid()}"
 
 
@@ -186,14 +189,14 @@ def test_a_bench_that_was_left_safe_is_only_reported_where_no_process_has_it(
     location: str, stops: Stops, note: dict[str, Any], text: str | None
 ) -> None:
     bench(location, "a", **note)
-    (result,) = stop_all(Asked())
+    (result,) = stop_all(StopArguments())
     assert (result.stands, result.text) == (True, text or "the table is at rest")
     assert stops.benches == ([] if text else ["a"])
 
 
 def test_a_bench_without_a_note_is_stopped(location: str, stops: Stops) -> None:
     place_of(location, "a").folder.mkdir(parents=True)
-    stop_all(Asked(database=location))
+    stop_all(StopArguments(database=location))
     assert stops.benches == ["a"]
 
 
@@ -203,15 +206,15 @@ def test_benches_are_those_of_the_database_that_is_named_else_all_that_are_known
     other = str(tmp_path / "other.sqlite")
     bench(location, "of the first", driver=me())
     bench(other, "of the other", driver=me(), registered=False)
-    stop_all(Asked(database=other))
+    stop_all(StopArguments(database=other))
     assert stops.benches == ["of the other"]
-    stop_all(Asked())
+    stop_all(StopArguments())
     assert stops.benches[1:] == ["of the first"]
     monkeypatch.setenv("LABCTL_DATABASE", f" {other} ")
-    stop_all(Asked())
+    stop_all(StopArguments())
     assert sorted(stops.benches[2:]) == ["of the first", "of the other"]
     monkeypatch.setenv("LABCTL_DATABASE", location)
-    stop_all(Asked())
+    stop_all(StopArguments())
     assert stops.benches[4:] == ["of the first"]
 
 
@@ -256,7 +259,7 @@ def test_only_the_bench_that_is_meant_is_stopped_by_its_name_or_its_table(
         ('name = "x"\n', []),
     ):
         stops.benches.clear()
-        stop_all(Asked(bench=written(tmp_path, text)))
+        stop_all(StopArguments(bench=written(tmp_path, text)))
         assert (text, stops.benches) == (text, meant)
 
 
@@ -264,20 +267,22 @@ def test_a_bench_that_no_process_has_driven_is_stopped_at_its_instruments(
     location: str, tmp_path: Path, stops: Stops
 ) -> None:
     file = written(tmp_path, 'name = "x"\n[table]\nport = "/dev/ttyUSB7"\n')
-    assert stop_all(Asked(bench=file)) == [StopResult("x", True, "stopped directly")]
+    assert stop_all(StopArguments(bench=file)) == [StopResult("x", True, "stopped directly")]
     (note,) = stops.notes
     assert (note.bench, note.document["name"], note.driver) == ("x", "x", ProcessId())
     stops.stands = False
-    assert stop_all(Asked(bench=written(tmp_path, 'name = "x"\n'))) == [StopResult("x", False, "stopped directly")]
-    assert stop_all(Asked(bench=written(tmp_path, SIMULATED))) == [
+    assert stop_all(StopArguments(bench=written(tmp_path, 'name = "x"\n'))) == [
+        StopResult("x", False, "stopped directly")
+    ]
+    assert stop_all(StopArguments(bench=written(tmp_path, SIMULATED))) == [
         StopResult("copy", True, "its instruments are simulated, and no process runs it")
     ]
     assert len(stops.notes) == 2
 
 
 def test_the_bench_file_is_read_as_the_service_reads_it_where_that_is_possible(tmp_path: Path, stops: Stops) -> None:
-    stop_all(Asked(bench="example-real"))  # a shipped one, by its name
-    stop_all(Asked(bench=written(tmp_path, 'name = "x"\n[table]\nport = "/dev/ttyUSB7"\ndriver = 3\n')))
+    stop_all(StopArguments(bench="example-real"))  # a shipped one, by its name
+    stop_all(StopArguments(bench=written(tmp_path, 'name = "x"\n[table]\nport = "/dev/ttyUSB7"\ndriver = 3\n')))
     complete, as_it_is = (note.document for note in stops.notes)
     assert (complete["name"], complete["standards"]) == ("my-bench", [])  # the file has no line for standards
     assert as_it_is == {"name": "x", "table": {"port": "/dev/ttyUSB7", "driver": 3}}
@@ -287,9 +292,9 @@ def test_a_stop_of_a_bench_that_no_process_has_driven_is_latched_where_its_datab
     location: str, tmp_path: Path
 ) -> None:
     file = written(tmp_path, 'name = "x"\n[table]\nport = "/dev/ttyUSB7"\n')
-    (result,) = stop_all(Asked(bench=file, database=location, by="Ada"))
+    (result,) = stop_all(StopArguments(bench=file, database=location, by="Ada"))
     assert result.latched is True
     assert [stop.by for stop in place_of(location, "x").latch.state().open] == ["Ada"]
     (tmp_path / "full.sqlite.benches").write_bytes(b"no folder")
-    (result,) = stop_all(Asked(bench=file, database=str(tmp_path / "full.sqlite")))
+    (result,) = stop_all(StopArguments(bench=file, database=str(tmp_path / "full.sqlite")))
     assert (result.stands, result.latched) == (True, False)

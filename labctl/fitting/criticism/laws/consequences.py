@@ -21,31 +21,31 @@ FASTER, BEYOND_K = 0.25, 10.0
 SAME_C = 0.5
 
 
-def consequences(law: Law, found: Criticism) -> list[str]:
+def consequences(law: Law, criticism: Criticism) -> list[str]:
     """Return what else would follow from a law, one sentence each, on the axis on which it adds most."""
-    data, base = found.fit_data, found.base
+    data, base = criticism.fit_data, criticism.base
     if base is None:
         return []
     channels = data.channels
     added = {axis: added_dps(law.fit, base, channels, axis) for axis in data.outputs}
     axis = max(added, key=lambda name: float(np.abs(added[name]).max()))
     if not _has_rate(law):
-        said = ["It does not depend on the rate."]
+        sentences = ["It does not depend on the rate."]
     else:
-        said = [_symmetry(law, channels, axis)]
+        sentences = [_symmetry(law, channels, axis)]
         row = int(np.argmax(np.abs(channels.rate_dps(axis))))
         fastest_dps = float(abs(channels.rate_dps(axis)[row]))
         if (1 + FASTER) * fastest_dps <= (data.info.max_rate_dps or np.inf):
             then = added_dps(law.fit, base, at_rates(channels, axis, 1 + FASTER), axis)
-            said.append(_beyond(f"{(1 + FASTER) * fastest_dps:.4g} deg/s", then, added[axis], row))
+            sentences.append(_beyond(f"{(1 + FASTER) * fastest_dps:.4g} deg/s", then, added[axis], row))
     if any(TEMPERATURE in text for text in law.formulas):
         for sign, end in ((1, "warmest"), (-1, "coldest")):
             row = _row_at_end(sign * data.temperature_c, added[axis])
             warm_c = data.temperature_c + sign * BEYOND_K
             moved = replace(channels, columns={**channels.columns, TEMPERATURE: warm_c})
             at = f"{warm_c[row]:.4g} deg C, {BEYOND_K:g} K beyond the {end} data set"
-            said.append(_beyond(at, added_dps(law.fit, base, moved, axis), added[axis], row))
-    return said
+            sentences.append(_beyond(at, added_dps(law.fit, base, moved, axis), added[axis], row))
+    return sentences
 
 
 def _beyond(where: str, then: Array, now: Array, row: int) -> str:

@@ -75,16 +75,16 @@ class Breaking:
 
 
 @single_threaded
-def laws_of(found: Criticism) -> list[Law]:
+def laws_of(criticism: Criticism) -> list[Law]:
     """Return the laws that are proposed for what a model leaves, at most five, the likeliest first.
 
     They are functions of the rate and of the channels that the residual follows. None of them makes the error at
     temperatures or rates that were left out worse.
     """
-    comparison, base = found.beside_missing, found.base
+    comparison, base = criticism.beside_missing, criticism.base
     if comparison is None or base is None:
         return []
-    scales = scales_of(found.data, _channels(found))
+    scales = scales_of(criticism.data, _channels(criticism))
     if not scales:
         return []
     states = Search(comparison, library(scales)).run()
@@ -93,7 +93,7 @@ def laws_of(found: Criticism) -> list[Law]:
     for state in states[:MAX_TRIED]:
         if len(laws) == MAX_LAWS or (laws and state.score < laws[0].evidence - FAR_BEHIND):
             break
-        law = _fitted(found, comparison, base, state)
+        law = _fitted(criticism, comparison, base, state)
         if law is not None and not any(_are_alike(law, other) for other in laws):
             laws.append(law)
     total = logsumexp([law.evidence for law in laws]) if laws else 0.0
@@ -102,19 +102,19 @@ def laws_of(found: Criticism) -> list[Law]:
 
 def coefficients_of_law(law: Law) -> dict[str, dict[str, Coefficient]]:
     """Return axis -> term -> value, standard uncertainty and unit of its coefficient in the fit with it."""
-    found: dict[str, dict[str, Coefficient]] = {}
+    coefficients: dict[str, dict[str, Coefficient]] = {}
     for axis, fit in law.fit.fitted.axes.items():
         u = none_for_nan(fit.u)
         rows = {owner: k for k, owner in enumerate(fit.effects)}
-        found[axis] = {
+        coefficients[axis] = {
             term.effect: {"value": float(fit.values[row, 0]), "u": u[row][0], "unit": "deg/s"}
             for term in law.terms
             if (row := rows.get(term.effect)) is not None
         }
-    return found
+    return coefficients
 
 
-def breaking(laws: Sequence[Law], found: Criticism) -> Breaking | None:
+def breaking(laws: Sequence[Law], criticism: Criticism) -> Breaking | None:
     """Return where the two likeliest laws differ most, with all else of their fits; None for fewer than two.
 
     The rates are those of the data sets, of their axes alone, times a share of up to a quarter more, as far as the unit
@@ -122,7 +122,7 @@ def breaking(laws: Sequence[Law], found: Criticism) -> Breaking | None:
     """
     if len(laws) < 2:
         return None
-    data, most = found.fit_data, Breaking(0.0, None, 0.0)
+    data, most = criticism.fit_data, Breaking(0.0, None, 0.0)
     limit_dps = data.info.max_rate_dps or np.inf
     for axis in data.outputs:
         rate_dps = data.true_rate_dps(axis)
@@ -137,22 +137,24 @@ def breaking(laws: Sequence[Law], found: Criticism) -> Breaking | None:
     return most if most.difference_dps > 0 else None
 
 
-def _channels(found: Criticism) -> list[str]:
+def _channels(criticism: Criticism) -> list[str]:
     """Return the rate, and the first channels that the residual follows; the temperature where it follows none.
 
     A channel that moved with the temperature is left out: the schedule does not say which of the two it is.
     """
     follows = [
-        name for name in found.verdict.depends_on if name != TABLE_RATE and not _moved_with_temperature(found, name)
+        name
+        for name in criticism.verdict.depends_on
+        if name != TABLE_RATE and not _moved_with_temperature(criticism, name)
     ]
     if TEMPERATURE not in follows[:MAX_CHANNELS]:
         follows = [*follows[: MAX_CHANNELS - 1], TEMPERATURE]
     return [TABLE_RATE, *follows[:MAX_CHANNELS]]
 
 
-def _moved_with_temperature(found: Criticism, name: str) -> bool:
+def _moved_with_temperature(criticism: Criticism, name: str) -> bool:
     """Return whether a channel rose and fell with the temperature, or against it, over the data sets."""
-    data = found.fit_data
+    data = criticism.fit_data
     if name == TEMPERATURE or name not in data.channels or not data.channels.history.thermometer:
         return False
     values = np.asarray(data.channels[name], dtype=np.float64)
@@ -174,10 +176,10 @@ def at_rates(channels: Channels, axis: str, share: float) -> Channels:
     return channels.with_rates({**channels.rates, axis: share * channels.rate_dps(axis)})
 
 
-def _goes_astray(found: Criticism, base: FitResult, fit: FitResult) -> bool:
+def _goes_astray(criticism: Criticism, base: FitResult, fit: FitResult) -> bool:
     """Return whether a fit adds far more between the rates of the data sets, where nothing was measured."""
-    channels = found.fit_data.channels
-    for axis in found.fit_data.outputs:
+    channels = criticism.fit_data.channels
+    for axis in criticism.fit_data.outputs:
         most = ASTRAY * float(np.abs(added_dps(fit, base, channels, axis)).max(initial=0.0))
         for share in (share for share in BETWEEN if share <= 1.0):
             between = added_dps(fit, base, at_rates(channels, axis, share), axis)
@@ -186,17 +188,17 @@ def _goes_astray(found: Criticism, base: FitResult, fit: FitResult) -> bool:
     return False
 
 
-def _fitted(found: Criticism, comparison: Comparison, base: FitResult, state: State) -> Law | None:
+def _fitted(criticism: Criticism, comparison: Comparison, base: FitResult, state: State) -> Law | None:
     """Return a law as it is fitted beside a model; None where what was left out is not predicted better with it."""
     names = [name for name in (f"law_{k}" for k in range(1, MAX_NAMES)) if name not in comparison.model.effect_ids]
     terms = tuple(Term(name, formula=text) for name, text in zip(names, state.formulas, strict=False))
     if held_out_rises(comparison, terms, {term.effect: Formula(term.effect, term.formula) for term in terms}):
         return None
     try:
-        fit = fit_preset(found.fit_data, changed(base.fitted.model, terms))
+        fit = fit_preset(criticism.fit_data, changed(base.fitted.model, terms))
     except LabctlError:  # what is exported could not be inverted, or the means do not determine it
         return None
-    if _is_worse(base, fit) or _goes_astray(found, base, fit):
+    if _is_worse(base, fit) or _goes_astray(criticism, base, fit):
         return None
     kinds = tuple(part.shape.kind for part in state.parts)
     taken = {axis: values - fit.residual_dps[axis] for axis, values in base.residual_dps.items()}

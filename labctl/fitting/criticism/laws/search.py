@@ -93,7 +93,7 @@ class Search:
         """Return a state with one term more, in several ways."""
         axes = self._by_axis(begun.formulas, [shape.formulas() for shape in self._shapes])
         worth = sum(axes.values()) - np.array([self._price + PER_SYMBOL * shape.nodes for shape in self._shapes])
-        found = []
+        states = []
         best_of_kind: dict[str, int] = {}
         for index in np.argsort(-worth).tolist():
             best_of_kind.setdefault(NUMBER.sub("", self._shapes[index].kind), index)  # powers are of one kind
@@ -102,8 +102,8 @@ class Search:
             part = self._refined(begun, self._shapes[index], strongest)
             gained = float(self._evidence(begun.formulas, [part.formulas])[0]) - self._price_of(part.shape)
             if gained > MIN_WORTH:
-                found.append(self._pruned(State((*begun.parts, part), begun.score + gained)))
-        return found
+                states.append(self._pruned(State((*begun.parts, part), begun.score + gained)))
+        return states
 
     def _pruned(self, state: State) -> State:
         """Return a state without the terms that are not worth their price beside those that came later."""
@@ -131,8 +131,8 @@ class Search:
 
         def unlikely(values: Array) -> float:
             constants = dict(zip(names, map(float, values), strict=True))
-            found = self._on_axis(axis, begun.formulas, [shape.formulas(constants)], noises)
-            return -float(max(found.log_bf[0], 0.0))
+            evidence = self._on_axis(axis, begun.formulas, [shape.formulas(constants)], noises)
+            return -float(max(evidence.log_bf[0], 0.0))
 
         start = np.array([shape.constants[name] for name in names])
         best = minimize(
@@ -144,9 +144,9 @@ class Search:
 
     def _likely(self, beside: Sequence[str], axis: str) -> list[Noise]:
         """Return the noises of an axis that are likely beside the model and formulas."""
-        found = self._on_axis(axis, beside, (), self._comparison.axes[axis].noises)
-        pairs = zip(found.noises, found.weights, strict=True)
-        return [noise for noise, weight in pairs if weight >= MIN_WEIGHT] or [found.best.noise]
+        evidence = self._on_axis(axis, beside, (), self._comparison.axes[axis].noises)
+        pairs = zip(evidence.noises, evidence.weights, strict=True)
+        return [noise for noise, weight in pairs if weight >= MIN_WEIGHT] or [evidence.best.noise]
 
     def _evidence(self, beside: Sequence[str], tried: Sequence[tuple[str, ...]]) -> Array:
         """Return the log Bayes factor of each option beside the model and formulas, over all axes, nats."""
@@ -168,12 +168,12 @@ class Search:
         )
 
     def _design(self, axis: str, beside: Sequence[str], tried: Sequence[tuple[str, ...]]) -> Design:
-        given = self._comparison.designs[axis]
+        design = self._comparison.designs[axis]
         more = [self._columns(axis, text) for text in beside]
-        base = np.concatenate([given.base, *more], axis=2)
-        precision = np.concatenate([given.precision, np.zeros(len(more))])
+        base = np.concatenate([design.base, *more], axis=2)
+        precision = np.concatenate([design.precision, np.zeros(len(more))])
         # shapes are centred on what was measured, and need not be made orthogonal to the base as a person's formulas
-        return replace(given, base=base, precision=precision, options=[self._option(axis, texts) for texts in tried])
+        return replace(design, base=base, precision=precision, options=[self._option(axis, texts) for texts in tried])
 
     def _option(self, axis: str, texts: tuple[str, ...]) -> CandidateShape:
         rows = np.concatenate([self._columns(axis, text) for text in texts], axis=2)
@@ -205,7 +205,7 @@ class Search:
 
 def _different(states: Sequence[State]) -> list[State]:
     """Return states without those that have the terms of a better one in another order."""
-    found: dict[frozenset[str], State] = {}
+    by_formulas: dict[frozenset[str], State] = {}
     for state in states:
-        found.setdefault(frozenset(state.formulas), state)
-    return list(found.values())
+        by_formulas.setdefault(frozenset(state.formulas), state)
+    return list(by_formulas.values())

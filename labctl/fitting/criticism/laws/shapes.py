@@ -174,28 +174,28 @@ def _rounded(value: float) -> float:
 def library(scales: Mapping[str, Scale]) -> list[Shape]:
     """Return every shape that a term of a law may have: of each channel, and of each pair of channels as a product."""
     rate = scales.get(TABLE_RATE)
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     if rate is not None:
-        found += [shape.of(rate.text) for shape in _of_rate(rate)]
+        shapes += [shape.of(rate.text) for shape in _of_rate(rate)]
     for scale in scales.values():
         if scale is rate:
             continue
         of_channel = [_named(shape, scale) for shape in _seen(OF_CHANNEL, scale)]
-        found += of_channel
+        shapes += of_channel
         if rate is None:
             continue
-        found += [
+        shapes += [
             shape.times(factor.format(u=rate.text), f"times {words}")
             for shape in of_channel
             for factor, words in (("{u}", "the rate"), ("abs({u})", "its size"), ("{u}**2", "its square"))
         ]
-        found += [
+        shapes += [
             shape.of(rate.text).times(factor.format(u=scale.text), f"times {words} {scale.name}")
             for shape in _of_rate(rate)
             for factor, words in (("{u}", "the"), ("{u}**2", "the square of the"))
         ]
-    found += _of_two([scale for scale in scales.values() if scale is not rate])
-    return list({shape.formulas(): shape for shape in found}.values())
+    shapes += _of_two([scale for scale in scales.values() if scale is not rate])
+    return list({shape.formulas(): shape for shape in shapes}.values())
 
 
 def _of_rate(rate: Scale) -> Iterator[Shape]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
 from labctl.fitting.data.channels import channels_of
-from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.earth_rate import up_rate_dps
 from labctl.fitting.data.mean_noise import quantisation_var_of, white_var_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording, to_points

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
 from labctl.fitting.data.channels import channels_of
-from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.earth_rate import up_rate_dps
 from labctl.fitting.data.fit_data import profile_of
 from labctl.fitting.data.mean_noise import white_var_of
 from labctl.fitting.data.rate_profile import RateProfile, Response

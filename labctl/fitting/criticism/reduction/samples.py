@@ -13,7 +13,7 @@ from labctl.fitting.criticism.reduction.basis import WAVES, orthonormal_basis
 from labctl.fitting.criticism.reduction.outliers import inlier_mask, white_level_dps
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
 from labctl.fitting.data.channels import Channels, body_rates
-from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.earth_rate import up_rate_dps
 from labctl.fitting.data.temperature.channel import with_stand_in
 from labctl.fitting.data.temperature.history import history_of
 from labctl.fitting.numeric.arrays import Array
@@ -155,5 +155,5 @@ def _steps_var(recording: Recording, numbers: Mapping[str, Array], axis: str) ->
     step_columns = numbers.get(f"gyro_{axis}{QUANTISATION}")
     if step_columns is None:
         return np.zeros(len(numbers[f"gyro_{axis}"]))
-    output = next((unit for name, unit in recording.info.output.items() if name == axis), None)
+    output = next((output_unit for name, output_unit in recording.info.output.items() if name == axis), None)
     return np.asarray((step_columns / (output.scale if output else 1.0)) ** 2)

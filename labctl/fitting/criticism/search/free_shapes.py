@@ -27,7 +27,7 @@ from labctl.fitting.criticism.model_comparison import (
     designs_beside,
     orthogonalised,
 )
-from labctl.fitting.criticism.verdict import LEAD
+from labctl.fitting.criticism.rivals import LEAD
 from labctl.fitting.effects import Effect, Term
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.progress import report_stage

@@ -14,7 +14,8 @@ from labctl.fitting.criticism.evidence.design import Design, Discrepancy
 from labctl.fitting.criticism.evidence.elimination import eliminate_base
 from labctl.fitting.criticism.model_comparison import Comparison, compare_models, designs_beside
 from labctl.fitting.criticism.ranking import Candidate
-from labctl.fitting.criticism.verdict import ENOUGH_NEXT, LEAD, channels_behind
+from labctl.fitting.criticism.rivals import LEAD
+from labctl.fitting.criticism.verdict import ENOUGH_NEXT, channels_behind
 from labctl.fitting.effects import Effect, Term
 
 #: Excess chi2 over its own scatter from which on something is said to remain.

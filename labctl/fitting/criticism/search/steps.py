@@ -84,8 +84,8 @@ class _Axis:
     def step(self, place: float, *, is_scaled: bool) -> CandidateShape:
         """Return a step as an option."""
         column = self._steps(np.array([place]))[:, [int(is_scaled)]]
-        name, unit = (f"{TIME}>{place:.6g} x rate", "1") if is_scaled else (f"{TIME}>{place:.6g}", "deg/s")
-        return CandidateShape(TIME, None, self._data.rows_of(column), (name,), (unit,))
+        name, unit_symbol = (f"{TIME}>{place:.6g} x rate", "1") if is_scaled else (f"{TIME}>{place:.6g}", "deg/s")
+        return CandidateShape(TIME, None, self._data.rows_of(column), (name,), (unit_symbol,))
 
     def _steps(self, places: Array) -> NDArray[np.float64]:
         t_s = np.asarray(self._data.nodes[TIME], dtype=np.float64)

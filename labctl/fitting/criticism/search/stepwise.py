@@ -13,6 +13,7 @@ from labctl.fitting.criticism.evidence.design import Discrepancy
 from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside, on_axis
 from labctl.fitting.criticism.ranking import Candidate, are_exact
+from labctl.fitting.criticism.rivals import ALIKE, FAR, LEAD
 from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
 from labctl.fitting.criticism.search.exact_shapes import with_exact_terms
 from labctl.fitting.criticism.search.free_shapes import beside_terms, channels_beside_smooth, channels_of_free_shape
@@ -21,10 +22,7 @@ from labctl.fitting.criticism.search.refinement import refined_term, with_refine
 from labctl.fitting.criticism.search.remainder import is_better_than_smooth, is_within_noise, remainder_of
 from labctl.fitting.criticism.search.steps import may_be_step
 from labctl.fitting.criticism.verdict import (
-    ALIKE,
     ENOUGH,
-    FAR,
-    LEAD,
     Form,
     Step,
     Verdict,

@@ -1,1 +1,1 @@
-"""Temperature of a recording: its thermometer, its course between data sets, its levels and legs."""
+"""Temperature of a recording: its thermometer, its profile between data sets, its levels and legs."""

@@ -20,9 +20,9 @@ from labctl.recording.columns import WITHIN_S
 
 #: Logged columns by name, (n,) each.
 LoggedColumns = Mapping[str, NDArray[np.generic]]
-#: What an effect asks of a temperature course (k,) with parameters, (k,).
+#: What an effect asks of a temperature profile (k,) with parameters, (k,).
 CourseFunction = Callable[..., Array]
-#: Spacing of a resampled temperature course, s.
+#: Spacing of a resampled temperature profile, s.
 SPACING_S = 10.0
 #: Windows whose middles are no further apart than this many of their lengths follow one another.
 NEXT_WINDOW = 1.2
@@ -31,14 +31,14 @@ ROUNDED_PLAYS = 4
 
 
 @dataclass(frozen=True)
-class TemperatureCourse:
+class TemperatureProfile:
     """Temperature of one powered run, evenly spaced by `SPACING_S`."""
 
     begin_s: float  #: time of the first value, s
     temperature_c: Array  #: (k,) deg C
 
     def at(self, values: Array, t_s: Array) -> Array:
-        """Return values of this course (k,) interpolated linearly at times `t_s` (n,), as (n,)."""
+        """Return values of this profile (k,) interpolated linearly at times `t_s` (n,), as (n,)."""
         times = self.begin_s + SPACING_S * np.arange(len(values))
         return np.interp(t_s, times, values)
 
@@ -48,16 +48,16 @@ class TemperatureHistory:
     """History of a recording.
 
     Each method takes the logged columns of the rows (n,) that it answers for; they need `t_s`, and `run` where there
-    is more than one. A history without courses answers 0 for every row.
+    is more than one. A history without profiles answers 0 for every row.
     """
 
-    courses: Mapping[int, TemperatureCourse] = field(default_factory=dict)  #: by number of the run
+    profiles: Mapping[int, TemperatureProfile] = field(default_factory=dict)  #: by number of the run
     counted: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  #: "run", "mounting" -> numbers, rising
     rate_dps: float = 1.0  #: largest table rate, deg/s, without sign
     span_c: tuple[float, float] = (0.0, 1.0)  #: lowest and highest temperature, deg C
     thermometer: bool = True  #: whether anything says how warm the unit was
     middle_s: float = 0.0  #: middle of the times within a recording, s: a clock may count from 1970
-    #: What was computed of the courses, by function and its parameter: every axis asks for the same.
+    #: What was computed of the profiles, by function and its parameter: every axis asks for the same.
     _known: dict[tuple[CourseFunction, tuple[float, ...]], dict[int, Array]] = field(default_factory=dict, repr=False)
 
     def numbers(self, name: str) -> tuple[int, ...]:
@@ -82,11 +82,11 @@ class TemperatureHistory:
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
         lag_k = np.zeros((len(t_s), len(taus_s)))
-        for number, course in self.courses.items():
+        for number, profile in self.profiles.items():
             in_run = run == number
             if in_run.any():
-                lags = _lags_two_ways(course.temperature_c, taus_s, cooling_taus_s)
-                lag_k[in_run] = np.column_stack([course.at(lag, t_s[in_run]) for lag in lags.T])
+                lags = _lags_two_ways(profile.temperature_c, taus_s, cooling_taus_s)
+                lag_k[in_run] = np.column_stack([profile.at(lag, t_s[in_run]) for lag in lags.T])
         return lag_k
 
     def hysteresis_state(self, columns: LoggedColumns, width_k: float, *, rounded: bool = False) -> Array:
@@ -102,19 +102,19 @@ class TemperatureHistory:
         return state
 
     def _evaluate(self, columns: LoggedColumns, function: CourseFunction, *parameters: float) -> Array:
-        """Return a function of each run's temperature course, (k,) to (k,), at the times of the rows, (n,)."""
-        if not self.courses:
+        """Return a function of each run's temperature profile, (k,) to (k,), at the times of the rows, (n,)."""
+        if not self.profiles:
             return np.zeros(len(next(iter(columns.values()), ())))
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
         cache = self._known.setdefault((function, parameters), {})
         evaluated = np.zeros(len(t_s))
-        for number, course in self.courses.items():
+        for number, profile in self.profiles.items():
             in_run = run == number
             if in_run.any():
                 if number not in cache:
-                    cache[number] = function(course.temperature_c, *parameters)
-                evaluated[in_run] = course.at(cache[number], t_s[in_run])
+                    cache[number] = function(profile.temperature_c, *parameters)
+                evaluated[in_run] = profile.at(cache[number], t_s[in_run])
         return evaluated
 
 
@@ -205,7 +205,7 @@ def history_of(recording: Recording) -> TemperatureHistory:
     span = (float(temperature_c.min()), float(temperature_c.max())) if len(temperature_c) else (0.0, 1.0)
     if "t_s" not in columns:
         return TemperatureHistory({}, counted, rate, span)
-    return TemperatureHistory(_courses(source, columns), counted, rate, span, middle_s=_middle_s(columns))
+    return TemperatureHistory(_profiles(source, columns), counted, rate, span, middle_s=_middle_s(columns))
 
 
 def _middle_s(columns: LoggedColumns) -> float:
@@ -215,12 +215,12 @@ def _middle_s(columns: LoggedColumns) -> float:
     return float((t_s.min() + t_s.max()) / 2) if len(t_s) else 0.0
 
 
-def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int, TemperatureCourse]:
+def _profiles(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int, TemperatureProfile]:
     t_s = np.asarray(source["t_s"], dtype=np.float64)
     temperature_c = np.asarray(source["temperature_c"], dtype=np.float64)
     run_of_row = np.asarray(source["run"]) if "run" in source else np.ones(len(t_s), dtype=np.int64)
     runs = np.unique(np.asarray(columns["run"])) if "run" in columns else np.array([1])
-    courses = {}
+    profiles = {}
     for run in runs:
         rows = (run_of_row == run) & np.isfinite(temperature_c)
         if "run" not in source:
@@ -234,12 +234,12 @@ def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int,
                 times, values, np.asarray(columns["duration_s"], dtype=np.float64)[rows][order]
             )
         grid = np.arange(times[0], times[-1] + SPACING_S, SPACING_S)
-        courses[int(run)] = TemperatureCourse(float(grid[0]), np.interp(grid, times, values))
-    return courses
+        profiles[int(run)] = TemperatureProfile(float(grid[0]), np.interp(grid, times, values))
+    return profiles
 
 
 def _to_the_ends(times: Array, values: Array, durations_s: Array) -> tuple[Array, Array]:
-    """Return a course of means, (k,), extended to the start of its first window and to the end of its last one.
+    """Return a profile of means, (k,), extended to the start of its first window and to the end of its last one.
 
     A follower starts at rest; on a ramp that is measured window by window it would otherwise start half a window late.
     An end is extended only where its two windows follow one another, so that they show the slope.

@@ -201,7 +201,7 @@ def _fitted(law: Law, gravity: float, sigma: Array, *, robust: bool, start: Arra
         first = least_squares(lambda theta: law.sizes(theta) - gravity, begin, law.jacobian)
         scale = max(1.4826 * float(np.median(np.abs(first.fun))), 1e-9)
         begin = first.x
-    found = least_squares(
+    solution = least_squares(
         lambda theta: (law.sizes(theta) - gravity) / sigma,
         begin,
         lambda theta: law.jacobian(theta) / sigma[:, None],
@@ -209,7 +209,7 @@ def _fitted(law: Law, gravity: float, sigma: Array, *, robust: bool, start: Arra
         f_scale=scale,
         x_scale="jac",
     )
-    return np.asarray(found.x, dtype=np.float64)
+    return np.asarray(solution.x, dtype=np.float64)
 
 
 def different_poses(directions: NDArray[np.float64]) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.earth import EARTH_RATE_DPS, up_rate_dps
+from labctl.fitting.data.earth_rate import EARTH_RATE_DPS, up_rate_dps
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.fitting.numeric.least_squares import Solution, solve

@@ -87,7 +87,7 @@ class Known:
 class ByFewer:
     """A calibration by few poses, and whether they agree with the earlier one."""
 
-    found: Accelerometer
+    accelerometer: Accelerometer
     p_value: float  #: of rests and earlier calibration together; small: they disagree
 
     @property
@@ -128,12 +128,12 @@ def by_fewer_poses(readings: PoseReadings, rests: Rests, known: Known) -> ByFewe
     _require_out_of_plane(serial, force, covariance[:FREE, :FREE])
     left = np.linalg.norm(force, axis=1) - gravity
     sigma = np.sqrt(white + extra)
-    found = Accelerometer(
+    accelerometer = Accelerometer(
         errors, bias, covariance, unit(force), sigma,
         np.ones(len(rests), dtype=np.bool_), float(np.sqrt(np.mean(left**2))), gravity, freedom,
         _freedom(jacobian, covariance, sigma, extra, known),
     )  # fmt: skip
-    return ByFewer(found, p_value)
+    return ByFewer(accelerometer, p_value)
 
 
 def _require_out_of_plane(serial: str, force: NDArray[np.float64], bias_covariance: NDArray[np.float64]) -> None:
@@ -193,13 +193,13 @@ def _fitted(accel_g: NDArray[np.float64], gravity: float, variance: Array, known
     from scipy.optimize import least_squares
 
     sigma = np.sqrt(variance)
-    found = least_squares(
+    solution = least_squares(
         lambda theta: _residual(theta, accel_g, gravity, sigma, known),
         np.concatenate([known.bias_g, known.errors]),
         lambda theta: _jacobian(theta, accel_g, sigma, known),
         x_scale="jac",
     )
-    return np.asarray(found.x, dtype=np.float64), 2 * float(found.cost)
+    return np.asarray(solution.x, dtype=np.float64), 2 * float(solution.cost)
 
 
 def _between(theta: Array, accel_g: NDArray[np.float64], gravity: float, white: Array, known: Known) -> float:
@@ -221,5 +221,7 @@ def _between(theta: Array, accel_g: NDArray[np.float64], gravity: float, white: 
         of_earlier = 0.0 if known.scatter is None else known.scatter.negative_log_likelihood(between)
         return negative_log_restricted_likelihood(jacobian, residual, np.diag(total)) + of_earlier
 
-    found = minimize_scalar(negative_log_likelihood, bounds=(1e-6, MAX_ROOT), method="bounded", options={"xatol": 1e-4})
-    return float((found.x * scale) ** 2)
+    minimum = minimize_scalar(
+        negative_log_likelihood, bounds=(1e-6, MAX_ROOT), method="bounded", options={"xatol": 1e-4}
+    )
+    return float((minimum.x * scale) ** 2)

@@ -127,7 +127,7 @@ def powers_of(away: Array, order: int) -> NDArray[np.float64]:
     return np.asarray(away[:, None] ** np.arange(1, order + 1), dtype=np.float64)
 
 
-def at_reference(readings: PoseReadings, rests: Rests, found: OverTemperature) -> tuple[PoseReadings, Rests]:
+def at_reference(readings: PoseReadings, rests: Rests, over_temperature: OverTemperature) -> tuple[PoseReadings, Rests]:
     """Return readings and rests with the forces of the reference temperature: `found.reference` fits them.
 
     Raises NotEnoughData without a thermometer.
@@ -135,8 +135,8 @@ def at_reference(readings: PoseReadings, rests: Rests, found: OverTemperature) -
     temperatures_c = rest_temperatures(readings, rests)
     assert readings.temperature_c is not None  # refused by the line before
     return (
-        replace(readings, accel_g=found.at_reference_g(readings.accel_g, readings.temperature_c)),
-        replace(rests, accel_g=found.at_reference_g(rests.accel_g, temperatures_c)),
+        replace(readings, accel_g=over_temperature.at_reference_g(readings.accel_g, readings.temperature_c)),
+        replace(rests, accel_g=over_temperature.at_reference_g(rests.accel_g, temperatures_c)),
     )
 
 

@@ -18,22 +18,22 @@ from labctl.stop.latch import StopRequest
 if TYPE_CHECKING:
     from labctl.services.campaigns.bench_runner import BenchRunner
 
-Asked = ToCampaign[ReasonRequest]
+AddressedRequest = ToCampaign[ReasonRequest]
 
 
-def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_service(control: ServiceBench, context: CommandContext, request: AddressedRequest) -> CampaignResponse:
     """End a campaign; one that does not run here is only closed.
 
     It is written down after it is done: neither a full disk nor a slow writer is a reason to go on.
     """
-    reason, runner = asked.body.text, control.runner
-    if runner is None or not runner.runs_or_was_stopped(asked.campaign):
-        new = StopRequest.new(actor().name, actor().via, reason, asked.campaign)
-        left = None if runner is None else runner.stop_left(asked.campaign, new)
+    reason, runner = request.body.text, control.runner
+    if runner is None or not runner.runs_or_was_stopped(request.campaign):
+        new = StopRequest.new(actor().name, actor().via, reason, request.campaign)
+        left = None if runner is None else runner.stop_left(request.campaign, new)
         stops = None if runner is None else runner.stop_latch
-        return left or abort_abandoned(context.store, asked.campaign, reason, context.now(), stops)
-    stop = runner.stop_of(asked.campaign) or StopRequest.new(actor().name, actor().via, reason, asked.campaign)
-    answer = runner.abort(asked.campaign, stop)
+        return left or abort_abandoned(context.store, request.campaign, reason, context.now(), stops)
+    stop = runner.stop_of(request.campaign) or StopRequest.new(actor().name, actor().via, reason, request.campaign)
+    answer = runner.abort(request.campaign, stop)
     if missing := _recorded(context, runner, stop):
         text = f"the campaign was aborted, but that is not in the audit trail{missing}"
         return answer.model_copy(update={"unrecorded": text})
@@ -56,16 +56,16 @@ def _recorded(context: CommandContext, runner: BenchRunner, stop: StopRequest) -
     return " yet: the database is busy" if thread.is_alive() else "".join(failed)
 
 
-def _in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_foreground(_: Foreground, context: CommandContext, request: AddressedRequest) -> CampaignResponse:
     """Close a campaign that no process runs any more; one that runs would hold the database."""
-    return abort_abandoned(context.store, asked.campaign, asked.body.text, context.now())
+    return abort_abandoned(context.store, request.campaign, request.body.text, context.now())
 
 
 #: Its command of the command line is written by hand: it stops the bench before it loads what declares the acts.
 ABORT = CampaignAct(
     name="abort",
     body=ReasonRequest,
-    asked=Asked,
+    request_type=AddressedRequest,
     summary="End a campaign",
     description="""End a running campaign now, in the safe state. The data measured so far are stored.
 

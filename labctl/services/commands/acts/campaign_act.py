@@ -14,22 +14,24 @@ from labctl.services.commands.command import Command
 from labctl.services.commands.context import BenchAct
 from labctl.services.commands.requests import Addressed
 
-AskedT = TypeVar("AskedT", bound=Addressed)
+AddressedT = TypeVar("AddressedT", bound=Addressed)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CampaignAct(BenchAct[AskedT, CampaignResponse], Generic[AskedT]):
+class CampaignAct(BenchAct[AddressedT, CampaignResponse], Generic[AddressedT]):
     """An act on one campaign, which answers how the campaign is then."""
 
     body: type[Request]  #: of the request
-    asked: Callable[..., AskedT]  #: the request with its address: of `campaign`, `body` and fields of its own
+    request_type: Callable[
+        ..., AddressedT
+    ]  #: the request with its address: of `campaign`, `body` and fields of its own
     summary: str  #: in the description of the API
     description: str
     command_line: CampaignCommand | None = None  #: None: its command is written by hand
     is_urgent: bool = False  #: over HTTP it has threads that other requests cannot fill
 
     @cached_property
-    def command(self) -> Command[AskedT, CampaignResponse]:
+    def command(self) -> Command[AddressedT, CampaignResponse]:
         """Its command, whose path ends with the name of the act."""
         return Command(
             method="POST",

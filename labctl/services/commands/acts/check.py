@@ -9,27 +9,27 @@ from labctl.services.commands.command import Command
 from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToBench
 
-Asked = ToBench[CheckRequest]
+AddressedRequest = ToBench[CheckRequest]
 
 
-def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> BenchCheckResponse:
+def _in_service(control: ServiceBench, context: CommandContext, request: AddressedRequest) -> BenchCheckResponse:
     """Check this service's bench. Raises NotFound for another one, BenchBusy while a campaign runs."""
     runner = control.bench_runner()
-    if asked.bench != runner.bench.name:
+    if request.bench != runner.bench.name:
         shared = context.store.is_shared
-        advice = whereabouts(context.store, asked.bench) if shared else f"name bench {runner.bench.name}"
+        advice = whereabouts(context.store, request.bench) if shared else f"name bench {runner.bench.name}"
         raise NotFound(
-            f"this service drives bench {runner.bench.name}, not {asked.bench!r}, and can check only its own bench; "
+            f"this service drives bench {runner.bench.name}, not {request.bench!r}, and can check only its own bench; "
             f"{advice}"
         )
-    found = runner.check()
-    context.store.audit.record(context.now(), "bench check", f"bench {found.bench}", {"ok": found.ok})
-    return found
+    checked = runner.check()
+    context.store.audit.record(context.now(), "bench check", f"bench {checked.bench}", {"ok": checked.ok})
+    return checked
 
 
-def _in_foreground(control: Foreground, _: CommandContext, asked: Asked) -> BenchCheckResponse:
+def _in_foreground(control: Foreground, _: CommandContext, request: AddressedRequest) -> BenchCheckResponse:
     """Check a bench by its file or its shipped name, in this process."""
-    return control.check(asked.bench)
+    return control.check(request.bench)
 
 
 CHECK = BenchAct(name="check", in_service=_in_service, in_foreground=_in_foreground, wait_s=OPENS_BENCH_S)

@@ -10,32 +10,32 @@ from labctl.services.commands.acts.campaign_command import CampaignCommand, Comm
 from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
 
-Asked = ToCampaign[ConfirmRequest]
+AddressedRequest = ToCampaign[ConfirmRequest]
 
 
-def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
-    body = asked.body
+def _in_service(control: ServiceBench, context: CommandContext, request: AddressedRequest) -> CampaignResponse:
+    body = request.body
     if control.runner is None:
-        raise not_running(context.store, asked.campaign, f"answer question {body.prompt}")
-    answer = control.runner.confirm(asked.campaign, body)
-    said = f"{body.prompt}: {'done' if body.confirmed else 'cannot be done'}; {body.by}; {body.reason}"
-    control.record(context, CONFIRM.name, asked.campaign, said)
+        raise not_running(context.store, request.campaign, f"answer question {body.prompt}")
+    answer = control.runner.confirm(request.campaign, body)
+    text = f"{body.prompt}: {'done' if body.confirmed else 'cannot be done'}; {body.by}; {body.reason}"
+    control.record(context, CONFIRM.name, request.campaign, text)
     return answer
 
 
-def _in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_foreground(_: Foreground, context: CommandContext, request: AddressedRequest) -> CampaignResponse:
     """Raise Conflict: no campaign asks anything here."""
-    raise not_running(context.store, asked.campaign, f"answer question {asked.body.prompt}")
+    raise not_running(context.store, request.campaign, f"answer question {request.body.prompt}")
 
 
-def _request(given: Values) -> Values:
+def _request(values: Values) -> Values:
     """Return the answer that the options give. Raises BadInput for two answers."""
-    is_declined = given["decline"] is not None
-    if given["again"] and is_declined:
+    is_declined = values["decline"] is not None
+    if values["again"] and is_declined:
         raise BadInput("--again and --decline answer the same question; give one of them")
     return {
-        "prompt": given["prompt"], "by": given["by"], "confirmed": not (is_declined or given["again"]),
-        "again": given["again"], "reason": given["decline"] or "",
+        "prompt": values["prompt"], "by": values["by"], "confirmed": not (is_declined or values["again"]),
+        "again": values["again"], "reason": values["decline"] or "",
     }  # fmt: skip
 
 
@@ -68,7 +68,7 @@ AGAIN = CommandOption(
 CONFIRM = CampaignAct(
     name="confirm",
     body=ConfirmRequest,
-    asked=Asked,
+    request_type=AddressedRequest,
     summary="Answer a campaign's question",
     description="Answer the question with this id; an answer to an older one is refused.",
     in_service=_in_service,

@@ -8,17 +8,17 @@ from labctl.services.commands.command import Command
 from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 
 
-def _start_in_service(control: ServiceBench, _: CommandContext, asked: LiveRequest) -> LiveStateResponse:
-    return control.live_control().start(asked)
+def _start_in_service(control: ServiceBench, _: CommandContext, request: LiveRequest) -> LiveStateResponse:
+    return control.live_control().start(request)
 
 
-def _start_in_foreground(_: Foreground, __: CommandContext, asked: LiveRequest) -> LiveStateResponse:
+def _start_in_foreground(_: Foreground, __: CommandContext, request: LiveRequest) -> LiveStateResponse:
     """Raise Conflict: `labctl live` calibrates in its own process."""
-    raise Conflict(f"no service runs on this database; calibrate {asked.serial or 'the unit'} with `labctl live`")
+    raise Conflict(f"no service runs on this database; calibrate {request.serial or 'the unit'} with `labctl live`")
 
 
-def _end_in_service(control: ServiceBench, _: CommandContext, asked: LiveEndRequest) -> LiveStateResponse:
-    return control.live_control().end(asked)
+def _end_in_service(control: ServiceBench, _: CommandContext, request: LiveEndRequest) -> LiveStateResponse:
+    return control.live_control().end(request)
 
 
 def _end_in_foreground(_: Foreground, __: CommandContext, ___: LiveEndRequest) -> LiveStateResponse:

@@ -10,19 +10,19 @@ from labctl.services.commands.context import OPENS_BENCH_S, CommandContext, Fore
 from labctl.services.commands.requests import CampaignResume
 
 
-def _in_service(control: ServiceBench, context: CommandContext, asked: CampaignResume) -> CampaignResponse:
-    runner, body = control.bench_runner(), asked.body
-    if asked.campaign is None:
+def _in_service(control: ServiceBench, context: CommandContext, request: CampaignResume) -> CampaignResponse:
+    runner, body = control.bench_runner(), request.body
+    if request.campaign is None:
         raise Conflict("state the number of the campaign to resume; `labctl campaign list` shows the numbers")
-    paused = runner.runs(asked.campaign)  # a resume after an interruption is recorded together with its rows
-    answer = runner.resume(asked.campaign, body)
+    paused = runner.runs(request.campaign)  # a resume after an interruption is recorded together with its rows
+    answer = runner.resume(request.campaign, body)
     if paused:
-        control.record(context, RESUME.name, asked.campaign, f"{body.reason or 'goes on'} ({body.by})")
+        control.record(context, RESUME.name, request.campaign, f"{body.reason or 'goes on'} ({body.by})")
     return answer
 
 
-def _in_foreground(control: Foreground, _: CommandContext, asked: CampaignResume) -> CampaignResponse:
-    return control.resume_campaign(asked)
+def _in_foreground(control: Foreground, _: CommandContext, request: CampaignResume) -> CampaignResponse:
+    return control.resume_campaign(request)
 
 
 CAMPAIGN = CommandOption(
@@ -45,7 +45,7 @@ DESCRIPTION = "Continue a paused campaign, or resume one that was interrupted, f
 RESUME = CampaignAct(
     name="resume",
     body=ResumeRequest,
-    asked=CampaignResume,
+    request_type=CampaignResume,
     summary="Resume a campaign",
     description=DESCRIPTION,
     in_service=_in_service,

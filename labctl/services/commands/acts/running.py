@@ -12,7 +12,7 @@ from labctl.services.commands.context import CommandContext, Foreground, Service
 from labctl.services.commands.requests import ToCampaign
 from procedures.contracts.control import Control
 
-Asked = ToCampaign[ReasonRequest]
+AddressedRequest = ToCampaign[ReasonRequest]
 
 
 def act_on_running(
@@ -23,31 +23,31 @@ def act_on_running(
     description: str,
     command_help: str,
     default_reason: str,
-) -> CampaignAct[Asked]:
+) -> CampaignAct[AddressedRequest]:
     """Return an act that gives the reason to `ask`, a method of `Control` that any thread may call.
 
     It is in the log and the audit trail, and is refused where the campaign does not run. `command_help` and
     `default_reason` are of its command.
     """
 
-    def in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
+    def in_service(control: ServiceBench, context: CommandContext, request: AddressedRequest) -> CampaignResponse:
         if control.runner is None:
-            raise refused(context, asked)
-        answer = control.runner.ask(asked.campaign, lambda running: ask(running, asked.body.text))
-        control.record(context, name, asked.campaign, asked.body.text)
+            raise refused(context, request)
+        answer = control.runner.ask(request.campaign, lambda running: ask(running, request.body.text))
+        control.record(context, name, request.campaign, request.body.text)
         return answer
 
-    def in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
+    def in_foreground(_: Foreground, context: CommandContext, request: AddressedRequest) -> CampaignResponse:
         """Raise Conflict: a campaign that this process could ask would hold the database."""
-        raise refused(context, asked)
+        raise refused(context, request)
 
-    def refused(context: CommandContext, asked: Asked) -> Exception:
-        return not_running(context.store, asked.campaign, f"{name} it ({asked.body.reason})")
+    def refused(context: CommandContext, request: AddressedRequest) -> Exception:
+        return not_running(context.store, request.campaign, f"{name} it ({request.body.reason})")
 
     return CampaignAct(
         name=name,
         body=ReasonRequest,
-        asked=Asked,
+        request_type=AddressedRequest,
         summary=summary,
         description=description,
         command_line=CampaignCommand(help=command_help, defaults={"reason": default_reason}),

@@ -14,20 +14,20 @@ from labctl.services.planning.loading import load_recipe
 from labctl.services.schedule import queue
 
 
-def _start_in_service(control: ServiceBench, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
-    return control.bench_runner().start(asked.body)
+def _start_in_service(control: ServiceBench, _: CommandContext, request: CampaignStart) -> CampaignResponse:
+    return control.bench_runner().start(request.body)
 
 
-def _start_in_foreground(control: Foreground, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
-    return control.run_campaign(asked)
+def _start_in_foreground(control: Foreground, _: CommandContext, request: CampaignStart) -> CampaignResponse:
+    return control.run_campaign(request)
 
 
-def _schedule_in_service(control: ServiceBench, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
-    return queue.add_start(context.store, asked.body, control.bench_runner().bench, context.now())
+def _schedule_in_service(control: ServiceBench, context: CommandContext, request: CampaignStart) -> ScheduledResponse:
+    return queue.add_start(context.store, request.body, control.bench_runner().bench, context.now())
 
 
-def _schedule_in_foreground(control: Foreground, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
-    return control.schedule(context, asked)
+def _schedule_in_foreground(control: Foreground, context: CommandContext, request: CampaignStart) -> ScheduledResponse:
+    return control.schedule(context, request)
 
 
 #: Raises Conflict where the service has no bench, BenchBusy while another campaign runs.
@@ -35,17 +35,17 @@ START = BenchAct(name="start", in_service=_start_in_service, in_foreground=_star
 SCHEDULE = BenchAct(name="schedule", in_service=_schedule_in_service, in_foreground=_schedule_in_foreground)
 
 
-def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:
+def _start_campaign(context: CommandContext, request: CampaignStart) -> CampaignResponse | ScheduledResponse:
     """Start a campaign now, or enter it into the schedule: the only place where that is decided."""
-    if asked.body.fit:
-        check_fit(load_recipe(asked.body.recipe))
-    if asked.body.hide:
+    if request.body.fit:
+        check_fit(load_recipe(request.body.recipe))
+    if request.body.hide:
         from labctl.services.simulation.effect_sizes import with_sizes  # noqa: PLC0415  slow to import
 
-        asked = replace(asked, body=with_sizes(asked.body, context.control.bench_of(asked)))
-    if queue.is_scheduled(asked.body):
-        return SCHEDULE.execute(context, asked)
-    return START.execute(context, asked)
+        request = replace(request, body=with_sizes(request.body, context.control.bench_of(request)))
+    if queue.is_scheduled(request.body):
+        return SCHEDULE.execute(context, request)
+    return START.execute(context, request)
 
 
 START_CAMPAIGN: Command[CampaignStart, CampaignResponse | ScheduledResponse] = Command(

@@ -66,8 +66,8 @@ def test_a_planned_recording_is_joined_as_a_measured_one() -> None:
         mean = [data.at_sets(np.asarray(data.nodes[name], dtype=np.float64)) for data in (made, real)]
         assert mean[0] == pytest.approx(mean[1], abs=5.0 if name.endswith("t_s") else 0.02), name
     assert made.nodes.history.numbers("run") == real.nodes.history.numbers("run")
-    for number, course in real.nodes.history.courses.items():
-        assert made.nodes.history.courses[number].begin_s == pytest.approx(course.begin_s, abs=5.0)
+    for number, course in real.nodes.history.profiles.items():
+        assert made.nodes.history.profiles[number].begin_s == pytest.approx(course.begin_s, abs=5.0)
 
 
 def test_the_experiment_that_shows_the_difference_has_the_information() -> None:

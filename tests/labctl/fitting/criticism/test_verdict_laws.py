@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from labctl.fitting.criticism.ranking import Candidate
-from labctl.fitting.criticism.verdict import LEAD, is_at_end, refines_base
+from labctl.fitting.criticism.rivals import LEAD
+from labctl.fitting.criticism.verdict import is_at_end, refines_base
 
 #: What counts, and no rounding could make, in nats.
 STEP = 1e-6

@@ -11,10 +11,10 @@ import pytest
 
 from labctl.fitting.criticism import verdict as module
 from labctl.fitting.criticism.ranking import Candidate
+from labctl.fitting.criticism.rivals import LEAD
 from labctl.fitting.criticism.verdict import (
     ENOUGH,
     ENOUGH_NEXT,
-    LEAD,
     MOST,
     SAME,
     Verdict,

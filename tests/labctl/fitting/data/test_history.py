@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from labctl.fitting.data.temperature.history import SPACING_S, TemperatureCourse, TemperatureHistory
+from labctl.fitting.data.temperature.history import SPACING_S, TemperatureHistory, TemperatureProfile
 
 
 def _state(temperature_c: np.ndarray, width_k: float) -> np.ndarray:
     """Return the state of a play of a width, at each temperature of a course."""
-    history = TemperatureHistory({1: TemperatureCourse(0.0, temperature_c)}, {}, 1.0)
+    history = TemperatureHistory({1: TemperatureProfile(0.0, temperature_c)}, {}, 1.0)
     times = SPACING_S * np.arange(len(temperature_c))
     return np.asarray(history.hysteresis_state({"t_s": times}, width_k))
 

@@ -18,7 +18,7 @@ import { takeKept } from "./finish_line.js";
 import { residualDiagnostics } from "./residual_diagnostics.js";
 import { selectedRows } from "./residual_map.js";
 import { ExploreState } from "./state.js";
-import { suspectList, verdictCard } from "./suspects.js";
+import { suspectList, verdictCard } from "./verdict_card.js";
 
 /** @import { Criticism, Effect, RecordingRow, Unit, Version } from "../../../types/api.js" */
 /** @import { Query } from "../../../types/pages.js" */

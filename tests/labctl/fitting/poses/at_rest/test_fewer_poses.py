@@ -55,7 +55,7 @@ def later(known: Known, directions: np.ndarray, seed: int, size: float = 1.0) ->
     readings = session(directions, seed + 1000, errors, bias_g)
     rests = find_rests(readings)
     fewer = by_fewer_poses(readings, rests, known)
-    worth = adequacy_of(fewer.found, rests, known.whitened)
+    worth = adequacy_of(fewer.accelerometer, rests, known.whitened)
     true = np.concatenate([bias_g, [errors[place] for place in UPPER]])
     return fewer, true, worth.heldout_g / worth.expected_g
 
@@ -64,8 +64,8 @@ def test_the_interval_of_four_poses_holds_the_truth(known: Known) -> None:
     inside, agree, ratios = [], [], []
     for seed in range(60):
         fewer, true, ratio = later(known, TETRAHEDRON, seed)
-        theta = np.concatenate([fewer.found.bias_g, [fewer.found.errors[place] for place in UPPER]])
-        inside += list(np.abs(theta - true) < 1.96 * np.sqrt(np.diag(fewer.found.covariance)))
+        theta = np.concatenate([fewer.accelerometer.bias_g, [fewer.accelerometer.errors[place] for place in UPPER]])
+        inside += list(np.abs(theta - true) < 1.96 * np.sqrt(np.diag(fewer.accelerometer.covariance)))
         agree.append(fewer.agrees)
         ratios.append(ratio)
     assert 0.92 < np.mean(inside) < 0.98
@@ -98,7 +98,7 @@ def test_a_bias_square_to_the_plane_of_all_poses_is_refused_or_right(known: Know
         if fewer is None:
             refused.append(error)
         else:
-            assert np.all(np.abs(fewer.found.bias_g - true[:3]) < 4 * fewer.found.u[:3])
+            assert np.all(np.abs(fewer.accelerometer.bias_g - true[:3]) < 4 * fewer.accelerometer.u[:3])
     assert len(refused) >= 10
     assert all("bias" in each and "up" in each for each in refused)
 
@@ -126,8 +126,8 @@ def test_scatter_between_rests_is_known_from_the_earlier_session_too() -> None:
         earlier = Known(values, was.covariance[3:, 3:] + np.diag(CHANGE**2), was.bias_g, scatter)
         faces = np.vstack([np.eye(3), -np.eye(3)]) * (1 + rng.normal(0, scatter_g, (6, 1)))
         fewer, true, _ = later(earlier, faces, seed)
-        theta = np.concatenate([fewer.found.bias_g, [fewer.found.errors[place] for place in UPPER]])
-        inside += list(np.abs(theta - true) < fewer.found.expanded)
+        theta = np.concatenate([fewer.accelerometer.bias_g, [fewer.accelerometer.errors[place] for place in UPPER]])
+        inside += list(np.abs(theta - true) < fewer.accelerometer.expanded)
         agree.append(fewer.agrees)
     assert 0.92 < np.mean(inside) < 0.985
     assert np.mean(agree) > 0.93

@@ -11,7 +11,7 @@ from functools import cache
 from typing import get_type_hints
 
 from labctl.answers.campaigns import CampaignResponse
-from labctl.processes.call_forms import CallForm, parameter, supervisor_form
+from labctl.processes.rpc_methods import RpcMethod, parameter, supervisor_method
 from labctl.services.commands.acts.catalogue import BENCH_ACTS
 from labctl.services.local_bench import LocalBench
 from labctl.store.connection.transactions import TRANSACTIONS
@@ -28,22 +28,22 @@ class Beat:
 
 
 @cache
-def form_of(name: str) -> CallForm:
-    """Return the form of a call of the bench process. Raises BadInput for a name that is none."""
+def method_of(name: str) -> RpcMethod:
+    """Return the method of a call of the bench process. Raises BadInput for a name that is none."""
     area, _, rest = name.partition(".")
     if area == "store" and rest in TRANSACTIONS:
-        return CallForm.of_method(name, TRANSACTIONS[rest])
+        return RpcMethod.of_method(name, TRANSACTIONS[rest])
     if area == "control" and rest in BENCH_ACTS:
         hints = get_type_hints(BENCH_ACTS[rest].in_service)
-        return CallForm(name, [parameter("asked", hints["asked"])], hints["return"])
+        return RpcMethod(name, [parameter("request", hints["request"])], hints["return"])
     made = _QUESTIONS.get(name)
-    return supervisor_form(name) if made is None else made(name)
+    return supervisor_method(name) if made is None else made(name)
 
 
-_QUESTIONS: dict[str, Callable[[str], CallForm]] = {
-    "watch": lambda name: CallForm(name, [], Beat),
-    "bench.live": lambda name: CallForm(name, [parameter("campaign", int)], tuple[bool, CampaignResponse | None]),
-    "bench.describe": lambda name: CallForm.of_method(name, LocalBench.describe),
-    "bench.live_state": lambda name: CallForm.of_method(name, LocalBench.live_state),
-    "bench.live_history": lambda name: CallForm.of_method(name, LocalBench.live_history),
+_QUESTIONS: dict[str, Callable[[str], RpcMethod]] = {
+    "watch": lambda name: RpcMethod(name, [], Beat),
+    "bench.live": lambda name: RpcMethod(name, [parameter("campaign", int)], tuple[bool, CampaignResponse | None]),
+    "bench.describe": lambda name: RpcMethod.of_method(name, LocalBench.describe),
+    "bench.live_state": lambda name: RpcMethod.of_method(name, LocalBench.live_state),
+    "bench.live_history": lambda name: RpcMethod.of_method(name, LocalBench.live_history),
 }

@@ -1,4 +1,4 @@
-"""Marks of a draft that are set in the transaction of something else: its campaign's plan, and its version."""
+"""Transitions of a draft that another transaction makes: that of its campaign's plan, and of its version."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Calls from one labctl process to another over a Unix socket in a private folder.
+"""Remote procedure calls (RPC) from one labctl process to another over a Unix socket in a private folder.
 
 A call and its answer are documents of declared types (`labctl.processes.documents`), so the process that answers runs
 nothing that a caller sends. The folder (mode 0700) keeps other users out.
@@ -17,8 +17,8 @@ from typing import Any
 
 from labctl.errors import BadInput, BenchSilent
 from labctl.log import get_logger
-from labctl.processes.call_forms import Call, CallForm, FormOf, read_call
 from labctl.processes.documents import BadDocument, answer, receive, refusal, value_of
+from labctl.processes.rpc_methods import Call, MethodOf, RpcMethod, read_call
 
 log = get_logger()
 
@@ -64,15 +64,15 @@ class UnderWay:
             return self._count
 
 
-class CallServer:
+class RpcServer:
     """Answers calls at a Unix socket, each caller in a thread of its own.
 
     A caller that sends what is no call gets a refusal, and its connection is closed; the log has one line.
     """
 
-    def __init__(self, path: Path, respond: Respond, form_of: FormOf) -> None:
-        """`form_of` has the types of a call by its name."""
-        self._path, self._respond, self._form_of = path, respond, form_of
+    def __init__(self, path: Path, respond: Respond, method_of: MethodOf) -> None:
+        """`method_of` has the types of a call by its name."""
+        self._path, self._respond, self._method_of = path, respond, method_of
         self._listener = Listener(str(path), "AF_UNIX", backlog=BACKLOG)
         self._over = False
         self._thread = threading.Thread(target=self._accept, name=f"calls-{path.name}", daemon=True)
@@ -113,16 +113,16 @@ class CallServer:
     def _one(self, connection: Connection) -> bool:
         """Answer one call; returns whether the connection waits for another. Raises EOFError, OSError at its end."""
         try:
-            call, form = read_call(receive(connection), self._form_of)
+            call, method = read_call(receive(connection), self._method_of)
         except (BadDocument, BadInput) as error:
             log.warning("call.refused", error=str(error))
             with contextlib.suppress(OSError), connection:
                 connection.send_bytes(refusal(error))
             return False
-        found = self._respond(call, connection)
-        if found is None:
+        result = self._respond(call, connection)
+        if result is None:
             return False
-        connection.send_bytes(_document(form, found))
+        connection.send_bytes(_document(method, result))
         return True
 
 
@@ -134,24 +134,24 @@ def answer_with(work: Callable[[], object]) -> Answer:
         return Answer(raised=error)
 
 
-def _document(form: CallForm, found: Answer) -> bytes:
-    if found.raised is not None:
-        return refusal(found.raised)
+def _document(method: RpcMethod, result: Answer) -> bytes:
+    if result.raised is not None:
+        return refusal(result.raised)
     try:
-        return answer(form.result, found.value)
+        return answer(method.result, result.value)
     except BadDocument as error:
         return refusal(error)
 
 
-class Caller:
+class RpcClient:
     """Calls the process behind a Unix socket. Any thread may call; each call has a connection to itself.
 
     Connections are kept for further calls.
     """
 
-    def __init__(self, path: Path, timeout_s: float, form_of: FormOf) -> None:
-        """`form_of` has the types of a call by its name."""
-        self._path, self._timeout_s, self._form_of = path, timeout_s, form_of
+    def __init__(self, path: Path, timeout_s: float, method_of: MethodOf) -> None:
+        """`method_of` has the types of a call by its name."""
+        self._path, self._timeout_s, self._method_of = path, timeout_s, method_of
         self._idle: list[Connection] = []
         self._guard = threading.Lock()
 
@@ -161,8 +161,8 @@ class Caller:
         Raises BenchSilent without an answer, BadDocument for arguments or an answer of other types than declared.
         """
         wait_s = self._timeout_s if timeout_s is None else timeout_s
-        form = self._form_of(name)
-        document = form.call(*args, **kwargs)
+        method = self._method_of(name)
+        document = method.call(*args, **kwargs)
         connection = self._taken()
         try:
             connection.send_bytes(document)
@@ -170,7 +170,7 @@ class Caller:
                 raise BenchSilent(
                     f"the bench process has not answered within {wait_s:g} s; inspect the bench if this continues"
                 )
-            found = receive(connection)
+            reply = receive(connection)
         except (EOFError, OSError) as error:
             connection.close()
             raise BenchSilent(
@@ -181,7 +181,7 @@ class Caller:
             raise
         with self._guard:
             self._idle.append(connection)
-        return value_of(form.result, found)
+        return value_of(method.result, reply)
 
     def _taken(self) -> Connection:
         with self._guard:

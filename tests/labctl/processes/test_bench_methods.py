@@ -13,9 +13,9 @@ import pytest
 from labctl.answers.benches import CheckRequest
 from labctl.answers.campaigns import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.answers.live import LiveEndRequest, LiveRequest
-from labctl.processes.bench_forms import Beat, form_of
-from labctl.processes.call_forms import CallForm, read_call
+from labctl.processes.bench_methods import Beat, method_of
 from labctl.processes.documents import BadDocument, answer, value_of
+from labctl.processes.rpc_methods import RpcMethod, read_call
 from labctl.processes.settings import BenchSettings
 from labctl.recording import RecordingInfo
 from labctl.services.commands.acts.catalogue import BENCH_ACTS, CAMPAIGN_ACTS
@@ -27,13 +27,13 @@ AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 INFO = RecordingInfo(serial="LEFT-1", axes=("z",), kind="samples", started_at=AT)
 
 
-def arrived(form: CallForm, **given: object) -> dict[str, object]:
-    call, found = read_call(form.call(**given), form_of)
+def arrived(form: RpcMethod, **given: object) -> dict[str, object]:
+    call, found = read_call(form.call(**given), method_of)
     assert (call.name, found) == (form.name, form)
     return dict(call.arguments)
 
 
-def answered(form: CallForm, value: object) -> object:
+def answered(form: RpcMethod, value: object) -> object:
     return value_of(form.result, answer(form.result, value))
 
 
@@ -46,7 +46,7 @@ def shown(value: object) -> str:
 def test_every_transaction_gets_what_was_given(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(PLAIN, RecordingInfo, (INFO,))
     hints = get_type_hints(inspect.unwrap(TRANSACTIONS[name]), include_extras=True)
-    form = form_of(f"store.{name}")
+    form = method_of(f"store.{name}")
     for result in examples(hints.pop("return")):
         assert shown(answered(form, result)) == shown(result)
     values = {each: list(examples(kind)) for each, kind in hints.items()}
@@ -56,7 +56,11 @@ def test_every_transaction_gets_what_was_given(name: str, monkeypatch: pytest.Mo
 
 
 ASKED: dict[str, tuple[object, ...]] = {
-    **{act.name: (act.asked(1, ReasonRequest(reason="tea")),) for act in CAMPAIGN_ACTS if act.body is ReasonRequest},
+    **{
+        act.name: (act.request_type(1, ReasonRequest(reason="tea")),)
+        for act in CAMPAIGN_ACTS
+        if act.body is ReasonRequest
+    },
     "start": (
         CampaignStart(CampaignRequest(recipe="short", checks=["table_free"]), simulated_start=AT, wire_log=Path("é")),
     ),
@@ -73,35 +77,35 @@ ASKED: dict[str, tuple[object, ...]] = {
 @pytest.mark.parametrize("name", BENCH_ACTS)
 def test_every_act_gets_what_was_asked(name: str) -> None:
     for asked in ASKED[name]:
-        found: Any = arrived(form_of(f"control.{name}"), asked=asked)["asked"]
+        found: Any = arrived(method_of(f"control.{name}"), request=asked)["request"]
         assert (type(found), found) == (type(asked), asked)
         body = getattr(asked, "body", asked)
         assert getattr(found, "body", found).model_fields_set == body.model_fields_set
 
 
 def test_an_act_on_what_no_request_may_say_is_refused() -> None:
-    form = form_of("control.start_live")
+    form = method_of("control.start_live")
     document = form.call(LiveRequest(serial="HG-1")).replace(b"HG-1", b"../1")
     why = r"what call control\.start_live was given is not as expected at 0\.serial: .*; stop the service and start it"
     with pytest.raises(BadDocument, match=why):
-        read_call(document, form_of)
+        read_call(document, method_of)
 
 
 def test_questions_and_what_a_supervisor_asks() -> None:
     for name in ("watch", "bench.describe", "bench.live_history", "address.give_back"):
-        assert arrived(form_of(name)) == {}
-    assert arrived(form_of("bench.live"), campaign=3) == {"campaign": 3}
-    assert arrived(form_of("bench.live_state"), watched=True) == {"watched": True}
-    assert answered(form_of("bench.live"), (True, None)) == (True, None)
+        assert arrived(method_of(name)) == {}
+    assert arrived(method_of("bench.live"), campaign=3) == {"campaign": 3}
+    assert arrived(method_of("bench.live_state"), watched=True) == {"watched": True}
+    assert answered(method_of("bench.live"), (True, None)) == (True, None)
     for beat in examples(Beat):
-        assert answered(form_of("watch"), beat) == beat
+        assert answered(method_of("watch"), beat) == beat
     for wanted in examples(BenchSettings):
-        assert shown(arrived(form_of("supervise"), wanted=wanted)["wanted"]) == shown(wanted)
+        assert shown(arrived(method_of("supervise"), wanted=wanted)["wanted"]) == shown(wanted)
 
 
 def test_numbers_of_numpy_arrive_as_numbers() -> None:
     given = {"campaign": 1, "reason": "r", "at": AT, "state": "failed"}
     detail = {"n": np.int64(3), "u": np.float64(0.1), "ok": np.bool_(True)}
-    found = arrived(form_of("store.Audit.record"), at=AT, action="a", subject="s", detail=detail)
+    found = arrived(method_of("store.Audit.record"), at=AT, action="a", subject="s", detail=detail)
     assert found["detail"] == {"n": 3, "u": 0.1, "ok": True}
-    assert arrived(form_of("store.Campaigns.close_unfinished"), **given)["state"].value == "failed"  # type: ignore[attr-defined]
+    assert arrived(method_of("store.Campaigns.close_unfinished"), **given)["state"].value == "failed"  # type: ignore[attr-defined]

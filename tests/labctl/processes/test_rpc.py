@@ -17,19 +17,19 @@ import pytest
 
 from labctl.acting_user import Actor, acting, actor
 from labctl.errors import BadInput, BenchSilent, DiskFull, LabctlError
-from labctl.processes.call_forms import Call, CallForm, parameter, supervisor_form
-from labctl.processes.calls import Answer, Caller, CallServer, Respond, answer_with
 from labctl.processes.documents import LONGEST_BYTES, BadDocument, receive
+from labctl.processes.rpc import Answer, Respond, RpcClient, RpcServer, answer_with
+from labctl.processes.rpc_methods import Call, RpcMethod, parameter, supervisor_method
 from tests.helpers.log_records import logged
 
 WAIT_S = 20.0
 
 
-def form_of(name: str) -> CallForm:
+def method_of(name: str) -> RpcMethod:
     """Calls of a number, a factor and a note, answered by a list of them and who acts."""
     if name != "any":
-        return supervisor_form(name)
-    return CallForm(name, [parameter("number", int), parameter("factor", float)], list[Any])
+        return supervisor_method(name)
+    return RpcMethod(name, [parameter("number", int), parameter("factor", float)], list[Any])
 
 
 def echo(call: Call, _: Connection) -> Answer:
@@ -38,8 +38,8 @@ def echo(call: Call, _: Connection) -> Answer:
 
 
 @contextmanager
-def serving(path: Path, respond: Respond) -> Iterator[Caller]:
-    server, caller = CallServer(path, respond, form_of), Caller(path, WAIT_S, form_of)
+def serving(path: Path, respond: Respond) -> Iterator[RpcClient]:
+    server, caller = RpcServer(path, respond, method_of), RpcClient(path, WAIT_S, method_of)
     server.start()
     try:
         yield caller
@@ -92,7 +92,7 @@ def test_an_end_that_does_not_answer_is_silent_after_a_time_and_its_late_answer_
 
 def test_no_process_at_all_is_silent(tmp_path: Path) -> None:
     with pytest.raises(BenchSilent, match="cannot be reached"):
-        Caller(tmp_path / "no_process", WAIT_S, form_of).call("any", 1, 2.0)
+        RpcClient(tmp_path / "no_process", WAIT_S, method_of).call("any", 1, 2.0)
 
 
 def test_a_process_that_has_gone_is_noticed_by_callers_that_knew_it(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
-"""A call as a document of two lines: what is asked and in whose name, and the arguments in their order.
+"""The methods of remote procedure calls: a call is a document of two lines, its head and its arguments in their order.
 
-Here are the forms of the calls that a supervisor makes, which loads little; all others are in `bench_forms`.
+Here are the methods that a supervisor calls, which loads little; all others are in `bench_methods`.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class Call:
 _HEAD: Form[_Head] = Form(_Head, "the head of a call")
 
 
-class CallForm:
-    """The types of one call."""
+class RpcMethod:
+    """A method that another process may call: its name and the types of its arguments and result."""
 
     def __init__(self, name: str, parameters: Sequence[inspect.Parameter], result: Any) -> None:
         """The annotations of `parameters` are types, not their names."""
@@ -54,8 +54,8 @@ class CallForm:
         self.result: Form[Any] = Form(result, f"the answer to call {name}")
 
     @classmethod
-    def of_method(cls, name: str, method: Callable[..., object]) -> CallForm:
-        """Return the form of a call of a method, by the method's annotations."""
+    def of_method(cls, name: str, method: Callable[..., object]) -> RpcMethod:
+        """Return the types of a call of a Python method, by the method's annotations."""
         hints = get_type_hints(inspect.unwrap(method), include_extras=True)
         _, *parameters = inspect.signature(method).parameters.values()  # all but self
         return cls(name, [each.replace(annotation=hints[each.name]) for each in parameters], hints["return"])
@@ -72,23 +72,23 @@ class CallForm:
         return dict(zip(self._signature.parameters, self._arguments.decode(document), strict=True))
 
 
-FormOf = Callable[[str], CallForm]
+MethodOf = Callable[[str], RpcMethod]
 
 
-def read_call(document: bytes, form_of: FormOf) -> tuple[Call, CallForm]:
-    """Return a call with its form. Raises BadDocument for what is no call, BadInput for one of an unknown name."""
+def read_call(document: bytes, method_of: MethodOf) -> tuple[Call, RpcMethod]:
+    """Return a call with its method. Raises BadDocument for what is no call, BadInput for one of an unknown name."""
     first, _, second = document.partition(b"\n")
     head = _HEAD.decode(first)
-    form = form_of(head.call)
-    return Call(head.call, form.arguments(second), head.actor, head.request_id), form
+    method = method_of(head.call)
+    return Call(head.call, method.arguments(second), head.actor, head.request_id), method
 
 
-def supervisor_form(name: str) -> CallForm:
-    """Return the form of a call that a supervisor makes. Raises BadInput for any other name."""
+def supervisor_method(name: str) -> RpcMethod:
+    """Return the method of a call that a supervisor makes. Raises BadInput for any other name."""
     if name == "supervise":
-        return CallForm(name, [parameter("wanted", BenchSettings)], None)
+        return RpcMethod(name, [parameter("wanted", BenchSettings)], None)
     if name == "address.give_back":
-        return CallForm(name, [], None)
+        return RpcMethod(name, [], None)
     raise BadInput(
         f"the bench process has no call {name[:60]!r}; stop the service and start it again, so that all its processes "
         "have one version of labctl"

@@ -12,11 +12,11 @@ from labctl.acting_user import acting
 from labctl.errors import BenchSilent
 from labctl.log import get_logger
 from labctl.log.context import for_request
-from labctl.processes.bench_forms import Beat, form_of
-from labctl.processes.call_forms import Call
-from labctl.processes.calls import Answer, UnderWay, answer_with
+from labctl.processes.bench_methods import Beat, method_of
 from labctl.processes.documents import answer
 from labctl.processes.held_address import HeldAddress
+from labctl.processes.rpc import Answer, UnderWay, answer_with
+from labctl.processes.rpc_methods import Call
 from labctl.processes.settings import BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.services.commands.acts.catalogue import BENCH_ACTS
@@ -34,7 +34,7 @@ MIN_BEAT_S = 0.1
 UNDER_WAY_S = 2.0
 
 
-class BenchCalls:
+class BenchRpc:
     """Answers the calls of other processes."""
 
     def __init__(
@@ -79,19 +79,19 @@ class BenchCalls:
 
     def _supervise(self, call: Call, connection: Connection) -> Answer | None:
         wanted = call.arguments["wanted"]
-        assert isinstance(wanted, BenchSettings)  # by the form of the call
-        found = answer_with(lambda: self._supervision.take_charge(wanted, connection))
-        return None if found.raised is None else found
+        assert isinstance(wanted, BenchSettings)  # by the types of the method
+        answer = answer_with(lambda: self._supervision.take_charge(wanted, connection))
+        return None if answer.raised is None else answer
 
     def _value(self, call: Call) -> Any:
         area, _, name = call.name.partition(".")
         if area == "store":
             return self._store.run(name, (), call.arguments)
         if area == "control":
-            return BENCH_ACTS[name].execute(self._context, call.arguments["asked"])
+            return BENCH_ACTS[name].execute(self._context, call.arguments["request"])
         if call.name == "bench.live":
             campaign = call.arguments["campaign"]
-            assert isinstance(campaign, int)  # by the form of the call
+            assert isinstance(campaign, int)  # by the types of the method
             return self._local.runs(campaign), self._local.status(campaign)
         if call.name == "bench.describe":
             return self._local.describe()
@@ -103,7 +103,7 @@ class BenchCalls:
 
     def _watch(self, connection: Connection) -> None:
         """Send the state to a watcher at every change until it disconnects, in the thread of its connection."""
-        changed, never, form = threading.Event(), threading.Event(), form_of("watch").result
+        changed, never, form = threading.Event(), threading.Event(), method_of("watch").result
         remove = self._local.listen(changed.set)
         self._watchers.add(connection)
         try:

@@ -1,0 +1,103 @@
+"""Rivals of the likeliest effect: which of them the data leave beside it.
+
+The rules are those of a verdict on a recording, and of the verdicts that a forecast foresees: `Pair` is what they ask
+of a leader and a rival, whether it was measured or is one outcome of a planned recording.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+from scipy.special import chdtrc
+
+from labctl.fitting.criticism.ranking import Candidate, are_exact
+from labctl.fitting.effects import CATALOGUE
+
+#: A lead of less than this over another candidate leaves both, nats: about 20 to 1.
+LEAD = 3.0
+#: A lead from which on the evidence alone decides against a rival with more coefficients, nats.
+FAR = 12.0
+#: A rival that leaves less than this of the leader's signal (chi2) cannot be distinguished from it ...
+INDISTINGUISHABLE_CHI2 = 7.0
+#: ... nor one with no more coefficients that reproduces more than this share of it.
+ALIKE = 0.995
+#: Further coefficients that noise makes so large with less than this probability are not 0.
+MIN_CHANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Pair(ABC):
+    """The likeliest effect and a rival of it. What is costly is computed where a rule asks for it."""
+
+    leader: Candidate
+    rival: Candidate
+    leader_log_bf: float  #: nats
+    rival_log_bf: float  #: nats
+    leader_gain: float  #: chi2 that the leader removes
+
+    @property
+    @abstractmethod
+    def share(self) -> float:
+        """The share of the leader's signal that the rival reproduces, 0 to 1."""
+
+    @property
+    @abstractmethod
+    def further_directions(self) -> int:
+        """How many more directions the rival has than the leader."""
+
+    @property
+    @abstractmethod
+    def further_gain(self) -> float:
+        """The chi2 that the rival removes beyond the leader."""
+
+    @property
+    @abstractmethod
+    def further_nats(self) -> float:
+        """The evidence against the coefficients that the rival has beyond the leader, nats."""
+
+    @property
+    @abstractmethod
+    def has_as_simple_a_shape(self) -> bool:
+        """Whether a shape of the rival with no more coefficients than the leader is not far behind it."""
+
+    @cached_property
+    def contains_leader(self) -> bool:
+        """Whether the rival reproduces the leader's signal up to what noise hides."""
+        return (1.0 - self.share) * self.leader_gain < INDISTINGUISHABLE_CHI2
+
+
+def cannot_be_distinguished(pair: Pair) -> bool:
+    """Return whether the data leave a rival beside the leader.
+
+    A rival that is the leader with more coefficients is judged by what is known of these: it is out where they are
+    next to nothing, by the same odds as any other, `LEAD`, unless it has a shape with no more coefficients than the
+    leader that is not far behind. One with a coefficient for each run or mounting stays in as well where noise hardly
+    makes them so large, whatever its evidence: the price of so many coefficients hides small shifts.
+    """
+    near = pair.rival_log_bf > pair.leader_log_bf - LEAD or (pair.rival_log_bf > 0 and _is_indistinguishable(pair))
+    kind = CATALOGUE.get(pair.rival.id)
+    is_random = kind is not None and kind.is_random
+    if not (near or is_random) or pair.further_directions <= 0 or not pair.contains_leader:
+        return near
+    if is_random:
+        return near or by_chance(pair.further_gain, pair.further_directions) < MIN_CHANCE
+    return near and (
+        pair.further_nats < LEAD or pair.rival_log_bf > pair.leader_log_bf or pair.has_as_simple_a_shape
+    )  # fmt: skip
+
+
+def _is_indistinguishable(pair: Pair) -> bool:
+    """Return whether a rival reproduces the leader's signal, without the evidence deciding against it.
+
+    A rival with more coefficients can follow any signal: it only counts while its evidence is not far behind.
+    """
+    if pair.share > ALIKE and pair.further_directions <= 0 and not are_exact(pair.leader, pair.rival):
+        return True
+    return pair.rival_log_bf > pair.leader_log_bf - FAR and pair.contains_leader
+
+
+def by_chance(gain: float, directions: int) -> float:
+    """Return the probability that noise removes so much chi2 in so many directions."""
+    return float(chdtrc(directions, max(gain, 0.0)))
