@@ -49,7 +49,7 @@ class Request(BaseModel):
     Every text of a request is one line, unless it is a `LongText`.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
     #: Whether control characters of texts become spaces: of an act that must not fail for the words that describe it.
     cleans_texts: ClassVar[bool] = False
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from importlib.metadata import version
 from typing import Annotated
 
 import typer
@@ -118,6 +117,8 @@ for name, command in COMMANDS.items():
 
 def _version(is_wanted: bool) -> None:
     if is_wanted:
+        from importlib.metadata import version
+
         typer.echo(f"labctl {version('labctl')}")
         raise typer.Exit
 
