@@ -18,7 +18,7 @@ Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
 class OrientationOptions(BaseModel):
     """Options with which the angle of one axis is integrated."""
 
-    model_config = ConfigDict(defer_build=True, frozen=True)
+    model_config = ConfigDict(frozen=True)
 
     axis: str | None = Field(
         default=None, max_length=1, description="Axis x, y or z; default: the only axis of the recording."

@@ -7,6 +7,8 @@ import sys
 
 # Fits are many small solves, for which threads only get in each other's way; to be set before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# labctl has no plug-ins of pydantic; to look for them reads the metadata of everything that is installed.
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 #: New objects after which garbage is collected; Python's own default is 700.
 COLLECTED_AFTER = 50_000
