@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["get_logger"]
 
-LEVELS = frozenset({"debug", "info", "warning", "error", "exception", "critical"})
+LEVELS = frozenset({"debug", "info", "warning", "error", "exception", "critical", "log"})
 
 
 def get_logger(**fields: object) -> FilteringBoundLogger:
@@ -41,7 +41,7 @@ class _Logger:
         return logger
 
     def __getattr__(self, name: str) -> object:
-        if name.startswith("__"):  # asked for by copy, pickle and the like
+        if name.startswith("_"):  # asked for by copy, pickle and the like
             raise AttributeError(name)
         if "structlog" not in sys.modules and name in LEVELS:
             return _drop
