@@ -17,7 +17,7 @@ LINE = r"^[^\x00-\x1f\x7f]{0,300}$"
 class Contact(BaseModel):
     """Name and address of an organisation; what is empty was not stated."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, str_strip_whitespace=True)
 
     name: str = Field(default="", pattern=LINE, description="Name of the organisation; empty: not stated.")
     street: str = Field(default="", pattern=LINE, description="Street and number, or post-office box.")

@@ -7,11 +7,12 @@ cannot be used gives one line that names distribution, entry point and error, an
 from __future__ import annotations
 
 import difflib
-import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Generic, TypeVar
+
+from instruments.logger import logger
 
 #: Entry-point groups of labctl begin with this.
 PREFIX = "labctl."
@@ -22,7 +23,7 @@ LONGEST_ERROR = 300
 
 PluginT = TypeVar("PluginT")
 PartT = TypeVar("PartT")
-_log = logging.getLogger(__name__)
+_log = logger(__name__)
 
 
 class PluginError(Exception):

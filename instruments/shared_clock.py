@@ -9,7 +9,6 @@ a ramp or a stream so lasts as long, in the time of the bench, as on a computer 
 from __future__ import annotations
 
 import fcntl
-import logging
 import math
 import mmap
 import os
@@ -22,8 +21,9 @@ from pathlib import Path
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock, RealWall, ScaledClock, SystemClock, Wall
+from instruments.logger import logger
 
-log = logging.getLogger(__name__)
+log = logger(__name__)
 
 #: The clock stands still while a registered thread is later than this: s of the clock, and at most s of real time.
 #: The first is the latency of all links, and so below what makes a stream count as late.

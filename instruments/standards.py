@@ -57,7 +57,7 @@ class Standard(BaseModel):
     The uncertainty is given in one of three ways: `u`; `expanded` with its `k`; `half_width` with `distribution`.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
     quantity: Quantity
     unit: Unit | None = None  #: None: the usual one of the quantity

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,12 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from instruments.clock import Clock, SystemClock
 from labctl.calibration import Calibration, read_calibration
 from labctl.calibration.certification import LeftOutWarning, warn
+from labctl.calibration.document import output_lines, read_source
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.temperature.channel import STAND_IN_C
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.models.correction import Correct, correct_across, correction, with_scale
 from labctl.fitting.models.memory import BLOCK, MemoryState, Remembered, RunningMemory, check_order, split_memory
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 __all__ = [
     "MARGIN_C",
@@ -91,9 +94,8 @@ class Compensator:
         self._outside = outside
         self._low_c, self._high_c = calibration.temperature_c
         self._slow, self._fast = output_limits_dps(calibration)
-        units = [calibration.output[axis] for axis in self.axes]
-        self._offset = np.array([output.offset for output in units])
-        self._scale = np.array([output.scale for output in units])
+        offsets, scales = output_lines(calibration)
+        self._offset, self._scale = np.array(offsets), np.array(scales)
         rest, self._memory = split_memory(calibration.fitted, self.axes)
         self._model = rest
         self._correct = correction(rest, self.axes)
@@ -112,7 +114,7 @@ class Compensator:
 
         One that is overdue or was revoked issues a CalibrationWarning and is loaded.
         """
-        return cls(read_calibration(Path(path)), outside)
+        return cls(read_source(path), outside)
 
     @classmethod
     def from_bytes(cls, content: bytes, outside: Outside = "clamp") -> Compensator:

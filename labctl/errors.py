@@ -37,10 +37,13 @@ LabctlError              exit 2, HTTP 400
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-from labctl.answers.json_object import JsonObject
-from labctl.withdrawal import Withdrawn
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from labctl.answers.json_object import JsonObject
+    from labctl.withdrawal import Withdrawn
 
 
 class LabctlError(Exception):

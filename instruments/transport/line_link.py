@@ -6,19 +6,19 @@ not come in time the next request waits until the line was silent for longer tha
 
 from __future__ import annotations
 
-import logging
 import re
 from collections.abc import Sequence
 
 from instruments.clock import Clock
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected
+from instruments.logger import logger
 from instruments.protocols.text_lines.line_syntax import LineSyntax
 from instruments.transport.factory import Ports
 from instruments.transport.port_failures import silence_remedy
 from instruments.transport.rtu import RtuLine
 from instruments.transport.serial import BROKEN, EIGHT_N_1, Line, SerialPort
 
-log = logging.getLogger(__name__)
+log = logger(__name__)
 
 #: Pauses before each further try, s.
 RETRY_PAUSES_S = (0.1, 1.0)

@@ -18,6 +18,7 @@ from pymodbus.pdu import ModbusPDU
 
 from instruments.clock import Clock, sleep_until
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected, one_line
+from instruments.logger import logger
 from instruments.protocols.modbus_codes import ACKNOWLEDGED, BUSY, EXCEPTIONS, TCP_PREFIX_BYTES, ends_at_a_frame_end
 from instruments.transport.port_failures import silence_remedy
 from instruments.transport.rtu import NeverSilent, RtuLine
@@ -84,7 +85,7 @@ def _bytes(received: bytes, advice: str) -> str:
 
 #: Failures are raised, not logged; without a handler pymodbus would write them to standard error.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
-log = logging.getLogger(__name__)
+log = logger(__name__)
 
 Client = ModbusTcpClient | ModbusSerialClient
 Request = Callable[[Client], ModbusPDU]

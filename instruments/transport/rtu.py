@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from typing import cast
 
 import serial
@@ -11,6 +10,7 @@ from pymodbus.client import ModbusSerialClient
 
 from instruments.clock import Clock, Deadline, wait_s
 from instruments.errors import MalformedReply
+from instruments.logger import logger
 from instruments.protocols.modbus_codes import READ_FUNCTIONS
 from instruments.transport.opened_port import open_port
 from instruments.transport.serial import BROKEN, Line, SerialPort
@@ -19,7 +19,7 @@ from instruments.transport.serial import BROKEN, Line, SerialPort
 #
 # A reply on RTU carries no number: only silence tells that no reply to an earlier request is still to come.
 
-log = logging.getLogger(__name__)
+log = logger(__name__)
 
 #: The line has to be silent for this much longer than the longest latency that was seen.
 SILENCE_FACTOR = 1.25

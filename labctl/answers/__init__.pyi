@@ -139,15 +139,13 @@ from labctl.answers.certification import (
     CertificationResponse as CertificationResponse,
     CertifiedErrors as CertifiedErrors,
     CertifyRequest as CertifyRequest,
-    DueSource as DueSource,
     FetchResponse as FetchResponse,
-    JudgementDetail as JudgementDetail,
-    Objection as Objection,
     ReleaseRequest as ReleaseRequest,
     ReleaseRequestResponse as ReleaseRequestResponse,
     RevokeRequest as RevokeRequest,
     WithdrawnResponse as WithdrawnResponse,
 )
+from labctl.answers.judgement import DueSource as DueSource, JudgementDetail as JudgementDetail, Objection as Objection
 from labctl.answers.comparison import (
     AxisResponse as AxisResponse,
     ComparisonColumns as ComparisonColumns,
@@ -396,7 +394,6 @@ from labctl.answers.recordings import (
     LogPreview as LogPreview,
     LogTarget as LogTarget,
     LogTrace as LogTrace,
-    RawChannelJson as RawChannelJson,
     RecordingAlone as RecordingAlone,
     RecordingFacts as RecordingFacts,
     RecordingOrigin as RecordingOrigin,
@@ -407,6 +404,7 @@ from labctl.answers.recordings import (
     SimulatedRequest as SimulatedRequest,
     TraceResponse as TraceResponse,
 )
+from labctl.answers.raw_channels import RawChannelJson as RawChannelJson
 from labctl.answers.reproduction import (
     PaperFigure as PaperFigure,
     PaperNumber as PaperNumber,

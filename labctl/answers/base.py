@@ -49,6 +49,7 @@ class Request(BaseModel):
     Every text of a request is one line, unless it is a `LongText`.
     """
 
+    # built at once: FastAPI would build the form of a body late too, and then warn of the alias that it gives it
     model_config = ConfigDict(extra="forbid", frozen=True)
     #: Whether control characters of texts become spaces: of an act that must not fail for the words that describe it.
     cleans_texts: ClassVar[bool] = False

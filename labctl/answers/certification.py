@@ -6,7 +6,6 @@ from datetime import datetime
 from typing import Literal
 
 from pydantic import Field
-from typing_extensions import TypedDict
 
 from labctl.answers.base import BY_KEY, Request, ResponseModel
 from labctl.answers.budget import CrossRatesJson
@@ -22,8 +21,8 @@ from labctl.answers.common_fields import (
     Serial,
     VersionNumber,
 )
+from labctl.answers.judgement import DueSource, Objection
 
-DueSource = Literal["user", "recipe", "configuration"]
 DUE_FROM = "Source of the number of days; null: no number is given, and there is no due date."
 WHEN = "Time of the verdict, which is the time of the certification."
 NO_VERDICT = (
@@ -91,35 +90,6 @@ class ReleaseRequestResponse(ResponseModel):
     waits_for_release: Literal[True] = Field(
         default=True, description="Always true: the version is not in force before a second person releases it."
     )
-
-
-class Objection(TypedDict):
-    """One objection to certifying a version."""
-
-    what: Literal["verdict", "worse", "data", "standard"]
-    """verdict: the model lacks something, or there is no verdict; worse: an error without compensation or of another
-    version is smaller; data: the data are certainly wrong; standard: a reference standard was bad."""
-    text: str
-    """The objection, with figures in deg/s."""
-    do: str
-    """What to do instead of certifying the version."""
-
-
-class JudgementDetail(TypedDict, total=False):
-    """What is stored beside a verdict."""
-
-    verdict_reason: str
-    """Why there is no verdict; empty if there is one."""
-    verdict_text: str
-    """The verdict in words; empty if there is none."""
-    error: dict[str, float | None]
-    """Name -> RMS error that the version states, deg/s; null: unknown."""
-    objections: list[Objection]
-    """Objections that were overridden; empty: none."""
-    due_from: str | None
-    """Where the due date is from; null: no due date."""
-    uncertainty_unknown: str
-    """Why the uncertainty in use was unknown; empty: it was known."""
 
 
 class CertifiedErrors(ResponseModel):

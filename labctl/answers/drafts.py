@@ -8,7 +8,9 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.answers.base import Request, ResponseModel
-from labctl.answers.certification import CertifiedErrors, Objection
+from labctl.answers.certification import (
+    CertifiedErrors,
+)
 from labctl.answers.common_fields import (
     CampaignNumber,
     CoefficientName,
@@ -22,6 +24,7 @@ from labctl.answers.common_fields import (
     Serial,
     VersionNumber,
 )
+from labctl.answers.judgement import Objection
 from labctl.answers.verification import AxisVerification
 
 

@@ -7,6 +7,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from labctl.answers.output_units import RATE_UNITS, OutputUnitName
+
 Axis = Literal["x", "y", "z"]
 #: What moves the unit, and so what its true rate is known from: `rates` a table, at one rate in each data set; `rest`
 #: nothing; `turns` a hand or a table, by a known angle in each data set; `profile` a table whose rate changes and is
@@ -14,9 +16,6 @@ Axis = Literal["x", "y", "z"]
 Motion = Literal["rates", "rest", "turns", "profile", "poses"]
 #: What a recording holds: every reading, a mean of each data set, or a table of coefficients that was published.
 RecordingKind = Literal["samples", "points", "coefficients"]
-
-#: Units that are rates already: what one deg/s is in them.
-RATE_UNITS = {"deg/s": 1.0, "rad/s": math.pi / 180.0, "deg/h": 3600.0}
 
 
 class OutputUnit(BaseModel):
@@ -27,9 +26,7 @@ class OutputUnit(BaseModel):
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
-    unit: Literal["deg/s", "rad/s", "deg/h", "V", "mV", "count", "arb"] = Field(
-        default="deg/s", description="Unit of the gyro column."
-    )
+    unit: OutputUnitName = Field(default="deg/s", description="Unit of the gyro column.")
     offset: float = Field(default=0.0, description="Value of the column at rate 0, in `unit`.")
     scale: float = Field(
         default=1.0,

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal, NotRequired
+from typing import Literal
 
 from pydantic import Field, JsonValue
-from typing_extensions import TypedDict
 
 from instruments.bench_config import SERIAL
 from labctl.answers.base import Request, ResponseModel
@@ -26,22 +25,6 @@ from labctl.answers.inspection import WARNINGS, DataWarning
 from labctl.answers.noise import AllanJson
 from labctl.answers.plans import RecipeSource
 from labctl.answers.recording_head import LeftOut, Motion
-
-
-class RawChannelJson(TypedDict):
-    """A channel as a device sends it: value = offset + scale x whole number."""
-
-    name: str
-    """Name of the channel."""
-    unit: str
-    """Unit of the value."""
-    scale: float
-    """Value of one count, in `unit`."""
-    offset: float
-    """Value at count 0, in `unit`."""
-    stands_for: NotRequired[str]
-    """Column that it replaces, as a reference thermometer replaces temperature_c; absent: none."""
-
 
 #: Columns of equal length; null: not known.
 Columns = dict[str, list[float | None] | list[int] | list[str] | list[bool]]

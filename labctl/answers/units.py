@@ -131,6 +131,22 @@ class AppliedVersion(ResponseModel):
     )
 
 
+class AxisPoint(ResponseModel):
+    """What a version leaves on one axis: a line over the rate."""
+
+    bias_dps: float = Field(description="Remaining bias: error at rate 0, deg/s.")
+    u_bias_dps: float = Field(
+        description="Standard uncertainty of `bias_dps` due to the scatter about the line, deg/s."
+    )
+    scale_factor: float | None = Field(
+        description="Remaining error divided by the rate (1 = 100 %); null: the recording has only one rate."
+    )
+    u_scale_factor: float | None = Field(
+        description="Standard uncertainty of `scale_factor` due to the scatter about the line, 1; null: the "
+        "recording has only one rate."
+    )
+
+
 class TrendPoint(ResponseModel):
     """One recording of the unit."""
 
@@ -154,19 +170,21 @@ class TrendPoint(ResponseModel):
     why: str = Field(default="", description="Why the version cannot be applied to this recording; else empty.")
 
 
-class AxisPoint(ResponseModel):
-    """What a version leaves on one axis: a line over the rate."""
+class DriftLine(ResponseModel):
+    """A straight line over time with its 95 % interval, from the first recording on and into the time after the last;
+    lists of equal length."""
 
-    bias_dps: float = Field(description="Remaining bias: error at rate 0, deg/s.")
-    u_bias_dps: float = Field(
-        description="Standard uncertainty of `bias_dps` due to the scatter about the line, deg/s."
+    at: list[datetime] = Field(description="Times of the points of the line.")
+    value: list[float] = Field(
+        description="Values of the line: deg/s for bias and error, a ratio for the scale factor."
     )
-    scale_factor: float | None = Field(
-        description="Remaining error divided by the rate (1 = 100 %); null: the recording has only one rate."
+    low: list[float | None] = Field(
+        description="Lower limit of the 95 % interval of the line, by Student's t; null "
+        "with fewer than three recordings."
     )
-    u_scale_factor: float | None = Field(
-        description="Standard uncertainty of `scale_factor` due to the scatter about the line, 1; null: the "
-        "recording has only one rate."
+    high: list[float | None] = Field(
+        description="Upper limit of the 95 % interval of the line, by Student's t; null with fewer than three "
+        "recordings."
     )
 
 
@@ -192,24 +210,6 @@ class Drift(ResponseModel):
     )
     significant: bool = Field(description="Whether 0 is outside the 95 % interval of `per_year`.")
     line: DriftLine = Field(description="Points of the straight line through the figures, for drawing.")
-
-
-class DriftLine(ResponseModel):
-    """A straight line over time with its 95 % interval, from the first recording on and into the time after the last;
-    lists of equal length."""
-
-    at: list[datetime] = Field(description="Times of the points of the line.")
-    value: list[float] = Field(
-        description="Values of the line: deg/s for bias and error, a ratio for the scale factor."
-    )
-    low: list[float | None] = Field(
-        description="Lower limit of the 95 % interval of the line, by Student's t; null "
-        "with fewer than three recordings."
-    )
-    high: list[float | None] = Field(
-        description="Upper limit of the 95 % interval of the line, by Student's t; null with fewer than three "
-        "recordings."
-    )
 
 
 class Leaving(ResponseModel):

@@ -9,11 +9,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, cast, get_args
 
 from instruments.configuration import changed
-from labctl.answers.calibration_file import CalibrationJson
+from labctl.answers.output_units import OutputUnitName
 from labctl.calibration.certification import Certification, read_certification
 from labctl.canonical_json import canonical, canonical_and_hash
 from labctl.errors import BadCalibrationFile, OtherConfiguration
@@ -21,13 +20,17 @@ from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.force_sensitivity import ForceSensitivity
 
-if TYPE_CHECKING:  # need pydantic, which costs as much to load as the rest of a robot's program
+if TYPE_CHECKING:  # types alone; some need pydantic, which costs as much to load as the rest of a robot's program
+    from pathlib import Path
+
+    from labctl.answers.calibration_file import CalibrationJson
     from labctl.answers.recording_head import OutputUnit
     from labctl.fitting.uncertainty.conditions import BenchConditions
 
 SCHEMA = "labctl-calibration/1"
 #: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
 MAX_BYTES = 64 << 20
+UNITS = frozenset(get_args(OutputUnitName))
 
 
 @dataclass(frozen=True)
@@ -152,6 +155,32 @@ class Calibration:
         return canonical(self.document) + b"\n"
 
 
+def output_lines(calibration: Calibration) -> tuple[list[float], list[float]]:
+    """Return offset and scale of each axis's output: rate_dps = (output - offset) / scale.
+
+    What labctl writes is read without pydantic, which is most of the time in which a robot's program loads a file;
+    `Calibration.output` reads the rest, or raises BadCalibrationFile.
+    """
+    stated = [_stated_line(calibration, axis) for axis in calibration.axes]
+    if None in stated:
+        units = calibration.output
+        stated = [(units[axis].offset, units[axis].scale) for axis in calibration.axes]
+    lines = [line for line in stated if line is not None]
+    return [offset for offset, _ in lines], [scale for _, scale in lines]
+
+
+def _stated_line(calibration: Calibration, axis: str) -> tuple[float, float] | None:
+    """Return offset and scale of an output where both are finite and its unit is known; the scale is not 0."""
+    with _reading("output"):
+        unit = calibration.document["output"][axis]
+        if set(unit) != {"unit", "offset", "scale"} or unit["unit"] not in UNITS:
+            return None
+        offset, scale = unit["offset"], unit["scale"]
+        if not (isinstance(offset, float) and isinstance(scale, float)):
+            return None
+        return (offset, scale) if math.isfinite(offset) and math.isfinite(scale) and scale != 0.0 else None
+
+
 def limits(pair: Sequence[float | None]) -> tuple[float, float]:
     """Return a range as numbers: null, where there is no limit, is infinite."""
     low, high = pair
@@ -163,6 +192,11 @@ def read_calibration(source: Path | bytes) -> Calibration:
 
     A file that another parser could read otherwise, such as one with a repeated key, is refused.
     """
+    return read_source(source)
+
+
+def read_source(source: Path | str | bytes) -> Calibration:
+    """Return `read_calibration` of a file, also by its path as text, or of bytes."""
     name = "calibration" if isinstance(source, bytes) else str(source)
     try:
         content = source if isinstance(source, bytes) else _content(source)
@@ -192,11 +226,11 @@ def read_calibration(source: Path | bytes) -> Calibration:
             f"{name}: was edited or damaged: the hash of its content is {digest[:16]}…, but the file gives "
             f"{str(written)[:16]}…; fetch it again with `labctl calibration`"
         )
-    return Calibration(cast(CalibrationJson, document))
+    return Calibration(cast("CalibrationJson", document))
 
 
-def _content(path: Path) -> bytes:
-    with path.open("rb") as file:
+def _content(path: Path | str) -> bytes:
+    with open(path, "rb") as file:  # noqa: PTH123  a robot's program does not load pathlib
         content = file.read(MAX_BYTES + 1)
     if len(content) > MAX_BYTES:
         raise ValueError(f"larger than the limit of {MAX_BYTES} bytes; check that it is a calibration file")

@@ -7,9 +7,13 @@ import sys
 
 # Fits are many small solves, for which threads only get in each other's way; to be set before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# labctl has no plug-ins of pydantic; to look for them reads the metadata of everything that is installed.
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 #: New objects after which garbage is collected; Python's own default is 700.
 COLLECTED_AFTER = 50_000
+#: And for the first time: a command's modules make some 300 000 that stay.
+FIRST_COLLECTED_AFTER = 500_000
 
 __all__ = ["main"]
 
@@ -40,6 +44,14 @@ def main() -> None:
 
         sys.exit(f"labctl: the command line needs {error.name}, which is not installed; run {install('lab')}")
     gc.freeze()
-    gc.set_threshold(COLLECTED_AFTER)
+    gc.set_threshold(FIRST_COLLECTED_AFTER)
+    gc.callbacks.append(_after_first_collection)
     gc.enable()
     run()
+
+
+def _after_first_collection(phase: str, _info: dict[str, int]) -> None:
+    """Collect garbage from now on after `COLLECTED_AFTER` new objects."""
+    if phase == "stop" and _after_first_collection in gc.callbacks:
+        gc.callbacks.remove(_after_first_collection)
+        gc.set_threshold(COLLECTED_AFTER)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
-from importlib.metadata import version
 from typing import Annotated
 
 import typer
 
 from labctl.acting_user import Actor, acting
+from labctl.cli.asked_command import part_for
 from labctl.cli.command_log import log_of_command
 from labctl.cli.commands import (
     accelerometer,
@@ -118,6 +119,8 @@ for name, command in COMMANDS.items():
 
 def _version(is_wanted: bool) -> None:
     if is_wanted:
+        from importlib.metadata import version
+
         typer.echo(f"labctl {version('labctl')}")
         raise typer.Exit
 
@@ -153,4 +156,4 @@ def main() -> None:
     """Run the command line; the process ends with the command."""
     open_missing_streams()
     with process_of_one_command():
-        app()
+        part_for(app, sys.argv[1:])()

@@ -14,7 +14,7 @@ from labctl.answers.campaigns import CampaignResponse
 from labctl.processes.rpc_methods import RpcMethod, parameter, supervisor_method
 from labctl.services.commands.acts.catalogue import BENCH_ACTS
 from labctl.services.local_bench import LocalBench
-from labctl.store.connection.transactions import TRANSACTIONS
+from labctl.store.store import transactions
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Beat:
 def method_of(name: str) -> RpcMethod:
     """Return the method of a call of the bench process. Raises BadInput for a name that is none."""
     area, _, rest = name.partition(".")
-    if area == "store" and rest in TRANSACTIONS:
-        return RpcMethod.of_method(name, TRANSACTIONS[rest])
+    if area == "store" and (method := transactions().get(rest)):
+        return RpcMethod.of_method(name, method)
     if area == "control" and rest in BENCH_ACTS:
         hints = get_type_hints(BENCH_ACTS[rest].in_service)
         return RpcMethod(name, [parameter("request", hints["request"])], hints["return"])

@@ -45,7 +45,7 @@ WORKER_MODULES = (
     "blosc2", "pyarrow.csv", "pyarrow.parquet", "labctl.plots", "labctl.processes.remote_bench",
     "labctl.services.commands.computed", "labctl.services.commands.registry",
     "labctl.services.criticism.next_experiment", "labctl.services.criticism.evaluation", "labctl.services.lab_service",
-    "labctl.services.simulation.visibility",
+    "labctl.services.simulation.visibility", "labctl.store.repositories.recordings",
 )  # fmt: skip
 
 

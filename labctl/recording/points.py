@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labctl.recording.motions.turn_means import turned_points
 from labctl.recording.motions.windows import kept_windows, usual_step_s, white_std_of_profile, window_labels
 from labctl.recording.quantisation import steps_columns
-from labctl.recording.recording import Columns, Recording
+from labctl.recording.recording import Columns, Recording, temperature_of
 from labctl.recording.spread import MIN_FOR_SPECTRUM, white_stds
 
 if TYPE_CHECKING:
@@ -35,15 +35,6 @@ _SLOPES = 20
 def dataset_starts(dataset: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the row, (m,), at which each data set of (n,) rows begins."""
     return np.flatnonzero(np.concatenate([[True], dataset[1:] != dataset[:-1]]))
-
-
-def temperature_of(columns: Columns) -> NDArray[np.float64] | None:
-    """Return how warm the unit was, (n,) deg C, or None where no column gives it.
-
-    The one place that decides: the unit's own thermometer, and where it has none the chamber's stands in for it.
-    """
-    temperatures_c = columns.get("temperature_c", columns.get("chamber_c"))
-    return None if temperatures_c is None else np.asarray(temperatures_c, dtype=np.float64)
 
 
 def pieces(columns: Columns, motion: Motion = "rates") -> NDArray[np.int64]:

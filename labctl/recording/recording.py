@@ -38,3 +38,12 @@ class Recording:
         raw = np.asarray(self.columns[f"gyro_{axis}"], dtype=np.float64)
         output = next((output_unit for name, output_unit in self.info.output.items() if name == axis), None)
         return raw if output is None else (raw - output.offset) / output.scale
+
+
+def temperature_of(columns: Columns) -> NDArray[np.float64] | None:
+    """Return how warm the unit was, (n,) deg C, or None where no column gives it.
+
+    The one place that decides: the unit's own thermometer, and where it has none the chamber's stands in for it.
+    """
+    temperatures_c = columns.get("temperature_c", columns.get("chamber_c"))
+    return None if temperatures_c is None else np.asarray(temperatures_c, dtype=np.float64)

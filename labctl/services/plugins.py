@@ -12,7 +12,7 @@ from instruments.simulation import simulation_plugins
 from labctl.answers.admin import DriverCheckResponse, DriverTestResponse, PluginResponse
 from labctl.errors import BadInput
 from labctl.exports import FORMATS
-from labctl.fitting.effects.catalogue import FAMILIES
+from labctl.fitting.effects.families import FAMILIES
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.importers import IMPORTERS
 from procedures.experiments import GROUP as EXPERIMENTS

@@ -18,9 +18,6 @@ from labctl.answers.units import (
     VersionErrors,
 )
 from labctl.errors import BadInput
-from labctl.exports import export_formats
-from labctl.services.drafts.answers import newest_drafts
-from labctl.services.planning.recipe_text import recipe_text
 from labctl.services.standards.usage import Notices
 from labctl.store import CampaignRow, CertificationRow, Store, Unit
 from labctl.store.paging import Page, PageRequest
@@ -77,6 +74,8 @@ def unit(store: Store, serial: str, now: datetime) -> UnitResponse:
 
 def _whole(store: Store, answers: Sequence[UnitResponse]) -> list[UnitResponse]:
     """Return units with what lists of all units leave out: how each is recalibrated, and its newest draft."""
+    from labctl.services.drafts.answers import newest_drafts  # noqa: PLC0415  lists of units have no drafts
+
     serials = [answer.serial for answer in answers]
     campaigns, drafts = store.due_units.campaigns(serials), newest_drafts(store, serials)
     again = {row.id: _recalibration(row) for row in store.campaigns.some(sorted(set(campaigns.values())))}
@@ -157,6 +156,8 @@ def _answer(
 @cache
 def _formats() -> list[ExportFormatResponse]:
     """Return what a calibration can be exported as: the same for every unit."""
+    from labctl.exports import export_formats  # noqa: PLC0415  loads what a calibration is computed with
+
     return [
         ExportFormatResponse(id=name, title=each.title, suffix=each.suffix, options=dict(each.options))
         for name, each in export_formats().items()
@@ -170,5 +171,7 @@ def _notices(store: Store, notices: Notices, act: CertificationRow | None) -> li
 
 
 def _recalibration(row: CampaignRow) -> RecalibrationResponse | None:
+    from labctl.services.planning.recipe_text import recipe_text  # noqa: PLC0415  lists of units have no recipes
+
     text = recipe_text(row.recipe)
     return RecalibrationResponse(recipe=text, name=row.recipe_name, bench=row.bench_name) if text else None

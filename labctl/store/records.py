@@ -6,16 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from instruments.bench_config import BenchFile
-from labctl.answers.certification import JudgementDetail
 from labctl.answers.json_object import JsonDocument, JsonObject
+from labctl.answers.judgement import JudgementDetail
 from labctl.answers.kept_answers import KeptAnswer
-from labctl.answers.recordings import RawChannelJson
+from labctl.answers.raw_channels import RawChannelJson
 from labctl.answers.steps import StepJson
-from labctl.recording.info import RecordingInfo
 from procedures.contracts.campaign_state import CampaignState
+
+if TYPE_CHECKING:
+    from instruments.bench_config import BenchFile
+    from labctl.recording.info import RecordingInfo
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,8 @@ class RecordingRow:
     @cached_property
     def recording_info(self) -> RecordingInfo:
         """`info`, validated."""
+        from labctl.recording.info import RecordingInfo  # noqa: PLC0415  most rows are listed, and stay as they are
+
         return RecordingInfo.model_validate(self.info)
 
 
@@ -119,6 +123,8 @@ class CampaignRow:
     @cached_property
     def bench_file(self) -> BenchFile:
         """`bench`, validated, without its simulation: that may have settings of another version of labctl."""
+        from instruments.bench_config import BenchFile  # noqa: PLC0415  as above
+
         return BenchFile.model_validate({**self.bench, "simulation": None})
 
 

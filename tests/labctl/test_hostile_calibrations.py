@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from labctl.calibration import Calibration, hash_of, read_calibration
+from labctl.calibration.document import output_lines
 from labctl.compensator import Compensator
 from labctl.errors import BadCalibrationFile
 from labctl.exports import export_calibration
@@ -122,3 +123,38 @@ def test_the_command_line_ends_in_one_line(calibration: Calibration, tmp_path: P
         assert found.stderr.startswith("labctl: ")
         assert found.stderr.count("\n") == 1
         assert not (tmp_path / "out.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("unit", "is_usable"),
+    [
+        ({"unit": "deg/s", "offset": 0.25, "scale": 2.0}, True),
+        ({"unit": "V", "offset": 1, "scale": 2}, True),
+        ({"unit": "rad/s"}, True),
+        ({"unit": "V", "offset": "1.5", "scale": 1.0}, True),
+        ({"unit": "mV"}, False),
+        ({"unit": "furlong", "offset": 0.0, "scale": 1.0}, False),
+        ({"unit": ["V"], "offset": 0.0, "scale": 1.0}, False),
+        ({"unit": "V", "offset": 0.0, "scale": 0.0}, False),
+        ({"unit": "V", "offset": float("inf"), "scale": 1.0}, False),
+        ({"unit": "V", "offset": 0.0, "scale": 1.0, "more": 1.0}, False),
+        ([0.0, 1.0], False),
+        (None, False),
+    ],
+)
+def test_a_compensator_reads_outputs_as_models_do(calibration: Calibration, unit: Any, *, is_usable: bool) -> None:
+    """What is read without pydantic is what pydantic makes of it, and the rest is refused as pydantic refuses it."""
+    spoilt = Calibration({**calibration.document, "output": dict.fromkeys(calibration.axes, unit)})
+
+    def by_models() -> list[tuple[float, float]]:
+        return [(of_axis.offset, of_axis.scale) for of_axis in map(spoilt.output.__getitem__, spoilt.axes)]
+
+    def by_numbers() -> list[tuple[float, float]]:
+        return list(zip(*output_lines(spoilt), strict=True))
+
+    if is_usable:
+        assert by_numbers() == by_models()
+        return
+    for read in (by_numbers, by_models):
+        with pytest.raises(BadCalibrationFile, match="its output cannot be read"):
+            read()

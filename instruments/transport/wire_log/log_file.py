@@ -7,7 +7,6 @@ there.
 
 from __future__ import annotations
 
-import logging
 import os
 import threading
 import zlib
@@ -15,9 +14,10 @@ from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 
+from instruments.logger import logger
 from instruments.transport.wire_log.document import Event, end_line, header_line, line_of
 
-log = logging.getLogger(__name__)
+log = logger(__name__)
 
 #: From one write to the next, s of real time.
 FLUSH_S = 0.25

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.rate_profile import RateProfile, Response
+from labctl.fitting.data.response import Response
 from labctl.fitting.data.temperature.channel import with_stand_in
 from labctl.fitting.data.temperature.history import TemperatureHistory, history_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.columns import RECORDING, WITHIN_S
 from labctl.recording.positions import up_in
+
+if TYPE_CHECKING:
+    from labctl.fitting.data.rate_profile import RateProfile
 
 BODY_AXES = ("x", "y", "z")
 #: What a law sees: the true rate (forward), or the output in its place (direct).

@@ -12,7 +12,8 @@ from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.motions.turn_means import rates_as_turned
-from labctl.recording.points import dataset_starts, temperature_of
+from labctl.recording.points import dataset_starts
+from labctl.recording.recording import temperature_of
 
 Range = tuple[float, float]
 #: A range of temperatures, deg C; None where no thermometer says how warm the unit was.

@@ -16,7 +16,8 @@ from labctl.fitting.data.earth_rate import up_rate_dps
 from labctl.fitting.data.mean_noise import white_var_of
 from labctl.fitting.data.mounting_angles import AngleColumns, angle_columns, placed_rad
 from labctl.fitting.data.noise_floor import NoiseFloor, noise_floor_of
-from labctl.fitting.data.rate_profile import RateProfile, Response, rate_profile
+from labctl.fitting.data.rate_profile import RateProfile, rate_profile
+from labctl.fitting.data.response import Response
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.fitting.data.temperature.levels import folds, temperature_levels
 from labctl.fitting.numeric.arrays import Array

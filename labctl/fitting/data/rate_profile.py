@@ -13,54 +13,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.data.response import Response
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Columns, dataset_starts
 from labctl.recording.motions.windows import kept_windows, stretch_starts, window_labels
 
-#: Length of the memory of a response: in time constants, and in sample intervals of the readings.
-MEMORY_TAUS, MEMORY_STEPS = 30.0, 256
+#: Length of the memory of a response, in sample intervals of the readings; in time constants: `MEMORY_TAUS`.
+MEMORY_STEPS = 256
 #: Extrapolation beyond the ends of a stretch: decay of the slope, and span from which the slope is taken, in samples.
 BEND_STEPS, SLOPE_STEPS = 64, 8
 #: Largest deviation from an even spacing, as a share of it; above it readings are resampled to one, and back.
 EVEN_SHARE = 1e-3
 #: Means over windows that are kept for another time: 0.2 MB each.
 MAX_CACHED = 128
-#: Names of the coefficients of a response.
-DELAY, TIME_CONSTANT = "delay", "time_constant"
 #: A factor on a spectrum: angular frequencies (k,) rad/s to complex numbers (k,).
 Factor = Callable[[Array], NDArray[np.complex128]]
-
-
-@dataclass(frozen=True)
-class Response:
-    """Frequency response of the output to the rate: a first-order lag and a delay, exp(-i w delay) / (1 + i w T)."""
-
-    delay_s: float = 0.0
-    time_constant_s: float = 0.0
-
-    def gain(self, rad_s: Array) -> NDArray[np.complex128]:
-        """Return the gain at angular frequencies (k,) rad/s."""
-        return np.asarray(np.exp(-1j * rad_s * self.delay_s) / (1 + 1j * rad_s * self.time_constant_s))
-
-    def slope(self, name: str, rad_s: Array) -> NDArray[np.complex128]:
-        """Return the derivative of the gain by `DELAY` or `TIME_CONSTANT`, 1/s."""
-        derivative = -1j * rad_s
-        return np.asarray(
-            derivative * self.gain(rad_s) / (1.0 if name == DELAY else 1 + 1j * rad_s * self.time_constant_s)
-        )
-
-    def value(self, name: str) -> float:
-        """Return a coefficient of the response by its name, s."""
-        return self.delay_s if name == DELAY else self.time_constant_s
-
-    def with_value(self, name: str, value: float) -> Response:
-        """Return the response with another delay or time constant, s."""
-        return replace(self, **{"delay_s" if name == DELAY else "time_constant_s": value})
-
-    @property
-    def memory_s(self) -> float:
-        """Duration after which the impulse response is negligible, s."""
-        return 2 * abs(self.delay_s) + MEMORY_TAUS * abs(self.time_constant_s)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.levels import level_centres, rate_levels
-from labctl.fitting.data.rate_profile import Response
+from labctl.fitting.data.response import Response
 from labctl.fitting.data.shifts import shift_columns
 from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array

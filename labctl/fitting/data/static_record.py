@@ -13,8 +13,7 @@ from labctl.fitting.numeric.allan import MIN_READINGS, Allan, Figure, allan
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 from labctl.recording import Recording
-from labctl.recording.points import temperature_of
-from labctl.recording.recording import Columns
+from labctl.recording.recording import Columns, temperature_of
 
 #: A temperature that stays within this counts as one.
 ONE_TEMPERATURE_K = 1.0

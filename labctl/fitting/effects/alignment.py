@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Term
 from labctl.fitting.effects.equation import YANG, Equation, Source, Symbol, term_528
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import Origin
 
 
 class Misalignment(Effect):

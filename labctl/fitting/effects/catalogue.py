@@ -1,6 +1,6 @@
-"""The catalogue of effects, by id: the entry points of the group `labctl.effects`, labctl's own first.
+"""The catalogue of effects, by id: labctl's own, then those of other distributions (`families`).
 
-An entry point is one class of effect, or several in a row; labctl's own stand in `EFFECTS`.
+An entry point of the group `labctl.effects` is one class of effect, or several in a row; labctl's own is `EFFECTS`.
 """
 
 from __future__ import annotations
@@ -8,10 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
-from instruments.plugins import PluginGroup
-from labctl.answers.effects import EffectJson
 from labctl.errors import BadInput
 from labctl.fitting.effects import (
     acceleration,
@@ -26,8 +24,9 @@ from labctl.fitting.effects import (
     thermal,
 )
 from labctl.fitting.effects.base import Effect, Term
-from labctl.fitting.effects.formula import NAME, Formula
-from labctl.fitting.effects.trial import refuse_useless
+
+if TYPE_CHECKING:
+    from labctl.answers.effects import EffectJson
 
 _OWN = (
     bias,
@@ -43,26 +42,6 @@ _OWN = (
 )
 #: labctl's own entry point: a family lists its effects in its EFFECTS.
 EFFECTS: tuple[type[Effect], ...] = tuple(kind for family in _OWN for kind in family.EFFECTS)
-Kinds = tuple[Effect, ...]
-
-
-def _checked(declared: Any) -> Kinds:
-    kinds = (declared,) if isinstance(declared, type) else tuple(declared)
-    effects = []
-    for kind in kinds:
-        if not (isinstance(kind, type) and issubclass(kind, Effect)):
-            raise TypeError(f"{kind!r} is not a subclass of labctl.fitting.effects.Effect; derive it from that class")
-        effect = kind()
-        if not NAME.fullmatch(effect.id):
-            raise ValueError(
-                f"effect id {effect.id!r} is not valid; use small letters, digits and _ only, beginning with a letter"
-            )
-        refuse_useless(effect)
-        effects.append(effect)
-    return tuple(effects)
-
-
-FAMILIES: PluginGroup[Kinds] = PluginGroup("labctl.effects", "family of effects", _checked)
 
 
 class Catalogue(Mapping[str, Effect]):
@@ -81,13 +60,14 @@ class Catalogue(Mapping[str, Effect]):
 
 @cache
 def _own() -> dict[str, Effect]:
-    """Return labctl's own effects."""
-    families = [FAMILIES.get(name) for name in FAMILIES.names if FAMILIES.plugin(name).is_own]
-    return {each.id: each for kinds in families for each in kinds}
+    """Return labctl's own effects; a robot's program needs no others, nor the metadata of what is installed."""
+    return {own.id: own for own in (kind() for kind in EFFECTS)}
 
 
 @cache
 def _all() -> dict[str, Effect]:
+    from labctl.fitting.effects.families import FAMILIES  # noqa: PLC0415  only where others' effects count
+
     return FAMILIES.merged(lambda kinds: ((kind.id, kind) for kind in kinds), "effect")
 
 
@@ -109,8 +89,12 @@ def effect(effect_id: str) -> Effect:
     raise BadInput(f"effect {effect_id!r} is not in the catalogue; {hint}")
 
 
-#: A fit asks for the formula of a term some hundred times, and a formula never changes; to read it takes 0.3 ms.
-_formula = lru_cache(maxsize=256)(Formula)
+@lru_cache(maxsize=256)
+def _formula(name: str, text: str) -> Effect:
+    """Return a formula; a fit asks for that of a term some hundred times, and to read it takes 0.3 ms."""
+    from labctl.fitting.effects.formula import Formula  # noqa: PLC0415  few models have one
+
+    return Formula(name, text)
 
 
 def kind_of(term: Term) -> Effect:

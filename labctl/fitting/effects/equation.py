@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from labctl.answers.effects import Gives
+if TYPE_CHECKING:
+    from labctl.answers.effects import Gives
 
 
 @dataclass(frozen=True)

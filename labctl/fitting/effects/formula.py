@@ -11,15 +11,17 @@ import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from labctl.answers.fitted_model import Origin
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Span, Term
 from labctl.fitting.numeric.arrays import Array
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import Origin
 
 #: What an operator or function takes and returns.
 Operand = float | Array

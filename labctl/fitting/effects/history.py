@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.rate_profile import Response
+from labctl.fitting.data.response import Response
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.effects.equation import IEEE_952, Equation, Source, Symbol, term_528
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import Origin
 
 
 class BiasDrift(Effect):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.effects.equation import IEEE_952, Equation, Source, Symbol, term_528
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import Origin
 
 
 class CrossAxisNonlinearity(Effect):

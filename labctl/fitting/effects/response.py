@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT, Response
+from labctl.fitting.data.response import DELAY, TIME_CONSTANT, Response
 from labctl.fitting.effects.base import Column, Effect, Law, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.effects.equation import Equation, Source, Symbol, term_528
 from labctl.fitting.numeric.arrays import Array
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import Origin
 
 
 class _Responding(Effect):

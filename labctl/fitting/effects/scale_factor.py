@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Law, Parameter, Reference, Span, Term, by_parameter, powers
 from labctl.fitting.effects.equation import IEEE_952, OJEDA, YANG, Equation, Source, Symbol, term_528
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.open_loop_sine import sine_ratio, sine_ratio_slope
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import Origin
 
 #: Parameter of a sine response whose amplitude was fitted beside K, in calibrations up to version 0.1.
 FREE_AMPLITUDE = "free_amplitude"

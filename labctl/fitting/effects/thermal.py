@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.effects.equation import IEEE_952, WEISS, Equation, Source, Symbol, term_528
 from labctl.fitting.effects.thermal_lag import LAGS
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import Origin
 
 
 class TemperatureRate(Effect):

@@ -10,15 +10,17 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.effects.equation import Equation, Source, Symbol
 from labctl.fitting.numeric.arrays import Array
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import Origin
 
 #: What makes the error: the distance between element and thermometer, or that of the squares of their temperatures.
 Part = Literal["all", "curved"]

@@ -12,7 +12,7 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.data.earth_rate import turning_columns, turning_size_dps, with_known_size, with_prior
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.mounting_angles import leaning_rates
-from labctl.fitting.data.rate_profile import TIME_CONSTANT
+from labctl.fitting.data.response import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.common_turn_error import with_common_error

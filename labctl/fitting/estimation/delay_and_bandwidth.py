@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT, Response
+from labctl.fitting.data.response import DELAY, TIME_CONSTANT, Response
 from labctl.fitting.effects.response import Bandwidth, TimeDelay
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel, without

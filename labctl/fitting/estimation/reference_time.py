@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadInput
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.rate_profile import DELAY
+from labctl.fitting.data.response import DELAY
 from labctl.fitting.models.error_part import ErrorPart
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.least_squares import Considered

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labctl.answers.fitted_model import ErrorModelJson, TermJson
 from labctl.fitting.data.channels import Argument, Channels
 from labctl.fitting.effects import Column, Reference, Term, kind_of
 from labctl.fitting.models.held import Held
 from labctl.fitting.models.temperature import Constant, TemperatureBasis, basis_from_dict
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import RECORDING
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import ErrorModelJson, TermJson
 
 #: Effects of these origins belong to the unit and are exported with its calibration.
 EXPORTED_ORIGINS = frozenset({"sensor", "package"})

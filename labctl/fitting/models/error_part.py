@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.answers.fitted_model import ErrorPartJson
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import ErrorPartJson
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.answers.fitted_model import AxisFitJson, FittedModelJson, LeftOutEffect
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.effects.scale_factor import FREE_AMPLITUDE
@@ -17,6 +17,9 @@ from labctl.fitting.models.error_part import ErrorPart
 from labctl.fitting.models.inversion import invert
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import none_for_nan
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import AxisFitJson, FittedModelJson, LeftOutEffect
 
 
 @dataclass(frozen=True)

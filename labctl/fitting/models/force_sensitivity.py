@@ -7,17 +7,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.answers.fitted_model import Coefficient, SpecificForceJson
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import none_for_nan
 from labctl.fitting.numeric.rounding import at_most
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import Coefficient, SpecificForceJson
 
 #: What an accelerometer gives, and `Compensator` takes by this name.
 INPUT = "specific_force_g"

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.answers.fitted_model import HeldCoefficientJson, HeldJson
 from labctl.fitting.models.temperature import LagrangeTable, TemperatureBasis
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import HeldCoefficientJson, HeldJson
 
 #: Temperatures between which a held table is interpolated, where it has as many.
 POINTS = 3

@@ -9,12 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from labctl.answers.fitted_model import StateJson
-from labctl.answers.json_object import JsonObject
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.data.temperature.history import LoggedColumns, TemperatureHistory, rounded_plays
@@ -23,6 +21,10 @@ from labctl.fitting.effects.thermal_lag import Lag, LagElement, Part, ScaleFacto
 from labctl.fitting.models.fitted_model import FittedModel, without
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.following import Steps
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import StateJson
+    from labctl.answers.json_object import JsonObject
 
 #: What `Follower.to_json` describes.
 STATE_EQUATION = (

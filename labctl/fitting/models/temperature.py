@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.answers.fitted_model import TemperatureBasisJson
 from labctl.fitting.numeric.arrays import Array
+
+if TYPE_CHECKING:
+    from labctl.answers.fitted_model import TemperatureBasisJson
 
 
 @dataclass(frozen=True)

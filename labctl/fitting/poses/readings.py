@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording, RecordingInfo
-from labctl.recording.points import temperature_of
+from labctl.recording.recording import temperature_of
 
 AXES: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")
 #: A data set in poses has at least so many readings: two rests of a second and a turn between them, at 10 Hz.

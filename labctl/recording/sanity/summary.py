@@ -16,10 +16,10 @@ from labctl.recording.columns import VERIFICATION
 from labctl.recording.info import RecordingInfo
 from labctl.recording.motions.turn_means import rates_as_turned
 from labctl.recording.motions.turns import USUAL_U_DEG
-from labctl.recording.points import dataset_starts, temperature_of
+from labctl.recording.points import dataset_starts
 from labctl.recording.positions import Position
 from labctl.recording.quantisation import codes_of
-from labctl.recording.recording import Columns, Recording
+from labctl.recording.recording import Columns, Recording, temperature_of
 from labctl.recording.verification import is_marked
 
 #: Blocks of a data set between which its level is compared, and readings that one block needs.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from instruments.bench import Bench
 from instruments.bench_config import BenchFile
 from instruments.interfaces.gyro import Channel
-from labctl.answers.recordings import RawChannelJson
+from labctl.answers.raw_channels import RawChannelJson
 from labctl.errors import BadInput
 
 #: Column of a recording that a fit takes as the temperature.

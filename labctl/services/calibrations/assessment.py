@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from labctl.answers.certification import AssessmentResponse, CertifiedErrors, Objection
+from labctl.answers.certification import (
+    AssessmentResponse,
+    CertifiedErrors,
+)
 from labctl.answers.criticism import CriticismResponse
+from labctl.answers.judgement import Objection
 from labctl.calibration import read_calibration
 from labctl.errors import BadInput, NotEnoughData, NotFound
 from labctl.fitting.models.inversion import NotConverged

@@ -10,11 +10,11 @@ from labctl.answers.certification import (
     AssessmentResponse,
     CertificationResponse,
     CertifyRequest,
-    JudgementDetail,
     ReleaseRequest,
     ReleaseRequestResponse,
     RevokeRequest,
 )
+from labctl.answers.judgement import JudgementDetail
 from labctl.errors import BadInput, CertificationRefused
 from labctl.services.calibrations.assessment import MIN_REASON_CHARACTERS, MIN_REASON_WORDS, assess
 from labctl.services.calibrations.due import interval_days

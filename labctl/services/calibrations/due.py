@@ -6,7 +6,7 @@ import re
 from datetime import timedelta
 
 from labctl import config
-from labctl.answers.certification import DueSource
+from labctl.answers.judgement import DueSource
 from labctl.errors import BadInput
 from labctl.store import Store
 

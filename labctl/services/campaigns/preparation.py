@@ -18,7 +18,7 @@ from instruments.shared_clock import clock_outside
 from instruments.standards import Standard
 from instruments.transport.factory import Wire
 from labctl.acting_user import actor
-from labctl.answers.recordings import RawChannelJson
+from labctl.answers.raw_channels import RawChannelJson
 from labctl.errors import BadInput, Conflict
 from labctl.log import get_logger
 from labctl.recording import RecordingInfo

@@ -22,7 +22,7 @@ from labctl.answers.fitted_model import AxisCoefficients
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT, Response
+from labctl.fitting.data.response import DELAY, TIME_CONSTANT, Response
 from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.direction_errors import Correct, move_errors

@@ -13,7 +13,7 @@ from labctl.answers.datasheet import Characteristic, DatasheetResponse, Measured
 from labctl.answers.noise import NoiseFigure
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.rate_profile import TIME_CONSTANT
+from labctl.fitting.data.response import TIME_CONSTANT
 from labctl.progress import report_stage
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.datasheet.measured import Figure, figures_of

@@ -12,7 +12,7 @@ from labctl.fitting.data.static_record import StaticRecord, longest_stretch, sta
 from labctl.fitting.numeric.allan import MIN_READINGS, allan
 from labctl.progress import report_stage
 from labctl.recording import Columns, Recording, RecordingInfo
-from labctl.recording.points import temperature_of
+from labctl.recording.recording import temperature_of
 from labctl.services.cache import cached
 from labctl.store import RecordingRow, Store
 

@@ -15,8 +15,7 @@ from labctl.fitting.numeric.allan import MIN_READINGS, Allan, allan
 from labctl.recording import Recording, read_recording
 from labctl.recording.column_map import ColumnMap
 from labctl.recording.data_files import read_table
-from labctl.recording.points import temperature_of
-from labctl.recording.recording import Columns
+from labctl.recording.recording import Columns, temperature_of
 from labctl.recording.verification import fitted_part
 from labctl.services.recordings.allan import allan_unit
 from labctl.services.recordings.importers import as_interchange

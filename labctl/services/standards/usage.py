@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import date, timedelta
+from typing import TYPE_CHECKING
 
-from instruments.standards import Standard
-from labctl.answers.standards import AffectedCalibration, AffectedResponse
 from labctl.errors import BadInput
 from labctl.natural_order import natural_key
-from labctl.recording.info import measured_at
 from labctl.store import (
     CalibrationRecord,
     RecordingRow,
@@ -19,6 +17,10 @@ from labctl.store import (
     StandardFinding,
     Store,
 )
+
+if TYPE_CHECKING:
+    from instruments.standards import Standard
+    from labctl.answers.standards import AffectedCalibration, AffectedResponse
 
 #: First and last day (UTC) of a measurement; None: unknown.
 Days = tuple[date | None, date | None]
@@ -30,6 +32,8 @@ def performed(store: Store, row: RecordingRow) -> Days:
         campaign = store.campaigns.get(row.campaign)
         begun = campaign.started_at or campaign.created_at
         return begun.date(), None if campaign.ended_at is None else campaign.ended_at.date()
+    from labctl.recording.info import measured_at  # noqa: PLC0415  most answers have no standard that was bad
+
     at = measured_at(row.info)
     if at is None:
         return None, None
@@ -82,6 +86,8 @@ def affected(store: Store, label: str, bad_from: date | None = None, bad_until: 
 
     Without days: those of its findings that are in force, else all. Raises NotFound, BadInput for days in reverse.
     """
+    from labctl.answers.standards import AffectedResponse  # noqa: PLC0415  as above
+
     if bad_from is not None and bad_until is not None and bad_until < bad_from:
         raise BadInput(f"from {bad_from} until {bad_until}: the last day is before the first; exchange them")
     standard = store.standards.get(label)
@@ -117,6 +123,8 @@ def _affected(
     days: dict[int, Days],
     standard: RegisteredStandard,
 ) -> AffectedCalibration:
+    from labctl.answers.standards import AffectedCalibration  # noqa: PLC0415  as above
+
     begun = [day for row in rows if (day := days[row.id][0]) is not None]
     ended = [day for row in rows if (day := days[row.id][1] or days[row.id][0]) is not None]
     known = len(begun) == len(rows)

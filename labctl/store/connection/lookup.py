@@ -16,8 +16,6 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, Protocol
 
 import sqlalchemy as sa
-from sqlalchemy.dialects.postgresql import ARRAY
-from sqlalchemy.dialects.postgresql.base import PGDialect
 
 from labctl.errors import DatabaseUnreachable, StoreError
 
@@ -37,6 +35,8 @@ _PREPARED, _BINARY = b"lookup", 1
 def one_of_keys(column: sa.ColumnElement[str], *, is_shared: bool) -> sa.ColumnElement[bool]:
     """Return the condition that a column is one of the keys; for a server (`is_shared`) they are one array."""
     if is_shared:
+        from sqlalchemy.dialects.postgresql import ARRAY  # noqa: PLC0415  most databases are files
+
         return column == sa.any_(sa.bindparam(KEYS, type_=ARRAY(sa.Text)))
     return column.in_(sa.bindparam(KEYS, expanding=True))
 
@@ -89,6 +89,8 @@ class ServerLookup:
 
         A server that is away (DatabaseUnreachable) is asked again for `patience_s`, once it has answered before.
         """
+        from sqlalchemy.dialects.postgresql.base import PGDialect  # noqa: PLC0415  most databases are files
+
         dialect = PGDialect(paramstyle="numeric_dollar")  # type: ignore[no-untyped-call]
         compiled = statement.compile(dialect=dialect)
         self._sql = str(compiled).encode()

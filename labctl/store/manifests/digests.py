@@ -6,10 +6,11 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 #: The digests of a block, in the order of their columns in `block_digests`.
 GROUPS = ("readings", "temperatures", "table_rates")
@@ -107,7 +108,7 @@ def block_digests(columns: Mapping[str, NDArray[np.generic]]) -> dict[str, str]:
 
 def _content(values: NDArray[np.generic]) -> bytes | memoryview:
     if values.dtype.kind in "iub":
-        return np.ascontiguousarray(values.astype(np.int64, copy=False)).data.cast("B") if len(values) else b""
+        return values.astype("int64", order="C", copy=False).data.cast("B") if len(values) else b""
     if values.dtype.kind == "f":
-        return np.ascontiguousarray(values.astype(np.float64, copy=False)).data.cast("B") if len(values) else b""
+        return values.astype("float64", order="C", copy=False).data.cast("B") if len(values) else b""
     return json.dumps([str(word) for word in values]).encode()

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import sqlalchemy as sa
 from sqlalchemy import exc
 
-from labctl.answers.certification import JudgementDetail
+from labctl.answers.judgement import JudgementDetail
 from labctl.answers.kept_answers import KeptAnswer
 from labctl.errors import Conflict, NotCertified, NotFound, VersionTaken
 from labctl.store.connection.database import Database

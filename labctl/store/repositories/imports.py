@@ -16,7 +16,7 @@ import sqlalchemy as sa
 from sqlalchemy import exc
 
 from labctl.answers.json_object import JsonObject
-from labctl.answers.recordings import RawChannelJson
+from labctl.answers.raw_channels import RawChannelJson
 from labctl.errors import Conflict
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
+from functools import cache
+from typing import Any
 
 import sqlalchemy as sa
 
@@ -20,8 +22,12 @@ from labctl.store.sealing.seals import changing, seal
 
 _k = tables.api_keys.c
 _ALL = sa.select(_k.name, _k.role, _k.digest, _k.created_at, _k.revoked_at)
-#: Built once: the query behind every request that carries a key.
-_BY_DIGEST = {shared: _ALL.where(one_of_keys(_k.digest, is_shared=shared)) for shared in (False, True)}
+
+
+@cache
+def _by_digest(*, is_shared: bool) -> sa.Select[*tuple[Any, ...]]:
+    """Return the query behind every request that carries a key."""
+    return _ALL.where(one_of_keys(_k.digest, is_shared=is_shared))
 
 
 class Keys:
@@ -68,7 +74,7 @@ class Keys:
 
     def lookup(self) -> Lookup:
         """Return the reads of keys by their digests, for `keys_by_digests`."""
-        return self._database.lookup(_BY_DIGEST[self._database.is_shared])
+        return self._database.lookup(_by_digest(is_shared=self._database.is_shared))
 
 
 async def keys_by_digests(lookup: Lookup, digests: Sequence[str]) -> dict[str, KeyRow]:

@@ -15,7 +15,7 @@ import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
-from labctl.answers.recordings import RawChannelJson
+from labctl.answers.raw_channels import RawChannelJson
 from labctl.errors import BadRecording, LabctlError, NotFound
 from labctl.recording.columns import ARRIVAL_S, DEVICE_S
 from labctl.recording.recording import Columns

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from typing_extensions import TypedDict
 
 from labctl.answers.json_object import JsonObject
-from labctl.answers.recordings import RawChannelJson
+from labctl.answers.raw_channels import RawChannelJson
 from labctl.recording.columns import ARRIVAL_S, DEVICE_S, READING_TIMES, TIME_COMMON_U_S, TIME_U_S, VERIFICATION
 from labctl.store import sample_codec
 from labctl.store.import_parts import block_row

@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from datetime import datetime
+from functools import cache
 from itertools import zip_longest
 from typing import Any
 
@@ -276,6 +277,7 @@ def _served_in_force() -> sa.Select[*tuple[Any, ...]]:
     )
 
 
+@cache
 def _served_together(*, is_shared: bool) -> sa.Select[*tuple[Any, ...]]:
     of = sa.and_(_X.serial == _C.serial, _X.version == _C.version)
     inner = tables.certifications.alias()
@@ -307,7 +309,6 @@ def _served_version() -> sa.Select[*tuple[Any, ...]]:
 
 #: Built once: the queries behind every GET of a calibration.
 _IN_FORCE, _VERSION = _served_in_force(), _served_version()
-_TOGETHER = {is_shared: _served_together(is_shared=is_shared) for is_shared in (False, True)}
 
 
 class Certifications:
@@ -327,7 +328,7 @@ class Certifications:
 
     def lookup(self) -> Lookup:
         """Return the reads of versions in force by serial numbers, for `served_together`."""
-        return self._database.lookup(_TOGETHER[self._database.is_shared])
+        return self._database.lookup(_served_together(is_shared=self._database.is_shared))
 
     def in_force(self, serials: Sequence[str] | None = None) -> dict[str, CertificationRow]:
         """Return serial number -> the act that put its version in force, for every unit that has a version in force.

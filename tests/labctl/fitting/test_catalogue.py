@@ -10,7 +10,7 @@ import pytest
 
 from instruments.plugins import PluginError
 from labctl.errors import BadInput
-from labctl.fitting.effects import CATALOGUE, Column, Effect, Term, catalogue, effect
+from labctl.fitting.effects import CATALOGUE, Column, Effect, Term, catalogue, effect, families
 from labctl.fitting.effects.bias import Bias
 from labctl.fitting.effects.catalogue import EFFECTS
 from tests.helpers.plugins import register
@@ -56,10 +56,11 @@ def test_labctls_own_effects_keep_their_order() -> None:
     assert list(CATALOGUE) == [kind.id for kind in EFFECTS]
     assert len(CATALOGUE) == len(EFFECTS)
     assert set(pickle.loads(pickle.dumps(CATALOGUE))) == set(CATALOGUE)
+    assert [own.id for own in families.checked(EFFECTS)] == list(CATALOGUE)  # each can be fitted, as others' have to be
 
 
 def test_an_effect_of_another_package_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
-    register(monkeypatch, catalogue.FAMILIES, "torsion", catalogue._checked(Torsion))
+    register(monkeypatch, families.FAMILIES, "torsion", families.checked(Torsion))
     assert list(CATALOGUE)[-1] == "cable_torsion"
     assert effect("cable_torsion").term == "Cable torsion"
     assert CATALOGUE["bias"].id == "bias"
@@ -79,11 +80,11 @@ def test_an_effect_of_another_package_comes_last(monkeypatch: pytest.MonkeyPatch
 def test_one_that_cannot_be_fitted_is_left_out_with_one_line(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, kind: Any, error: str
 ) -> None:
-    plugin = register(monkeypatch, catalogue.FAMILIES, "torsion", None)
+    plugin = register(monkeypatch, families.FAMILIES, "torsion", None)
     monkeypatch.setattr(type(plugin), "load", lambda _: kind)
-    del catalogue.FAMILIES._loaded["torsion"]
+    del families.FAMILIES._loaded["torsion"]
     with pytest.raises(PluginError, match=error):
-        catalogue.FAMILIES.get("torsion")
+        families.FAMILIES.get("torsion")
     assert list(CATALOGUE) == [own.id for own in EFFECTS]
     (record,) = caplog.records
     assert "entry point 'torsion' (acme:torsion) of acme-plugins 0.3" in record.getMessage()
@@ -93,7 +94,7 @@ def test_an_id_of_labctls_own_is_not_taken(monkeypatch: pytest.MonkeyPatch, capl
     class Other(Torsion):
         id = "bias"
 
-    register(monkeypatch, catalogue.FAMILIES, "torsion", catalogue._checked((Other, Torsion)))
+    register(monkeypatch, families.FAMILIES, "torsion", families.checked((Other, Torsion)))
     assert isinstance(dict(CATALOGUE.items())["bias"], Bias)
     assert "cable_torsion" in CATALOGUE
     (record,) = caplog.records

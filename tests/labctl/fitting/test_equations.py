@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import roots_genlaguerre
 
 from labctl.fitting.data.channels import BODY_AXES, Channels, body_rates
-from labctl.fitting.data.rate_profile import Response
+from labctl.fitting.data.response import Response
 from labctl.fitting.data.temperature.history import SPACING_S, TemperatureHistory, TemperatureProfile
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.effects.base import Column, Reference

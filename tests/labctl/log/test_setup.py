@@ -285,3 +285,18 @@ def test_a_record_that_cannot_be_rendered_stops_nobody(tmp_path: Path) -> None:
         log.info("next")
     assert records.events() == ["log.unreadable", "next"]
     assert records.all()[0]["error"] == "ValueError in a record of 'wild'"
+
+
+def test_before_a_log_has_begun_a_record_loads_no_library_and_is_written_nowhere() -> None:
+    program = (
+        "import sys\n"
+        "from labctl.log import get_logger\n"
+        "log = get_logger(bench='left')\n"
+        "log.error('too.early', value=1)\n"
+        "assert 'structlog' not in sys.modules\n"
+        "log.bind(value=2).error('bound.early')\n"
+        "assert 'structlog' in sys.modules\n"
+        "log.critical('still.early')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

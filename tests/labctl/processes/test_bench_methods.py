@@ -20,7 +20,7 @@ from labctl.processes.settings import BenchSettings
 from labctl.recording import RecordingInfo
 from labctl.services.commands.acts.catalogue import BENCH_ACTS, CAMPAIGN_ACTS
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
-from labctl.store.connection.transactions import TRANSACTIONS
+from labctl.store.store import transactions
 from tests.helpers.example_values import PLAIN, examples
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -42,10 +42,10 @@ def shown(value: object) -> str:
     return repr(value).replace("TzInfo(0)", repr(UTC))
 
 
-@pytest.mark.parametrize("name", sorted(TRANSACTIONS))
+@pytest.mark.parametrize("name", sorted(transactions()))
 def test_every_transaction_gets_what_was_given(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(PLAIN, RecordingInfo, (INFO,))
-    hints = get_type_hints(inspect.unwrap(TRANSACTIONS[name]), include_extras=True)
+    hints = get_type_hints(inspect.unwrap(transactions()[name]), include_extras=True)
     form = method_of(f"store.{name}")
     for result in examples(hints.pop("return")):
         assert shown(answered(form, result)) == shown(result)

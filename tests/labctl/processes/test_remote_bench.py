@@ -31,7 +31,7 @@ from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
 from labctl.stop.wire import StopServer
 from labctl.store import Store, StoreAddress, open_store
-from labctl.store.connection.transactions import TRANSACTIONS
+from labctl.store.store import REPOSITORIES, transactions
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 BENCH = load_bench("single-axis-sim")
@@ -85,9 +85,9 @@ def test_what_a_killed_web_process_was_importing_is_discarded_by_the_next_one(st
 
 
 def test_every_transaction_is_a_method_of_a_repository(store: Store) -> None:
-    repositories = {type(each).__name__: type(each) for each in vars(store).values()}
-    assert TRANSACTIONS
-    for name in TRANSACTIONS:
+    repositories = {type(each).__name__: type(each) for each in (getattr(store, name) for name in REPOSITORIES)}
+    assert transactions()
+    for name in transactions():
         repository, _, method = name.partition(".")
         assert callable(getattr(repositories[repository], method)), name
     with pytest.raises(KeyError):

@@ -15,7 +15,8 @@ from labctl.fitting.data.channels import channels_of
 from labctl.fitting.data.earth_rate import up_rate_dps
 from labctl.fitting.data.fit_data import profile_of
 from labctl.fitting.data.mean_noise import white_var_of
-from labctl.fitting.data.rate_profile import RateProfile, Response
+from labctl.fitting.data.rate_profile import RateProfile
+from labctl.fitting.data.response import Response
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording, to_points
 

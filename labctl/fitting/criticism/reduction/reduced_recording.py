@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.answers.criticism import OutputStep
 from labctl.fitting.data.channels import Carrier, Channels
-from labctl.fitting.data.rate_profile import Response
+from labctl.fitting.data.response import Response
 from labctl.fitting.data.static_record import StaticRecord
 from labctl.fitting.effects import Column
 from labctl.fitting.numeric.arrays import Array

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.recording import Columns, Recording
-from labctl.recording.points import temperature_of
+from labctl.recording.recording import temperature_of
 
 #: The temperature of a unit without a thermometer, deg C: no answer shows it.
 STAND_IN_C = 25.0

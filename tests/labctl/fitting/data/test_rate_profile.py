@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT, RateProfile, Response, rate_profile
+from labctl.fitting.data.rate_profile import RateProfile, rate_profile
+from labctl.fitting.data.response import DELAY, TIME_CONSTANT, Response
 
 STEP_S = 0.01
 
