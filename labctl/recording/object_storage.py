@@ -6,6 +6,7 @@ import errno
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from labctl.answers.storage_url import refused_because
 from labctl.errors import BadInput, BadRecording, LabctlError, NotFound
@@ -96,14 +97,17 @@ class ObjectStorage:
     def put(self, name: str, source: Path) -> None:
         """Write a file, whole or not at all, in place of one that is there. Raises BadInput."""
         path = self._path(name)
+        part = f"{path}.{uuid4().hex}.part"  # of this process alone: another one may publish the same recording
         try:
             if not self._has_folders:
                 self._files.put_file(str(source), path)
                 return
             self._files.makedirs(path.rpartition("/")[0], exist_ok=True)
-            self._files.put_file(str(source), f"{path}.part")
-            self._files.mv(f"{path}.part", path)
+            self._files.put_file(str(source), part)
+            self._files.mv(part, path)
         except Exception as error:
+            with suppress(Exception):  # it may not be there
+                self._files.rm_file(part)
             raise BadInput(
                 f"{self.url}/{name}: cannot be written ({reason_of(error)}); check the URL, the free space and the "
                 "rights, then publish again: what is there stays"

@@ -8,7 +8,7 @@ from datetime import timedelta
 import pytest
 
 from labctl.answers.fleet import FleetChartRequest, FleetReportRequest, FleetReportResponse, FleetUnits
-from labctl.errors import BadInput
+from labctl.errors import BadInput, NotFound
 from labctl.services.fleet.evidence import content_of, sums_in
 from labctl.services.fleet.figures import fleet_chart, type_figures
 from labctl.services.fleet.report import fleet_report
@@ -98,6 +98,8 @@ def test_a_report_is_on_one_type(store: Store) -> None:
         fleet_report(store, FleetReportRequest(), NOW)
     with pytest.raises(BadInput, match=r"no unit of type 'FOG-Z' matches; .* are of 'FOG-A', 'MEMS-B'"):
         fleet_report(store, FleetReportRequest(type="FOG-Z"), NOW)
+    with pytest.raises(NotFound, match=r"^no unit matches batch 'B9', text 'X'; `labctl units` lists the units$"):
+        fleet_report(store, FleetReportRequest(batch="B9", search="X"), NOW)
     alone = fleet_report(store, FleetReportRequest(type="MEMS-B"), NOW)
     assert (alone.compared, alone.missing, alone.groups) == (0, [], [])
     assert "at least 5" in alone.text[0]

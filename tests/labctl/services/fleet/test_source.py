@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import closing
@@ -13,6 +15,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from fsspec.implementations.local import LocalFileSystem
 from fsspec.implementations.memory import MemoryFileSystem
 
 from instruments.clock import VirtualClock
@@ -179,6 +182,32 @@ def test_only_what_is_not_there_unchanged_is_published(lab: Path) -> None:
         with pytest.raises(NotFound, match="no unit matches"):
             publish(store, request.model_copy(update={"type": "none"}))
     assert not list((lab / "published").rglob("*.part"))
+
+
+def test_two_may_publish_at_once_and_what_cannot_be_written_leaves_no_part(
+    lab: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    url, file_put = f"file://{lab}/both", LocalFileSystem.put_file
+    request = FleetPublishRequest(url=url, search="U0000")
+    with open_store(str(lab / "lab.sqlite"), write=False) as store:
+
+        def beside(files: LocalFileSystem, source: str, target: str) -> None:
+            file_put(files, source, target)
+            monkeypatch.setattr(LocalFileSystem, "put_file", file_put)  # the other publishes while this one writes
+            assert publish(store, request).written == 2
+
+        monkeypatch.setattr(LocalFileSystem, "put_file", beside)
+        first, second = publish(store, request), publish(store, request)
+        assert (first.written, first.unchanged, second.written, second.unchanged) == (1, 1, 0, 2)
+
+        def full(files: LocalFileSystem, source: str, target: str) -> None:
+            Path(target).write_bytes(Path(source).read_bytes()[:10])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), target)
+
+        monkeypatch.setattr(LocalFileSystem, "put_file", full)
+        with pytest.raises(BadInput, match="No space left on device.*free space"):
+            publish(store, request.model_copy(update={"again": True}))
+    assert not list((lab / "both").rglob("*.part"))
 
 
 def test_what_is_published_is_a_recording_in_the_interchange_format(lab: Path) -> None:
