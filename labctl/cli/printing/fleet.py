@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Self
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from labctl.cli.output import console, format_number, print_part, stderr, table
+from labctl.texts import counted
 
 if TYPE_CHECKING:
     from labctl.answers.fleet import (
@@ -69,7 +70,7 @@ def print_job(answer: FleetJobResponse) -> None:
     if answer.waiting:
         said.append(f"{answer.waiting} left")
     console.print(f"fleet job {answer.id} ({answer.kind}, {answer.engine}): {answer.state}", style="bold")
-    console.print(f"  {answer.units} units: {', '.join(said)}")
+    console.print(f"  {counted(answer.units, 'unit')}: {', '.join(said)}")
     if answer.processor_s_per_unit is not None:
         console.print(
             f"  processor time {answer.processor_s:.1f} s, {answer.processor_s_per_unit:.3g} s per unit computed"
@@ -106,9 +107,9 @@ def print_units(answers: list[FleetUnitResponse], total: int) -> None:
 
 def print_published(answer: FleetPublishResponse) -> None:
     """Print what was written to a storage."""
-    console.print(f"{answer.url}: recordings of {answer.units} units", style="bold", soft_wrap=True)
+    console.print(f"{answer.url}: recordings of {counted(answer.units, 'unit')}", style="bold", soft_wrap=True)
     console.print(
-        f"  {answer.written} recordings written ({answer.size_bytes / 1e6:.3g} MB), {answer.unchanged} unchanged"
+        f"  {counted(answer.written, 'recording')} written ({answer.size_bytes / 1e6:.3g} MB), {answer.unchanged} unchanged"
     )
     for each in answer.failed[:MAX_UNPUBLISHED]:
         console.print(f"  {each.serial}: {each.reason}", soft_wrap=True)
@@ -134,7 +135,7 @@ def print_report(answer: FleetReportResponse) -> None:
 
 
 def _print_figures(figures: FleetTypeResponse) -> None:
-    console.print(f"type {figures.type or 'not stated'}: {figures.units} units", style="bold")
+    console.print(f"type {figures.type or 'not stated'}: {counted(figures.units, 'unit')}", style="bold")
     classes = [
         f"{each.units} {f'below {each.high:g}' if each.high is not None else f'from {each.low:g}'}"
         for each in figures.error_over_floor
