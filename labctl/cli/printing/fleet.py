@@ -109,7 +109,8 @@ def print_published(answer: FleetPublishResponse) -> None:
     """Print what was written to a storage."""
     console.print(f"{answer.url}: recordings of {counted(answer.units, 'unit')}", style="bold", soft_wrap=True)
     console.print(
-        f"  {counted(answer.written, 'recording')} written ({answer.size_bytes / 1e6:.3g} MB), {answer.unchanged} unchanged"
+        f"  {counted(answer.written, 'recording')} written ({answer.size_bytes / 1e6:.3g} MB), "
+        f"{answer.unchanged} unchanged"
     )
     for each in answer.failed[:MAX_UNPUBLISHED]:
         console.print(f"  {each.serial}: {each.reason}", soft_wrap=True)

@@ -205,7 +205,7 @@ def test_two_may_publish_at_once_and_what_cannot_be_written_leaves_no_part(
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), target)
 
         monkeypatch.setattr(LocalFileSystem, "put_file", full)
-        with pytest.raises(BadInput, match="No space left on device.*free space"):
+        with pytest.raises(BadInput, match=r"No space left on device.*free space"):
             publish(store, request.model_copy(update={"again": True}))
     assert not list((lab / "both").rglob("*.part"))
 
