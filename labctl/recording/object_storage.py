@@ -5,10 +5,11 @@ from __future__ import annotations
 import errno
 from contextlib import suppress
 from pathlib import Path
+from shlex import quote
 from typing import Any
 from uuid import uuid4
 
-from labctl.answers.storage_url import refused_because
+from labctl.answers.storage_url import EXAMPLES, refused_because
 from labctl.errors import BadInput, BadRecording, LabctlError, NotFound
 from labctl.extras import needs_extra
 from labctl.recording.data_files.damaged_files import reason_of
@@ -28,7 +29,7 @@ class ObjectStorage:
         """Open the storage; nothing is read yet. Raises BadInput where the URL or its scheme cannot be used."""
         if reason := refused_because(url):
             raise BadInput(
-                f"the URL of a storage is refused: {reason}; give scheme, place and folder only, as s3://bucket/lab"
+                f"the URL of a storage is refused: {reason}; give scheme, place and folder only, as {EXAMPLES}"
             )
         with needs_extra("fleet", f"the storage {url}"):
             import fsspec  # noqa: PLC0415  of the extra `fleet`
@@ -59,10 +60,14 @@ class ObjectStorage:
         """Raise NotFound where nothing is under the URL, BadInput where that cannot be found out."""
         try:
             exists = bool(self._files.exists(self._root))
+            if exists and self._has_folders:  # of a file system that is not mounted the empty folder is left
+                exists = bool(self._files.ls(self._root, detail=False))
         except Exception as error:
             raise BadInput(self._unreadable(self.url, error)) from error
         if not exists:
-            raise NotFound(f"{self.url}: nothing is there; `labctl fleet publish {self.url}` writes recordings there")
+            raise NotFound(
+                f"{self.url}: nothing is there; `labctl fleet publish {quote(self.url)}` writes recordings there"
+            )
 
     def size(self, name: str) -> int | None:
         """Return the bytes of a file; None where there is none, or it cannot be read."""
@@ -87,7 +92,7 @@ class ObjectStorage:
             raise
         except (FileNotFoundError, NotADirectoryError) as error:
             raise NotFound(
-                f"{shown}: there is no such object; `labctl fleet publish {self.url}` writes what is missing"
+                f"{shown}: there is no such object; `labctl fleet publish {quote(self.url)}` writes what is missing"
             ) from error
         except Exception as error:
             if isinstance(error, OSError) and error.errno in NO_ROOM:

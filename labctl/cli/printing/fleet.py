@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Self
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from labctl.cli.output import console, format_number, print_part, stderr, table
+from labctl.cli.output import console, format_number, stderr, table
 from labctl.texts import counted
 
 if TYPE_CHECKING:
@@ -95,14 +95,18 @@ def print_jobs(answers: list[FleetJobResponse]) -> None:
     console.print(rows)
 
 
-def print_units(answers: list[FleetUnitResponse], total: int) -> None:
-    """Print what came of units."""
+def print_units(answers: list[FleetUnitResponse], total: int, more: str) -> None:
+    """Print what came of units; `more` says how to see those that are left out here."""
+    if not answers:
+        console.print("no unit of the job is in this state")
+        return
     rows = table("", "unit", "state", "version", "verdict", "reason")
     for each in answers:
         version = "–" if each.version is None else str(each.version)
         rows.add_row(each.serial, each.state, version, each.verdict or "–", each.reason)
     console.print(rows)
-    print_part(len(answers), total, "units")
+    if len(answers) < total:
+        console.print(f"{len(answers)} of {total} units; {more}")
 
 
 def print_published(answer: FleetPublishResponse) -> None:

@@ -28,12 +28,13 @@ from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.fleet import jobs
 from labctl.services.fleet.publishing import CONTENTS, publish
+from labctl.services.fleet.task import FleetTask
 from labctl.services.planning.loading import load_bench
 from labctl.store import open_store
 from labctl.store.paging import PageRequest
 from labctl.store.repositories.published_readings import raw_of
 from labctl.store.repositories.sample_blocks import DataSetHead, in_units
-from tests.helpers.fleets import AT, add_units, run_job
+from tests.helpers.fleets import AT, HereEngine, add_units, run_job
 from tests.helpers.lab import Lab
 from tests.helpers.one_row_sets import one_row_sets
 
@@ -235,6 +236,24 @@ def test_a_storage_without_recordings_ends_the_job(lab: Path) -> None:
             publish(store, FleetPublishRequest(url="s3://bucket/lab"))
         with pytest.raises(BadInput, match="choose a scheme that fsspec knows"):
             publish(store, FleetPublishRequest(url="sausage://bucket/lab"))
+
+
+def test_a_storage_that_is_lost_ends_the_job_and_leaves_its_other_units_to_do(lab: Path) -> None:
+    begun: list[str] = []
+
+    def lost_after_one(task: FleetTask) -> None:
+        begun.append(task.serial)
+        if len(begun) == 2:  # as where a file system is not mounted any more
+            shutil.rmtree(lab / "published")
+            (lab / "published").mkdir()
+
+    with open_store(str(lab / "lab.sqlite"), write=True) as store:
+        asked = {"source": f"file://{lab}/published", "effects": ["bias"], "accept_warnings": True}
+        with pytest.raises(NotFound, match="nothing is there"):
+            run_job(store, HereEngine(store, lost_after_one), **asked)
+        (job,) = jobs.job_answers(store, PageRequest(), AT).rows
+        assert (job.state, job.done, job.failed, job.waiting) == ("failed", 1, 0, len(DATA) - 1)
+        assert run_job(store, **{**asked, "source": ""}).skipped == 1
 
 
 def test_the_command_publishes_and_shows_no_password(lab: Path) -> None:
