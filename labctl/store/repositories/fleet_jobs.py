@@ -271,9 +271,12 @@ class FleetJobs:
 
     @transaction
     def take(self, job: int, runner: str, since: datetime, at: datetime) -> bool:
-        """Have a process carry out a job, unless another one gave a sign of life since an instant; returns whether."""
+        """Have a process carry out a job, unless another one gave a sign of life since an instant; returns whether.
+
+        A sign of life that is as far in the future is from before the clock was set back.
+        """
         j = tables.fleet_jobs.c
-        is_free = sa.or_(j.runner.in_(("", runner)), j.seen_at < since)
+        is_free = sa.or_(j.runner.in_(("", runner)), j.seen_at < since, j.seen_at > at + (at - since))
         query = sa.update(tables.fleet_jobs).where(j.id == job, j.state.in_(OPEN), is_free)
         first = sa.func.coalesce(j.started_at, sa.bindparam("first", at, type_=tables.Instant()))
         with self._database.writing() as connection:
