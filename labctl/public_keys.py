@@ -78,5 +78,12 @@ def public_key(content: bytes, location: str) -> PublicKey:
 
 
 def read_public_key(path: Path) -> PublicKey:
-    """Read a public key from a PEM file. Raises BadInput, OSError."""
-    return public_key(path.read_bytes(), str(path))
+    """Read a public key from a PEM file. Raises BadInput."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BadInput(
+            f"{path}: the public key cannot be read ({error.strerror or error}); name the .pub file that `labctl "
+            "seal-key create` writes"
+        ) from error
+    return public_key(content, str(path))

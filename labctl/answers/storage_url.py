@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 MAX_URL_CHARACTERS = 1000
+EXAMPLES = "s3://bucket/lab or file:///data/lab"
 #: How a URL of a storage is written: scheme, place and folder, and nothing else.
 URL = r"^[a-z][a-z0-9+.-]*://[^?#]+$"
 #: Type of the error about a URL: what was given is not shown, since it may hold a password.
@@ -42,7 +43,7 @@ def refused_because(url: str) -> str:
 
 def _checked(url: str) -> str:
     if url and (reason := refused_because(url)):
-        text = "the URL is refused: {reason}; give scheme, place and folder only, as s3://bucket/lab"
+        text = f"the URL is refused: {{reason}}; give scheme, place and folder only, as {EXAMPLES}"
         raise PydanticCustomError(REFUSED, text, {"reason": reason})
     return url
 

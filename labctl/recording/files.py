@@ -16,7 +16,7 @@ from instruments.toml_documents import read_toml, shown
 from labctl.errors import BadRecording
 from labctl.extras import needs_extra
 from labctl.recording.checks import checked, checked_environment
-from labctl.recording.info import RecordingInfo
+from labctl.recording.info import SERIAL_RULE, RecordingInfo
 from labctl.recording.recording import Recording
 
 HEAD = "recording.toml"
@@ -64,7 +64,9 @@ def read_head(path: Path) -> RecordingInfo:
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
         value_text = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
-        raise BadRecording(f"{path}: {place}: {first['msg']}{value_text}") from error
+        is_serial = (place, first["type"]) == ("serial", "string_pattern_mismatch")
+        said = SERIAL_RULE if is_serial else first["msg"]
+        raise BadRecording(f"{path}: {place}: {said}{value_text}") from error
 
 
 def _data_file(folder: Path, kind: str) -> Path:

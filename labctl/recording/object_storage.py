@@ -5,9 +5,11 @@ from __future__ import annotations
 import errno
 from contextlib import suppress
 from pathlib import Path
+from shlex import quote
 from typing import Any
+from uuid import uuid4
 
-from labctl.answers.storage_url import refused_because
+from labctl.answers.storage_url import EXAMPLES, refused_because
 from labctl.errors import BadInput, BadRecording, LabctlError, NotFound
 from labctl.extras import needs_extra
 from labctl.recording.data_files.damaged_files import reason_of
@@ -27,7 +29,7 @@ class ObjectStorage:
         """Open the storage; nothing is read yet. Raises BadInput where the URL or its scheme cannot be used."""
         if reason := refused_because(url):
             raise BadInput(
-                f"the URL of a storage is refused: {reason}; give scheme, place and folder only, as s3://bucket/lab"
+                f"the URL of a storage is refused: {reason}; give scheme, place and folder only, as {EXAMPLES}"
             )
         with needs_extra("fleet", f"the storage {url}"):
             import fsspec  # noqa: PLC0415  of the extra `fleet`
@@ -58,10 +60,14 @@ class ObjectStorage:
         """Raise NotFound where nothing is under the URL, BadInput where that cannot be found out."""
         try:
             exists = bool(self._files.exists(self._root))
+            if exists and self._has_folders:  # of a file system that is not mounted the empty folder is left
+                exists = bool(self._files.ls(self._root, detail=False))
         except Exception as error:
             raise BadInput(self._unreadable(self.url, error)) from error
         if not exists:
-            raise NotFound(f"{self.url}: nothing is there; `labctl fleet publish {self.url}` writes recordings there")
+            raise NotFound(
+                f"{self.url}: nothing is there; `labctl fleet publish {quote(self.url)}` writes recordings there"
+            )
 
     def size(self, name: str) -> int | None:
         """Return the bytes of a file; None where there is none, or it cannot be read."""
@@ -86,7 +92,7 @@ class ObjectStorage:
             raise
         except (FileNotFoundError, NotADirectoryError) as error:
             raise NotFound(
-                f"{shown}: there is no such object; `labctl fleet publish {self.url}` writes what is missing"
+                f"{shown}: there is no such object; `labctl fleet publish {quote(self.url)}` writes what is missing"
             ) from error
         except Exception as error:
             if isinstance(error, OSError) and error.errno in NO_ROOM:
@@ -96,14 +102,17 @@ class ObjectStorage:
     def put(self, name: str, source: Path) -> None:
         """Write a file, whole or not at all, in place of one that is there. Raises BadInput."""
         path = self._path(name)
+        part = f"{path}.{uuid4().hex}.part"  # of this process alone: another one may publish the same recording
         try:
             if not self._has_folders:
                 self._files.put_file(str(source), path)
                 return
             self._files.makedirs(path.rpartition("/")[0], exist_ok=True)
-            self._files.put_file(str(source), f"{path}.part")
-            self._files.mv(f"{path}.part", path)
+            self._files.put_file(str(source), part)
+            self._files.mv(part, path)
         except Exception as error:
+            with suppress(Exception):  # it may not be there
+                self._files.rm_file(part)
             raise BadInput(
                 f"{self.url}/{name}: cannot be written ({reason_of(error)}); check the URL, the free space and the "
                 "rights, then publish again: what is there stays"

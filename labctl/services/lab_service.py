@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
 from importlib.metadata import version
-from pathlib import Path
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
@@ -49,7 +48,7 @@ from labctl.services.recordings.staging import remove_abandoned
 from labctl.services.standards.register import count_by_state
 from labctl.services.sufficiency.answers import with_target
 from labctl.services.units import count_due
-from labctl.store import Store, keys_by_digests, served_together
+from labctl.store import Store, database_name, keys_by_digests, served_together
 from labctl.store.paging import Page, PageRequest
 from procedures.contracts.campaign_state import ENDED
 from procedures.execution.signals import shutdown_hook
@@ -257,7 +256,7 @@ class LabService:
         return HealthResponse(
             status="look at the bench" if unconfirmed else "ok",
             version=VERSION,
-            database=Path(self.store.location).name,  # a folder, or a password in a URL, is not shown
+            database=database_name(self.store.location),
             since=self._opened_at.isoformat(),
             bench=bench,
             schedule_trouble=self.bench_access.schedule_trouble,

@@ -31,7 +31,7 @@ from labctl.fitting.magnetometer.calibrate import AXES
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.poses.triad import UPPER
 from labctl.recording.files import FILE_NAMES
-from labctl.recording.info import SERIAL_PATTERN
+from labctl.recording.info import SERIAL_PATTERN, SERIAL_RULE
 from labctl.services.sensor_coefficients import coefficients_of
 from labctl.services.sensor_exports import export_of
 from labctl.store import NewSensorVersion, SensorVersionRow, Store
@@ -77,9 +77,7 @@ def _kept(
     store: Store, serial: str, sensor: SensorName, request: AccelerometerRequest | MagnetometerRequest, at: datetime
 ) -> dict[str, object]:
     if re.fullmatch(SERIAL_PATTERN, serial) is None:
-        raise BadInput(
-            f"serial number {serial[:80]!r}: give 1 to 64 characters: a letter or digit, then also . _ + # - and spaces"
-        )
+        raise BadInput(f"serial number {serial[:80]!r}: {SERIAL_RULE}")
     result = request.result.model_dump(mode="json")
     problem = _problem(_estimates(request.result), request.result.covariance) or _not_json(result)
     if problem is None and isinstance(request.result, AccelerometerResponse) and request.result.temperature is not None:

@@ -1,6 +1,6 @@
 from labctl.store.connection.anchor_file import parse_anchor as parse_anchor
 from labctl.store.connection.database import Writer as Writer
-from labctl.store.connection.location import is_url as is_url, shown as shown
+from labctl.store.connection.location import database_name as database_name, is_url as is_url, shown as shown
 from labctl.store.connection.writer_lock import (
     Holder as Holder,
     ServiceAddress as ServiceAddress,

@@ -139,6 +139,9 @@ def test_another_laboratory_s_key_is_refused(file: Path, tmp_path: Path) -> None
     create_seal_key(tmp_path / "other.pem")
     with pytest.raises(BadCalibrationFile, match="another laboratory's"):
         Bundle.open(file, public_key=tmp_path / "other.pem.pub", clock=VirtualClock(LATER))
+    for absent in (tmp_path, tmp_path / "absent.pub"):
+        with pytest.raises(BadInput, match=f"{absent}: the public key cannot be read .*; name the .pub file"):
+            Bundle.open(file, public_key=absent)
 
 
 def test_a_signature_of_the_key_over_something_else_is_refused(file: Path, key: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -128,7 +129,8 @@ def move_database(
         earlier = f", {answer.kept} of them by an earlier move" if answer.kept else ""
         text = f"{answer.target}: {answer.rows} rows of {answer.tables} tables as in {answer.source}{earlier}"
         console.print(f"{text}; sha256 {answer.sha256}", soft_wrap=True)
-        console.print(f"next: `labctl serve --database {answer.target}`; {answer.source} is not used any more")
+        serve = f"labctl serve --database {quote(answer.target)}"
+        console.print(f"next: `{serve}`; {answer.source} is not used any more", soft_wrap=True)
     for finding in answer.check.findings:
         stderr.print(f"labctl: {answer.target}: {finding.part}: {finding.text}")
     if answer.check.findings:

@@ -14,6 +14,8 @@ from labctl.cli.printing.diagnosis import DiagnosisPrinter, print_diagnosis_end
 from labctl.errors import BadInput, Conflict, NotFound
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from labctl.answers.diagnosis import (
         DiagnosisRequest,
         DiagnosisResponse,
@@ -75,12 +77,15 @@ def diagnose(
     A diagnosis that was stopped is continued. On a bench that is not simulated each experiment has to be confirmed.
     With --at the first experiment is chosen now, and the service begins it at that time.
     """
+    from instruments.clock import SystemClock
     from labctl.answers.diagnosis import DiagnosisRequest
     from labctl.config import default_database
     from labctl.services.commands.open import diagnosis_service_url
     from labctl.store.connection.location import is_url
 
     with one_clear_line():
+        if time_zone is not None and at is None:
+            raise BadInput(f"--time-zone {time_zone}: it is that of --at, which is not given; give both or neither")
         options = {"version": version, "recordings": recording_numbers(recording), "at": at, "time_zone": time_zone}
         request = DiagnosisRequest.model_validate(options if hours is None else {**options, "hours": hours})
         printer = DiagnosisPrinter(quiet=as_json)
@@ -102,7 +107,8 @@ def diagnose(
     else:
         print_diagnosis_end(answer)
     is_set = at is not None and answer.begins_at is not None and answer.state == "measuring"
-    if (not answer.ended and not is_set) or answer.outcome == "insufficient_data":
+    is_well = answer.ended or is_set or waits_for_its_time(answer, SystemClock().utc())
+    if not is_well or answer.outcome == "insufficient_data":
         raise typer.Exit(1)
 
 
@@ -147,10 +153,14 @@ def _follow(
         if answer is None:
             answer = client.start_diagnosis(serial, request)
         elif answer.state in {"stopped", "failed"}:
+            refuse_other_bench(answer, url, _bench_of(url))
             answer = client.act_on_diagnosis(answer.id, "resume", "continued on the command line", by=os_user())
+        else:
+            refuse_other_bench(answer, url, _bench_of(url))
         while not answer.ended and answer.state not in {"stopped", "failed"}:
             printer.update(answer)
-            if request.at is not None and answer.state == "measuring":
+            is_set = request.at is not None and answer.state == "measuring"
+            if is_set or waits_for_its_time(answer, clock.utc()):
                 return answer  # the service begins at that time
             if answer.state == "awaiting_confirmation":
                 if (reply := ask_experiment(answer, answer.rounds[-1])) is None:
@@ -161,6 +171,33 @@ def _follow(
                 answer = client.diagnosis(answer.id)
     printer.update(answer)
     return answer
+
+
+def waits_for_its_time(answer: DiagnosisResponse, now: datetime) -> bool:
+    """Return whether the first experiment of a diagnosis is chosen, and the time of its begin is still to come."""
+    waits = answer.state == "measuring" and answer.rounds[-1].campaign is None
+    return waits and answer.begins_at is not None and now < answer.begins_at
+
+
+def _bench_of(url: str) -> str:
+    """Return the name of the bench that a service drives; empty for none."""
+    from labctl.answers.service import HealthResponse
+    from labctl.service_connection import ServiceConnection
+    from labctl.services.commands.remote import HttpExecutor
+
+    with ServiceConnection(url) as connection:
+        bench = HttpExecutor(connection).fetch("/health", HealthResponse).bench
+    return "" if bench is None else bench.name
+
+
+def refuse_other_bench(answer: DiagnosisResponse, url: str, bench: str) -> None:
+    """Raise Conflict for a diagnosis that the service of another bench would never go on with."""
+    if bench != answer.bench:
+        raise Conflict(
+            f"diagnosis {answer.id} of {answer.serial} is on bench {answer.bench}, but the service at {url} drives "
+            f"{bench or 'no bench'}; start the service of that bench, or end the diagnosis with `labctl diagnose "
+            f"{answer.serial} --end`"
+        )
 
 
 def _run(

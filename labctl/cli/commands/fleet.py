@@ -156,7 +156,7 @@ def publish(
     A recording that is there unchanged is not written again.
     """
     from labctl.answers.fleet import FleetPublishRequest
-    from labctl.answers.storage_url import refused_because
+    from labctl.answers.storage_url import EXAMPLES, refused_because
     from labctl.cli.stage_line import stage_line
     from labctl.errors import BadInput
     from labctl.services.fleet.publishing import publish as publish_recordings
@@ -164,7 +164,7 @@ def publish(
 
     with one_clear_line(), open_readonly(database) as store, stage_line():
         if reason := refused_because(url):
-            raise BadInput(f"URL is refused: {reason}; give scheme, place and folder only, as s3://bucket/lab")
+            raise BadInput(f"URL is refused: {reason}; give scheme, place and folder only, as {EXAMPLES}")
         request = FleetPublishRequest(
             url=url, type=type_, batch=batch, supplier=supplier, search=search, again=again
         )  # fmt: skip
@@ -255,7 +255,7 @@ def units(
     else:
         from labctl.cli.printing.fleet import print_units
 
-        print_units(page.rows, page.total)
+        print_units(page.rows, page.total, "a larger --limit lists more")
 
 
 @app.command()
@@ -329,4 +329,4 @@ def _print(answer: FleetJobResponse, *, as_json: bool, database: str | None = No
 
         with open_readonly(database) as store:
             page = unit_answers(store, answer.id, PageRequest(limit=20), "failed")
-        print_units(page.rows, page.total)
+        print_units(page.rows, page.total, f"`labctl fleet units {answer.id} --state failed` lists all")

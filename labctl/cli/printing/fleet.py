@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Self
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from labctl.cli.output import console, format_number, print_part, stderr, table
+from labctl.cli.output import console, format_number, stderr, table
+from labctl.texts import counted
 
 if TYPE_CHECKING:
     from labctl.answers.fleet import (
@@ -69,7 +70,7 @@ def print_job(answer: FleetJobResponse) -> None:
     if answer.waiting:
         counts.append(f"{answer.waiting} left")
     console.print(f"fleet job {answer.id} ({answer.kind}, {answer.engine}): {answer.state}", style="bold")
-    console.print(f"  {answer.units} units: {', '.join(counts)}")
+    console.print(f"  {counted(answer.units, 'unit')}: {', '.join(counts)}")
     if answer.processor_s_per_unit is not None:
         console.print(
             f"  processor time {answer.processor_s:.1f} s, {answer.processor_s_per_unit:.3g} s per unit computed"
@@ -94,21 +95,26 @@ def print_jobs(answers: list[FleetJobResponse]) -> None:
     console.print(rows)
 
 
-def print_units(answers: list[FleetUnitResponse], total: int) -> None:
-    """Print what came of units."""
+def print_units(answers: list[FleetUnitResponse], total: int, more: str) -> None:
+    """Print what came of units; `more` says how to see those that are left out here."""
+    if not answers:
+        console.print("no unit of the job is in this state")
+        return
     rows = table("", "unit", "state", "version", "verdict", "reason")
     for each in answers:
         version = "–" if each.version is None else str(each.version)
         rows.add_row(each.serial, each.state, version, each.verdict or "–", each.reason)
     console.print(rows)
-    print_part(len(answers), total, "units")
+    if len(answers) < total:
+        console.print(f"{len(answers)} of {total} units; {more}")
 
 
 def print_published(answer: FleetPublishResponse) -> None:
     """Print what was written to a storage."""
-    console.print(f"{answer.url}: recordings of {answer.units} units", style="bold", soft_wrap=True)
+    console.print(f"{answer.url}: recordings of {counted(answer.units, 'unit')}", style="bold", soft_wrap=True)
     console.print(
-        f"  {answer.written} recordings written ({answer.size_bytes / 1e6:.3g} MB), {answer.unchanged} unchanged"
+        f"  {counted(answer.written, 'recording')} written ({answer.size_bytes / 1e6:.3g} MB), "
+        f"{answer.unchanged} unchanged"
     )
     for each in answer.failed[:MAX_UNPUBLISHED]:
         console.print(f"  {each.serial}: {each.reason}", soft_wrap=True)
@@ -134,7 +140,7 @@ def print_report(answer: FleetReportResponse) -> None:
 
 
 def _print_figures(figures: FleetTypeResponse) -> None:
-    console.print(f"type {figures.type or 'not stated'}: {figures.units} units", style="bold")
+    console.print(f"type {figures.type or 'not stated'}: {counted(figures.units, 'unit')}", style="bold")
     classes = [
         f"{each.units} {f'below {each.high:g}' if each.high is not None else f'from {each.low:g}'}"
         for each in figures.error_over_floor

@@ -74,10 +74,14 @@ class OutlierUnit:
 
     @property
     def reason(self) -> str:
-        """Why it is an outlier, in one sentence."""
-        side = "above" if self.value > self.expected else "below"
+        """Why it is an outlier, in one sentence: its distance in spreads where they exceed its own uncertainty."""
+        side, own = "above" if self.value > self.expected else "below", f"{self.u:.2g} {self.unit}"
+        spread = f"{self.spread:.2g} {self.unit}"
+        if self.spread > self.u:
+            distance, beside = f"{abs(self.spreads):.1f} spreads of the type ({spread})", ""
+        else:
+            distance, beside = f"{abs(self.t):.1f} standard uncertainties", f"the spread of the type is {spread}, "
         return (
-            f"{self.coefficient} = {self.value:.4g} {self.unit} is {abs(self.spreads):.1f} spreads of the type "
-            f"({self.spread:.2g} {self.unit}) {side} the expected {self.expected:.4g} {self.unit}; the unit's own "
-            f"standard uncertainty is {self.u:.2g} {self.unit}"
+            f"{self.coefficient} = {self.value:.4g} {self.unit} is {distance} {side} the expected "
+            f"{self.expected:.4g} {self.unit}; {beside}the unit's own standard uncertainty is {own}"
         ).replace(" )", ")")

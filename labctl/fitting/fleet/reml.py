@@ -21,6 +21,8 @@ FALL = 1.9207294103470612
 POINTS, BEYOND = 48, 0.6
 #: Spreads between which the maximum is searched for, over the root mean square of y, and steps of the first search.
 MIN_SHARE, MAX_SHARE, STEPS = 1e-4, 10.0, 24
+#: A spread whose log likelihood exceeds that of none by less is none: the search ends near zero, not there.
+NO_EVIDENCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ def reml(y: Array, variance: Array, columns: NDArray[np.float64]) -> RemlEstimat
     tau, least = (
         (float(minimum.x), float(minimum.fun)) if minimum.fun <= losses[best] else (float(grid[best]), losses[best])
     )
+    if grid[0] == 0.0 and losses[0] - least < NO_EVIDENCE:
+        tau, least = 0.0, losses[0]
     low, high = _interval(loss, tau, float(least), float(grid[0]), 4.0 * MAX_SHARE)
     values, covariance, chi2 = weighted_fit(y, variance + (tau * scale) ** 2, columns)
     predictive = _predictive(loss, low, high, float(least))

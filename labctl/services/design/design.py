@@ -69,6 +69,11 @@ def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFil
     posed = pose(store, request, bench)
     problem, goal = posed.problem, Goal(request.u_dps, request.hours)
     ramps = problem.model not in TABLES and problem.base.order == "position-major"
+    without = None
+    if posed.of_type is not None:
+        without = chosen(search(replace(problem, prior=None, evaluated={}), goal, ramps=ramps), goal)
+        if without is not None and without.scheme is not None:
+            problem.candidate(without.scheme)  # the search may miss it; with the prior it is no worse
     tried = search(problem, goal, ramps=ramps)
     choice = chosen(tried, goal)
     if choice is None:
@@ -78,7 +83,6 @@ def design_campaign(store: Store | None, request: DesignRequest, bench: BenchFil
     answer = _answer(outcome, posed.bench, posed.known, posed.like)
     if posed.of_type is None:
         return answer
-    without = chosen(search(replace(problem, prior=None, evaluated={}), goal, ramps=ramps), goal)
     return answer.model_copy(update={"type_prior": DesignPrior(
         type=posed.of_type.type, model=posed.of_type.model, units=posed.of_type.prior.units,
         without=None if without is None else outcome.designed(without),
@@ -113,7 +117,7 @@ def pose(store: Store | None, request: DesignRequest, bench: BenchFile | None) -
     name = f"{base.name}-designed"
     useful = tuple(each for each in on.tilted_positions if is_useful(base.positions, axes, each))
     problem = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name, useful)
-    of_type = _prior(store, request, model, effects)
+    of_type = _prior(store, request, model, effects, axes)
     problem = problem if of_type is None else replace(problem, prior=of_type.prior)
     return Posed(problem, on, known, like, of_type)
 
@@ -139,9 +143,12 @@ class _Found:
 
 
 def _prior(
-    store: Store | None, request: DesignRequest, model: str | None, effects: tuple[str, ...]
+    store: Store | None, request: DesignRequest, model: str | None, effects: tuple[str, ...], axes: tuple[str, ...]
 ) -> TypePrior | None:
-    """Return what the type of a unit says of the model, if it is asked for. Raises BadInput, NotEnoughData."""
+    """Return what the type of a unit says of the model, if it is asked for. Raises BadInput, NotEnoughData.
+
+    A prior that knows none of the outputs `axes` is refused, as the fit of the recipe would refuse it.
+    """
     if request.type_prior is None:
         return None
     from labctl.services.design.type_prior import prior_of_type  # noqa: PLC0415  slow to load, seldom needed
@@ -150,7 +157,15 @@ def _prior(
         raise BadInput(
             f"type {request.type_prior!r}: there is no database with calibrated units; name one with --database"
         )
-    return prior_of_type(store, request.type_prior, model, effects)
+    found = prior_of_type(store, request.type_prior, model, effects)
+    if not any(found.prior.known(axis) for axis in axes):
+        outputs = ", ".join(sorted({name.partition(".")[0] for name in found.prior.names}))
+        raise BadInput(
+            f"type {request.type_prior!r}: its calibrated units have output {outputs}, but the recipe on this bench is "
+            f"for output {', '.join(axes)}, of which they say nothing; name a bench for such units with --bench, or "
+            "leave the prior out"
+        )
+    return found
 
 
 def _model(request: DesignRequest, like: Recipe | None) -> tuple[str | None, tuple[str, ...]]:

@@ -48,8 +48,8 @@ def prior_of_type(
     """Return the prior of one more unit of a type for a model, from the newest version of each other unit.
 
     The versions have this model, or without the added effects; versions that were fitted with a prior themselves do
-    not count, nor does the unit `without`. Raises BadInput for a type that is not stated, NotEnoughData for too few
-    units.
+    not count, nor does the unit `without`. Raises BadInput for a type that is not stated, NotFound for one without
+    units, NotEnoughData for too few.
     """
     if not type_:
         raise BadInput("the unit has no type; state its model in the bench file or in recording.toml, or fit it alone")
@@ -71,6 +71,9 @@ def prior_of_type(
                 hashlib.sha256("\n".join(chosen).encode()).hexdigest(),
             )  # fmt: skip
         seen = max(seen, len(population.table))
+    wanted = FleetFilter(type_)
+    if not store.fleet.serials(wanted, "", 1):
+        raise wanted.no_match()
     raise NotEnoughData(
         f"type {type_!r} has {seen} other units with comparable calibrations by model {whole or 'custom'}, but a prior "
         f"takes at least {MIN_UNITS}; calibrate more units of the type with this model, or leave the prior out"

@@ -80,8 +80,8 @@ def _next(row: DiagnosisRow, rounds: list[RoundRow]) -> str:
         )
     if row.state == "measuring" and row.begins_at is not None and rounds[-1].campaign is None:
         return (
-            f"leave `labctl serve` running: it begins the experiment of round {rounds[-1].number} on bench "
-            f"{row.bench_name}, not before {row.begins_at:%Y-%m-%d %H:%M %Z}"
+            f"have the service of bench {row.bench_name} running (`labctl serve`): it begins the experiment of round "
+            f"{rounds[-1].number}, not before {row.begins_at:%Y-%m-%d %H:%M %Z}"
         )
     if row.state in {"stopped", "failed"}:
         return f"`labctl diagnose {row.serial}` continues it; `labctl diagnose {row.serial} --end` ends it for good"

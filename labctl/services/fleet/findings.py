@@ -23,6 +23,7 @@ from labctl.fitting.fleet.type_sums import TypeSums
 from labctl.fitting.fleet.unit_coefficients import UnitCoefficients
 from labctl.services.fleet.evidence import sums_in
 from labctl.store import Store
+from labctl.texts import counted
 
 #: Outliers of a report, at most; its text says how many there are.
 MAX_OUTLIERS = 100
@@ -65,12 +66,13 @@ def population_in(units: Sequence[UnitCoefficients]) -> Compared:
         "No batch, bench, supplier or trend differs from the rest of the type."
     ]
     if outliers:
-        sentences.append(f"{len({each.serial for each in outliers})} units are not like their type.")
+        unlike = len({each.serial for each in outliers})
+        sentences.append(f"{counted(unlike, 'unit')} {'is' if unlike == 1 else 'are'} not like the type.")
     if population.left_out:
         first = population.left_out[0]
-        sentences.append(
-            f"{len(population.left_out)} units were left out, first {first.serial_number}: {first.reason}."
-        )
+        left_out = len(population.left_out)
+        verb = "was" if left_out == 1 else "were"
+        sentences.append(f"{counted(left_out, 'unit')} {verb} left out, first {first.serial_number}: {first.reason}.")
     return Compared(
         len(population.table),
         len(population.left_out),

@@ -12,7 +12,7 @@ from labctl.answers.fleet import (
     FleetUnitResponse,
     FleetUnitState,
 )
-from labctl.answers.storage_url import refused_because
+from labctl.answers.storage_url import EXAMPLES, refused_because
 from labctl.config import FLEET_ENGINE_VARIABLE, FLEET_SOURCE_VARIABLE, fleet_engine, fleet_source
 from labctl.errors import BadInput
 from labctl.fitting.models.presets import preset_for
@@ -38,7 +38,7 @@ def refuse_other_source(source: str) -> None:
     if reason := allowed and refused_because(allowed):
         raise BadInput(
             f"{FLEET_SOURCE_VARIABLE} of this service is refused: {reason}; start the service with scheme, place and "
-            "folder only, as s3://bucket/lab"
+            f"folder only, as {EXAMPLES}"
         )
     if source not in {"", allowed}:
         raise BadInput(

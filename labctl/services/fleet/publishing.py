@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labctl.answers.fleet import FleetPublishRequest, FleetPublishResponse, FleetUnpublished
-from labctl.errors import LabctlError, NotFound
+from labctl.errors import LabctlError
 from labctl.progress import report_stage
 from labctl.recording.files import ENVIRONMENT, HEAD, head_of
 from labctl.recording.object_storage import ObjectStorage
@@ -60,10 +60,7 @@ def publish(store: Store, request: FleetPublishRequest) -> FleetPublishResponse:
                     break
                 _put(storage, row, files, so_far)
     if not units:
-        raise NotFound(
-            f"no unit matches (type {request.type!r}, batch {request.batch!r}, supplier {request.supplier!r}, "
-            f"text {request.search!r}); `labctl units` lists the units"
-        )
+        raise filter_of(request).no_match()
     return FleetPublishResponse(url=storage.url, units=units, failed=failed, **vars(so_far))
 
 

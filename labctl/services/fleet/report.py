@@ -21,7 +21,7 @@ MAX_VERSIONS = 20_000
 
 
 def fleet_report(store: Store, request: FleetReportRequest, now: datetime) -> FleetReportResponse:
-    """Return the report on the units of a type, computed when something of it changed. Raises BadInput."""
+    """Return the report on the units of a type, computed when something of it changed. Raises BadInput, NotFound."""
     type_ = _the_type(store, request, now)
     of_type = request.model_copy(update={"type": type_})
     question = {
@@ -33,7 +33,7 @@ def fleet_report(store: Store, request: FleetReportRequest, now: datetime) -> Fl
 
 
 def _the_type(store: Store, request: FleetReportRequest, now: datetime) -> str:
-    """Return the type that is asked for, or the only one that there is. Raises BadInput."""
+    """Return the type that is asked for, or the only one that there is. Raises BadInput, NotFound."""
     types = [each.type for each in store.fleet_reports.types(filter_of(request), now)]
     if request.type or len(types) == 1:
         if request.type and request.type not in types:
@@ -43,6 +43,8 @@ def _the_type(store: Store, request: FleetReportRequest, now: datetime) -> str:
                 f"{_listed(others) or 'no type: import them'}"
             )
         return request.type or types[0]
+    if not types:
+        raise filter_of(request).no_match()
     raise BadInput(
         f"a report is on the units of one type, and these are of {len(types)} ({_listed(types)}); name one with --type"
     )

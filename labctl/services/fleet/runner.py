@@ -31,6 +31,8 @@ UNITS_AT_ONCE = 200
 POLL_INTERVAL_S = 1.0
 #: A process without a sign of life for so long has left its job.
 LEFT_AFTER = timedelta(seconds=60)
+#: After the first unit that failed, and after so many more without one that did not, the storage is looked for.
+FAILED_IN_A_ROW = 20
 Report = Callable[[], None]
 
 
@@ -73,6 +75,7 @@ class JobRun:
         self._under_way: dict[Future[Outcome], tuple[FleetTask, UnderWay]] = {}
         self._again: deque[str] = deque()
         self._tries: Counter[str] = Counter()
+        self._failed_in_a_row = 0
         from labctl.services.fleet.evidence import EvidenceParts  # noqa: PLC0415  slow to load, for a job alone
 
         self._evidence = EvidenceParts()
@@ -207,7 +210,14 @@ class JobRun:
         result = FleetResult(task.serial, "failed", reason=reason)
         self._store.fleet.keep(self._job.id, self._request.kind, result, self._clock.utc())
 
+    def _refuse_lost_source(self, outcome: Outcome) -> None:
+        """Raise NotFound or BadInput where the storage is gone: all units that are left would fail by that alone."""
+        self._failed_in_a_row = self._failed_in_a_row + 1 if outcome.result.state == "failed" else 0
+        if self._failed_in_a_row % FAILED_IN_A_ROW == 1:
+            refuse_missing_source(self._request.source)
+
     def _write(self, task: FleetTask, outcome: Outcome) -> None:
+        self._refuse_lost_source(outcome)
         if outcome.fit is None:
             kept = self._store.fleet.keep(self._job.id, self._request.kind, outcome.result, task.at)
             if kept and outcome.estimates is not None and (part := self._evidence.add(task.serial, outcome.estimates)):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+from urllib.parse import urlsplit
 
 
 def is_url(location: str) -> bool:
@@ -13,3 +15,8 @@ def is_url(location: str) -> bool:
 def shown(location: str) -> str:
     """Return a database's path or URL as it may be printed: without its password."""
     return re.sub(r"(://[^/?#:@]*):.*@", r"\1:***@", location)
+
+
+def database_name(location: str) -> str:
+    """Return the name of a database alone: neither its folder or host nor a password."""
+    return Path(urlsplit(location).path if is_url(location) else location).name

@@ -51,6 +51,14 @@ class FleetFilter:
         ]
         return sa.and_(search_units(PageRequest(self.search)), *stated)
 
+    def no_match(self, model: str = "") -> NotFound:
+        """Return the error where no unit is so, nor has an error model if one is asked for."""
+        given = {"type": self.type, "batch": self.batch, "supplier": self.supplier, "text": self.search}
+        named = [f"{name} {value!r}" for name, value in {**given, "error model": model}.items() if value]
+        if named:
+            return NotFound(f"no unit matches {', '.join(named)}; `labctl units` lists the units")
+        return NotFound("the database has no unit with a recording; `labctl import` adds recordings")
+
 
 @dataclass(frozen=True)
 class NewFleetJob:
@@ -180,10 +188,7 @@ class FleetJobs:
             x = tables.fleet_units.c
             units = int(connection.scalar(sa.select(sa.func.count()).where(x.job_id == number)) or 0)
             if not units:
-                raise NotFound(
-                    f"no unit matches (type {wanted.type!r}, batch {wanted.batch!r}, supplier {wanted.supplier!r}, "
-                    f"text {wanted.search!r}, error model {model!r}); `labctl units` lists the units"
-                )
+                raise wanted.no_match(model)
             connection.execute(sa.update(j).where(j.c.id == number).values(units=units))
             detail = {"request": dict(new.request), "units": units, "engine": new.engine}
             append(connection, at, f"fleet {new.kind}", _subject(int(number or 0)), detail)
@@ -266,9 +271,12 @@ class FleetJobs:
 
     @transaction
     def take(self, job: int, runner: str, since: datetime, at: datetime) -> bool:
-        """Have a process carry out a job, unless another one gave a sign of life since an instant; returns whether."""
+        """Have a process carry out a job, unless another one gave a sign of life since an instant; returns whether.
+
+        A sign of life that is as far in the future is from before the clock was set back.
+        """
         j = tables.fleet_jobs.c
-        is_free = sa.or_(j.runner.in_(("", runner)), j.seen_at < since)
+        is_free = sa.or_(j.runner.in_(("", runner)), j.seen_at < since, j.seen_at > at + (at - since))
         query = sa.update(tables.fleet_jobs).where(j.id == job, j.state.in_(OPEN), is_free)
         first = sa.func.coalesce(j.started_at, sa.bindparam("first", at, type_=tables.Instant()))
         with self._database.writing() as connection:

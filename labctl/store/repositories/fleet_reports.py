@@ -125,7 +125,8 @@ class FleetReports:
         for first in range(0, len(ids), VERSIONS_AT_ONCE):
             some = ids[first : first + VERSIONS_AT_ONCE]
             with self._database.reading() as connection:
-                rows = connection.execute(sa.select(*columns).select_from(joined).where(c.id.in_(some))).all()
+                query = sa.select(*columns).select_from(joined).where(c.id.in_(some))
+                rows = connection.execute(query.order_by(c.recording_id.desc())).all()
             for row in rows:
                 yield FleetVersion(row[0], row[1], row[2], row[3], row[4], bytes(row[5]))
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
+from labctl.answers.diagnosis import DiagnosisResponse, DiagnosisRound
+from labctl.cli.commands.diagnosis import refuse_other_bench, waits_for_its_time
+from labctl.errors import Conflict
 from tests.helpers.lab import Lab
 
 RECIPE = """name = "few-rates"
@@ -23,6 +27,7 @@ settle_s = 2
 #: All that the simulated unit has beside what is hidden in it.
 MODEL = "bias,scale_factor,bias_temperature,scale_factor_temperature,sine_response,scale_factor_even"
 UNIT = "FOG-0001"
+TONIGHT = datetime(2099, 3, 28, 22, tzinfo=UTC)
 
 
 @pytest.fixture(scope="module")
@@ -73,3 +78,28 @@ def test_a_diagnosis_for_later_needs_a_service(ambiguous: Lab, tmp_path: Path) -
     refused = lab.run("diagnose", UNIT, "--at", "2099-01-01T22:00", status=2)
     assert "nothing begins a diagnosis later; start `labctl serve`, or leave the option out" in refused.stderr
     assert lab.json("campaign", "list")[0]["recipe"] == "few-rates"
+    alone = lab.run("diagnose", UNIT, "--time-zone", "Europe/Berlin", status=2)
+    assert "--time-zone Europe/Berlin: it is that of --at, which is not given; give both or neither" in alone.stderr
+
+
+def scheduled(campaign: int | None = None, state: str = "measuring") -> DiagnosisResponse:
+    """Return a diagnosis whose first experiment begins at TONIGHT."""
+    first = DiagnosisRound.model_construct(number=1, campaign=campaign)
+    return DiagnosisResponse.model_construct(
+        id=3, serial=UNIT, bench="bench-a", state=state, begins_at=TONIGHT, rounds=[first]
+    )
+
+
+def test_a_diagnosis_for_later_is_not_followed_until_it_begins() -> None:
+    before, after = TONIGHT - timedelta(hours=1), TONIGHT + timedelta(seconds=1)
+    assert waits_for_its_time(scheduled(), before)
+    assert not waits_for_its_time(scheduled(), after)
+    assert not waits_for_its_time(scheduled(campaign=2), before)
+    assert not waits_for_its_time(scheduled(state="judging"), before)
+
+
+@pytest.mark.parametrize(("drives", "said"), [("bench-b", "drives bench-b"), ("", "drives no bench")])
+def test_the_service_of_another_bench_is_not_waited_for(drives: str, said: str) -> None:
+    with pytest.raises(Conflict, match=f"is on bench bench-a, but the service at http://x {said}; start the service"):
+        refuse_other_bench(scheduled(), "http://x", drives)
+    refuse_other_bench(scheduled(), "http://x", "bench-a")

@@ -25,6 +25,7 @@ from labctl.store import (
     NewCalibration,
     ServiceAddress,
     Store,
+    database_name,
     holder_of,
     migrate,
     migrate_database,
@@ -281,3 +282,16 @@ def test_all_recordings_of_a_version_are_kept_and_the_step_can_be_taken_back(sto
     with open_store(location, write=True) as migrated:
         assert migrated.calibrations.get("G-1", 1).recordings == (second,)
         assert migrated.calibrations.get("G-1", 1).recording == second
+
+
+@pytest.mark.parametrize(
+    ("location", "name"),
+    [
+        ("/var/lib/labctl/lab.sqlite", "lab.sqlite"),
+        ("postgresql+psycopg://ann:hunter2@db.lab/gyros", "gyros"),
+        ("postgresql+psycopg://ann@/gyros?host=/run/postgresql&port=5433", "gyros"),
+        ("sqlite:////var/lib/labctl/lab.sqlite", "lab.sqlite"),
+    ],
+)
+def test_the_name_of_a_database_shows_no_folder_host_or_password(location: str, name: str) -> None:
+    assert database_name(location) == name

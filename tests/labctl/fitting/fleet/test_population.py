@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from labctl.errors import NotEnoughData
+from labctl.fitting.fleet.findings import OutlierUnit
 from labctl.fitting.fleet.population import Population, population_of
 from labctl.fitting.fleet.unit_coefficients import UnitCoefficients
 
@@ -101,6 +102,15 @@ def test_one_wild_unit_is_named_with_its_reason_and_widens_no_spread(quiet: Popu
     assert "standard uncertainty is 0.05 deg/s" in outlier.reason
     assert [(e.factor, e.level) for e in found.effects] == [("batch", "B3")]
     assert found.coefficients[2].spread == pytest.approx(quiet.coefficients[2].spread, rel=0.1)
+
+
+def test_the_distance_of_an_outlier_is_in_spreads_only_where_the_type_has_one() -> None:
+    alike = OutlierUnit("U7", "x.bias_t1", "deg/s/K", 0.02, 1e-6, 0.0, 1.4e-5, 1428.6, 0.0)
+    assert alike.reason == (
+        "x.bias_t1 = 0.02 deg/s/K is 1428.6 standard uncertainties above the expected 1e-06 deg/s/K; the spread of the "
+        "type is 0 deg/s/K, the unit's own standard uncertainty is 1.4e-05 deg/s/K"
+    )
+    assert "is 200.0 spreads of the type (0.0001 deg/s/K) above" in replace(alike, spread=1e-4).reason
 
 
 def test_a_fifth_of_wild_units_hides_nothing() -> None:

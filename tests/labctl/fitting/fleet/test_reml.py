@@ -32,6 +32,14 @@ def test_the_spread_of_the_trials_of_a_vaccine_is_the_published_one() -> None:
     assert found.low < found.tau < found.predictive < found.high
 
 
+def test_units_that_differ_by_less_than_their_uncertainties_show_have_no_spread() -> None:
+    y = np.random.default_rng(3).normal(0.0, 0.2, 30)
+    found = reml(y, np.ones(30), np.ones((30, 1)))
+    assert (found.tau, found.low) == (0.0, 0.0)
+    assert found.values[0] == pytest.approx(np.mean(y))
+    assert 0.0 < found.predictive < found.high < 0.5
+
+
 def test_the_test_of_heterogeneity_is_the_published_one() -> None:
     """The same analysis: Q(df = 12) = 152.2330, and tau^2 = 0.3088 by DerSimonian and Laird."""
     y, variance = log_risk_ratios()

@@ -16,7 +16,8 @@ from labctl.answers.design import DesignRequest
 from labctl.calibration import read_calibration
 from labctl.cli.printing.calibrations import print_fit
 from labctl.cli.printing.design import print_design
-from labctl.errors import BadInput, NotEnoughData
+from labctl.errors import BadInput, NotEnoughData, NotFound
+from labctl.recording import Recording
 from labctl.services.calibrations.fitting import fit_unit, fitted_unit, one_version
 from labctl.services.certificates.assembly import statements
 from labctl.services.certificates.facts import Facts
@@ -29,6 +30,13 @@ from tests.helpers.fleets import AT, run_job, unit_points
 
 WITH, ALONE = FitRequest(model="bias_scale", type_prior=True), FitRequest(model="bias_scale")
 NEW, OTHER = 50, 51
+
+
+def about_z(recording: Recording) -> Recording:
+    """Return the recording of a unit that measures about z, as the units of the simulated single-axis bench do."""
+    columns = {name.replace("_x", "_z"): values for name, values in recording.columns.items()}
+    columns["position"] = np.full(len(columns["dataset"]), "z")
+    return Recording(recording.info.model_copy(update={"axes": ("z",)}), columns)
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +54,9 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
         for number in range(60, 63):
             opened.recordings.add_import(unit_points(number, "MEMS-B"), AT)
         assert run_job(opened, type="MEMS-B", model="bias_scale", effects=[]).done == 3
+        for number in range(70, 70 + MIN_UNITS):
+            opened.recordings.add_import(about_z(unit_points(number, "FOG-Z")), AT)
+        assert run_job(opened, type="FOG-Z", model="bias_scale", effects=[]).done == MIN_UNITS
         yield opened
 
 
@@ -93,22 +104,31 @@ def test_a_type_with_too_few_units_or_without_the_model_gives_no_prior(store: St
         fitted_unit(store, f"U{NEW:05d}", FitRequest(model="ojeda2000", type_prior=True), AT)
     with pytest.raises(BadInput, match="the unit has no type; state its model"):
         prior_of_type(store, "", "bias_scale", [])
+    with pytest.raises(NotFound, match="no unit matches type 'FOG-Q'; `labctl units`"):
+        prior_of_type(store, "FOG-Q", "bias_scale", [])
 
 
 def test_a_design_with_the_prior_takes_no_longer_and_its_recipe_is_fitted_with_it(
     store: Store, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    asked = {"like": "ojeda2000", "model": "bias_scale", "u_dps": 0.01, "type_prior": "FOG-A"}
+    asked = {"like": "ojeda2000", "model": "bias_scale", "u_dps": 0.01, "type_prior": "FOG-Z"}
     answer = design_campaign(store, DesignRequest.model_validate(asked), load_bench("single-axis-sim"))
     prior = answer.type_prior
     assert prior is not None
-    assert (prior.type, prior.units) == ("FOG-A", MIN_UNITS)
+    assert (prior.type, prior.units) == ("FOG-Z", MIN_UNITS)
     assert prior.without is not None
     assert answer.chosen.hours <= prior.without.hours
+    assert answer.chosen.u_worst_dps < 0.99 * prior.without.u_worst_dps
     rules = parse_recipe(answer.recipe_toml).fit
     assert rules is not None
     assert rules.type_prior
     print_design(answer, Path("mine.toml"))
     printed = " ".join(capsys.readouterr().out.split())
-    assert f"with the prior of {MIN_UNITS} units of type FOG-A by bias_scale: {answer.chosen.hours:.1f} h" in printed
+    assert f"with the prior of {MIN_UNITS} units of type FOG-Z by bias_scale: {answer.chosen.hours:.1f} h" in printed
     assert f"without it {prior.without.hours:.1f} h" in printed
+
+
+def test_a_prior_of_other_outputs_than_the_recipe_measures_is_refused(store: Store) -> None:
+    asked = DesignRequest(like="ojeda2000", model="bias_scale", u_dps=0.01, type_prior="FOG-A")
+    with pytest.raises(BadInput, match=r"type 'FOG-A': its calibrated units have output x, but .* output z,"):
+        design_campaign(store, asked, load_bench("single-axis-sim"))

@@ -81,7 +81,8 @@ def test_a_diagnosis_for_the_night_judges_at_once_and_begins_no_experiment_befor
         service.tick()
     waits = service.http.get(f"/api/diagnoses/{started['id']}").json()
     assert (waits["state"], len(waits["rounds"]), waits["rounds"][0]["campaign"]) == ("measuring", 1, None)
-    assert waits["next"].endswith("of round 1 on bench single-axis-sim, not before 2026-11-01 21:00 UTC")
+    assert waits["next"].startswith("have the service of bench single-axis-sim running")
+    assert waits["next"].endswith("of round 1, not before 2026-11-01 21:00 UTC")
     assert len(service.http.get("/api/campaigns").json()) == campaigns
     service.clock.sleep(21 * 3600.0 + 1.0)
     for _ in range(4):

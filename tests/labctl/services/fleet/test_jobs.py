@@ -187,6 +187,13 @@ def test_a_job_is_carried_out_by_one_process_and_taken_up_when_that_one_is_gone(
     assert versions(store) == [[1]] * UNITS
 
 
+def test_a_job_is_not_left_for_good_where_the_clock_was_set_back(store: Store) -> None:
+    job = jobs.begin(store, FleetJobRequest(kind="fit", effects=["bias"]), AT, "another process")
+    for back, done in ((LEFT_AFTER / 2, 0), (timedelta(days=1), UNITS)):
+        carry_out(store, VirtualClock(AT - back), job.id, this_process(), lambda: HereEngine(store))
+        assert jobs.job_answer(store, job.id, AT).done == done
+
+
 def test_an_engine_that_does_not_answer_ends_the_job_with_the_reason(store: Store) -> None:
     def nothing() -> HereEngine:
         raise ComputationEnded("no scheduler")

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import timedelta
+from pathlib import Path
 
 import pytest
 
 from labctl.answers.fleet import FleetChartRequest, FleetReportRequest, FleetReportResponse, FleetUnits
-from labctl.errors import BadInput
+from labctl.calibration import read_calibration
+from labctl.errors import BadInput, NotFound
 from labctl.services.fleet.evidence import content_of, sums_in
 from labctl.services.fleet.figures import fleet_chart, type_figures
 from labctl.services.fleet.report import fleet_report
-from labctl.store import Store, open_store
+from labctl.store import FleetFilter, Store, open_store
 from tests.helpers.fleets import AT, run_job, unit_points
 
 UNITS = 12
@@ -98,6 +101,8 @@ def test_a_report_is_on_one_type(store: Store) -> None:
         fleet_report(store, FleetReportRequest(), NOW)
     with pytest.raises(BadInput, match=r"no unit of type 'FOG-Z' matches; .* are of 'FOG-A', 'MEMS-B'"):
         fleet_report(store, FleetReportRequest(type="FOG-Z"), NOW)
+    with pytest.raises(NotFound, match=r"^no unit matches batch 'B9', text 'X'; `labctl units` lists the units$"):
+        fleet_report(store, FleetReportRequest(batch="B9", search="X"), NOW)
     alone = fleet_report(store, FleetReportRequest(type="MEMS-B"), NOW)
     assert (alone.compared, alone.missing, alone.groups) == (0, [], [])
     assert "at least 5" in alone.text[0]
@@ -128,3 +133,17 @@ def test_sums_are_the_same_after_they_were_kept(store: Store) -> None:
             other = again.benches[bench][axis]
             assert other.shapes == each.shapes
             assert (other.information == each.information).all()
+
+
+def test_versions_come_newest_recording_first(tmp_path: Path) -> None:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        for number in range(3):
+            store.recordings.add_import(unit_points(number), AT)
+        assert run_job(store).done == 3
+        again = unit_points(1)
+        later = again.info.model_copy(update={"started_at": AT + timedelta(days=300)})
+        store.recordings.add_import(replace(again, info=later), AT)
+        assert run_job(store).done == 1
+        versions = list(store.fleet_reports.versions(FleetFilter("FOG-A"), "", 100))
+        assert [each.serial for each in versions] == ["U00001", "U00002", "U00001", "U00000"]
+        assert read_calibration(versions[0].document).document["version"] == 2

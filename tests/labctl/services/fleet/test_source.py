@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import closing
@@ -13,6 +15,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from fsspec.implementations.local import LocalFileSystem
 from fsspec.implementations.memory import MemoryFileSystem
 
 from instruments.clock import VirtualClock
@@ -25,12 +28,13 @@ from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.fleet import jobs
 from labctl.services.fleet.publishing import CONTENTS, publish
+from labctl.services.fleet.task import FleetTask
 from labctl.services.planning.loading import load_bench
 from labctl.store import open_store
 from labctl.store.paging import PageRequest
 from labctl.store.repositories.published_readings import raw_of
 from labctl.store.repositories.sample_blocks import DataSetHead, in_units
-from tests.helpers.fleets import AT, add_units, run_job
+from tests.helpers.fleets import AT, HereEngine, add_units, run_job
 from tests.helpers.lab import Lab
 from tests.helpers.one_row_sets import one_row_sets
 
@@ -181,6 +185,32 @@ def test_only_what_is_not_there_unchanged_is_published(lab: Path) -> None:
     assert not list((lab / "published").rglob("*.part"))
 
 
+def test_two_may_publish_at_once_and_what_cannot_be_written_leaves_no_part(
+    lab: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    url, file_put = f"file://{lab}/both", LocalFileSystem.put_file
+    request = FleetPublishRequest(url=url, search="U0000")
+    with open_store(str(lab / "lab.sqlite"), write=False) as store:
+
+        def beside(files: LocalFileSystem, source: str, target: str) -> None:
+            file_put(files, source, target)
+            monkeypatch.setattr(LocalFileSystem, "put_file", file_put)  # the other publishes while this one writes
+            assert publish(store, request).written == 2
+
+        monkeypatch.setattr(LocalFileSystem, "put_file", beside)
+        first, second = publish(store, request), publish(store, request)
+        assert (first.written, first.unchanged, second.written, second.unchanged) == (1, 1, 0, 2)
+
+        def full(files: LocalFileSystem, source: str, target: str) -> None:
+            Path(target).write_bytes(Path(source).read_bytes()[:10])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), target)
+
+        monkeypatch.setattr(LocalFileSystem, "put_file", full)
+        with pytest.raises(BadInput, match=r"No space left on device.*free space"):
+            publish(store, request.model_copy(update={"again": True}))
+    assert not list((lab / "both").rglob("*.part"))
+
+
 def test_what_is_published_is_a_recording_in_the_interchange_format(lab: Path) -> None:
     with open_store(str(lab / "lab.sqlite"), write=False) as store:
         for number in DATA:
@@ -206,6 +236,24 @@ def test_a_storage_without_recordings_ends_the_job(lab: Path) -> None:
             publish(store, FleetPublishRequest(url="s3://bucket/lab"))
         with pytest.raises(BadInput, match="choose a scheme that fsspec knows"):
             publish(store, FleetPublishRequest(url="sausage://bucket/lab"))
+
+
+def test_a_storage_that_is_lost_ends_the_job_and_leaves_its_other_units_to_do(lab: Path) -> None:
+    begun: list[str] = []
+
+    def lost_after_one(task: FleetTask) -> None:
+        begun.append(task.serial)
+        if len(begun) == 2:  # as where a file system is not mounted any more
+            shutil.rmtree(lab / "published")
+            (lab / "published").mkdir()
+
+    with open_store(str(lab / "lab.sqlite"), write=True) as store:
+        asked = {"source": f"file://{lab}/published", "effects": ["bias"], "accept_warnings": True}
+        with pytest.raises(NotFound, match="nothing is there"):
+            run_job(store, HereEngine(store, lost_after_one), **asked)
+        (job,) = jobs.job_answers(store, PageRequest(), AT).rows
+        assert (job.state, job.done, job.failed, job.waiting) == ("failed", 1, 0, len(DATA) - 1)
+        assert run_job(store, **{**asked, "source": ""}).skipped == 1
 
 
 def test_the_command_publishes_and_shows_no_password(lab: Path) -> None:
