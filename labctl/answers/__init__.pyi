@@ -210,6 +210,7 @@ from labctl.answers.drafts import (
     LimitResult as LimitResult,
     RemainingLine as RemainingLine,
 )
+from labctl.answers.effect_origin import Origin as Origin
 from labctl.answers.effects import (
     CataloguedEffect as CataloguedEffect,
     EffectJson as EffectJson,
@@ -241,7 +242,6 @@ from labctl.answers.fitted_model import (
     HeldJson as HeldJson,
     LeftOutEffect as LeftOutEffect,
     LegErrorJson as LegErrorJson,
-    Origin as Origin,
     ReferenceJson as ReferenceJson,
     SpecificForceJson as SpecificForceJson,
     StateJson as StateJson,

@@ -14,7 +14,8 @@ from labctl.answers.common_fields import (
     Serial,
     VersionNumber,
 )
-from labctl.answers.fitted_model import Coefficient, CorrelationTimes, Origin, ThermalFamilyJson, ThermalHintJson
+from labctl.answers.effect_origin import Origin
+from labctl.answers.fitted_model import Coefficient, CorrelationTimes, ThermalFamilyJson, ThermalHintJson
 from labctl.answers.inspection import WARNINGS, DataWarning
 from labctl.answers.joint import JointJson
 from labctl.answers.laws import LawTest, ProposedLaw

@@ -6,7 +6,7 @@ from typing import Literal
 
 from typing_extensions import TypedDict
 
-from labctl.answers.fitted_model import Origin
+from labctl.answers.effect_origin import Origin
 
 #: What a symbol of an equation stands for.
 SymbolKind = Literal["coefficient", "parameter", "channel", "other"]

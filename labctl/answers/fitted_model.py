@@ -6,11 +6,10 @@ from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import Doc, TypedDict
 
+from labctl.answers.effect_origin import Origin
 from labctl.answers.joint import JointJson
 from labctl.answers.json_object import JsonObject
 from labctl.answers.poses import PosesJson
-
-Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
 
 
 class TermJson(TypedDict):

@@ -12,7 +12,7 @@ from labctl.fitting.effects.equation import Equation, Source, Symbol, term_528
 from labctl.fitting.numeric.arrays import Array
 
 if TYPE_CHECKING:
-    from labctl.answers.fitted_model import Origin
+    from labctl.answers.effect_origin import Origin
 
 GRAVITY = 9.80665
 #: Specific force along an axis that changes by less, g, is the tilt of a support and the drift of an accelerometer with

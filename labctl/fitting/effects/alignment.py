@@ -9,7 +9,7 @@ from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Term
 from labctl.fitting.effects.equation import YANG, Equation, Source, Symbol, term_528
 
 if TYPE_CHECKING:
-    from labctl.answers.fitted_model import Origin
+    from labctl.answers.effect_origin import Origin
 
 
 class Misalignment(Effect):

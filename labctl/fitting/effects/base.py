@@ -9,17 +9,15 @@ import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
+from labctl.answers.effect_origin import Origin
 from labctl.fitting.data.channels import Carrier, Channels
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects.equation import Equation, Source
 from labctl.fitting.numeric.arrays import Array
-
-if TYPE_CHECKING:
-    from labctl.answers.fitted_model import Origin
 
 #: Which output axes an effect shows on: the one that turns, the others, or all alike.
 Rows = Literal["own", "cross", "all"]

@@ -11,7 +11,7 @@ from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Span, T
 from labctl.fitting.effects.equation import IEEE_952, OJEDA, WEISS, YANG, Equation, Source, Symbol, term_528
 
 if TYPE_CHECKING:
-    from labctl.answers.fitted_model import Origin
+    from labctl.answers.effect_origin import Origin
 
 
 class Bias(Effect):

@@ -12,7 +12,7 @@ from labctl.fitting.effects.trial import refuse_useless
 Kinds = tuple[Effect, ...]
 
 
-def checked(declared: Any) -> Kinds:
+def _checked(declared: Any) -> Kinds:
     """Return a class of effect, or several, as effects; raises TypeError or ValueError where one cannot be fitted."""
     kinds = (declared,) if isinstance(declared, type) else tuple(declared)
     effects = []
@@ -29,4 +29,4 @@ def checked(declared: Any) -> Kinds:
     return tuple(effects)
 
 
-FAMILIES: PluginGroup[Kinds] = PluginGroup("labctl.effects", "family of effects", checked)
+FAMILIES: PluginGroup[Kinds] = PluginGroup("labctl.effects", "family of effects", _checked)

@@ -21,7 +21,7 @@ from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Span, T
 from labctl.fitting.numeric.arrays import Array
 
 if TYPE_CHECKING:
-    from labctl.answers.fitted_model import Origin
+    from labctl.answers.effect_origin import Origin
 
 #: What an operator or function takes and returns.
 Operand = float | Array

@@ -14,7 +14,7 @@ from labctl.fitting.effects.equation import Equation, Source, Symbol, term_528
 from labctl.fitting.numeric.arrays import Array
 
 if TYPE_CHECKING:
-    from labctl.answers.fitted_model import Origin
+    from labctl.answers.effect_origin import Origin
 
 
 class _Responding(Effect):

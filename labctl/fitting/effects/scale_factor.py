@@ -15,7 +15,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.open_loop_sine import sine_ratio, sine_ratio_slope
 
 if TYPE_CHECKING:
-    from labctl.answers.fitted_model import Origin
+    from labctl.answers.effect_origin import Origin
 
 #: Parameter of a sine response whose amplitude was fitted beside K, in calibrations up to version 0.1.
 FREE_AMPLITUDE = "free_amplitude"

@@ -14,7 +14,7 @@ from labctl.fitting.effects.equation import IEEE_952, WEISS, Equation, Source, S
 from labctl.fitting.effects.thermal_lag import LAGS
 
 if TYPE_CHECKING:
-    from labctl.answers.fitted_model import Origin
+    from labctl.answers.effect_origin import Origin
 
 
 class TemperatureRate(Effect):

@@ -20,7 +20,7 @@ from labctl.fitting.effects.equation import Equation, Source, Symbol
 from labctl.fitting.numeric.arrays import Array
 
 if TYPE_CHECKING:
-    from labctl.answers.fitted_model import Origin
+    from labctl.answers.effect_origin import Origin
 
 #: What makes the error: the distance between element and thermometer, or that of the squares of their temperatures.
 Part = Literal["all", "curved"]

@@ -56,11 +56,13 @@ def test_labctls_own_effects_keep_their_order() -> None:
     assert list(CATALOGUE) == [kind.id for kind in EFFECTS]
     assert len(CATALOGUE) == len(EFFECTS)
     assert set(pickle.loads(pickle.dumps(CATALOGUE))) == set(CATALOGUE)
-    assert [own.id for own in families.checked(EFFECTS)] == list(CATALOGUE)  # each can be fitted, as others' have to be
+    assert [own.id for own in families._checked(EFFECTS)] == list(
+        CATALOGUE
+    )  # each can be fitted, as others' have to be
 
 
 def test_an_effect_of_another_package_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
-    register(monkeypatch, families.FAMILIES, "torsion", families.checked(Torsion))
+    register(monkeypatch, families.FAMILIES, "torsion", families._checked(Torsion))
     assert list(CATALOGUE)[-1] == "cable_torsion"
     assert effect("cable_torsion").term == "Cable torsion"
     assert CATALOGUE["bias"].id == "bias"
@@ -94,7 +96,7 @@ def test_an_id_of_labctls_own_is_not_taken(monkeypatch: pytest.MonkeyPatch, capl
     class Other(Torsion):
         id = "bias"
 
-    register(monkeypatch, families.FAMILIES, "torsion", families.checked((Other, Torsion)))
+    register(monkeypatch, families.FAMILIES, "torsion", families._checked((Other, Torsion)))
     assert isinstance(dict(CATALOGUE.items())["bias"], Bias)
     assert "cable_torsion" in CATALOGUE
     (record,) = caplog.records

@@ -1,0 +1,7 @@
+"""Where the cause of an effect is."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
