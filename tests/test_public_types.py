@@ -36,7 +36,7 @@ ALLOWED = {
     "labctl/log/redaction.py": ({"Redaction.fields"}, STRUCTLOG),
     "labctl/log/rendering.py": ({"Fields", "Rendering.__call__", "error_fields"}, STRUCTLOG),
     "labctl/processes/rpc_methods.py": ({"RpcMethod.__init__", "parameter"}, KIND),
-    "labctl/processes/rpc.py": ({"Answer.value", "Caller.call"}, BY_NAME),
+    "labctl/processes/rpc.py": ({"Answer.value", "RpcClient.call"}, BY_NAME),
     "labctl/processes/documents.py": ({"Form.__init__"}, KIND),
     "labctl/service_connection.py": (
         {"ServiceConnection.request", "json_of"},

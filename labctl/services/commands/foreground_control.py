@@ -67,8 +67,8 @@ class ForegroundControl:
     def run_campaign(self, request: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
         start_request = StartRequest(
-            recipe=request.body.recipe, bench=request.bench, clip=request.body.clip, hide=request.body.hide, fit=request.body.fit,
-            speed=request.speed, seed=request.seed, simulated_start=request.simulated_start,
+            recipe=request.body.recipe, bench=request.bench, clip=request.body.clip, hide=request.body.hide,
+            fit=request.body.fit, speed=request.speed, seed=request.seed, simulated_start=request.simulated_start,
             confirmed_by=request.body.confirmed_by, checks=request.body.checks,
         )  # fmt: skip
         with self._open_terminal() as terminal:

@@ -45,21 +45,21 @@ from tests.helpers.openapi import openapi_document
 Asked = ToCampaign[ReasonRequest]
 
 
-def _linger_in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _linger_in_service(control: ServiceBench, context: CommandContext, request: Asked) -> CampaignResponse:
     control.bench_runner()
-    control.record(context, LINGER.name, asked.campaign, asked.body.text)
-    return campaign_status(context.store, asked.campaign)
+    control.record(context, LINGER.name, request.campaign, request.body.text)
+    return campaign_status(context.store, request.campaign)
 
 
-def _linger_in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
-    raise not_running(context.store, asked.campaign, "let it linger")
+def _linger_in_foreground(_: Foreground, context: CommandContext, request: Asked) -> CampaignResponse:
+    raise not_running(context.store, request.campaign, "let it linger")
 
 
 #: Nothing but this makes an act.
 LINGER = CampaignAct(
     name="linger",
     body=ReasonRequest,
-    asked=Asked,
+    request_type=Asked,
     summary="Hold the temperature",
     description="Stay in the present soak.",
     command_line=CampaignCommand(
