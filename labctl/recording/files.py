@@ -64,9 +64,9 @@ def read_head(path: Path) -> RecordingInfo:
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
         value_text = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
-        is_serial = (place, first["type"]) == ("serial", "string_pattern_mismatch")
-        said = SERIAL_RULE if is_serial else first["msg"]
-        raise BadRecording(f"{path}: {place}: {said}{value_text}") from error
+        if (place, first["type"]) == ("serial", "string_pattern_mismatch"):
+            raise BadRecording(f"{path}: serial cannot be used{value_text}; give {SERIAL_RULE}") from error
+        raise BadRecording(f"{path}: {place}: {first['msg']}{value_text}") from error
 
 
 def _data_file(folder: Path, kind: str) -> Path:

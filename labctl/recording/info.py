@@ -14,7 +14,7 @@ from labctl.answers.recording_head import Axis, LeftOut, Motion, OutputUnit, Rec
 
 #: Serial number of a unit.
 SERIAL_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
-SERIAL_RULE = "give 1 to 64 characters: a letter A to Z or digit, then also . _ + # - and spaces"
+SERIAL_RULE = "1 to 64 characters: a letter A to Z or digit, then also . _ + # - and spaces"
 #: What the rate of the table is known from, as a table says it, and in words.
 RateReference = Literal["computed", "demanded", "measured"]
 REFERENCES: dict[RateReference, str] = {

@@ -77,7 +77,7 @@ def _kept(
     store: Store, serial: str, sensor: SensorName, request: AccelerometerRequest | MagnetometerRequest, at: datetime
 ) -> dict[str, object]:
     if re.fullmatch(SERIAL_PATTERN, serial) is None:
-        raise BadInput(f"serial number {serial[:80]!r}: {SERIAL_RULE}")
+        raise BadInput(f"serial number {serial[:80]!r} cannot be used; give {SERIAL_RULE}")
     result = request.result.model_dump(mode="json")
     problem = _problem(_estimates(request.result), request.result.covariance) or _not_json(result)
     if problem is None and isinstance(request.result, AccelerometerResponse) and request.result.temperature is not None:
