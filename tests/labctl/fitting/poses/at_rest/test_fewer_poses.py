@@ -153,7 +153,7 @@ def test_six_faces_agree_with_imucal() -> None:
     loose = Known(
         np.zeros(6), np.diag(np.repeat([0.1, 0.01], 3) ** 2), np.zeros(3), Scatter((NOISE / WORDS) ** 2, 0.0, 1e6)
     )
-    found = by_fewer_poses(table, measured, loose).found
+    found = by_fewer_poses(table, measured, loose).accelerometer
     assert WORDS * found.bias_g == pytest.approx(IMUCAL_OFFSET, abs=0.6)  # 0.3 mg
     per_g = WORDS * np.linalg.norm(np.eye(3) + found.errors, axis=1)
     assert per_g == pytest.approx(IMUCAL_PER_G, rel=3e-4)
