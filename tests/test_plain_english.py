@@ -67,6 +67,8 @@ BANNED = {
     r"sa(?:y|ys|id) nothing of itself": "reported no identification",
 }
 WORDS = {phrase: re.compile(rf"\b(?:{phrase})\b", re.IGNORECASE) for phrase in BANNED}
+#: Any of them: most texts have none, and are read once.
+ANY = re.compile("|".join(pattern.pattern for pattern in WORDS.values()), re.IGNORECASE)
 #: Data of the database and of requests that stay as they are.
 KEPT = {
     ("labctl/api/middleware.py", "nobody"),
@@ -82,6 +84,7 @@ def hits(texts: list[Written]) -> list[str]:
     return [
         f"{where}: {found[0]!r}: write {BANNED[phrase]}"
         for where, text in texts
+        if ANY.search(text)
         for phrase, pattern in WORDS.items()
         for found in pattern.finditer(text)
         if (where.partition(":")[0], text) not in KEPT
@@ -89,13 +92,18 @@ def hits(texts: list[Written]) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize(
-    "written",
-    [documentation, python_strings, python_comments, field_descriptions, page_strings],
-    ids=lambda each: each.__name__,
-)
+@pytest.mark.parametrize("written", [documentation, field_descriptions, page_strings], ids=lambda each: each.__name__)
 def test_no_banned_word_is_read(written: Callable[[], Iterator[Written]]) -> None:
     texts = list(written())
+    assert len(texts) > 100
+    found = hits(texts)
+    assert not found, "\n".join(["plain technical English, please:", *found])
+
+
+@pytest.mark.parametrize("written", [python_strings, python_comments], ids=lambda each: each.__name__)
+def test_no_banned_word_is_read_in_the_code(written: Callable[[re.Pattern[str]], Iterator[Written]]) -> None:
+    """All strings and comments of the files that have one of the words anywhere in their text."""
+    texts = list(written(ANY))
     assert len(texts) > 100
     found = hits(texts)
     assert not found, "\n".join(["plain technical English, please:", *found])

@@ -10,13 +10,13 @@ from tests.helpers.worker_count import EACH_BYTES, available_bytes, worker_count
 
 
 @pytest.mark.parametrize(
-    ("processors", "processes_in_memory", "count"), [(2, 100, 6), (8, 100, 12), (2, 3, 3), (2, 0, 1)]
+    ("processors", "processes_in_memory", "count"), [(2, 100, 4), (8, 100, 10), (2, 3, 3), (2, 0, 1)]
 )
 def test_so_many_as_compute_and_wait_at_once_and_as_the_memory_has_room_for(
     processors: int, processes_in_memory: int, count: int
 ) -> None:
     assert worker_count(processors, processes_in_memory * EACH_BYTES) == count
-    assert worker_count(processors, None) == processors + 4
+    assert worker_count(processors, None) == processors + 2
 
 
 def test_the_memory_that_is_available_is_what_the_system_states(tmp_path: Path) -> None:

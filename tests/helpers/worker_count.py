@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-#: Tests that wait for a browser, another process or a serial line at the same time, while all processors compute.
-WAITING = 4
+#: Processes whose tests wait for a browser, another process or a serial line while the others compute. Each one more
+#: imports and prepares all anew: on two processors six took longer than four.
+WAITING = 2
 #: Memory of one of these processes at its end, and of what it starts (a browser, a service, a database), bytes.
 EACH_BYTES = 1_500_000_000
 

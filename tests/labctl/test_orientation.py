@@ -123,6 +123,7 @@ def test_bad_readings_are_refused_and_change_nothing(t_s: float, rate: float) ->
     assert o.update(1.1, 1.0) == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 def test_the_simulated_gyrostar_drifts_less_than_a_degree_a_minute() -> None:
     """The report's result: 10 min of warm-up, then a standstill that renews the offset every 2 min.
 

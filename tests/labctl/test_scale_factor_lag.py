@@ -206,6 +206,7 @@ def test_a_scale_factor_that_lags_is_named_on_a_turning_table_and_found_with_its
     assert (after.form, after.named) == ("adequate", ())
 
 
+@pytest.mark.slow
 def test_axes_have_time_constants_of_their_own_where_they_differ() -> None:
     recording = turned_unit(4, Turned(scale_lag_s=400.0, axes=("x", "y", "z"), of_axes=(0.6, 1.0, 1.6), loops=1))
     _, data, model = based(recording, ("misalignment",))

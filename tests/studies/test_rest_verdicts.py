@@ -15,6 +15,7 @@ def test_a_record_at_rest_gets_a_true_verdict(cell: str) -> None:
     assert not found.is_worse
 
 
+@pytest.mark.slow
 def test_an_advised_hysteresis_halves_the_error_of_the_next_record() -> None:
     found = outcome("tactical", "hysteresis", 1, records=2)
     assert found.advised == ("thermal_hysteresis",)

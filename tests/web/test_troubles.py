@@ -80,6 +80,7 @@ def test_a_wrong_file_is_refused_with_the_place_of_the_fault(
     faults.clear()  # the browser itself logs each refusal
 
 
+@pytest.mark.slow
 def test_two_people_at_once_make_two_versions(fog: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

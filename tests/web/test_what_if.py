@@ -64,6 +64,7 @@ def test_the_slider_moves_between_the_fits_without_and_with_the_effect(
     assert rms_shown(panel) == float(f"{np.sqrt(np.mean(middle**2)):.3g}")
 
 
+@pytest.mark.slow
 def test_a_second_effect_lies_over_it_and_their_parting_rates_become_a_plan(
     opened: tuple[Page, Locator], tmp_path: Path
 ) -> None:

@@ -77,9 +77,15 @@ def test_a_field_named_with_a_unit_states_this_unit(model: type[BaseModel]) -> N
     assert without_unit({name: field.description for name, field in model.model_fields.items()}) == {}
 
 
+@cache
+def described_dictionaries() -> Mapping[str, Mapping[str, str]]:
+    """Return the docstrings of the fields of every typed dictionary."""
+    return typed_dictionaries()
+
+
 @pytest.mark.parametrize("kind", typed_dicts(), ids=lambda kind: f"{kind.__module__}.{kind.__name__}")
 def test_each_field_of_a_typed_dictionary_has_a_docstring_with_its_unit(kind: type) -> None:
-    described = typed_dictionaries()[kind.__name__]
+    described = described_dictionaries()[kind.__name__]
     assert [name for name in kind.__annotations__ if name not in described] == []
     assert without_unit(described) == {}
 

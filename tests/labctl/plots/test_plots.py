@@ -93,6 +93,7 @@ def test_the_map_has_each_data_set_where_it_was_measured_and_dims_what_means_not
         assert cells.customdata[row][column] == str(source["dataset"][k])
 
 
+@pytest.mark.slow
 def test_all_maps_share_one_scale() -> None:
     criticism = held(three_axes(4), "yang2018", full=True)
     from labctl.fitting.criticism import residual_maps

@@ -52,6 +52,7 @@ def cells_of(figure: Any) -> list[tuple[str, str, str, float]]:
     ]
 
 
+@pytest.mark.slow
 def test_every_measured_cell_is_in_the_map_with_all_signs_of_rate() -> None:
     points, shown = triaxial()
     figure = maps(shown)
@@ -68,6 +69,7 @@ def test_every_measured_cell_is_in_the_map_with_all_signs_of_rate() -> None:
         assert len({cell[2] for cell in cells if cell[0] == panel}) == 10
 
 
+@pytest.mark.slow
 def test_a_cell_has_the_residual_of_its_data_set_at_its_rate_and_temperature() -> None:
     points, shown = triaxial()
     figure = maps(shown)
@@ -102,6 +104,7 @@ def test_a_map_without_levels_has_each_data_set_at_its_own_temperature() -> None
         assert place[str(number)] == pytest.approx((rate, warm), abs=0.26)
 
 
+@pytest.mark.slow
 def test_scatters_draw_every_data_set_where_it_was_measured() -> None:
     points, shown = triaxial()
     figure = channels(shown)
@@ -131,6 +134,7 @@ def test_a_thinned_picture_says_n_of_how_many(draw: Any, monkeypatch: pytest.Mon
     assert "60 of 121 data sets drawn" in figure.layout.annotations[0].text
 
 
+@pytest.mark.slow
 def test_a_time_axis_is_there_only_where_time_is_known() -> None:
     figure = time(untimed())
     assert figure is not None

@@ -120,6 +120,7 @@ def test_a_service_hears_of_signals_until_it_is_closed(tmp_path: Path, monkeypat
     assert handlers() == before
 
 
+@pytest.mark.slow
 def test_a_service_that_cannot_say_where_it_is_ends_its_processes(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     reported: list[supervisor.Ready] = []
@@ -137,6 +138,7 @@ def test_a_service_that_cannot_say_where_it_is_ends_its_processes(tmp_path: Path
             os.kill(pid, 0)
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_again_and_again_ends_the_service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(liveness, "MAX_RESTARTS", 0)
     location = str(tmp_path / "lab.sqlite")

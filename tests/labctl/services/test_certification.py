@@ -73,6 +73,7 @@ def test_what_lacks_something_is_refused_in_one_line_unless_overridden(lab: Lab)
     assert lab.json("audit", "verify")["ok"] is True
 
 
+@pytest.mark.slow
 def test_a_version_worse_than_its_parent_or_than_the_one_in_force_is_refused(lab: Lab) -> None:
     lab.run("fit", FOG, "--effects", "bias,scale_factor,scale_factor_odd")
     lab.run("improve", FOG, "--remove", "scale_factor_odd")

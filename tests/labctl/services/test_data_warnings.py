@@ -52,6 +52,7 @@ def test_good_data_have_no_warning_anywhere(lab: Lab, brought_in: Callable[[Reco
     ]
 
 
+@pytest.mark.slow
 def test_certainly_wrong_data_are_refused_in_one_line_unless_accepted(
     lab: Lab, brought_in: Callable[[Recording], list[dict[str, object]]]
 ) -> None:

@@ -136,6 +136,7 @@ def test_without_it_the_error_is_in_the_scale_factor_and_is_named_table_rate_rat
     assert "so this difference becomes part of the scale factor" in found.events[0][1]
 
 
+@pytest.mark.slow
 def test_an_error_in_one_direction_is_found_by_direction(tmp_path: Path) -> None:
     """Without the angles it would be taken for an asymmetry of the gyro."""
     found = campaign(tmp_path, {"reference": "demanded"}, rate_ratio=1.0002, rate_ratio_reverse=1.0)

@@ -51,6 +51,7 @@ def without_fixture() -> DesignResponse:
     return designed(BENCH)
 
 
+@pytest.mark.slow
 def test_it_says_what_a_tilted_fixture_saves_and_chooses_it_where_the_bench_has_one() -> None:
     has, has_not = with_fixture(), without_fixture()
     assert has.tilted is not None

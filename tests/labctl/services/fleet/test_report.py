@@ -69,6 +69,7 @@ def test_the_batch_that_differs_is_found_and_said(report: FleetReportResponse) -
     assert report.compared == UNITS
 
 
+@pytest.mark.slow
 def test_figures_count_each_unit_once(store: Store, report: FleetReportResponse) -> None:
     figures = report.figures
     assert figures.units == figures.fitted == figures.criticised == UNITS
@@ -79,6 +80,7 @@ def test_figures_count_each_unit_once(store: Store, report: FleetReportResponse)
     assert types == {"FOG-A": UNITS, "MEMS-B": 1}
 
 
+@pytest.mark.slow
 def test_a_chart_shows_each_unit_once_by_batch_over_time(store: Store) -> None:
     chart = fleet_chart(store, FleetChartRequest(type="FOG-A", axis="x", name="scale_factor"))
     assert {point.level: point.units for point in chart.points}.keys() == set(BATCHES)
@@ -96,6 +98,7 @@ def test_a_chart_shows_each_unit_once_by_batch_over_time(store: Store) -> None:
         fleet_chart(store, FleetChartRequest(axis="x", name="scale_factor", factor="colour"))
 
 
+@pytest.mark.slow
 def test_a_report_is_on_one_type(store: Store) -> None:
     with pytest.raises(BadInput, match="'FOG-A', 'MEMS-B'"):
         fleet_report(store, FleetReportRequest(), NOW)
@@ -108,12 +111,14 @@ def test_a_report_is_on_one_type(store: Store) -> None:
     assert "at least 5" in alone.text[0]
 
 
+@pytest.mark.slow
 def test_of_a_part_of_a_type_nothing_is_said_that_takes_all_of_it(store: Store) -> None:
     part = fleet_report(store, FleetReportRequest(type="FOG-A", batch="B2"), NOW)
     assert (part.compared, part.missing, part.evidence_units) == (len(BATCHES["B2"]), [], 0)
     assert any("all of its units" in sentence for sentence in part.text)
 
 
+@pytest.mark.slow
 def test_criticisms_that_were_made_again_do_not_count_twice(store: Store) -> None:
     assert run_job(store, kind="criticise", search="U00003", again=True).done == 1
     report = fleet_report(store, FleetReportRequest(type="FOG-A"), NOW)
@@ -123,6 +128,7 @@ def test_criticisms_that_were_made_again_do_not_count_twice(store: Store) -> Non
     assert fleet_report(store, FleetReportRequest(type="FOG-A"), NOW).evidence_units == UNITS
 
 
+@pytest.mark.slow
 def test_sums_are_the_same_after_they_were_kept(store: Store) -> None:
     contents, _ = store.fleet_reports.evidence("FOG-A", "")
     sums = sums_in(contents[0])

@@ -121,6 +121,7 @@ def reasons(lab: Path, database: Path | None = None, **asked: object) -> dict[st
         return {row.serial: row.reason for row in jobs.unit_answers(store, job.id, PageRequest(), "failed").rows}
 
 
+@pytest.mark.slow
 def test_results_are_those_of_the_database_to_the_last_digit_and_its_readings_are_not_read(
     lab: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

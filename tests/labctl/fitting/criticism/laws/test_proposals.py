@@ -48,6 +48,7 @@ def test_the_likeliest_law_is_the_true_one(found: Criticism, laws: list[Law]) ->
     assert described == pytest.approx(error_dps(rates), abs=0.1 * SIZE_DPS)
 
 
+@pytest.mark.slow
 def test_a_law_leaves_less_of_the_data_sets_and_of_those_left_out(found: Criticism, laws: list[Law]) -> None:
     assert found.base is not None
     for law in laws:
@@ -57,11 +58,13 @@ def test_a_law_leaves_less_of_the_data_sets_and_of_those_left_out(found: Critici
     assert sum(law.probability for law in laws) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_it_says_what_else_would_follow(found: Criticism, laws: list[Law]) -> None:
     said = consequences(laws[0], found)
     assert said[0] == "It changes its sign with the direction of the rate, and is 0 at rest."
 
 
+@pytest.mark.slow
 def test_two_laws_are_told_apart_where_they_differ_most(found: Criticism, laws: list[Law]) -> None:
     """Of one law there is nothing to tell; two that differ in period part where no data set is."""
     assert breaking(laws[:1], found) is None
