@@ -26,7 +26,7 @@ from labctl.fitting.design.range_of_use import RangeOfUse
 from labctl.fitting.models.presets import POSES, preset_for
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.design.known import Known, known_noise
-from labctl.services.design.problem import Candidate, Goal, Problem
+from labctl.services.design.problem import NOT_POSSIBLE, Candidate, Goal, Problem
 from labctl.services.design.search import chosen, next_best, search
 from labctl.services.design.sentences import decisions
 from labctl.services.design.tilted_fixture import TiltedChoice, is_useful, tilted_choice
@@ -34,7 +34,7 @@ from labctl.services.planning.earlier_campaigns import times_on_bench
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
 from labctl.services.planning.plan_answer import misalignment_outlook
-from procedures.contracts.errors import PlanRefused, ProcedureError
+from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Mount
 from procedures.planning.limits import BenchLimits, missing_instruments
 from procedures.planning.step_writer import MOUNTING_S
@@ -324,7 +324,7 @@ def _reference(problem: Problem, like: Recipe | None) -> tuple[Candidate | None,
     try:
         plain = recipe.model_copy(update={"fit": FitRules(model=problem.model, effects=problem.effects)})
         return problem.of_recipe(plain, None, problem.effects), ""
-    except (LabctlError, ProcedureError, ValueError) as error:
+    except NOT_POSSIBLE as error:
         return None, str(error)
 
 

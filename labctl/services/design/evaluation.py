@@ -7,13 +7,12 @@ from pydantic import ValidationError
 
 from instruments.bench_config import BenchFile
 from labctl.answers.design import DesignRequest, EvaluateRequest, EvaluateResponse
-from labctl.errors import BadInput, LabctlError
+from labctl.errors import BadInput
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.design.design import allowed_rates, allowed_temperatures, designed_campaign, pose
-from labctl.services.design.problem import Goal
+from labctl.services.design.problem import NOT_POSSIBLE, Goal
 from labctl.services.planning.loading import load_recipe
 from labctl.store import Store
-from procedures.contracts.errors import ProcedureError
 from procedures.recipe.fit_rules import FitRules
 from procedures.recipe.recipe import Recipe, recipe_document
 
@@ -43,7 +42,7 @@ def evaluated(store: Store | None, request: EvaluateRequest, bench: BenchFile | 
     try:
         goal = Goal(request.u_dps, design.hours)
         campaign = designed_campaign(problem.of_recipe(fitted, None, problem.effects), goal, posed.bench.units_at_once)
-    except (LabctlError, ProcedureError, ValueError) as error:
+    except NOT_POSSIBLE as error:
         why = str(error)
     return EvaluateResponse(
         bench=posed.bench.name,

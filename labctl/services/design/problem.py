@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+from pydantic import ValidationError
+
 from labctl.errors import LabctlError
 from labctl.fitting.design.heat_course import HeatFlow
 from labctl.fitting.design.noise_figures import NoiseFigures
@@ -19,6 +22,8 @@ from procedures.recipe.fit_rules import FitRules
 from procedures.recipe.recipe import Recipe
 from procedures.recipe.schemes import Cycle, Scheme, Span, recipe_of
 
+#: What says that a recipe cannot be run on the bench, or not fitted; any other error is one of the code.
+NOT_POSSIBLE = (LabctlError, ProcedureError, ValidationError, np.linalg.LinAlgError)
 #: Fitted beside a model without a thermal response where data are taken while the temperature moves: what heat flow
 #: itself does to the bias; a calibration does not contain it.
 OF_MOVING_HEAT = "temperature_rate"
@@ -98,7 +103,7 @@ class Problem:
         if scheme not in self.evaluated:
             try:
                 self.evaluated[scheme] = self._evaluate(scheme)
-            except (LabctlError, ProcedureError, ValueError):
+            except NOT_POSSIBLE:
                 self.evaluated[scheme] = None
         return self.evaluated[scheme]
 

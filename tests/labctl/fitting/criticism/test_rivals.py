@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
@@ -36,6 +36,19 @@ class GivenPair(Pair):
     further_gain: float = 0.0
     further_nats: float = 0.0
     has_as_simple_a_shape: bool = False
+
+
+def test_every_pair_has_to_state_what_the_rules_ask_for() -> None:
+    computed = {"share", "further_directions", "further_gain", "further_nats", "has_as_simple_a_shape"}
+    assert Pair.__abstractmethods__ == computed
+    assert all(isinstance(vars(Pair)[name], property) for name in computed)
+    given = [field.name for field in fields(Pair)]
+    assert given == ["leader", "rival", "leader_log_bf", "rival_log_bf", "leader_gain"]
+
+
+def test_what_leaves_as_much_as_noise_hides_is_another_signal() -> None:
+    assert not GivenPair(share=0.0, leader_gain=7.0).contains_leader
+    assert GivenPair(share=0.0, leader_gain=6.99).contains_leader
 
 
 @pytest.mark.parametrize(("rival_log_bf", "stays"), [(17.01, True), (17.0, False), (25.0, True)])
