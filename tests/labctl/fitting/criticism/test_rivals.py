@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from scipy.stats import chi2
 
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.rivals import Pair, by_chance, cannot_be_distinguished
+from labctl.fitting.criticism.verdict import has_as_simple_a_shape as measured_as_simple_a_shape
 
 #: Twice: what noise exceeds with a probability of 0.001 in two directions is 13.8 (chi2).
 TWO_DIRECTIONS = float(chi2.isf(1e-3, 2))
@@ -131,3 +133,53 @@ def test_the_probability_of_a_gain_by_chance_is_the_share_of_noise_that_gives_it
     drawn = np.random.default_rng(3).chisquare(directions, 200_000)
     assert by_chance(4.0, directions) == pytest.approx(np.mean(drawn > 4.0), abs=4e-3)
     assert by_chance(-1.0, directions) == by_chance(0.0, directions) == 1.0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape of a candidate on one axis, with its evidence, nats, and the number of its coefficients."""
+
+    candidate: str
+    log_bf: float
+    dimensions: int = 1
+    smooth: bool = False
+
+
+def has_as_simple_a_shape(*axes: list[Shape]) -> bool:
+    """Return what the verdict says of the rival "polynomial" beside the leader, the first shape of each axis."""
+    names = [f"gyro_{number}" for number in range(len(axes))]
+    comparison = SimpleNamespace(
+        axes={
+            name: SimpleNamespace(
+                log_bf=np.array([shape.log_bf for shape in shapes]),
+                dimensions=np.array([shape.dimensions for shape in shapes]),
+            )
+            for name, shapes in zip(names, axes, strict=True)
+        },
+        designs={name: SimpleNamespace(options=shapes) for name, shapes in zip(names, axes, strict=True)},
+    )
+    leader = SimpleNamespace(id="sine", option=dict.fromkeys(names, 0))
+    return measured_as_simple_a_shape(comparison, leader, SimpleNamespace(id="polynomial"))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("shape", "is_there"),
+    [
+        (Shape("polynomial", 8.01), True),
+        (Shape("polynomial", 8.0), False),  # twelve nats behind
+        (Shape("polynomial", 25.0), True),
+        (Shape("polynomial", 8.01, dimensions=2), True),  # of as many coefficients as the leader
+        (Shape("polynomial", 25.0, dimensions=3), False),
+        (Shape("polynomial", 25.0, smooth=True), False),
+        (Shape("saturation", 25.0), False),
+    ],
+)
+def test_a_rival_has_as_simple_a_shape_that_is_less_than_twelve_nats_behind(shape: Shape, is_there: bool) -> None:
+    assert has_as_simple_a_shape([Shape("sine", 20.0, dimensions=2), shape]) is is_there
+
+
+def test_how_far_a_shape_is_behind_is_added_over_the_axes() -> None:
+    leader = Shape("sine", 20.0)
+    assert has_as_simple_a_shape([leader, Shape("polynomial", 14.0)], [leader, Shape("polynomial", 14.1)])
+    assert not has_as_simple_a_shape([leader, Shape("polynomial", 14.0)], [leader, Shape("polynomial", 14.0)])
+    assert not has_as_simple_a_shape([leader, Shape("polynomial", 19.0)], [leader])
