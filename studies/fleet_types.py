@@ -100,17 +100,16 @@ class Campaign:
             for axis, design in self.designs.items()
         ])  # fmt: skip
 
-    def measured(self, rng: np.random.Generator, truth: Array) -> FitData:
-        """Return the data sets of a unit with coefficients (k,): noise and drift are drawn."""
+    def measured(self, rng: np.random.Generator, truth: Array, *, is_drift_drawn: bool = False) -> FitData:
+        """Return the data sets of a unit with coefficients (k,): the drift of the study, or one drawn for each axis."""
         outputs, begin = {}, 0
         for axis, design in self.designs.items():
-            own = truth[begin : begin + design.columns.shape[1]]
+            own, scatter = truth[begin : begin + design.columns.shape[1]], self.data.scatter(axis)
             begin += len(own)
-            outputs[axis] = self.data.outputs[axis] + design.columns @ own + self._noise(rng, axis)
+            drift = expected_drifts(rng, scatter, 1)[0] if is_drift_drawn else DRIFT
+            noise = drawn_noise(rng, self.sets.middle_s, scatter, drift)
+            outputs[axis] = self.data.outputs[axis] + design.columns @ own + noise
         return replace(self.data, outputs=outputs)
-
-    def _noise(self, rng: np.random.Generator, axis: str) -> Array:
-        return drawn_noise(rng, self.sets.middle_s, self.data.scatter(axis), DRIFT)
 
 
 def drawn_noise(rng: np.random.Generator, t_s: Array, scatter: Scatter, noise: Drift) -> Array:

@@ -156,10 +156,10 @@ def _groups(fleets: int, seed: int) -> Iterator[str]:
 def _priors(fleets: int, seed: int) -> Iterator[str]:
     """Yield how many data sets a new unit needs with a prior, for the U of a campaign without one."""
     yield (
-        "| units of the type are | prior from | data sets alone | U, mdeg/s | covered, % | data sets with it | ratio "
-        "| U, mdeg/s | covered, % | covered by the exact prior, % | prior refused, % |"
+        "| units of the type are | prior from | data sets alone | U, mdeg/s | data sets with it | ratio | U, mdeg/s "
+        "| drift | covered alone, % | covered with it, % | covered by the exact prior, % | prior refused, % |"
     )
-    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     kinds = {
         "alike in all but the bias": ALIKE_BUT_BIAS, "alike in temperature": ALIKE_IN_TEMPERATURE,
         "different in all": DIFFERENT,
@@ -171,17 +171,19 @@ def _priors(fleets: int, seed: int) -> Iterator[str]:
             population_of(Fleet(kind, units).drawn(full, np.random.default_rng([seed, 4, row, i])))
             for i in range(fleets)
         ]
-        campaign, u = smallest(prior_of(populations[0]), alone, full)
-        inside, places, refused = covered([prior_of(each) for each in populations], kind, campaign, seed)
+        priors = [prior_of(each) for each in populations]
         exact = [exact_prior(kind, full.names, units)] * fleets
-        inside_exact, _, _ = covered(exact, kind, campaign, seed)
-        inside_alone, _, _ = covered([None] * fleets, kind, full, seed)
+        campaign, u = smallest(priors[0], alone, full)
         n, few = len(full.sets), len(campaign.sets)
-        yield (
-            f"| {title} | {units} units | {n} | {1e3 * alone:.3g} | {share(inside_alone, places)} "
-            f"| {few} | {few / n:.2f} | {1e3 * u:.3g} | {share(inside, places)} | {share(inside_exact, places)} "
-            f"| {share(refused, fleets * NEW_UNITS)} |"
-        )
+        for drift, is_drawn in (("of this study", False), ("drawn as a fit expects it", True)):
+            inside_alone, _, _ = covered([None] * fleets, kind, full, seed, is_drawn)
+            inside, places, refused = covered(priors, kind, campaign, seed, is_drawn)
+            inside_exact, _, _ = covered(exact, kind, campaign, seed, is_drawn)
+            yield (
+                f"| {title} | {units} units | {n} | {1e3 * alone:.3g} | {few} | {few / n:.2f} | {1e3 * u:.3g} "
+                f"| {drift} | {share(inside_alone, places)} | {share(inside, places)} | {share(inside_exact, places)} "
+                f"| {share(refused, fleets * NEW_UNITS)} |"
+            )
 
 
 def _drifts(units: int, seed: int) -> Iterator[str]:
@@ -233,7 +235,11 @@ def exact_prior(kind: Mapping[str, tuple[float, float]], names: Sequence[str], u
 
 
 def covered(
-    priors: Sequence[CoefficientPrior | None], kind: Mapping[str, tuple[float, float]], campaign: Campaign, seed: int
+    priors: Sequence[CoefficientPrior | None],
+    kind: Mapping[str, tuple[float, float]],
+    campaign: Campaign,
+    seed: int,
+    is_drift_drawn: bool,
 ) -> tuple[int, int, int]:
     """Return how many corrected rates of new units are within their U, of how many, and how many priors were refused.
 
@@ -243,7 +249,7 @@ def covered(
     for i, prior in enumerate(priors):
         rng = np.random.default_rng([seed, 5, i])
         for truth in truths(rng, kind, campaign.names, NEW_UNITS):
-            data = campaign.measured(rng, truth)
+            data = campaign.measured(rng, truth, is_drift_drawn=is_drift_drawn)
             if prior is not None:
                 found = fit_with_prior(data, PRESET, prior)
                 fits, refused = found.fitted.axes, refused + (not found.is_used)
