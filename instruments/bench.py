@@ -16,6 +16,7 @@ from instruments.errors import InstrumentError, WrongSimulation
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.reference import Reference
+from instruments.interfaces.supply import Supply
 from instruments.interfaces.table import RateTable
 from instruments.interfaces.unit_handler import UnitHandler
 from instruments.simulation import Simulation, open_simulation, simulated_links, simulated_unit_handler
@@ -33,10 +34,11 @@ class Bench:
     simulation: Simulation | None = None  #: the simulated instruments of this process, where the bench has any
     references: dict[str, Reference] = field(default_factory=dict)  #: by name
     configurations: dict[str, dict[str, str]] = field(default_factory=dict)  #: unit -> how it is to be set
+    supply: Supply | None = None  #: of the units
 
     def close(self) -> None:
         """Close every link, also after one cannot be closed; raises the first InstrumentError or OSError at the end."""
-        closers: list[Callable[[], None]] = [each.close for each in (self.table, self.chamber) if each is not None]
+        closers: list[Callable[[], None]] = [each.close for each in (self.table, self.chamber, self.supply) if each]
         closers += [reference.close for reference in self.references.values()]
         failures: list[Exception] = []
         for close in [*(gyro.stop for gyro in self.gyros.values()), *closers]:
@@ -71,6 +73,7 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
         simulation,
         {reference.name: driver_of(reference).make(reference, ports, clock) for reference in bench.references},
         {gyro.name: gyro.configuration for gyro in bench.gyros},
+        None if bench.supply is None else driver_of(bench.supply).make(bench.supply, ports, clock),
     )
 
 

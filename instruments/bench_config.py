@@ -93,6 +93,28 @@ class ChamberSettings(DeviceSettings):
         return self
 
 
+class SupplySettings(DeviceSettings):
+    """Address of a programmable power supply of the units, and what the units may be supplied with."""
+
+    nominal_v: float = Field(gt=0)
+    min_v: float = Field(gt=0)
+    max_v: float = Field(gt=0)
+    current_limit_a: float = Field(gt=0)
+    tolerance_v: float = Field(default=0.05, gt=0)  #: of the measured voltage against the one that was set
+    #: "nominal": the units stay on, and a resumed campaign goes on in their powered session; "off": it begins another.
+    safe_state: Literal["nominal", "off"] = "nominal"
+    column: str = Field(default="supply_v", pattern=r"^[a-z][a-z0-9_]*_v$")  #: of the recording: the measured voltage
+
+    @model_validator(mode="after")
+    def _nominal_within(self) -> SupplySettings:
+        if not self.min_v <= self.nominal_v <= self.max_v:
+            raise ValueError(
+                f"nominal_v = {self.nominal_v:g} V must lie between min_v = {self.min_v:g} and max_v = "
+                f"{self.max_v:g} V; correct it"
+            )
+        return self
+
+
 class GyroSettings(DeviceSettings):
     """One unit on the bench: address, identity and limits of exposure."""
 
@@ -195,6 +217,7 @@ class BenchFile(Strict):
     latitude_deg: float | None = Field(default=None, ge=-90, le=90)
     table: SerializeAsAny[TableSettings] | None = None  #: absent: the units are turned by hand
     chamber: SerializeAsAny[ChamberSettings] | None = None  #: absent: the units are at room temperature
+    supply: SerializeAsAny[SupplySettings] | None = None  #: absent: labctl neither sets nor logs the supply voltage
     gyros: tuple[SerializeAsAny[GyroSettings], ...] = Field(min_length=1)
     references: tuple[SerializeAsAny[ReferenceSettings], ...] = ()
     laboratory: Laboratory | None = None  #: as certificates name it
@@ -202,10 +225,10 @@ class BenchFile(Strict):
     #: Directions of the body that a tilted fixture of the bench brings up, such as "x+y+z"; absent: it has none.
     tilted_positions: tuple[TiltedPosition, ...] = ()
     simulation: SimulationSettings | None = None
-    #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
-    #: here is not used.
+    #: Name of a section or gyro ("table", "supply" ...) -> its driver's release, filled in when the drivers are found;
+    #: what a file says here is not used.
     drivers: dict[str, DriverRelease] = Field(default_factory=dict)
-    #: "table", "chamber" or gyro name -> what the instrument and its USB adapter say of themselves (serial, firmware,
+    #: Name of a section or gyro -> what the instrument and its USB adapter say of themselves (serial, firmware,
     #: adapter ...), filled in when a campaign is prepared.
     reported: dict[str, dict[str, str]] = Field(default_factory=dict)
 
@@ -232,7 +255,7 @@ class BenchFile(Strict):
     @model_validator(mode="after")
     def _references_are_distinct(self) -> BenchFile:
         """Reject two instruments of one name, and a second reference as the temperature of the units."""
-        names = ["table", "chamber", *(unit.name for unit in self.gyros)]
+        names = ["table", "chamber", "supply", *(unit.name for unit in self.gyros)]
         for reference in self.references:
             if reference.name in names:
                 raise ValueError(
@@ -300,14 +323,14 @@ class BenchFile(Strict):
 
     @property
     def sections(self) -> dict[str, DeviceSettings]:
-        """Every device, by its name: table, chamber, references, gyros."""
+        """Every device, by its name: table, chamber, supply, references, gyros."""
         references = {reference.name: reference for reference in self.references}
         return {**self.instruments, **references, **{gyro.name: gyro for gyro in self.gyros}}
 
     @property
     def instruments(self) -> dict[str, DeviceSettings]:
-        """The table and the chamber, those that the bench has."""
-        sections = {"table": self.table, "chamber": self.chamber}
+        """The table, the chamber and the supply, those that the bench has."""
+        sections = {"table": self.table, "chamber": self.chamber, "supply": self.supply}
         return {name: section for name, section in sections.items() if section is not None}
 
 

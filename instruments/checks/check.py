@@ -17,6 +17,7 @@ from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro, GyroIdentity, Readings
 from instruments.interfaces.reference import Reference
 from instruments.interfaces.self_checks import SelfChecking, StreamingGyro
+from instruments.interfaces.supply import Supply
 from instruments.interfaces.table import RateTable
 from instruments.simulation import Simulation
 from instruments.transport.adapters import adapter_of
@@ -95,6 +96,26 @@ def ask_reference(reference: Reference, report: DeviceReport) -> None:
     for channel in reference.channels:
         value = channel.offset + channel.scale * raw[channel.name]
         report.add([Finding(channel.name, f"{channel.name} {value:g} {channel.unit}", value=value, unit=channel.unit)])
+
+
+def ask_supply(supply: Supply, report: DeviceReport) -> None:
+    """Check the identity of the supply, its limits, and its output; nothing is switched."""
+    try:
+        report.add([Finding("identity", supply.identify())])
+        raw, is_on = supply.read().raw, supply.is_on()
+    except InstrumentError as error:
+        report.failed("identity" if not report.findings else "readings", error)
+        return
+    limits = supply.limits
+    report.add([Finding("limits", f"{limits.min_v:g} to {limits.max_v:g} V, at most {limits.current_limit_a:g} A")])
+    for channel in supply.channels:
+        value_v = channel.offset + channel.scale * raw[channel.name]
+        report.add([Finding(channel.name, f"{channel.name} {value_v:g} {channel.unit}", value=value_v, unit="V")])
+    if is_on:
+        report.add([Finding("output", "the output is on")])
+    else:
+        text = "the output is off, so that the units do not answer; a campaign switches it on, or do so at its panel"
+        report.add([Finding("output", text, "doubtful")])
 
 
 def ask_gyro(gyro: Gyro, report: DeviceReport) -> None:
@@ -237,7 +258,7 @@ def check(
 
 
 def _sections(bench: BenchFile) -> Iterator[tuple[str, DeviceSettings, Kind]]:
-    kinds: dict[str, Kind] = {"table": "table", "chamber": "chamber"}
+    kinds: dict[str, Kind] = {"table": "table", "chamber": "chamber", "supply": "supply"}
     kinds |= dict.fromkeys((reference.name for reference in bench.references), "reference")
     kinds |= dict.fromkeys((gyro.name for gyro in bench.gyros), "gyro")
     for name, section in bench.sections.items():
@@ -257,6 +278,8 @@ def _ask(opened: Bench, report: DeviceReport, stated_reply: Mapping[str, str]) -
         ask_table(opened.table, report)
     elif report.kind == "chamber" and opened.chamber is not None:
         ask_chamber(opened.chamber, report)
+    elif report.kind == "supply" and opened.supply is not None:
+        ask_supply(opened.supply, report)
     elif report.kind == "reference":
         ask_reference(opened.references[report.device], report)
     elif report.kind == "gyro":

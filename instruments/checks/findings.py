@@ -10,7 +10,7 @@ from instruments.errors import InstrumentError
 
 #: `doubtful`: a campaign can run, and its figures may be worse; `bad`: it cannot, or its figures would be wrong.
 State = Literal["good", "doubtful", "bad"]
-Kind = Literal["table", "chamber", "reference", "gyro", "other"]
+Kind = Literal["table", "chamber", "reference", "supply", "gyro", "other"]
 STATES: tuple[State, ...] = ("good", "doubtful", "bad")
 
 
@@ -29,7 +29,7 @@ class Finding:
 class DeviceReport:
     """Everything that was found out about one instrument."""
 
-    device: str  #: "table", "chamber" or gyro name
+    device: str  #: "table", "chamber", "supply" or gyro name
     kind: Kind
     address: str
     findings: list[Finding] = field(default_factory=list)

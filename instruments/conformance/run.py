@@ -14,10 +14,13 @@ from instruments.errors import InstrumentError, LimitError, LinkError
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.reference import Reference
+from instruments.interfaces.supply import Supply
 from instruments.interfaces.table import RateTable
 from instruments.plugins import summary
 
-PROTOCOLS: dict[Kind, type] = {"table": RateTable, "chamber": Chamber, "reference": Reference, "gyro": Gyro}
+PROTOCOLS: dict[Kind, type] = {
+    "table": RateTable, "chamber": Chamber, "reference": Reference, "supply": Supply, "gyro": Gyro
+}  # fmt: skip
 #: An instrument that says nothing must not hold the bench up for longer, s.
 LONGEST_SILENCE_S = 60.0
 TRIALS = 12
@@ -303,10 +306,51 @@ def reads_every_quantity(stand: Stand) -> None:
     )
 
 
+def refuses_a_voltage_beyond_its_limits(stand: Stand) -> None:
+    """Check that the voltage of the units stays where it is."""
+    supply = stand.driver
+    before = supply.read().raw
+    for wrong_v in (supply.limits.max_v + 0.1, supply.limits.min_v - 0.1):
+        try:
+            supply.set_voltage_v(wrong_v)
+        except LimitError:
+            continue
+        raise Failed(
+            f"set_voltage_v({wrong_v:g}) was accepted, but {wrong_v:g} V is beyond min_v or max_v of the bench file; "
+            "raise LimitError before a byte is sent"
+        )
+    require(
+        all(abs(supply.read().raw[name] - value) <= 100 for name, value in before.items()),
+        "the voltage changed although it was refused",
+    )
+
+
+def reaches_its_voltage_and_its_safe_state(stand: Stand) -> None:
+    """Check a voltage, its read-back and its measurement, then the safe state and the output switched off."""
+    supply, clock = stand.driver, stand.clock
+    channel = supply.channels[0]
+    for wanted_v in (supply.limits.min_v, supply.limits.max_v):
+        set_v = supply.set_voltage_v(wanted_v)
+        require(abs(set_v - wanted_v) < supply.limits.tolerance_v, f"set_voltage_v({wanted_v:g}) returns {set_v:g} V")
+        clock.sleep(1.0)
+        measured_v = channel.offset + channel.scale * supply.read().raw[channel.name]
+        require(
+            abs(measured_v - wanted_v) < supply.limits.tolerance_v,
+            f"{measured_v:g} V was measured 1 s after set_voltage_v({wanted_v:g})",
+        )
+    require(supply.is_on(), "is_on() returns False after set_voltage_v")
+    safe_v = supply.make_safe()
+    wanted_v = 0.0 if supply.safe_state == "off" else supply.limits.nominal_v
+    require(abs(safe_v - wanted_v) < supply.limits.tolerance_v, f"make_safe() returns {safe_v:g} V, not {wanted_v:g} V")
+    supply.switch_off()
+    require(not supply.is_on(), "is_on() returns True after switch_off()")
+
+
 OF_KIND = {
     "table": (refuses_a_rate_beyond_its_limit, turns_and_comes_to_rest),
     "chamber": (refuses_a_set_point_beyond_its_limits, reads_back_its_set_point),
     "reference": (reads_every_quantity,),
+    "supply": (refuses_a_voltage_beyond_its_limits, reaches_its_voltage_and_its_safe_state, reads_every_quantity),
     "gyro": (gives_whole_numbers_at_rising_times, sees_the_rate_of_the_table),
 }
 

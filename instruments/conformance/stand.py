@@ -10,16 +10,17 @@ from pydantic import ValidationError
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, is_simulated_address, read_bench, shipped_benches
 from instruments.clock import VirtualClock
-from instruments.drivers.driver import ChamberDriver, GyroDriver, ReferenceDriver, TableDriver, Trial
+from instruments.drivers.driver import ChamberDriver, GyroDriver, ReferenceDriver, SupplyDriver, TableDriver, Trial
 from instruments.drivers.registry import DRIVERS
 from instruments.drivers.resolution import resolve
 
 if TYPE_CHECKING:
     from instruments.simulators.links.faults import Faults
 
-Kind = Literal["table", "chamber", "reference", "gyro"]
+Kind = Literal["table", "chamber", "reference", "supply", "gyro"]
 KINDS: dict[type, Kind] = {
-    TableDriver: "table", ChamberDriver: "chamber", ReferenceDriver: "reference", GyroDriver: "gyro"
+    TableDriver: "table", ChamberDriver: "chamber", ReferenceDriver: "reference", SupplyDriver: "supply",
+    GyroDriver: "gyro",
 }  # fmt: skip
 
 
@@ -88,7 +89,7 @@ def _with_trial(name: str, kind: Kind, trial: Trial) -> BenchFile:
     elif kind == "reference":
         record["references"] = [{"name": "reference"} | section]
     else:
-        record[kind] = record[kind] | section
+        record[kind] = (record[kind] or {}) | section
         record["simulation"]["table"] |= dict(trial.table)
     try:
         return resolve(BenchFile.model_validate(record))
@@ -117,5 +118,6 @@ def open_stand(name: str, file: BenchFile) -> Stand:
         )
     clock = VirtualClock()
     bench = open_bench(file, clock)
-    drivers: dict[str, Any] = {"table": bench.table, "chamber": bench.chamber, **bench.references, **bench.gyros}
+    drivers: dict[str, Any] = {"table": bench.table, "chamber": bench.chamber, "supply": bench.supply}
+    drivers |= {**bench.references, **bench.gyros}
     return Stand(kind, file, clock, bench, drivers[entry[0]], url)

@@ -11,12 +11,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from instruments.bench_config import ChamberSettings, GyroSettings, ReferenceSettings, TableSettings
+from instruments.bench_config import ChamberSettings, GyroSettings, ReferenceSettings, SupplySettings, TableSettings
 from instruments.clock import Clock
 from instruments.drivers.probe import HostProbe, Probe
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.reference import Reference
+from instruments.interfaces.supply import Supply
 from instruments.interfaces.table import RateTable
 from instruments.transport.factory import Ports
 
@@ -24,14 +25,15 @@ TableT = TypeVar("TableT", bound=TableSettings)
 ChamberT = TypeVar("ChamberT", bound=ChamberSettings)
 GyroT = TypeVar("GyroT", bound=GyroSettings)
 ReferenceT = TypeVar("ReferenceT", bound=ReferenceSettings)
+SupplyT = TypeVar("SupplyT", bound=SupplySettings)
 
 
 @dataclass(frozen=True)
 class Trial:
     """Where `labctl driver test` tries a driver: on a simulated bench that ships with labctl, in place of its own part.
 
-    `section` is what the bench file says of the driver's table, chamber, reference or first gyro: the address of the
-    driver's simulator, and what else it needs; `unit` is the table of the gyro in [simulation.units], `table`
+    `section` is what the bench file says of the driver's table, chamber, supply, reference or first gyro: the address
+    of the driver's simulator, and what else it needs; `unit` is the table of the gyro in [simulation.units], `table`
     what [simulation.table] has beside what the bench says.
     """
 
@@ -77,5 +79,15 @@ class ReferenceDriver(Generic[ReferenceT]):
 
     settings: type[ReferenceT]
     make: Callable[[ReferenceT, Ports, Clock], Reference]
+    trial: Trial | None = None  #: not needed where a shipped simulated bench has the driver
+    probe: Probe | HostProbe | None = None  #: recognises it, for `labctl bench new`
+
+
+@dataclass(frozen=True)
+class SupplyDriver(Generic[SupplyT]):
+    """Driver of a programmable power supply of the units."""
+
+    settings: type[SupplyT]
+    make: Callable[[SupplyT, Ports, Clock], Supply]
     trial: Trial | None = None  #: not needed where a shipped simulated bench has the driver
     probe: Probe | HostProbe | None = None  #: recognises it, for `labctl bench new`

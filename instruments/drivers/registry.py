@@ -4,24 +4,32 @@ from __future__ import annotations
 
 from typing import Any
 
-from instruments.bench_config import ChamberSettings, DeviceSettings, GyroSettings, ReferenceSettings, TableSettings
-from instruments.drivers.driver import ChamberDriver, GyroDriver, ReferenceDriver, TableDriver
+from instruments.bench_config import (
+    ChamberSettings,
+    DeviceSettings,
+    GyroSettings,
+    ReferenceSettings,
+    SupplySettings,
+    TableSettings,
+)
+from instruments.drivers.driver import ChamberDriver, GyroDriver, ReferenceDriver, SupplyDriver, TableDriver
 from instruments.plugins import PluginGroup
 
-Driver = TableDriver[Any] | ChamberDriver[Any] | GyroDriver[Any] | ReferenceDriver[Any]
+Driver = TableDriver[Any] | ChamberDriver[Any] | GyroDriver[Any] | ReferenceDriver[Any] | SupplyDriver[Any]
 #: Kind of driver -> what it drives, and the model that its settings extend.
 KINDS: dict[type[Driver], tuple[str, type[DeviceSettings]]] = {
     TableDriver: ("table", TableSettings),
     ChamberDriver: ("chamber", ChamberSettings),
     GyroDriver: ("gyro", GyroSettings),
     ReferenceDriver: ("reference", ReferenceSettings),
+    SupplyDriver: ("supply", SupplySettings),
 }
 
 
 def _checked(driver: Any) -> Driver:
-    if not isinstance(driver, TableDriver | ChamberDriver | GyroDriver | ReferenceDriver):
+    if not isinstance(driver, tuple(KINDS)):
         raise TypeError(
-            f"{driver!r} is not a TableDriver, ChamberDriver, GyroDriver or ReferenceDriver of "
+            f"{driver!r} is not a TableDriver, ChamberDriver, GyroDriver, ReferenceDriver or SupplyDriver of "
             "instruments.drivers.driver; make it one of these"
         )
     _, base = KINDS[type(driver)]

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from instruments.bench_config import BenchFile, DeviceSettings, DriverRelease
-from instruments.drivers.driver import ChamberDriver, GyroDriver, ReferenceDriver, TableDriver
+from instruments.drivers.driver import ChamberDriver, GyroDriver, ReferenceDriver, SupplyDriver, TableDriver
 from instruments.drivers.registry import DRIVERS, KINDS, Driver, names_of
 from instruments.plugins import PluginError, UnknownPlugin
 
@@ -23,7 +23,7 @@ def resolve(bench: BenchFile) -> BenchFile:
     another kind, and of each setting that its driver does not take. A plug-in is imported when a section names it.
     """
     wrong: list[InitErrorDetails] = []
-    kinds: dict[str, type[Driver]] = {"table": TableDriver, "chamber": ChamberDriver}
+    kinds: dict[str, type[Driver]] = {"table": TableDriver, "chamber": ChamberDriver, "supply": SupplyDriver}
     fixed = {name: _section(section, (name,), kinds[name], wrong) for name, section in bench.instruments.items()}
     gyros = [_section(gyro, ("gyros", number), GyroDriver, wrong) for number, gyro in enumerate(bench.gyros)]
     references = [

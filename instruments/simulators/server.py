@@ -41,7 +41,7 @@ class SimulationServer:
     def start(self) -> BenchFile:
         """Open every port; returns the bench file with the real addresses. Raises OSError, LinkError."""
         record = self._bench.model_dump(exclude_none=True)  # a bench file has no null, nor have a driver's own settings
-        devices = {name: record[name] for name in ("table", "chamber") if name in record}
+        devices = {name: record[name] for name in ("table", "chamber", "supply") if name in record}
         devices |= {each["name"]: each for each in (*record["gyros"], *record["references"])}
         for name, settings in devices.items():
             self._serve_device(name, settings)

@@ -21,7 +21,7 @@ class InstrumentSetup:
     port_buffer_bytes: int  #: unread bytes that a serial port keeps
 
     def instrument(self, name: str) -> DeviceSettings:
-        """Return the bench file's section "table" or "chamber"; raises LinkError where the bench has none."""
+        """Return the bench file's section "table", "chamber" or "supply"; raises LinkError where the bench has none."""
         if (device := self.bench.instruments.get(name)) is None:
             raise LinkError(name, f"bench {self.bench.name} has no [{name}]; add the section, or correct the address")
         return device

@@ -112,7 +112,7 @@ class DeviceCheck(ResponseModel):
     device: str = Field(description="Name of the instrument in the bench file.")
     ok: bool = Field(description="Whether no finding is bad.")
     text: str = Field(description="The bad findings or, if there are none, all findings, in one line.")
-    kind: Literal["table", "chamber", "reference", "gyro", "other"] = Field(
+    kind: Literal["table", "chamber", "reference", "supply", "gyro", "other"] = Field(
         default="other", description="Kind of instrument."
     )
     state: Literal["good", "doubtful", "bad"] = Field(

@@ -23,6 +23,7 @@ from instruments.simulators.physics.hand_motion import HandMotion
 from instruments.simulators.physics.instability import BiasInstability
 from instruments.simulators.physics.motion import TableMotion
 from instruments.simulators.physics.servo_motion import ServoMotion
+from instruments.simulators.physics.supply_output import REGULATED, SupplyOutput
 from instruments.simulators.physics.thermal import Body, Heat
 from instruments.simulators.physics.tumbling import Tumbling
 from instruments.simulators.physics.unit_profiles import UnitTruth, make_unit, usual_rate_hz
@@ -56,7 +57,7 @@ class ProfileMotion:
 
 
 def supply_wander_v(t_s: Array) -> Array:
-    """Return the deviation of the supply voltage from nominal, (n,) V, at times (n,) s."""
+    """Return the deviation of an unregulated supply voltage from nominal, (n,) V, at times (n,) s."""
     return _waves(t_s, (0.06, 5.3, 0.0), (0.04, 1.7, 1.0))
 
 
@@ -102,6 +103,7 @@ class World:
         settings = bench.simulation or SimulationSettings()
         self.starts_at = starts_at
         self.settings = settings
+        self.supply = None if bench.supply is None else SupplyOutput(bench.supply.nominal_v)  #: of the units
         self.north_deg = number(settings.table, "north_deg", 33.0)
         latitude_deg = settings.latitude_deg if settings.latitude_deg is not None else bench.latitude_deg
         self.errors = BenchErrors.drawn(bench.standards, [settings.seed]) if settings.draw_standards else BenchErrors()
@@ -179,6 +181,12 @@ class World:
         times = np.concatenate([t_s[:1] - period_s, t_s]) - self._encoder_late_s
         noise = self._encoder_noise_deg * self._encoder_rng.standard_normal(len(times))
         return np.asarray(np.diff(self.motion.angle_deg(times) + noise) / period_s)
+
+    def supply_v(self, t_s: Array, usual_v: float = 0.0) -> Array:
+        """Return the supply voltage of the units at times (n,) s, (n,) V; `usual_v` is that without a [supply]."""
+        if self.supply is None:
+            return usual_v + supply_wander_v(t_s)
+        return self.supply.volts(t_s) + REGULATED * supply_wander_v(t_s)
 
     @staticmethod
     def humidity_pct(t_s: Array) -> Array:
@@ -284,7 +292,7 @@ class SimulatedGyro:
         drift = self._instability.sample(t_s)
         rate = rate + drift + truth.white_dps_rthz * np.sqrt(self.sample_rate_hz) * white[:, :-1]
         thermometer = shown[:, None] + truth.thermometer_noise_c * white[:, -1:]
-        return GyroSample(rate, np.repeat(thermometer, len(truth.axes), axis=1), truth.supply_v + supply_wander_v(t_s))
+        return GyroSample(rate, np.repeat(thermometer, len(truth.axes), axis=1), world.supply_v(t_s, truth.supply_v))
 
     def _felt(self, t_s: Array, period_s: float) -> tuple[Array, Array]:
         """Return the table's mean rate over each sampling interval, deg/s, and its angle as they are felt, (n,)."""
@@ -313,7 +321,7 @@ class SimulatedGyro:
             mounting=world.mounting,
             full_scale_dps=self.settings.max_rate_dps,
             north_deg=world.north_deg,
-            supply_wander_v=supply_wander_v(t_s),
+            supply_wander_v=world.supply_v(t_s) - (0.0 if world.supply is None else world.supply.nominal_v),
             humidity_pct=humidity_pct(t_s),
             own_at=self._own_at,
         )
