@@ -20,7 +20,7 @@ Changes = Mapping[str, object] | None
 #: What an experiment does not take over from the recipe: it is no calibration.
 NOT_TAKEN: Mapping[str, object] = {
     "fit": None, "verification": None, "profiles": (), "indexing": None, "inverted": None, "power_cycle": None,
-    "ramp": None,
+    "supply": None, "ramp": None,
     "replicates": {}, "repeats": 1,
 }  # fmt: skip
 
@@ -65,6 +65,8 @@ def all_blocks() -> tuple[Block, ...]:
 SHORT_SOAK_S = 1200.0
 #: Temperatures of a loop, and of an experiment with several temperatures, at most.
 LOOP_C, SEVERAL_C = 7, 4
+#: Steps of the supply voltage, % of the nominal one: three voltages also show a curved response.
+SUPPLY_PCT = (-5.0, 0.0, 5.0)
 #: A slow ramp, K/min, and the least span of a ramp, K.
 SLOW_C_PER_MIN, MIN_RAMP_K = 0.25, 5.0
 #: From and to which frequency sines are swept, Hz, and how long a sweep takes, s.
@@ -186,6 +188,13 @@ def _power_cycles(recipe: Recipe) -> Changes:
     rates = few_rates(recipe)
     cycle = {"count": 3, "off_s": 600.0, "rates_dps": rates}
     return _at_one(recipe, rates, positions=[recipe.positions[0]], power_cycle=cycle, **_one_session(recipe))
+
+
+def _supply_steps(recipe: Recipe) -> Changes:
+    """The voltages forwards and backwards, so that a drift is not taken for their effect."""
+    rates = few_rates(recipe)
+    steps = {"deviations_pct": SUPPLY_PCT, "rates_dps": rates}
+    return _at_one(recipe, rates, positions=[recipe.positions[0]], supply=steps, repeats=2, **_one_session(recipe))
 
 
 def _from_switching_on(recipe: Recipe) -> Changes:
@@ -334,6 +343,10 @@ BLOCKS: tuple[Block, ...] = (
     ),
     Block("one_powered_run", "all positions twice in one powered run, at one temperature", _one_powered_run),
     Block("power_cycles", "three power cycles at constant temperature", _power_cycles),
+    Block(
+        "supply_steps", "a few rates at three supply voltages, forwards and backwards, at one temperature",
+        _supply_steps, needs=("a programmable supply of the units ([supply] of the bench file)",),
+    ),
     Block("from_switching_on", "a few rates again and again for an hour from switching on", _from_switching_on),
     Block("wait", "a few rates at one temperature, an hour after switching on", _wait),
     Block("at_rest", "a record at rest of two hours", _at_rest),

@@ -27,7 +27,7 @@ KINDS: dict[type[Driver], tuple[str, type[DeviceSettings]]] = {
 
 
 def _checked(driver: Any) -> Driver:
-    if not isinstance(driver, tuple(KINDS)):
+    if not isinstance(driver, TableDriver | ChamberDriver | GyroDriver | ReferenceDriver | SupplyDriver):
         raise TypeError(
             f"{driver!r} is not a TableDriver, ChamberDriver, GyroDriver, ReferenceDriver or SupplyDriver of "
             "instruments.drivers.driver; make it one of these"

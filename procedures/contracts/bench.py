@@ -8,6 +8,7 @@ from typing import Protocol
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.reference import Reference
+from instruments.interfaces.supply import Supply
 from instruments.interfaces.table import RateTable
 
 
@@ -25,6 +26,9 @@ class Bench(Protocol):
 
     @property
     def references(self) -> Mapping[str, Reference]: ...
+
+    @property
+    def supply(self) -> Supply | None: ...
 
     @property
     def configurations(self) -> Mapping[str, Mapping[str, str]]: ...  # unit -> how it is to be set

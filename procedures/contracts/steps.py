@@ -123,6 +123,15 @@ class Turn(StepBase):
     within_s: float  #: from the question to the answer that it is done
 
 
+class SetSupply(StepBase):
+    """A new voltage of the units' supply; ends when the measured voltage has arrived and was held for `settle_s`."""
+
+    kind: Literal["set_supply"] = "set_supply"
+    voltage_v: float
+    settle_s: float = 0.0
+    timeout_s: float = 30.0
+
+
 class Rest(StepBase):
     """Nothing moves for a while; the environment is recorded."""
 
@@ -147,6 +156,7 @@ Step = Annotated[
     | Soak
     | Acquire
     | Turn
+    | SetSupply
     | Rest
     | SafeState,
     Field(discriminator="kind"),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.reference import Reference
+from instruments.interfaces.supply import Supply
 from instruments.interfaces.table import RateTable
 from procedures.contracts.bench import Bench
 from procedures.contracts.errors import StepFailed
@@ -20,12 +21,16 @@ class ActiveBench:
     air_chamber: Chamber | None
     gyros: dict[str, Gyro]  #: by name; those that take part
     dropped: dict[str, str] = field(default_factory=dict)  #: unit name -> why it dropped out
-    references: dict[str, Reference] = field(default_factory=dict)  #: by name
+    references: dict[str, Reference] = field(default_factory=dict)  #: by name; the supply among them
+    supply: Supply | None = None  #: of the units
 
     @classmethod
     def of(cls, bench: Bench) -> ActiveBench:
         """Return an opened bench with all of its units taking part."""
-        return cls(bench.table, bench.chamber, dict(bench.gyros), references=dict(bench.references))
+        references: dict[str, Reference] = dict(bench.references)
+        if bench.supply is not None:  # its voltage is logged beside the readings
+            references[bench.supply.name] = bench.supply
+        return cls(bench.table, bench.chamber, dict(bench.gyros), references=references, supply=bench.supply)
 
     @property
     def table(self) -> RateTable:
@@ -60,6 +65,11 @@ class ActiveBench:
         """Stop the rate table, if there is one. Raises InstrumentError."""
         if self.rate_table is not None:
             self.rate_table.stop()
+
+    def power_units(self) -> None:
+        """Switch the supply on at its nominal voltage, if there is one. Raises InstrumentError."""
+        if self.supply is not None:
+            self.supply.set_voltage_v(self.supply.limits.nominal_v)
 
     def drop(self, gyro: str, reason: str) -> Gyro:
         """Exclude a unit from the rest of the campaign; returns it."""

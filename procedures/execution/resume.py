@@ -97,6 +97,7 @@ class _ChamberDeviation:
 
 def _switch_on(context: ExecutionContext, run: int, restart: Restart) -> None:
     """Ensure that the units are on, streams open. After a power cut they come back alone, or a person is asked."""
+    context.bench.power_units()  # the safe state switches nothing on
     if not restart.power_lost:
         open_streams(context, run)
         return

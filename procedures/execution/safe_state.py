@@ -1,4 +1,4 @@
-"""The safe state: table at rest, chamber at its safe set point and read back, streams closed."""
+"""The safe state: table at rest, chamber and supply at their safe set points and read back, streams closed."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import partial
 
 from instruments.clock import Clock
 from instruments.interfaces.chamber import Chamber
+from instruments.interfaces.supply import Supply
 from instruments.interfaces.table import RateTable
 from procedures.contracts.bench import Bench
 
@@ -56,6 +57,9 @@ def _parts(bench: Bench, clock: Clock) -> Iterator[tuple[str, Callable[[], str |
         yield TABLE, partial(stop_table, bench.table, clock)
     if bench.chamber is not None:
         yield "chamber to its safe set point", partial(_make_chamber_safe, bench.chamber)
+    if bench.supply is not None:
+        what = "supply switched off" if bench.supply.safe_state == "off" else "supply to its nominal voltage"
+        yield what, partial(_make_supply_safe, bench.supply)
     for name, gyro in bench.gyros.items():
         yield f"stream of {name} closed", gyro.stop
 
@@ -95,4 +99,12 @@ def _make_chamber_safe(chamber: Chamber) -> str | None:
             f"set point {set_c:g} deg C was read back instead of {chamber.safe_c:g} deg C; set it at the "
             "panel of the chamber"
         )
+    return None
+
+
+def _make_supply_safe(supply: Supply) -> str | None:
+    set_v = supply.make_safe()
+    wanted_v = 0.0 if supply.safe_state == "off" else supply.limits.nominal_v
+    if abs(set_v - wanted_v) > supply.limits.tolerance_v:
+        return f"{set_v:g} V was read back instead of {wanted_v:g} V; set it at the panel of the supply"
     return None

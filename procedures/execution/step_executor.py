@@ -15,6 +15,7 @@ from procedures.contracts.steps import (
     MoveChamber,
     Rest,
     SafeState,
+    SetSupply,
     Soak,
     Step,
     StepResult,
@@ -30,7 +31,7 @@ from procedures.recipe.rules import WAITED_FOR
 PAUSES_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 STANDSTILL_S = 60.0
 #: Steps that can be begun again without asking a person anew; a turn by hand asks anyway.
-REPEATABLE = (Home, MeasureClock, MoveChamber, Soak, Acquire, Turn, Rest)
+REPEATABLE = (Home, MeasureClock, MoveChamber, Soak, SetSupply, Acquire, Turn, Rest)
 
 
 def is_reconnectable(context: ExecutionContext, step: Step, error: LinkError) -> bool:

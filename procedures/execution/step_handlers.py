@@ -19,6 +19,7 @@ from procedures.contracts.steps import (
     PowerOn,
     Rest,
     SafeState,
+    SetSupply,
     Soak,
 )
 from procedures.execution.acquire import acquire
@@ -48,6 +49,7 @@ def power_on(context: ExecutionContext, step: PowerOn) -> Figures:
     """Switch the units on, check that they are those of the bench file, open their streams, warm up."""
     context.soaked = None
     run = step.run + context.added_runs
+    context.bench.power_units()
     ask(context, Prompt(context.new_prompt_id(), "power_on", f"switch the units on (session {run})"))
     context.recorder.journal.session_began(run, context.recorder.t_s())
     open_streams(context, run)
@@ -95,6 +97,8 @@ def power_off(context: ExecutionContext, step: PowerOff) -> Figures:
     context.monitor.units_powered(0)
     run = step.run + context.added_runs
     ask(context, Prompt(context.new_prompt_id(), "power_off", f"switch the units off (session {run})"))
+    if context.bench.supply is not None:
+        context.bench.supply.switch_off()
     record_for(context, step.off_s)
     return {"run": float(run)}
 
@@ -191,6 +195,31 @@ def _unsettled(context: ExecutionContext, step: Soak, judge: SoakCriterion, took
         raise GuardTripped("soak", action, reason, context.bench.chamber.name)
 
 
+def set_supply(context: ExecutionContext, step: SetSupply) -> Figures:
+    """Set the voltage of the units' supply, wait until it is measured, and let the units settle.
+
+    Raises StepFailed when it does not arrive in time.
+    """
+    supply = context.bench.supply
+    if supply is None:
+        raise StepFailed("this bench has no programmable supply; add a [supply] section to the bench file")
+    set_v, column = supply.set_voltage_v(step.voltage_v), supply.channels[0].name
+    began_s = context.clock.now_s() - context.paused_s
+    for _ in polls(context):
+        measured_v = context.monitor.references.values[column]
+        took_s = context.clock.now_s() - context.paused_s - began_s
+        if abs(measured_v - set_v) <= supply.limits.tolerance_v:
+            break
+        if took_s >= step.timeout_s:
+            raise StepFailed(
+                f"{supply.name}: {measured_v:g} V was measured {took_s:.0f} s after {set_v:g} V was set, limit "
+                f"{supply.limits.tolerance_v:g} V off; check the load and the current limit of "
+                f"{supply.limits.current_limit_a:g} A"
+            )
+    record_for(context, step.settle_s)
+    return {"voltage_v": set_v, "measured_v": context.monitor.references.values[column]}
+
+
 def rest(context: ExecutionContext, step: Rest) -> Figures:
     """Wait at rest."""
     with context.monitor.taking_readings():
@@ -217,6 +246,7 @@ HANDLERS: Mapping[str, Callable[..., Figures]] = {
     "soak": soak,
     "acquire": acquire,
     "turn": turn,
+    "set_supply": set_supply,
     "rest": rest,
     "safe_state": safe_state,
 }

@@ -10,6 +10,7 @@ from instruments.errors import InstrumentError
 from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
 from instruments.interfaces.rate_course import RateCourse, course_complaint
+from instruments.interfaces.supply import SupplyLimits
 from instruments.interfaces.table import TableLimits
 from instruments.positions import Position
 from procedures.contracts.bench import Bench
@@ -41,6 +42,7 @@ class BenchLimits:
     air_tau_s: float | None = None  #: time constant of the chamber's air, for the forecast; None: a guess is used
     earlier: EarlierTimes | None = None  #: what earlier campaigns of the bench took, for the forecast
     tilted_positions: tuple[str, ...] = ()  #: directions of the body that a tilted fixture brings up
+    supply: SupplyLimits | None = None  #: of the units; None: labctl does not set it
 
     @classmethod
     def of(
@@ -50,11 +52,9 @@ class BenchLimits:
         """Return the limits of an opened bench, the others as its file says (`BenchFile`)."""
         units = {name: gyro.limits for name, gyro in bench.gyros.items()}
         chamber = None if bench.chamber is None else bench.chamber.limits
-        if bench.table is None:
-            return cls(None, chamber, units, None, needs_person, True, air_tau_s, earlier, tilted_positions)
-        achievable_dps = bench.table.achievable_dps
-        limits = bench.table.limits
-        return cls(limits, chamber, units, achievable_dps, needs_person, True, air_tau_s, earlier, tilted_positions)
+        supply = None if bench.supply is None else bench.supply.limits
+        table = (None, None) if bench.table is None else (bench.table.limits, bench.table.achievable_dps)
+        return cls(table[0], chamber, units, table[1], needs_person, True, air_tau_s, earlier, tilted_positions, supply)
 
     @property
     def max_acceleration_dps2(self) -> float:
@@ -121,6 +121,10 @@ class BenchLimits:
         ]
         return "outside " + " and ".join(complaints) if complaints else None
 
+    def supply_complaint(self, deviation_pct: float) -> str | None:
+        """Return which limit of the supply a deviation from its nominal voltage passes, or None."""
+        return None if self.supply is None else self.supply.complaint(self.supply.voltage_v(deviation_pct))
+
     def real_rate_dps(self, rate_dps: float) -> float:
         """Return the rate the table would really run, as far as it is known."""
         return rate_dps if self.achievable_dps is None or rate_dps == 0 else self.achievable_dps(rate_dps)
@@ -164,6 +168,7 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
     beyond += _courses_beyond(recipe, courses)
     values["profiles"] = tuple(each for each, text in zip(values["profiles"], courses, strict=True) if not text)
     empty += _ramp_complaints(recipe, limits) + _fixture_complaints(recipe, limits)
+    empty += _no_supply(recipe, limits)
     handling = recipe.mounting.handling_c
     if handling is not None and (text := limits.temperature_complaint(handling)):
         empty.append(f"mounting.handling_c {handling:g}: {text}")
@@ -203,6 +208,17 @@ def _fixture_complaints(recipe: Recipe, limits: BenchLimits) -> list[str]:
     ]
 
 
+def _no_supply(recipe: Recipe, limits: BenchLimits) -> list[str]:
+    """Return what is said to a recipe with steps of the supply voltage on a bench without a supply."""
+    if recipe.supply is None or limits.supply is not None:
+        return []
+    text = (
+        "supply: the bench has no programmable supply, so that labctl cannot set the voltage of the units; where it "
+        "has one, add a [supply] section to the bench file"
+    )
+    return [text]
+
+
 def _courses_beyond(recipe: Recipe, complaints: list[str | None]) -> list[str]:
     """Return what is wrong with the courses of a recipe; once where no course can be run at all."""
     if CONSTANT_ONLY in complaints:
@@ -217,11 +233,13 @@ def _point_lists(recipe: Recipe) -> list[tuple[str, str]]:
     for name in ("indexing", "inverted"):
         if getattr(recipe, name) is not None:
             lists += [(name, "temperatures_c"), (name, "rates_dps")]
-    lists += [(name, "rates_dps") for name in ("power_cycle", "ramp") if getattr(recipe, name) is not None]
-    return lists
+    lists += [(name, "rates_dps") for name in ("power_cycle", "ramp", "supply") if getattr(recipe, name) is not None]
+    return [*lists, ("supply", "deviations_pct")] if recipe.supply is not None else lists
 
 
 def _complaint(limits: BenchLimits, recipe: Recipe, key: str, value: float) -> str | None:
     if key == "temperatures_c":
         return limits.temperature_complaint(value)
+    if key == "deviations_pct":
+        return limits.supply_complaint(value)
     return limits.rate_complaint(value, recipe.guards.max_rate_error_fraction)

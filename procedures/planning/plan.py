@@ -21,6 +21,7 @@ from procedures.contracts.steps import (
     PowerOn,
     Rest,
     SafeState,
+    SetSupply,
     Soak,
     Step,
     Turn,
@@ -85,8 +86,27 @@ class Plan(BaseModel):
         """Return what has to be done again before step `index` can be run from cold: home, temperature, soak.
 
         For resuming a campaign in the middle. The mounting is unchanged, so no Mount is among them. What the
-        step does itself is not done before it: no temperature before one that sets another.
+        step does itself is not done before it: no temperature before one that sets another. The safe state has left
+        the supply at its nominal voltage.
         """
+        steps, supply = self._lead_in(index), self._supply_before(index)
+        if supply is None:
+            return steps
+        soaks = tuple(step for step in steps if isinstance(step, Soak))
+        return (*(step for step in steps if step not in soaks), supply, *soaks)
+
+    def _supply_before(self, index: int) -> SetSupply | None:
+        """Return the step that set the voltage at which step `index` runs; None where it is the nominal one."""
+        if index >= len(self.steps) or isinstance(self.steps[index], SafeState | SetSupply | PowerOn):
+            return None
+        for step in reversed(self.steps[:index]):
+            if isinstance(step, PowerOn):
+                return None
+            if isinstance(step, SetSupply):
+                return step
+        return None
+
+    def _lead_in(self, index: int) -> tuple[Step, ...]:
         if index >= len(self.steps) or isinstance(self.steps[index], SafeState) or not self._drives:
             return ()
         before = self.steps[:index]
@@ -136,7 +156,7 @@ class Plan(BaseModel):
         ]
         end = max(of_it, default=index)
         later = next((step for step in self.steps[end + 1 :] if isinstance(step, PowerOn | Acquire | Turn)), None)
-        kinds: tuple[type, ...] = (Acquire, Turn, CheckHome, Soak, MoveChamber, Rest)
+        kinds: tuple[type, ...] = (Acquire, Turn, CheckHome, Soak, MoveChamber, SetSupply, Rest)
         kinds = kinds if isinstance(later, Acquire | Turn) else (*kinds, PowerOn, PowerOff)
         return tuple(n for n in range(index + 1, end + 1) if isinstance(self.steps[n], kinds))
 
@@ -185,6 +205,8 @@ def _refuse_endless(recipe: Recipe) -> None:
         data_sets += mountings * len(indexing.temperatures_c) * len(indexing.rates_dps)
     if recipe.inverted is not None:
         data_sets += len(recipe.positions) * len(recipe.inverted.temperatures_c) * len(recipe.inverted.rates_dps)
+    if (supply := recipe.supply) is not None:
+        data_sets += recipe.repeats * len(supply.deviations_pct) * len(supply.rates_dps)
     if recipe.power_cycle is not None:
         data_sets += recipe.power_cycle.count * len(recipe.power_cycle.rates_dps)
     if (ramp := recipe.ramp) is not None:

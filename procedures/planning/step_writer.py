@@ -16,6 +16,7 @@ from procedures.contracts.steps import (
     PowerOff,
     PowerOn,
     SafeState,
+    SetSupply,
     Soak,
     Step,
 )
@@ -32,6 +33,7 @@ ROOM_C = 25.0
 HOMING_S = 30.0
 CHECK_S = 10.0  #: back to home by counted steps, and the homing
 CLOCK_SHORT_S = 10.0  #: steady part of the shorter run that measures the step clock
+SUPPLY_S = 10.0  #: until the voltage of a supply was measured
 MOUNTING_S = 600.0  #: a person walks up, turns the units and confirms; a unit handler takes no time
 
 
@@ -68,6 +70,7 @@ class _StepWriter:
         for block in order_points(self.recipe):
             self.measure(block)
         self.power_cycles()
+        self.supply_steps()
         for block in verification_blocks(self.recipe):
             levels = tuple(Level(level.temperature_c, self.runnable(level.rates_dps)) for level in block.levels)
             self.measure(replace(block, levels=levels))
@@ -281,6 +284,21 @@ class _StepWriter:
             self.power_on()
             self.soak(self.air_c)
             self.acquire(Level(self.air_c, rules.rates_dps))
+
+    def supply_steps(self) -> None:
+        """Set one voltage of the supply after the other, run rates at each, and go back to the nominal voltage."""
+        rules, supply = self.recipe.supply, self.limits.supply
+        if rules is None or supply is None:
+            return
+        for time in range(self.recipe.repeats):
+            for deviation_pct in rules.deviations_pct[:: -1 if time % 2 else 1]:
+                self.set_supply(supply.voltage_v(deviation_pct), rules.settle_s)
+                self.acquire(Level(self.air_c, rules.rates_dps))
+        self.set_supply(supply.nominal_v, rules.settle_s)
+        self.check_home(Level(self.air_c, rules.rates_dps))
+
+    def set_supply(self, voltage_v: float, settle_s: float) -> None:
+        self.steps.append(SetSupply(voltage_v=voltage_v, settle_s=settle_s, expected_s=settle_s + SUPPLY_S))
 
 
 def _known(earlier_s: float | None, guess_s: float) -> float:

@@ -31,6 +31,7 @@ from procedures.recipe.rules import (
     Replicates,
     ResumeRules,
     SoakRules,
+    SupplySteps,
     Table,
     Verification,
     Whole,
@@ -45,7 +46,7 @@ LONGEST_KEY = 80
 #: What a recipe of turns by hand has no use for: no table and no chamber is driven.
 _OF_RATES = (
     "temperatures_c", "rates_dps", "order", "temperature_order", "rate_order", "repeats", "soak", "acquire",
-    "replicates", "indexing", "inverted", "power_cycle", "ramp", "profiles", "verification", "stop",
+    "replicates", "indexing", "inverted", "power_cycle", "supply", "ramp", "profiles", "verification", "stop",
 )  # fmt: skip
 
 
@@ -76,6 +77,7 @@ class Recipe(Table):
     indexing: Indexing | None = None
     inverted: Inverted | None = None
     power_cycle: PowerCycle | None = None
+    supply: SupplySteps | None = None
     ramp: Ramp | None = None
     verification: Verification | None = None  #: absent: nothing is measured beside what is fitted
     mounting: Mounting = Mounting()

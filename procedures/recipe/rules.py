@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
 from instruments import positions
 
@@ -160,6 +160,24 @@ class PowerCycle(Table):
     count: Whole = Field(default=1, ge=1)
     off_s: Number = Field(default=600.0, ge=0)
     rates_dps: tuple[Number, ...] = Field(min_length=1)
+
+
+class SupplySteps(Table):
+    """Rates at several voltages of the units' supply, after the levels of the last mounting and at their last
+    temperature. The voltages are gone through as often as the rates of a level, in turn forwards and backwards.
+    """
+
+    deviations_pct: tuple[Number, ...] = Field(min_length=1, max_length=50)  #: from the nominal voltage of the bench
+    rates_dps: tuple[Number, ...] = Field(min_length=1)
+    settle_s: Number = Field(default=30.0, ge=0, le=3600)  #: after the voltage has arrived: the unit's heat changes
+
+    @field_validator("deviations_pct")
+    @classmethod
+    def _more_than_nothing(cls, deviations_pct: tuple[float, ...]) -> tuple[float, ...]:
+        """Refuse a voltage of 0 or less."""
+        if min(deviations_pct) <= -100:
+            raise ValueError(f"{min(deviations_pct):g} % leaves no voltage; give deviations of a few per cent")
+        return deviations_pct
 
 
 class Verification(Table):

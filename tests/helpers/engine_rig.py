@@ -37,6 +37,7 @@ class Rig:
             gyro.bench = self
         self.imu = self.gyros[gyros[0]]
         self.references: dict[str, Any] = {}
+        self.supply: Any = None
         self.journal = RecordingJournal(self.trace)
         self.journal.hooks.append(self._mounted)
         self.control = Control()
@@ -67,7 +68,8 @@ class Rig:
         return Recipe.model_validate(values)
 
     def plan(self, recipe: Recipe | None = None) -> Plan:
-        limits = BenchLimits(TABLE, CHAMBER, {name: gyro.limits for name, gyro in self.gyros.items()})
+        units = {name: gyro.limits for name, gyro in self.gyros.items()}
+        limits = BenchLimits(TABLE, CHAMBER, units, supply=None if self.supply is None else self.supply.limits)
         return make_plan(recipe or self.recipe(), limits)
 
     def make(self, recipe: Recipe | None = None, **options: Any) -> Any:

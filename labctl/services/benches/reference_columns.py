@@ -18,7 +18,7 @@ def raw_channel(channel: Channel) -> RawChannelJson:
 
 
 def reference_channels(bench: Bench, bench_file: BenchFile) -> tuple[RawChannelJson, ...]:
-    """Return the channels of every reference instrument, the chosen temperature marked.
+    """Return the channels of every reference instrument, the chosen temperature marked, and that of the supply.
 
     Raises BadInput for two of one name, and for a chosen instrument that measures no temperature.
     """
@@ -35,6 +35,10 @@ def reference_channels(bench: Bench, bench_file: BenchFile) -> tuple[RawChannelJ
                 )
             temperature_channel["stands_for"] = TEMPERATURE
         raw_channels += channels
+    if bench.supply is not None:
+        channels = [raw_channel(channel) for channel in bench.supply.channels]
+        refuse_doubled_columns(bench.supply.name, tuple(channels), tuple(raw_channels))
+        raw_channels += channels
     return tuple(raw_channels)
 
 
@@ -44,7 +48,7 @@ def refuse_doubled_columns(name: str, channels: tuple[RawChannelJson, ...], othe
         column = min(doubled)
         raise BadInput(
             f"{name}: column {column} has another source already; set columns = "
-            f'{{ {column} = "other_{column}" }} in its [[references]]'
+            f'{{ {column} = "other_{column}" }} in its [[references]], or column = "other_{column}" in [supply]'
         )
 
 

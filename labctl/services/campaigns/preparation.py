@@ -50,6 +50,8 @@ from procedures.planning.plan import Plan, make_plan
 from procedures.recipe.recipe import Recipe
 
 log = get_logger()
+#: A unit whose supply was just switched on is asked after this, s.
+START_UP_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -233,8 +235,23 @@ def _identify_at_rest(bench: Bench, clock: Clock) -> None:
         chamber.identify()
     for reference in bench.references.values():
         reference.identify()
+    _power_units(bench, clock)
     if table is not None and table.is_moving() and (complaint := stop_table(table, clock)):
         raise InstrumentError(table.name, complaint)
+
+
+def _power_units(bench: Bench, clock: Clock) -> None:
+    """Switch the supply of the units on at its nominal voltage, where it is off: they are to say what they are.
+
+    Raises InstrumentError.
+    """
+    supply = bench.supply
+    if supply is None:
+        return
+    supply.identify()
+    if not supply.is_on():
+        supply.set_voltage_v(supply.limits.nominal_v)
+        clock.sleep(START_UP_S)
 
 
 def _units(

@@ -101,6 +101,7 @@ def prepare_resume(
     lost = request.power == "lost" or (
         request.power is None and (new_world or power_failed(standing.boot_id, boot_id()))
     )
+    lost = lost or (bench_file.supply is not None and bench_file.supply.safe_state == "off")
     new_session = lost and plan.run_at(standing.start_at, standing.skipped) > 0
     t_s = max(standing.last_t_s, (clock.utc() - row.started_at).total_seconds() if row.started_at else 0.0)
     gap_s = t_s - standing.last_t_s

@@ -14,6 +14,7 @@ from instruments.bench_config import BenchFile, read_bench, shipped_benches
 from instruments.drivers.resolution import resolve
 from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
+from instruments.interfaces.supply import SupplyLimits
 from instruments.interfaces.table import TableLimits
 from instruments.positions import Position
 from instruments.toml_documents import read_toml_text, shown
@@ -120,7 +121,15 @@ def limits_of(bench: BenchFile, *, driven: bool = False, earlier: EarlierTimes |
         air_tau_s=bench.air_tau_s,
         earlier=earlier,
         tilted_positions=bench.tilted_positions,
+        supply=_supply_limits(bench),
     )
+
+
+def _supply_limits(bench: BenchFile) -> SupplyLimits | None:
+    supply = bench.supply
+    if supply is None:
+        return None
+    return SupplyLimits(supply.nominal_v, supply.min_v, supply.max_v, supply.current_limit_a, supply.tolerance_v)
 
 
 def bench_for(recipe: Recipe, *, driven: bool = False) -> str:

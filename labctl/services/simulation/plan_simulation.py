@@ -20,7 +20,7 @@ from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo
 from labctl.recording.columns import ARRIVAL_S, DEVICE_S, RATE_TIME_U, VERIFICATION
 from labctl.services.benches.standards import standards_of
-from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, Step
+from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, SetSupply, Step
 from procedures.planning.chamber_time import counted_move_s
 from procedures.planning.plan import Plan
 from procedures.planning.step_writer import MOUNTING_S, ROOM_C
@@ -78,12 +78,18 @@ class _Walk:
                 case MoveChamber():
                     self._world.heat.set(self._t, step.temperature_c)
                     self._setpoint = step.temperature_c
+                case SetSupply():
+                    self._set_supply(step)
                 case Acquire():
                     self._acquire(step)
                 case _:
                     pass
             self._t = max(self._t, begun + self._counted_s(step))
             self._log(begun, self._t)
+
+    def _set_supply(self, step: SetSupply) -> None:
+        assert self._world.supply is not None  # such a step is planned for a bench with a supply only
+        self._world.supply.set(self._t, step.voltage_v)
 
     def _counted_s(self, step: Step) -> float:
         """Return how long a step takes at least, s, whatever is known of the bench: a seed gives the same again."""

@@ -115,7 +115,7 @@ def test_the_limits_of_an_open_bench(rig: Any) -> None:
     assert (found.needs_person, found.air_tau_s, found.is_driven) == (False, 120.0, True)
     assert found.real_rate_dps(100.0) == rig.table.achievable_dps(100.0)
     assert BenchLimits.of(rig).needs_person
-    by_hand: Any = SimpleNamespace(table=None, chamber=None, gyros=rig.gyros)
+    by_hand: Any = SimpleNamespace(table=None, chamber=None, supply=None, gyros=rig.gyros)
     bare = BenchLimits.of(by_hand, air_tau_s=60.0)
     assert (bare.table, bare.chamber, bare.achievable_dps, bare.needs_person) == (None, None, None, True)
     assert bare.air_tau_s == 60.0
