@@ -84,9 +84,7 @@ def test_an_error_of_an_earlier_command_is_not_that_of_this_one_but_a_refusal_is
     opened.simulated._errors.extend(['-113,"Undefined header"'] * 3)
     assert opened.driver.set_voltage_v(5.1) == 5.1
     opened.faults.arm("refusal", count=1)
-    with pytest.raises(
-        RequestRejected, match=r"refused to set 5\.2 V: error -222 'Data out of range' after ':APPL CH1"
-    ):
+    with pytest.raises(RequestRejected, match=r"refused to set 5\.2 V: error -222 'Data out of range' after ':APPL"):
         opened.driver.set_voltage_v(5.2)
     assert opened.measured_v() == pytest.approx(5.1, abs=0.002)
 
@@ -107,9 +105,7 @@ def test_an_output_that_is_off_is_switched_on_and_one_whose_protection_trips_is_
     assert opened.driver.is_on()
     assert opened.measured_v() == pytest.approx(5.0, abs=0.002)
     opened.simulated.turn_knob(opened.clock.now_s(), 7.0)  # beyond the overvoltage protection of 5.78 V
-    with pytest.raises(
-        RequestRejected, match=r"instead of 5 V, limit 0\.05 V off: its overvoltage protection has trip"
-    ):
+    with pytest.raises(RequestRejected, match=r"instead of 5 V, limit 0\.05 V off: its overvoltage protection has"):
         opened.measured_v()
 
 
@@ -118,9 +114,7 @@ def test_a_voltage_that_others_change_or_the_load_pulls_down_is_reported_once_it
     opened.driver.set_voltage_v(5.0)
     opened.measured_v()
     opened.simulated.turn_knob(opened.clock.now_s(), 5.2)
-    with pytest.raises(
-        RequestRejected, match=r"at 5\.2\d* V instead of 5 V, limit 0\.05 V off: it controls the voltage"
-    ):
+    with pytest.raises(RequestRejected, match=r"at 5\.2\d* V instead of 5 V, limit 0\.05 V off: it controls the"):
         opened.measured_v()
     opened.driver.set_voltage_v(5.0)
     opened.measured_v()
