@@ -29,7 +29,7 @@ def stop_instruments(
     say: Callable[[str], None] = lambda _: None,
     stands: Callable[[], None] = lambda: None,
 ) -> InstrumentsLeft:
-    """Bring table and chamber of a bench to their safe state. Raises nothing.
+    """Bring table, chamber and supply of a bench to their safe state. Raises nothing.
 
     `document` is the bench file as JSON; `say` gets what could not be confirmed yet, `stands` is called as soon as the
     table is at rest.
@@ -57,6 +57,9 @@ def _stopped(bench: BenchFile, say: Callable[[str], None], stands: Callable[[], 
         complaints = make_safe(opened, clock, PAUSES_S, note)
     if complaints:
         return InstrumentsLeft(at_rest, safe=False, text="; ".join(complaints))
-    sections = (("table at rest", bench.table), ("chamber at its safe set point", bench.chamber))
+    sections = (
+        ("table at rest", bench.table), ("chamber at its safe set point", bench.chamber),
+        ("supply in its safe state", bench.supply),
+    )  # fmt: skip
     parts = ", ".join(name for name, section in sections if section is not None)
     return InstrumentsLeft(at_rest, safe=True, text=parts or "nothing on this bench moves by itself")
