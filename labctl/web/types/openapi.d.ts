@@ -7186,7 +7186,7 @@ export interface components {
              * @default other
              * @enum {string}
              */
-            kind: "table" | "chamber" | "reference" | "gyro" | "other";
+            kind: "table" | "chamber" | "reference" | "supply" | "gyro" | "other";
             /**
              * State
              * @description doubtful: a campaign can run, but its results may be less accurate. bad: a campaign cannot run, or its results would be wrong.
