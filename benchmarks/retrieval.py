@@ -24,7 +24,7 @@ from benchmarks.served import TICKS_PER_S, serve
 from labctl.client import Client
 from labctl.store import Store, open_store
 from labctl.store.paging import PageRequest
-from labctl.store.repositories.fleet_jobs import FleetFilter
+from labctl.store.repositories.fleet_filter import FleetFilter
 from labctl.store.repositories.units import UnitFilter
 from studies import postgresql_cluster
 

@@ -64,11 +64,11 @@ from labctl.store.repositories.drafts.repository import (
 )
 from labctl.store.repositories.drafts.repository import Drafts as Drafts
 from labctl.store.repositories.fetches import FetchRow as FetchRow, Fetches as Fetches
+from labctl.store.repositories.fleet_filter import FleetFilter as FleetFilter
 from labctl.store.repositories.fleet_jobs import (
     FleetCoefficient as FleetCoefficient,
     FleetCounts as FleetCounts,
     FleetEvidence as FleetEvidence,
-    FleetFilter as FleetFilter,
     FleetFit as FleetFit,
     FleetJobRow as FleetJobRow,
     FleetJobs as FleetJobs,

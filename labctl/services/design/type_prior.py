@@ -83,7 +83,9 @@ def prior_of_type(
 def _units(store: Store, type_: str, model: str, without: str) -> tuple[list[UnitCoefficients], dict[str, str]]:
     """Return the calibrated units of a type by a model, and the hash of the newest version of each."""
     units, hashes = [], {}
-    for each, document_hash in _versions(store.fleet_reports.versions(FleetFilter(type_), model, MAX_VERSIONS)):
+    for each, document_hash in _versions(
+        store.fleet_reports.versions(FleetFilter(type_, error_model=model), MAX_VERSIONS)
+    ):
         if each.serial_number != without and each.serial_number not in hashes:  # the newest recordings come first
             units.append(each)
             hashes[each.serial_number] = document_hash

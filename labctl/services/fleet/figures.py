@@ -10,6 +10,7 @@ from labctl.answers.fleet import (
     FleetChartRequest,
     FleetChartResponse,
     FleetDue,
+    FleetReportRequest,
     FleetTypeResponse,
     FleetUnits,
     RatioClass,
@@ -25,7 +26,8 @@ SPANS = 60
 
 def filter_of(request: FleetUnits) -> FleetFilter:
     """Return which units a request is about."""
-    return FleetFilter(request.type, request.batch, request.supplier, request.search)
+    model = request.model if isinstance(request, FleetReportRequest) else ""
+    return FleetFilter(request.type, request.batch, request.supplier, request.search, model)
 
 
 def type_figures(store: Store, request: FleetUnits, now: datetime) -> list[FleetTypeResponse]:

@@ -57,10 +57,10 @@ def begin(store: Store, request: FleetJobRequest, at: datetime, runner: str = ""
         preset_for(request.model or None, list(request.effects))
     elif request.effects:
         raise BadInput("effects are of a fit, and a criticism judges the newest versions as they are; leave them out")
-    wanted = FleetFilter(request.type, request.batch, request.supplier, request.search)
-    new = NewFleetJob(request.kind, request.model_dump(mode="json"), request.engine, actor().name)
     model = request.model if request.kind == "criticise" else ""
-    return job_answer(store, store.fleet.begin(new, wanted, model, runner, at), at)
+    wanted = FleetFilter(request.type, request.batch, request.supplier, request.search, model)
+    new = NewFleetJob(request.kind, request.model_dump(mode="json"), request.engine, actor().name)
+    return job_answer(store, store.fleet.begin(new, wanted, runner, at), at)
 
 
 def cancel(store: Store, job: int, request: FleetCancelRequest, at: datetime) -> FleetJobResponse:

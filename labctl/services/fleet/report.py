@@ -25,7 +25,7 @@ def fleet_report(store: Store, request: FleetReportRequest, now: datetime) -> Fl
     type_ = _the_type(store, request, now)
     of_type = request.model_copy(update={"type": type_})
     question = {
-        "fleet": of_type.model_dump(mode="json"), "state": store.fleet_reports.state(filter_of(of_type), of_type.model),
+        "fleet": of_type.model_dump(mode="json"), "state": store.fleet_reports.state(filter_of(of_type)),
     }  # fmt: skip
     report = cached(FleetReportResponse, question, lambda: _computed(store, of_type, now))
     figures = next(iter(type_figures(store, of_type, now)), None)  # they change with the date alone
@@ -38,6 +38,8 @@ def _the_type(store: Store, request: FleetReportRequest, now: datetime) -> str:
     if request.type or len(types) == 1:
         if request.type and request.type not in types:
             others = [each.type for each in store.fleet_reports.types(FleetFilter(), now)]
+            if request.type in others:
+                raise filter_of(request).no_match()
             raise BadInput(
                 f"no unit of type {request.type!r} matches; the units of this database are of "
                 f"{_listed(others) or 'no type: import them'}"
@@ -58,7 +60,7 @@ def _computed(store: Store, request: FleetReportRequest, now: datetime) -> Fleet
     from labctl.services.fleet.findings import ageing_in, evidence_in, population_in  # noqa: PLC0415  slow to load
 
     report_stage("reading the versions")
-    versions = list(store.fleet_reports.versions(filter_of(request), request.model, MAX_VERSIONS))
+    versions = list(store.fleet_reports.versions(filter_of(request), MAX_VERSIONS))
     units = list(_coefficients(versions))
     report_stage("comparing the units")
     compared = population_in(units)

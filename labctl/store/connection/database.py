@@ -209,7 +209,8 @@ class Database:
                     commits = self._backend.before_commit(connection, synced=synced)
                     ended = True
             except exc.DatabaseError as error:
-                if isinstance(error, exc.IntegrityError | exc.ProgrammingError):
+                is_of_labctl = isinstance(error, exc.IntegrityError | exc.ProgrammingError)
+                if is_of_labctl and not self._backend.words_for(error):
                     raise
                 self._backend.refuse_other()
                 if not (ended and self._backend.is_unreachable(error) and self.outlast(lambda: self._is_kept(number))):
@@ -273,7 +274,7 @@ class Database:
             raise StoreError(f"{self._shown}: all connections are in use; try again in a few seconds") from error
 
     def _unread(self, error: exc.DatabaseError) -> StoreError:
-        text = f"{self._shown}: {error.orig}"
+        text = f"{self._shown}: {self._backend.words_for(error) or error.orig}"
         return (DatabaseUnreachable if self._backend.is_unreachable(error) else StoreError)(text)
 
     def note_address(self, address: ServiceAddress) -> None:

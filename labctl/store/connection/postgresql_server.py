@@ -29,6 +29,8 @@ LOCK_TIMEOUT_S = IDLE_TIMEOUT_S = 20
 WRITER_PATIENCE_S, READER_PATIENCE_S = 45.0, 2.0
 #: SQLSTATEs of a full disk, and of a lock that was not granted in time.
 DISK_FULL, LOCK_NOT_AVAILABLE = "53100", "55P03"
+#: SQLSTATEs of a user without a right, and of a server that follows another one.
+INSUFFICIENT_PRIVILEGE, READ_ONLY_TRANSACTION = "42501", "25006"
 #: The class of errors that are about the connection and not about the statement, and the errors of a server that is
 #: shut down, was killed, is starting, drops its database, or has no connection left. The codes are SQLSTATEs.
 CONNECTION_CLASS = "08"
@@ -89,11 +91,18 @@ class PostgresqlServer(Backend):
         return getattr(error.orig, "sqlstate", None) == DISK_FULL
 
     def words_for(self, error: exc.DatabaseError) -> str:
-        """Return the message for a refused connection, or for a lock that was not granted in time; else empty."""
-        state = getattr(error.orig, "sqlstate", None)
+        """Return the message for what the server refuses, or for a lock that was not granted in time; else empty."""
+        state, text = getattr(error.orig, "sqlstate", None), " ".join(str(error.orig).split())
         if state is None and _is_refusal(error):
-            text = " ".join(str(error.orig).split())
             return f"the database server refuses the connection ({text}); check user, password and database in the URL"
+        if state == INSUFFICIENT_PRIVILEGE:
+            return (
+                f"the user '{self._engine.url.username}' of the database lacks a right ({text}); the owner of the "
+                "tables gives it: SELECT on all tables to read; to write also INSERT, UPDATE and DELETE on them, and "
+                "USAGE on all sequences"
+            )
+        if state == READ_ONLY_TRANSACTION:
+            return f"the database server takes no changes ({text}); use the URL of the primary server"
         if state != LOCK_NOT_AVAILABLE:
             return ""
         return (

@@ -18,46 +18,12 @@ from labctl.store.connection.transactions import transaction
 from labctl.store.paging import Page, PageRequest, rows_to_read
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.calibrations import NewCalibration, add_version
+from labctl.store.repositories.fleet_filter import FleetFilter
 from labctl.store.repositories.records_by_name import record_of, records_of
-from labctl.store.repositories.units import SEEN, search_units
 from labctl.store.schema import tables
 
 #: States in which something is left to do.
 OPEN: tuple[FleetJobState, ...] = ("waiting", "running")
-
-
-@dataclass(frozen=True)
-class FleetFilter:
-    """Which units: of a type (their model), a batch, a supplier, with a text; empty: any."""
-
-    type: str = ""
-    batch: str = ""
-    supplier: str = ""
-    search: str = ""
-
-    @property
-    def condition(self) -> sa.ColumnElement[bool]:
-        """The condition on rows of the table of units."""
-        return sa.and_(SEEN, self.of_measured)
-
-    @property
-    def of_measured(self) -> sa.ColumnElement[bool]:
-        """The same for units that are known to be measured, as those with a version or a result are."""
-        c = tables.units.c
-        stated = [
-            column == value
-            for column, value in ((c.model, self.type), (c.batch, self.batch), (c.supplier, self.supplier))
-            if value
-        ]
-        return sa.and_(search_units(PageRequest(self.search)), *stated)
-
-    def no_match(self, model: str = "") -> NotFound:
-        """Return the error where no unit is so, nor has an error model if one is asked for."""
-        given = {"type": self.type, "batch": self.batch, "supplier": self.supplier, "text": self.search}
-        named = [f"{name} {value!r}" for name, value in {**given, "error model": model}.items() if value]
-        if named:
-            return NotFound(f"no unit matches {', '.join(named)}; `labctl units` lists the units")
-        return NotFound("the database has no unit with a recording; `labctl import` adds recordings")
 
 
 @dataclass(frozen=True)
@@ -161,11 +127,10 @@ class FleetJobs:
         self._database = database
 
     @transaction
-    def begin(self, new: NewFleetJob, wanted: FleetFilter, model: str, runner: str, at: datetime) -> int:
+    def begin(self, new: NewFleetJob, wanted: FleetFilter, runner: str, at: datetime) -> int:
         """Write down a job with its units; returns its number. Raises NotFound where no unit matches.
 
-        `model` restricts it to units whose newest version is of this error model; empty: any. `runner` is the process
-        that carries it out at once; empty: the next service.
+        `runner` is the process that carries it out at once; empty: the next service.
         """
         j, u = tables.fleet_jobs, tables.units
         with self._database.writing() as connection:
@@ -179,16 +144,15 @@ class FleetJobs:
                 sa.insert(j).values(**values, created_at=at, units=0, state="waiting", runner=runner, seen_at=at)
                 .returning(j.c.id)
             )  # fmt: skip
-            condition = wanted.condition if not model else sa.and_(wanted.condition, newest_has_model(model))
             which = sa.select(
                 sa.literal(number).label("job_id"), u.c.serial, sa.literal(new.kind), sa.literal("waiting")
-            ).where(condition)
+            ).where(wanted.condition)
             columns = ["job_id", "serial", "kind", "state"]
             connection.execute(sa.insert(tables.fleet_units).from_select(columns, which, include_defaults=False))
             x = tables.fleet_units.c
             units = int(connection.scalar(sa.select(sa.func.count()).where(x.job_id == number)) or 0)
             if not units:
-                raise wanted.no_match(model)
+                raise wanted.no_match()
             connection.execute(sa.update(j).where(j.c.id == number).values(units=units))
             detail = {"request": dict(new.request), "units": units, "engine": new.engine}
             append(connection, at, f"fleet {new.kind}", _subject(int(number or 0)), detail)
@@ -356,17 +320,6 @@ class FleetJobs:
                 f"{result.serial} version {fit.version} was made by another fit in the meantime; fit again"
             ) from error
         return True
-
-
-def newest_has_model(model: str) -> sa.ColumnElement[bool]:
-    """Return the condition that the newest version of a row of the table of units is of an error model."""
-    own, later = tables.calibrations.alias(), tables.calibrations.alias()
-    newest = sa.select(sa.func.max(later.c.version)).where(later.c.serial == tables.units.c.serial)
-    return sa.exists().where(
-        own.c.serial == tables.units.c.serial,
-        own.c.version == newest.correlate(tables.units).scalar_subquery(),
-        own.c.model == model,
-    )
 
 
 def _subject(job: int) -> str:

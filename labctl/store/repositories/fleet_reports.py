@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from labctl.answers.json_object import JsonDocument
 from labctl.store.connection.database import Database
-from labctl.store.repositories.fleet_jobs import FleetFilter, newest_has_model
+from labctl.store.repositories.fleet_filter import FleetFilter
 from labctl.store.repositories.units import UNSEEN
 from labctl.store.schema import tables
 from labctl.store.schema.types import EPOCH
@@ -89,10 +89,10 @@ class FleetReports:
                 figures[model].due[key] = n
         return [each for each in figures.values() if each.units]
 
-    def state(self, wanted: FleetFilter, model: str) -> str:
+    def state(self, wanted: FleetFilter) -> str:
         """Return a text that changes with every version and criticism that a report would be computed from."""
         c, x, e = tables.calibrations.c, tables.fleet_units.c, tables.fleet_evidence.c
-        ours = sa.select(tables.units.c.serial).where(_condition(wanted, model))
+        ours = sa.select(tables.units.c.serial).where(wanted.condition)
         versions = sa.select(sa.func.count(), sa.func.max(c.id)).where(c.serial.in_(ours))
         judged = sa.select(sa.func.count(), sa.func.max(x.job_id)).where(x.newest, x.serial.in_(ours))
         evidence = sa.select(sa.func.count(), sa.func.max(e.id)).where(e.type == wanted.type)
@@ -106,7 +106,7 @@ class FleetReports:
             )
         return repr((rows, stated))
 
-    def versions(self, wanted: FleetFilter, model: str, most: int) -> Iterator[FleetVersion]:
+    def versions(self, wanted: FleetFilter, most: int) -> Iterator[FleetVersion]:
         """Yield the newest version by each recording of each unit, those of the newest recordings first."""
         c, r, u, k = tables.calibrations.c, tables.recordings.c, tables.units.c, tables.campaigns.c
         newest = sa.select(sa.func.max(c.id).label("id")).where(c.recording_id.is_not(None))
@@ -116,7 +116,7 @@ class FleetReports:
             .join(tables.recordings, r.id == c.recording_id)
             .outerjoin(tables.campaigns, k.id == r.campaign_id)
         )
-        ours = sa.select(u.serial).where(_condition(wanted, model))
+        ours = sa.select(u.serial).where(wanted.condition)
         with_newest = sa.join(tables.calibrations, newest_ids, newest_ids.c.id == c.id)
         which = sa.select(c.id).select_from(with_newest).where(c.serial.in_(ours)).order_by(c.recording_id.desc())
         columns = (c.serial, u.batch, u.supplier, k.bench_name, r.info, c.document)
@@ -167,10 +167,6 @@ class FleetReports:
             width = max((last - first) / spans, timedelta(seconds=1))
             query = _chart_query(joined, ours, factor, first, width)
             return [_chart_point(row) for row in connection.execute(query)], (first, last)
-
-
-def _condition(wanted: FleetFilter, model: str) -> sa.ColumnElement[bool]:
-    return wanted.condition if not model else sa.and_(wanted.condition, newest_has_model(model))
 
 
 def _results(wanted: FleetFilter) -> sa.Select[*tuple[Any, ...]]:

@@ -15,7 +15,8 @@ from labctl.natural_order import natural_key
 from labctl.store import migrate, migrate_database
 from labctl.store.connection.database import Database
 from labctl.store.paging import PageRequest
-from labctl.store.repositories.fleet_jobs import FleetFilter, FleetJobs, NewFleetJob
+from labctl.store.repositories.fleet_filter import FleetFilter
+from labctl.store.repositories.fleet_jobs import FleetJobs, NewFleetJob
 from labctl.store.repositories.units import Certifications, Units
 from labctl.store.schema import tables
 
@@ -65,7 +66,7 @@ def test_units_are_listed_in_natural_order(location: str) -> None:
     assert [unit.serial for unit in units.page(PageRequest("", 2, "A-5")).rows] == ["A-10", "A-100"]  # none is A-5
     assert [serial for serial, _ in Certifications(database).newest_versions()] == SERIALS
     assert jobs.serials(FleetFilter(), "", 4) + jobs.serials(FleetFilter(), SERIALS[3], 100) == SERIALS
-    job = jobs.begin(NewFleetJob("fit", {}, "local", "Ada"), FleetFilter(), "", "", AT)
+    job = jobs.begin(NewFleetJob("fit", {}, "local", "Ada"), FleetFilter(), "", AT)
     first = jobs.units(job, PageRequest("", 5, None))
     rest = jobs.units(job, PageRequest("", None, first.next_after))
     assert [row.serial for row in [*first.rows, *rest.rows]] == SERIALS

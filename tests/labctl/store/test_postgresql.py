@@ -274,6 +274,37 @@ def test_a_refused_connection_is_said_at_once(url: str, part: str, wrong: str, w
     assert time.monotonic() - begun_s < postgresql_server.READER_PATIENCE_S
 
 
+def read_and_note(url: str) -> None:
+    with open_store(url, write=True) as store:
+        assert subjects(store) == ["row 1"]
+        note(store, 2)
+
+
+@pytest.mark.parametrize(
+    ("rights", "lacking"),
+    [
+        ("", "permission denied for table alembic_version"),
+        ("SELECT", "permission denied for table audit_head"),
+        ("SELECT, INSERT, UPDATE", "permission denied for sequence audit_id_seq"),
+    ],
+)
+def test_a_user_without_a_right_is_said_with_the_right(url: str, rights: str, lacking: str) -> None:
+    with open_store(url, write=True) as store:
+        note(store, 1)
+    user = f"limited_{len(rights)}"
+    with psycopg.connect(sa.make_url(url).set(drivername="postgresql").render_as_string(), autocommit=True) as owner:
+        owner.execute(f"DROP ROLE IF EXISTS {user}")
+        owner.execute(f"CREATE ROLE {user} LOGIN")
+        if rights:
+            owner.execute(f"GRANT {rights} ON ALL TABLES IN SCHEMA public TO {user}")
+    limited = sa.make_url(url).set(username=user).render_as_string()
+    expected = f"the user '{user}' of the database lacks a right .{lacking}.; the owner of the tables gives it: SELECT"
+    with pytest.raises(StoreError, match=expected):
+        read_and_note(limited)
+    with open_store(url, write=True) as store:
+        assert subjects(store) == ["row 1"]
+
+
 def opened(url: str, monkeypatch: pytest.MonkeyPatch, **limits: float) -> Store:
     """Open the database with limits of its own."""
     with monkeypatch.context() as changed:

@@ -141,6 +141,19 @@ def test_sums_are_the_same_after_they_were_kept(store: Store) -> None:
             assert (other.information == each.information).all()
 
 
+def test_all_figures_of_a_report_are_of_the_error_model(tmp_path: Path) -> None:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        for number, model in enumerate(("bias", "bias_scale", "bias_scale")):
+            store.recordings.add_import(unit_points(number), AT)
+            assert run_job(store, search=f"U{number:05d}", model=model, effects=[]).done == 1
+        of_any = fleet_report(store, FleetReportRequest(), NOW)
+        of_bias = fleet_report(store, FleetReportRequest(model="bias"), NOW)
+        assert [(each.figures.units, each.figures.fitted) for each in (of_any, of_bias)] == [(3, 3), (1, 1)]
+        for request in (FleetReportRequest(model="turns"), FleetReportRequest(type=of_any.type, model="turns")):
+            with pytest.raises(NotFound, match=r"no unit matches .*error model 'turns'; `labctl units` lists"):
+                fleet_report(store, request, NOW)
+
+
 def test_versions_come_newest_recording_first(tmp_path: Path) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         for number in range(3):
@@ -150,6 +163,6 @@ def test_versions_come_newest_recording_first(tmp_path: Path) -> None:
         later = again.info.model_copy(update={"started_at": AT + timedelta(days=300)})
         store.recordings.add_import(replace(again, info=later), AT)
         assert run_job(store).done == 1
-        versions = list(store.fleet_reports.versions(FleetFilter("FOG-A"), "", 100))
+        versions = list(store.fleet_reports.versions(FleetFilter("FOG-A"), 100))
         assert [each.serial for each in versions] == ["U00001", "U00002", "U00001", "U00000"]
         assert read_calibration(versions[0].document).document["version"] == 2
