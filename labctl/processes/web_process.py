@@ -141,7 +141,10 @@ def serve(line: Connection, settings: WebSettings) -> None:
     SupervisorWatch(os.getppid(), lambda: _stop_for(settings)).start()
     with socket.socket(fileno=settings.listener) as listener, contextlib.suppress(KeyboardInterrupt):
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # the server raises it again at its end
-        server.run(sockets=[listener])
+        try:
+            server.run(sockets=[listener])
+        finally:
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the supervisor asks once more, and this process is ending
     if keys is not None:
         keys.close()
     service.close()

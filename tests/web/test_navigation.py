@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import httpx
 import pytest
 
-from tests.helpers.browser import Faults, Service
+from tests.helpers.browser import Faults, Service, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -64,7 +64,7 @@ def test_a_button_that_opens_a_page_opens_it_at_its_top(visit: Callable[..., Pag
 
 def test_the_sections_of_a_page_are_entries_of_the_history(visit: Callable[..., Page]) -> None:
     page = visit("/effects", size=LOW)
-    page.get_by_role("heading", level=1).wait_for()
+    settled(page)
     page.evaluate("""() => {
       const section = Object.assign(document.createElement("h2"), { id: "part", textContent: "A part" });
       section.style.marginTop = "2000px";
