@@ -36,7 +36,7 @@ def test_a_visit_moves_at_most_1500_kb_and_a_later_one_50(
     page = visit(path.format(serial=made["serial"]), alone=True)  # nothing is kept from an earlier visit
     first = moved_bytes(page)
     assert sum(first.values()) <= FIRST_VISIT_BYTES, first
-    drawn = any(address.endswith("plotly.js") for address in first)
+    drawn = any(address.endswith("plotly-cartesian.js") for address in first)
     assert drawn == ("{serial}" in path), "a page without a figure does not load what draws them"
     page.reload()
     again = moved_bytes(page)
