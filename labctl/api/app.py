@@ -42,6 +42,7 @@ from labctl.api.routers import (
     units,
     validity,
 )  # fmt: skip
+from labctl.api.validators import ValidatorMiddleware
 from labctl.services.admin.key_memory import KeyMemory
 from labctl.services.lab_service import LabService
 
@@ -117,6 +118,7 @@ def create_app(service: LabService, access: AccessPolicy | None = None, keys: Ke
     problems.install(app)
     app.router.routes.extend(api_routes())
     web.install(app)
+    app.add_middleware(ValidatorMiddleware)  # tags the document, whatever coding it travels in
     app.add_middleware(CompressionMiddleware)
     app.add_middleware(InForceMiddleware, service=service)
     app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy(), keys=keys)
