@@ -17,6 +17,7 @@ from labctl.api.calibration_answer import InForceMiddleware
 from labctl.api.compression import CompressionMiddleware
 from labctl.api.dependencies import ControlPool
 from labctl.api.descriptions import DescribedAPI
+from labctl.api.known_recording import NotModified, answer_not_modified
 from labctl.api.middleware import AccessMiddleware
 from labctl.api.request_log import RequestFigures, RequestLogMiddleware
 from labctl.api.routers import (
@@ -116,6 +117,7 @@ def create_app(service: LabService, access: AccessPolicy | None = None, keys: Ke
     )
     app.state.service = service
     problems.install(app)
+    app.add_exception_handler(NotModified, answer_not_modified)
     app.router.routes.extend(api_routes())
     web.install(app)
     app.add_middleware(ValidatorMiddleware)  # tags the document, whatever coding it travels in

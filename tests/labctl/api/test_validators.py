@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
 import numpy as np
 import pytest
 from fastapi import FastAPI, Response
 from fastapi.testclient import TestClient
 from starlette.responses import StreamingResponse
 
+from labctl.api.routers import recordings
 from labctl.api.validators import ValidatorMiddleware, is_known
 from tests.helpers.certifying import OVERRIDE
 from tests.helpers.recordings import points
@@ -50,13 +55,37 @@ def tag_of(client: TestClient, path: str) -> str:
 @pytest.mark.parametrize(
     "path",
     [
-        "/api/recordings/1", "/api/recordings/1/datasets", "/api/recordings/1/trace?channel=gyro_z",
+        "/api/recordings/1", "/api/recordings/1/datasets",
         f"{UNIT}/calibrations/1", f"{UNIT}/calibrations/1/criticism", f"{UNIT}/calibrations/1/comparison",
         "/api/units?limit=50",
     ],
 )  # fmt: skip
 def test_an_unchanged_answer_is_sent_once(fitted: TestClient, path: str) -> None:
     tag_of(fitted, path)
+
+
+@pytest.mark.parametrize("path", ["trace?channel=gyro_z&points=50", "inspection"])
+def test_what_depends_on_a_recording_alone_is_not_computed_for_a_client_that_has_it(
+    ran: TestClient, monkeypatch: pytest.MonkeyPatch, path: str
+) -> None:
+    address = f"/api/recordings/1/{path}"
+    tag = tag_of(ran, address)
+    computed: list[int] = []
+    for name in ("trace_of", "inspection_of_recording"):
+        monkeypatch.setattr(recordings, name, lambda _, recording, *__: computed.append(recording))
+    assert ran.get(address, headers={"If-None-Match": tag}).status_code == 304
+    assert computed == []
+
+
+def test_a_data_set_that_is_marked_changes_what_shows_the_recording(ran: TestClient, tmp_path: Path) -> None:
+    paths = [f"/api/recordings/1/{path}" for path in ("trace?channel=gyro_z&points=50", "inspection", "datasets")]
+    before = [tag_of(ran, path) for path in paths]
+    assert tag_of(ran, paths[0].replace("50", "60")) != before[0], "another part of it is asked for"
+    with closing(sqlite3.connect(tmp_path / "lab.sqlite")) as database, database:
+        database.execute("UPDATE data_sets SET state = 'interrupted' WHERE recording_id = 1 AND number = 2")
+    after = [ran.get(path, headers={"If-None-Match": tag}) for path, tag in zip(paths, before, strict=True)]
+    assert [answer.status_code for answer in after] == [200, 200, 200]
+    assert {answer.headers["etag"] for answer in after}.isdisjoint(before)
 
 
 def test_each_data_set_of_a_running_campaign_changes_the_answers_that_show_it(client: TestClient) -> None:
@@ -92,7 +121,7 @@ def test_a_certification_changes_the_answers_that_state_it(fitted: TestClient) -
     assert set(after).isdisjoint(before)
     revoked = fitted.post(f"{UNIT}/calibrations/1/revoke", json={"by": "A. Person", "reason": "the table was loose"})
     assert revoked.status_code == 200, revoked.text
-    assert {tag_of(fitted, path) for path in paths}.isdisjoint({*before, *after})
+    assert {tag_of(fitted, path) for path in paths}.isdisjoint(after)
 
 
 def test_a_criticism_of_other_data_or_of_another_version_has_another_tag(fitted: TestClient) -> None:
