@@ -17,6 +17,7 @@ from labctl.api.calibration_answer import InForceMiddleware
 from labctl.api.compression import CompressionMiddleware
 from labctl.api.dependencies import ControlPool
 from labctl.api.descriptions import DescribedAPI
+from labctl.api.known_recording import NotModified, answer_not_modified
 from labctl.api.middleware import AccessMiddleware
 from labctl.api.request_log import RequestFigures, RequestLogMiddleware
 from labctl.api.routers import (
@@ -42,6 +43,7 @@ from labctl.api.routers import (
     units,
     validity,
 )  # fmt: skip
+from labctl.api.validators import ValidatorMiddleware
 from labctl.services.admin.key_memory import KeyMemory
 from labctl.services.lab_service import LabService
 
@@ -115,8 +117,10 @@ def create_app(service: LabService, access: AccessPolicy | None = None, keys: Ke
     )
     app.state.service = service
     problems.install(app)
+    app.add_exception_handler(NotModified, answer_not_modified)
     app.router.routes.extend(api_routes())
     web.install(app)
+    app.add_middleware(ValidatorMiddleware)  # tags the document, whatever coding it travels in
     app.add_middleware(CompressionMiddleware)
     app.add_middleware(InForceMiddleware, service=service)
     app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy(), keys=keys)

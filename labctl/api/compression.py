@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+import sys
+
+import anyio.to_thread
 from starlette.datastructures import Headers
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipResponder
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from labctl.web.assets import accepted_codings
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
 #: A shorter answer fits into a network packet as it is.
 MIN_COMPRESSED_BYTES = 1400
 EVENTS = "text/event-stream"
-ACCEPTED = b"accept-encoding"
 #: Events of a computation: some stages, then a large answer. Those that go on for hours pass as they are.
 ENDING_STREAMS = ("/criticism/events",)
 #: Half the time of the highest level, for a twentieth more bytes.
 COMPRESSION_LEVEL = 5
+#: Of zstd: a third of the time of gzip. It finds what an answer says twice, however far apart (400 kB became 170 kB).
+ZSTD_LEVEL = 6
 
 
 class CompressionMiddleware:
-    """Compresses by gzip what has no strong ETag: that is of exactly the bytes that are sent (RFC 9110, 8.8.1).
+    """Compresses by zstd, else by gzip, what has no strong ETag: that is of exactly the bytes sent (RFC 9110, 8.8.1).
 
     Server-sent events that go on, pictures and archives pass as they are; what is large is compressed in a thread.
     """
@@ -27,10 +38,13 @@ class CompressionMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
-        if scope["type"] == "http" and any(b"gzip" in value for name, value in scope["headers"] if name == ACCEPTED):
+        accepted = (
+            accepted_codings(Headers(scope=scope).get("accept-encoding", "")) if scope["type"] == "http" else set()
+        )
+        if made := next((each for each in (_ZstdResponder, _Responder) if each.content_encoding in accepted), None):
             ends = scope["path"].endswith(ENDING_STREAMS)
             passing = tuple(kind for kind in DEFAULT_EXCLUDED_CONTENT_TYPES if not (ends and kind == EVENTS))
-            responder = _Responder(self._app, MIN_COMPRESSED_BYTES, COMPRESSION_LEVEL, exclude_content_types=passing)
+            responder = made(self._app, MIN_COMPRESSED_BYTES, COMPRESSION_LEVEL, exclude_content_types=passing)
             await responder(scope, receive, send)
         else:
             await self._app(scope, receive, send)
@@ -49,3 +63,19 @@ class _Responder(GZipResponder):
             await self.send(message)
         else:
             await super().send_with_compression(message)
+
+
+class _ZstdResponder(_Responder):
+    """The same by zstd; each part of a stream can be read as soon as it is there."""
+
+    content_encoding = "zstd"
+    _frame: zstd.ZstdCompressor | None = None
+
+    async def apply_compression(self, body: bytes, *, more_body: bool) -> bytes:
+        if len(body) >= self.thread_minimum_size:
+            return await anyio.to_thread.run_sync(self._compressed, body, more_body)
+        return self._compressed(body, more_body)
+
+    def _compressed(self, body: bytes, more_body: bool) -> bytes:
+        self._frame = self._frame or zstd.ZstdCompressor(level=ZSTD_LEVEL)
+        return self._frame.compress(body, self._frame.FLUSH_BLOCK if more_body else self._frame.FLUSH_FRAME)

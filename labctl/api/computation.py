@@ -13,13 +13,14 @@ from typing import Any, ParamSpec, TypeVar
 
 import anyio
 import anyio.to_thread
-from fastapi import Request
+from fastapi import Request, Response
 from starlette.exceptions import HTTPException
 
 from labctl.answers.base import ResponseModel
 from labctl.answers.criticism import StageResponse
 from labctl.api.event_stream import EventStream
 from labctl.api.problems import as_problem
+from labctl.api.validators import REVALIDATED, is_known, weak_tag
 from labctl.errors import LabctlError
 from labctl.progress import Progress
 from labctl.services.cache import NotCached, cached_only
@@ -73,10 +74,11 @@ async def while_connected(
 
 async def follow(
     request: Request, service: LabService, work: Work[..., ResponseModel], *args: object, **named: object
-) -> EventStream:
+) -> Response:
     """Return server-sent events: `stage` for each stage of `work`, then `answer` or, where it fails, `problem`.
 
-    The work is ended at once when the client leaves. Raises what fails before the first stage.
+    The work is ended at once when the client leaves. Raises what fails before the first stage. An answer that is there
+    without a stage has an ETag; status 304 where the client has it.
     """
     loop = asyncio.get_running_loop()
     stages: asyncio.Queue[str | None] = asyncio.Queue()
@@ -95,6 +97,9 @@ async def follow(
         if result.cancelled():
             raise HTTPException(CLIENT_LEFT, "the client has disconnected before the computation began")
         result.result()
+    if first is None:
+        await _end(left)
+        return _known_answer(request, _last_event(result, request.url.path))
 
     async def stream() -> AsyncIterator[bytes]:
         try:
@@ -112,7 +117,15 @@ async def follow(
         finally:
             await _end(result, left)
 
-    return EventStream(stream(), headers={"Cache-Control": "no-cache"})
+    return EventStream(stream(), headers={"Cache-Control": REVALIDATED})
+
+
+def _known_answer(request: Request, event: bytes) -> Response:
+    """Return the event of an answer that was not computed now, with its ETag; 304 where the client has it."""
+    headers = {"Cache-Control": REVALIDATED, "ETag": weak_tag([event])}
+    if is_known(headers["ETag"], request.headers.get("if-none-match")):
+        return Response(status_code=304, headers=headers)
+    return Response(event, media_type=EventStream.media_type, headers=headers)
 
 
 async def execute(service: LabService, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:

@@ -18,6 +18,8 @@ from labctl.web.assets import IMMUTABLE, REVALIDATED, Asset, Assets, accepted_co
 
 FOLDER = Path(__file__).parent / "static"
 PLOTLY = Path(str(plotly.__file__)).parent / "package_data" / "plotly.min.js"
+#: Plotly's own build of the same version without maps, finance and three dimensions: a third of the size.
+PLOTLY_CARTESIAN = Path(__file__).parent / "vendor" / "plotly-cartesian.min.js"
 STATIC = "/static/"
 #: Address prefixes of the pages; the router in the browser handles the rest of an address.
 PAGES = (
@@ -76,7 +78,7 @@ def install(app: FastAPI) -> None:
 @cache
 def _assets() -> Assets:
     """Return the files, compressed once per process."""
-    return Assets(FOLDER, {"plotly.js": PLOTLY})
+    return Assets(FOLDER, {"plotly.js": PLOTLY, "plotly-cartesian.js": PLOTLY_CARTESIAN})
 
 
 def _is_of_a_browser(request: Request) -> bool:

@@ -11,7 +11,16 @@ import {
   temperatureColours,
 } from "../../labctl/web/static/js/core/colour_scales.js";
 import { csvText, fileName, traceRows } from "../../labctl/web/static/js/core/csv.js";
+import { buildFor } from "../../labctl/web/static/js/core/plotly.js";
 import { POSITIONS, signature, VARIABLES } from "../../labctl/web/static/js/effects/signatures.js";
+
+test("the small build of Plotly draws flat figures, the whole one everything else", () => {
+  const traces = (/** @type {string[]} */ ...types) => types.map((type) => ({ type }));
+  assert.equal(buildFor([]), "plotly-cartesian.js");
+  assert.equal(buildFor(traces("scatter", "heatmap", "bar")), "plotly-cartesian.js");
+  for (const other of ["surface", "scatter3d", "scattergl", "a later type"])
+    assert.equal(buildFor(traces("scatter", other)), "plotly.js", other);
+});
 
 test("cells with commas, quotes and line ends are quoted", () => {
   const rows = [

@@ -188,10 +188,11 @@ async def criticism_events(
     recordings: RecordingNumbers = None,
     other_unit: OtherUnit = False,
     formula: Formulas = None,
-) -> EventStream:
+) -> Response:
     """Server-sent events: `stage` as each stage begins, then `answer`, the criticism, or `problem`.
 
-    The computation is cancelled when the client leaves.
+    The computation is cancelled when the client leaves. An answer that was computed before has an ETag: 304 when the
+    caller has it already.
     """
     competing = tuple(read_formulas(formula or []))
     return await follow(

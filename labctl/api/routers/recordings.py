@@ -27,6 +27,7 @@ from labctl.answers.recordings import (
 )
 from labctl.api.computation import execute, while_connected, with_files
 from labctl.api.dependencies import ServiceDep, command_route
+from labctl.api.known_recording import OF_RECORDING
 from labctl.api.paging import AfterNumber, Limit, Search, in_parts
 from labctl.recording.column_map.templates import template
 from labctl.services.calibrations.orientation import orientation_of_recording
@@ -222,7 +223,7 @@ def datasets(recording: int, service: ServiceDep) -> DataSetsResponse:
     return catalogue.data_sets(service.store, recording)
 
 
-@router.get("/{recording}/trace", summary="A channel over time")
+@router.get("/{recording}/trace", summary="A channel over time", dependencies=[OF_RECORDING])
 async def trace(
     request: Request,
     recording: int,
@@ -241,7 +242,7 @@ async def trace(
     return await while_connected(request, service, trace_of, recording, channel, from_s, until_s, points)
 
 
-@router.get("/{recording}/inspection", summary="Inspection of a recording")
+@router.get("/{recording}/inspection", summary="Inspection of a recording", dependencies=[OF_RECORDING])
 async def inspection(request: Request, recording: int, service: ServiceDep) -> InspectionResponse:
     """What is wrong with the readings before anything is fitted to them, what was left out when they were imported, and
     a picture of every channel with the places of the findings."""

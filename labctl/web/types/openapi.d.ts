@@ -191,7 +191,8 @@ export interface paths {
          * Follow a criticism while it is computed
          * @description Server-sent events: `stage` as each stage begins, then `answer`, the criticism, or `problem`.
          *
-         *     The computation is cancelled when the client leaves.
+         *     The computation is cancelled when the client leaves. An answer that was computed before has an ETag: 304 when the
+         *     caller has it already.
          */
         get: operations["criticism_events_api_units__serial__calibrations__version__criticism_events_get"];
         put?: never;

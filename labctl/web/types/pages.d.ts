@@ -144,6 +144,7 @@ export interface Plotly {
   };
   restyle: (plot: HTMLElement, changed: object, traces: number[]) => Promise<unknown>;
   react: (plot: HTMLElement, data: PlotTrace[], layout: PlotLayout, config: object) => Promise<unknown>;
+  purge: (plot: HTMLElement) => unknown;
   relayout: (plot: HTMLElement, changed: object) => Promise<unknown>;
   toImage: (plot: HTMLElement | Picture, options: object) => Promise<string>;
 }

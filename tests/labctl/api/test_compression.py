@@ -5,9 +5,12 @@ from __future__ import annotations
 import gzip
 import json
 import zlib
+from collections.abc import Callable
+from typing import Protocol
 
 import httpx
 import pytest
+from backports import zstd
 from fastapi import FastAPI, Response
 from starlette.responses import StreamingResponse
 from starlette.testclient import TestClient
@@ -17,6 +20,10 @@ from labctl.api.routers import effects
 
 ROWS = [{"serial": f"A{number}", "rate_dps": number / 7} for number in range(500)]
 BODY = json.dumps(ROWS).encode()
+
+
+class Unpacking(Protocol):
+    def decompress(self, part: bytes, /) -> bytes: ...
 
 
 def events() -> StreamingResponse:
@@ -43,12 +50,22 @@ def sent(client: TestClient, path: str, accepted: str) -> tuple[httpx.Headers, b
         return answer.headers, b"".join(answer.iter_raw())
 
 
-def test_an_answer_is_compressed_for_a_client_that_takes_it(client: TestClient) -> None:
-    headers, raw = sent(client, "/rows", "gzip, deflate, br, zstd")
-    assert headers["content-encoding"] == "gzip"
+@pytest.mark.parametrize(
+    ("accepted", "coding", "unpack"),
+    [
+        ("gzip, deflate, br, zstd", "zstd", zstd.decompress),
+        ("gzip, deflate", "gzip", gzip.decompress),
+        ("gzip, zstd;q=0", "gzip", gzip.decompress),
+    ],
+)
+def test_an_answer_is_compressed_for_a_client_that_takes_it(
+    client: TestClient, accepted: str, coding: str, unpack: Callable[[bytes], bytes]
+) -> None:
+    headers, raw = sent(client, "/rows", accepted)
+    assert headers["content-encoding"] == coding
     assert headers["vary"] == "Accept-Encoding"
     assert int(headers["content-length"]) == len(raw) < len(BODY) / 3
-    assert json.loads(gzip.decompress(raw)) == ROWS
+    assert json.loads(unpack(raw)) == ROWS
 
 
 @pytest.mark.parametrize(("path", "accepted"), [("/rows", "identity"), ("/short", "gzip"), ("/file", "gzip")])
@@ -58,11 +75,15 @@ def test_what_gains_nothing_or_is_a_file_passes_as_it_is(client: TestClient, pat
     assert json.loads(raw) == ROWS[: len(json.loads(raw))]
 
 
-def test_events_that_end_with_an_answer_are_compressed_and_sent_one_by_one(client: TestClient) -> None:
-    with client.stream("GET", "/criticism/events", headers={"accept-encoding": "gzip"}) as answer:
-        assert answer.headers["content-encoding"] == "gzip"
+@pytest.mark.parametrize(
+    ("coding", "unpack"), [("gzip", zlib.decompressobj(16 + zlib.MAX_WBITS)), ("zstd", zstd.ZstdDecompressor())]
+)
+def test_events_that_end_with_an_answer_are_compressed_and_sent_one_by_one(
+    client: TestClient, coding: str, unpack: Unpacking
+) -> None:
+    with client.stream("GET", "/criticism/events", headers={"accept-encoding": coding}) as answer:
+        assert answer.headers["content-encoding"] == coding
         raw = list(answer.iter_raw())
-    unpack = zlib.decompressobj(16 + zlib.MAX_WBITS)
     events = [unpack.decompress(part) for part in raw]
     assert b"".join(events) == b"data: 1\n\n" * 500
     assert events[0].startswith(b"data: 1\n\n"), "the first event is there before the last is made"

@@ -14,7 +14,7 @@ from starlette.testclient import TestClient
 
 from labctl.web import install
 from labctl.web.assets import Assets, accepted_codings
-from labctl.web.pages import FOLDER, PLOTLY
+from labctl.web.pages import FOLDER, PLOTLY, PLOTLY_CARTESIAN
 
 FIGURES = FOLDER / "js" / "core" / "figure.js"
 
@@ -41,6 +41,19 @@ def test_each_file_of_a_page_has_an_address_of_its_release(client: TestClient) -
         answer = client.get(address)
         assert answer.status_code == 200, address
         assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
+
+
+def test_both_builds_of_plotly_are_of_one_version(client: TestClient) -> None:
+    """Else a figure would change with what else its page shows; `npm pack plotly.js-cartesian-dist-min@VERSION`."""
+    heads = [path.read_text(encoding="utf-8")[:200] for path in (PLOTLY, PLOTLY_CARTESIAN)]
+    first, second = (re.search(r"plotly\.js .*v(\d+\.\d+\.\d+)", head) for head in heads)
+    assert first is not None
+    assert second is not None
+    assert first[1] == second[1]
+    served = client.get(release_of(client) + "plotly-cartesian.js")
+    assert served.content == PLOTLY_CARTESIAN.read_bytes()
+    assert len(served.content) < PLOTLY.stat().st_size / 3
+    assert PLOTLY_CARTESIAN.with_name("plotly.LICENSE").read_text(encoding="utf-8").startswith("MIT License")
 
 
 def test_no_file_names_another_by_an_address_that_does_not_change() -> None:

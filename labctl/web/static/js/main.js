@@ -1,6 +1,6 @@
 // Entry point: the routes of all pages.
 
-import { loadPlotly } from "./core/figure.js";
+import { loadPlotly } from "./core/plotly.js";
 import { route, start } from "./core/router.js";
 import { buildLayout } from "./core/layout.js";
 import { preparePrinting } from "./core/print.js";

@@ -6,31 +6,12 @@ import { figureAddress, showIfAsked } from "./figure_link.js";
 import { csvText, fileName, traceRows } from "./csv.js";
 import { toast } from "./components.js";
 import { h, whenNearViewport } from "./elements.js";
-import { staticUrl } from "./static_url.js";
+import { loadPlotly, loadedFor, setDrawnBy } from "./plotly.js";
 
 /** @import { CsvRows, Figure, Picture, Plot, PlotLayout, Plotly, PlotTrace } from "../../../types/pages.js" */
 
-/** @type {Promise<Plotly> | null} */
-let script = null;
 /** @type {Set<Figure>} */
 const drawnFigures = new Set();
-
-/**
- * Load Plotly once, on first use.
- * @returns {Promise<Plotly>}
- */
-export function loadPlotly() {
-  script ??= new Promise((resolve, reject) => {
-    const failed = () => {
-      script = null; // the next figure tries again
-      reject(new Error("the plotting library could not be loaded; reload the page"));
-    };
-    document.head.append(
-      h("script", { src: staticUrl("plotly.js"), onload: () => resolve(window.Plotly), onerror: failed }),
-    );
-  });
-  return script;
-}
 
 /** Height of the line below a saved figure. */
 const LINE_PX = 24;
@@ -179,7 +160,7 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
 
   /** @param {"png" | "svg"} format */
   async function picture(format) {
-    const Plotly = await loadPlotly();
+    const Plotly = await loadPlotly(plot.data);
     const link = await Plotly.toImage(withLine(plot, provenance()), {
       format,
       width: Math.max(plot.clientWidth, 800),
@@ -194,19 +175,21 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
   async function update() {
     if (waiting) return;
     waiting = true;
-    const Plotly = await loadPlotly();
+    await loadPlotly();
     await new Promise(requestAnimationFrame);
     waiting = false;
-    await drawWith(Plotly, null);
+    const picture = draw();
+    await drawWith(await loadPlotly(picture.data), picture, null);
     performance.mark("labctl:picture");
   }
 
   /**
    * @param {Plotly} Plotly
+   * @param {Picture} picture
    * @param {number | null} width px; null: as wide as the page lets it be
    */
-  async function drawWith(Plotly, width) {
-    const { data, layout = {} } = draw();
+  async function drawWith(Plotly, { data, layout = {} }, width) {
+    setDrawnBy(plot, Plotly);
     const first = !plot.data;
     const sized = width === null ? { autosize: true } : { autosize: false, width };
     await Plotly.react(plot, data, { ...themedLayout(layout), ...sized }, config(data));
@@ -221,7 +204,9 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
    * @param {number | null} width
    */
   function drawAt(width) {
-    if (window.Plotly) drawWith(window.Plotly, width);
+    const picture = draw();
+    const Plotly = loadedFor(picture.data);
+    if (Plotly) drawWith(Plotly, picture, width);
   }
   showIfAsked(element, slug);
   whenNearViewport(element, update); // draw on demand: a page with ten figures opens as fast as one with two

@@ -7,6 +7,7 @@ import { h, setChildren } from "./elements.js";
 import { count, plainNumber } from "./format.js";
 import { button, factList, loadInto, notice } from "./components.js";
 import { reachByKeyboard } from "./keyboard_points.js";
+import { drawnBy } from "./plotly.js";
 import { query, updateQuery } from "./router.js";
 
 /** @import { FigurePoint } from "../../../types/api.js" */
@@ -155,8 +156,8 @@ export function selectPoints(figure, place, asked) {
   reachByKeyboard(figure, {
     places,
     onmove: (at) => {
-      if (at) window.Plotly.Fx.hover(figure.plot, [{ curveNumber: at.sets[0], pointNumber: at.sets[1] }]);
-      else window.Plotly.Fx.unhover(figure.plot);
+      if (at) drawnBy(figure.plot).Fx.hover(figure.plot, [{ curveNumber: at.sets[0], pointNumber: at.sets[1] }]);
+      else if (figure.plot.data) drawnBy(figure.plot).Fx.unhover(figure.plot);
     },
     onselect: ([series, k]) => (series === undefined ? place.close() : show(series, k)),
   });

@@ -2,7 +2,8 @@
 // noise floor. The numbers at rest are those of the service; what is shown in between is drawn between them.
 
 import { setChildren, h, wantsLessMotion } from "../core/elements.js";
-import { axisColour, colour, figure, loadPlotly } from "../core/figure.js";
+import { axisColour, colour, figure } from "../core/figure.js";
+import { drawnBy, loadPlotly } from "../core/plotly.js";
 import { isNumber, number, percent } from "../core/format.js";
 import { button, card } from "../core/components.js";
 import { channelTitle, inDatasetOrder, scaled, setText, shownText } from "./dataset_rows.js";
@@ -254,7 +255,7 @@ function residualDots(state, shown, first) {
   );
   return {
     element,
-    move: (residual) => element.plot.data && window.Plotly.restyle(element.plot, { y: [[...residual]] }, [0]),
+    move: (residual) => element.plot.data && drawnBy(element.plot).restyle(element.plot, { y: [[...residual]] }, [0]),
   };
 }
 

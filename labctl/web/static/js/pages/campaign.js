@@ -180,10 +180,11 @@ export async function page({ params, query, signal }) {
 function loadCourse(now, path, signal) {
   const first = Object.values(now.recordings)[0];
   const one = { path: { recording: String(first) }, signal };
+  const alone = { ...one, query: { points: false } };
   return Promise.all([
     get("/api/campaigns/{campaign}/course", { path, signal }),
     first === undefined ? null : get("/api/recordings/{recording}/datasets", one),
-    first === undefined ? null : get("/api/recordings/{recording}", one),
+    first === undefined ? null : get("/api/recordings/{recording}", alone),
   ]);
 }
 

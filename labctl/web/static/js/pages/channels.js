@@ -166,7 +166,7 @@ async function readLogged(now, last, signal) {
       const of = { path: { recording: String(recording) }, signal };
       const [sets, about] = await Promise.all([
         get("/api/recordings/{recording}/datasets", of),
-        get("/api/recordings/{recording}", of),
+        get("/api/recordings/{recording}", { ...of, query: { points: false } }),
       ]);
       return { serial, sets: { ...sets, output: about.info.output ?? {} } };
     }),

@@ -22,6 +22,9 @@ const LISTED = 100;
 
 /** @param {PageContext} context */
 export async function page({ query: asked, signal }) {
+  // with the unit in the address, what is asked for does not wait for the list
+  const asking = asked.unit ? unitAndRecordings(asked.unit, signal) : null;
+  asking?.catch(() => {}); // awaited below
   const units = await get("/api/units", { query: { limit: LISTED }, signal });
   if (!units.length) {
     return h(
@@ -35,10 +38,7 @@ export async function page({ query: asked, signal }) {
     );
   }
   const { serial } = asked.unit ? { serial: asked.unit } : (units.find((each) => each.calibrations.length) ?? units[0]);
-  const [unit, own] = await Promise.all([
-    get("/api/units/{serial}", { path: { serial }, signal }),
-    get("/api/recordings", { query: { unit: serial }, signal }),
-  ]);
+  const [unit, own] = await (asking ?? unitAndRecordings(serial, signal));
   const versions = [...unit.calibrations].sort((a, b) => a - b);
   const version = asked.version ? Number(asked.version) : versions.at(-1);
   const calibration =
@@ -63,6 +63,16 @@ export async function page({ query: asked, signal }) {
   else element.append(versionView({ unit, calibration, versions, chosen, motion, query: asked, signal }));
   return element;
 }
+
+/**
+ * @param {string} serial
+ * @param {AbortSignal} signal
+ */
+const unitAndRecordings = (serial, signal) =>
+  Promise.all([
+    get("/api/units/{serial}", { path: { serial }, signal }),
+    get("/api/recordings", { query: { unit: serial }, signal }),
+  ]);
 
 /**
  * What the figures of the page are of.

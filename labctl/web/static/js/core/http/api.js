@@ -180,6 +180,17 @@ export async function* eventStream(path, { path: parameters, after, query, signa
   }
 }
 
+/**
+ * Request an answer that was just computed once more, when the page is idle: now it has an ETag, so the browser keeps
+ * it and the next view of the page does not load it again.
+ * @param {FollowedPath} path
+ * @param {Options<"get", FollowedPath>} options
+ */
+function keepAnswer(path, { path: parameters, query, signal }) {
+  const again = () => fetch(address(path, parameters, query), { headers: headers(), signal }).then((r) => r.text());
+  (window.requestIdleCallback ?? setTimeout)(() => again().catch(() => {}));
+}
+
 /** @typedef {"/api/units/{serial}/calibrations/{version}/criticism/events"} FollowedPath */
 /** @typedef {Streams[FollowedPath]} Followed */
 /**
@@ -190,10 +201,15 @@ export async function* eventStream(path, { path: parameters, after, query, signa
  * @returns {Promise<Followed["answer"]>}
  */
 export async function getFollowed(path, { onstage, ...options }) {
+  let computed = false;
   for await (const { event, data } of eventStream(path, options)) {
-    if (event === "stage") onstage(/** @type {Followed["stage"]} */ (data).stage);
-    else if (event === "answer") return /** @type {Followed["answer"]} */ (data);
-    else if (event === "problem") throw new Problem(/** @type {Followed["problem"]} */ (data));
+    if (event === "stage") {
+      computed = true;
+      onstage(/** @type {Followed["stage"]} */ (data).stage);
+    } else if (event === "answer") {
+      if (computed) keepAnswer(path, options);
+      return /** @type {Followed["answer"]} */ (data);
+    } else if (event === "problem") throw new Problem(/** @type {Followed["problem"]} */ (data));
   }
   throw new Unreachable();
 }

@@ -1,6 +1,7 @@
 // Two 3-D scenes on the same axes, side by side, or one above the other on a narrow screen.
 
 import { colour } from "../../core/figure.js";
+import { drawnBy } from "../../core/plotly.js";
 
 /** @import { Plot } from "../../../../types/pages.js" */
 
@@ -81,6 +82,6 @@ export function linkCameras(plot) {
   plot.on("plotly_relayout", (changed) => {
     if (CAMERAS.every(([from]) => from in changed)) return; // both were set by this function
     for (const [from, to] of CAMERAS)
-      if (from in changed) window.Plotly.relayout(plot, { [from]: changed[from], [to]: changed[from] });
+      if (from in changed) drawnBy(plot).relayout(plot, { [from]: changed[from], [to]: changed[from] });
   });
 }
