@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from labctl.services.planning.plan_answer import describe_plan
-from tests.helpers.browser import NARROW, Faults, Service, figure
+from tests.helpers.browser import NARROW, Faults, Service, figure, number_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -159,7 +159,7 @@ def test_a_plan_says_what_further_mountings_are_worth(tmp_path: Path, chromium: 
         for row, more in enumerate(plan.misalignment.further, start=1):
             expect(rows.nth(row)).to_contain_text(more.turned)
             expect(rows.nth(row)).to_contain_text(more.recipe_toml)
-            said = float(rows.nth(row).get_by_role("cell").nth(1).inner_text().replace("−", "-"))
+            said = number_of(rows.nth(row).get_by_role("cell").nth(1).inner_text())
             assert said == pytest.approx(more.expanded, rel=0.05)
         page.close()
     finally:

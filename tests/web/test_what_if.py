@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from labctl.services.planning.plan_answer import describe_plan
-from tests.helpers.browser import Service, figure, settled
+from tests.helpers.browser import Service, figure, number_of, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
@@ -104,7 +104,7 @@ def test_another_shape_is_fitted_again_by_the_service_and_the_fitted_one_comes_b
     knee.fill("36.4")
     knee.dispatch_event("change")
     expect(panel).to_contain_text("Fitted again with this shape.")
-    stated = float(panel.locator("label", has_text="Shape:").locator("span.muted").inner_text().split()[0])
+    stated = number_of(panel.locator("label", has_text="Shape:").locator("span.muted").inner_text().split()[0])
     assert 60 < stated < 80
     expected = service.post(
         "/api/units/OSU-FOG-2024/calibrations/1/preview", {"add": [f"saturation@knee_dps={stated}"]}
