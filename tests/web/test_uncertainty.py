@@ -162,7 +162,7 @@ def test_titles_and_legend_of_contributions_are_whole_and_apart(visit: Callable[
         assert max(text[3] for text in texts) <= bottom + 1, found
         assert min(name[2] for name in found["names"]) >= found["titles"][0][3] - 1, (
             found
-        )  # below the title of the axis
+        )  # below the axis
         assert found["panel"][3] - found["panel"][2] > (bottom - top) / 3, found  # the legend leaves room to the lines
 
 
