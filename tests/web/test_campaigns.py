@@ -232,3 +232,29 @@ def test_a_designed_recipe_is_the_services_and_its_plan_is_shown(service: Servic
     plan = service.post("/api/plans", {"recipe": expected["recipe_toml"]})
     expect(page.get_by_role("region", name="Steps")).to_contain_text(str(plan["datasets"]))
     assert plan["expected_s"] == pytest.approx(3600 * expected["chosen"]["hours"])
+
+
+#: A list of events of two days, on the page.
+EVENTS = """async (given) => {
+  const { eventList } = await import("/static/js/bench/event_list.js");
+  const list = eventList(10);
+  document.querySelector("main").replaceChildren(list);
+  given.forEach((at, k) =>
+    list.add({ at, t_s: 60 * k, level: "info", kind: "note", message: `event ${k}`, device: null, value: null }));
+}"""
+
+
+def test_events_of_several_days_stand_below_their_day(visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/campaigns")
+    page.get_by_role("heading", name="Campaigns", exact=True).wait_for()
+    page.evaluate(EVENTS, ["2026-01-05T12:00:00Z", "2026-01-06T12:00:00Z", "2026-01-06T12:01:00Z"])
+    lines = page.locator("main .events li")
+    expect(lines).to_have_count(5)
+    days = [text for text in lines.all_inner_texts() if text.endswith("2026")]
+    assert days == ["6 Jan 2026", "5 Jan 2026"]
+    assert lines.nth(0).inner_text() == "6 Jan 2026"
+    assert "event 0" in lines.nth(4).inner_text()
+    page.evaluate(EVENTS, ["2026-01-06T12:00:00Z", "2026-01-06T12:01:00Z"])
+    expect(lines).to_have_count(2)  # one day needs no line of its own

@@ -91,6 +91,25 @@ def test_a_search_is_in_the_address_and_finds_what_was_not_shown(visit: Callable
     expect(page.get_by_text("No units hold “nosuch”.")).to_be_visible()
 
 
+def test_units_have_the_same_order_in_every_list(service: Service, visit: Callable[..., Page]) -> None:
+    serials = ["AA2", "A-10", "A-02", "Aa2", "A-2", "A.2", "A-002"]
+    with service.lab_service.store._database.writing() as connection:
+        connection.execute(
+            sa.insert(tables.units),
+            [{"serial": serial, "model": "VG-35", "technology": "fog", "first_seen_at": AT} for serial in serials],
+        )
+    ordered = [row["serial"] for row in service.get("/api/units")]
+    assert ordered == ["A-2", "A-02", "A-002", "A-10", "A.2", "AA2", "Aa2"]
+    page = visit("/units")
+    page.get_by_role("main").locator("tbody tr").nth(6).wait_for()
+    assert page.get_by_role("main").locator("tbody tr td:first-child").all_inner_texts() == ordered
+    page = visit("/explore?unit=A-10")
+    choice = page.get_by_label("Unit")
+    choice.wait_for()
+    assert choice.locator("option").all_inner_texts() == ordered
+    assert choice.input_value() == "A-10"
+
+
 @pytest.mark.usefixtures("many")
 def test_a_choice_is_in_the_address_and_goes_with_a_search(visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect

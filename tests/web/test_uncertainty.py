@@ -160,9 +160,7 @@ def test_titles_and_legend_of_contributions_are_whole_and_apart(visit: Callable[
         assert max(text[1] for text in texts) <= right + 1, found
         assert min(text[2] for text in texts) >= top - 1, found
         assert max(text[3] for text in texts) <= bottom + 1, found
-        assert min(name[2] for name in found["names"]) >= found["titles"][0][3] - 1, (
-            found
-        )  # below the axis
+        assert min(name[2] for name in found["names"]) >= found["titles"][0][3] - 1, found  # below the axis
         assert found["panel"][3] - found["panel"][2] > (bottom - top) / 3, found  # the legend leaves room to the lines
 
 
