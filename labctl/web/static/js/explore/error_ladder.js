@@ -18,6 +18,8 @@ import { residualMap } from "./residual_map.js";
 
 /** The raw error is hidden at first where it is more than this factor above the fitted errors and would flatten their lines. */
 const RAW_ERROR_RATIO = 10;
+/** Room for the words beside the line of the noise floor. */
+const FLOOR_PX = 48;
 
 /**
  * @param {Ladder} ladder
@@ -63,6 +65,7 @@ export function ladderFigure(ladder, motion) {
     layout: {
       yaxis: { type: "log", title: { text: "RMS error, deg/s" }, ...ticksOf(sizes), tickformat: "~g" },
       xaxis: { type: "category" },
+      margin: { l: 58, r: FLOOR_PX, t: 12, b: 44 },
       shapes: ladder.noise_floor_dps
         ? [
             {
@@ -80,12 +83,14 @@ export function ladderFigure(ladder, motion) {
         ? [
             {
               xref: "paper",
-              x: 0.01,
+              x: 1,
+              xshift: 4,
               y: Math.log10(ladder.noise_floor_dps),
-              text: "noise floor",
+              text: "noise<br>floor", // beside the line: on it, it would lie over a version that reaches the floor
+              align: "left",
               showarrow: false,
               xanchor: "left",
-              yanchor: "bottom",
+              yanchor: "middle",
               font: { color: colour("good"), size: 12 },
             },
           ]

@@ -259,7 +259,8 @@ function coefficientText(suspect, axis) {
  * A value with no line break before its uncertainty, nor within its power of ten.
  * @param {string} text
  */
-const unbroken = (text) => text.replaceAll(" ± ", "\u00a0±\u00a0").replaceAll("× ", "×\u00a0");
+const unbroken = (text) =>
+  text.replaceAll(/ (%|± )|([<>]) /g, (gap) => gap.replaceAll(" ", "\u00a0")).replaceAll("× ", "×\u00a0");
 
 /** @param {Criticism} criticism */
 function aliasNotice(criticism) {
@@ -339,8 +340,8 @@ function experimentList(criticism) {
             {},
             each.do,
             each.hours ? ` (${number(each.hours, 2)} h)` : "",
-            `; one cause is then named alone with a probability of ${probabilityText(each.power)}`,
-            each.names_wrong < MIN_WRONG ? "" : `, a wrong one with ${probabilityText(each.names_wrong)}`,
+            `; one cause is then named alone with a probability of ${unbroken(probabilityText(each.power))}`,
+            each.names_wrong < MIN_WRONG ? "" : `, a wrong one with ${unbroken(probabilityText(each.names_wrong))}`,
           ),
           h("p", { class: "muted small" }, each.why),
           each.toml
