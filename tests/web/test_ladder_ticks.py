@@ -23,7 +23,7 @@ LADDER = """async (errors) => {
   const drawn = new Promise((resolve) => { figure.ondrawn = resolve; });
   await figure.update();
   await drawn;
-  return [...figure.querySelectorAll(".ytick")].map((each) => [each.textContent, each.getBoundingClientRect().top]);
+  return [...figure.querySelectorAll(".ytick text")].map((each) => [each.textContent, each.getBoundingClientRect().top]);
 }"""
 
 
