@@ -23,7 +23,8 @@ LADDER = """async (errors) => {
   const drawn = new Promise((resolve) => { figure.ondrawn = resolve; });
   await figure.update();
   await drawn;
-  return [...figure.querySelectorAll(".ytick text")].map((each) => [each.textContent, each.getBoundingClientRect().top]);
+  const labels = [...figure.querySelectorAll(".ytick text")];
+  return labels.map((each) => [each.textContent, each.getBoundingClientRect().top]);
 }"""
 
 
