@@ -211,6 +211,12 @@ def settled(page: Page) -> None:
     page.wait_for_function("() => !document.querySelector('main[aria-busy], .busy')", polling=POLL_MS)
 
 
+def number_of(text: str) -> float:
+    """Return a number that a page shows: its sign is the minus sign, U+2212."""
+    assert "-" not in text, f"{text!r} has a hyphen where a page has the minus sign"
+    return float(text.replace("\u2212", "-"))
+
+
 def figure(page: Page, name: str) -> dict[str, Any]:
     """Return what a figure of the page shows, once it is drawn."""
     plot = page.locator(f'.plot[aria-label^="{name}"]').first

@@ -50,9 +50,9 @@ test("readings of one time are those of chamber, unit, step and data set", () =>
   assert.equal(rows.Step, "2: acquire");
   assert.equal(rows.Chamber, "20.00 deg C");
   assert.equal(rows.A, "22.00 deg C");
-  assert.equal(rows["Table rate"], "-40 deg/s");
+  assert.equal(rows["Table rate"], "−40 deg/s");
   assert.equal(rows["Data set"], "1: complete");
-  assert.equal(rows["gyro z"], "-39.98765 V");
+  assert.equal(rows["gyro z"], "−39.98765 V");
   assert.equal(
     Object.fromEntries(readingsAt({ course: COURSE, steps: STEPS, datasets: null }, 95)).Step,
     "between two steps",

@@ -21,9 +21,10 @@ test("effects that a verdict names come first, then the most probable", () => {
   assert.equal(suspectColumns([{ named: [], suspects: many }]).length, 5);
 });
 
-test("a suspect that is not listed has no probability, one far below 1 % has 0", () => {
+test("a suspect that is not listed has no probability, and none is impossible or certain", () => {
   const line = lineOfRound(ROUND, ["thermal_lag", "warm_up", "run_shift"]);
-  assert.deepEqual(line.probabilities, ["–", "0.61", "0"]);
+  assert.deepEqual(line.probabilities, ["–", "61 %", "< 1 %"]);
+  assert.deepEqual(lineOfRound({ ...ROUND, suspects: { warm_up: 0.9999 } }, ["warm_up"]).probabilities, ["> 99 %"]);
   assert.deepEqual([line.hours, line.verdict], ["2.1", "ambiguous: thermal_lag, warm_up"]);
   assert.equal(lineOfRound({ ...ROUND, came_text: "measured" }, []).experiment, `${ROUND.why}. measured`);
 });

@@ -17,6 +17,9 @@ test("a number has its significant digits, and a power of ten only far from 1", 
   holds(format.number, [
     [[0.0012], "0.00120"],
     [[1234.5], "1230"],
+    [[-1234.5], "−1230"],
+    [[-0.0042, 2], "−0.0042"],
+    [[-4.5e-7, 2], "−4.5 × 10⁻⁷"],
     [[9.999], "10.0"],
     [[0], "0"],
     [[4.5e-7, 2], "4.5 × 10⁻⁷"],
@@ -30,8 +33,10 @@ test("a number has its significant digits, and a power of ten only far from 1", 
 
 test("a setting has no trailing zeros", () => {
   holds(format.plainNumber, [
-    [[-100], "-100"],
+    [[-100], "−100"],
+    [[-1270.4], "−1270"],
     [[12.5], "12.5"],
+    [[-2.5e-7], "−2.5e−7"],
     [[0.0042], "0.0042"],
     [[null], "–"],
   ]);
@@ -73,7 +78,10 @@ test("a result and its uncertainty end at the same place", () => {
   holds(format.withUncertainty, [
     [[0.0002013, 0.0000031, "1"], "201.3 ± 3.1 ppm"],
     [[9.06e-7, 2.1e-9, "(deg/s)^-1"], "(9.060 ± 0.021) × 10⁻⁷ (deg/s)⁻¹"],
+    [[-0.02, 0.0031, "deg/s"], "−0.0200 ± 0.0031 deg/s"],
+    [[-9.06e-7, 2.1e-9, "(deg/s)^-1"], "(−9.060 ± 0.021) × 10⁻⁷ (deg/s)⁻¹"],
     [[1.5, null, "deg/s"], "1.5 deg/s"],
+    [[-1.5, null, "deg/s"], "−1.5 deg/s"],
     [[null, 1, "deg/s"], "–"],
   ]);
 });
@@ -83,6 +91,41 @@ test("the uncertainty has two significant digits, and the value its place", () =
   assert.deepEqual(roundedToUncertainty(1234.5, 120), { value: "1230", u: "120", exponent: 0 });
   assert.equal(roundedToUncertainty(-0.00002, 0.0019).value, "0.0000"); // a zero has no sign
   assert.deepEqual(roundedToUncertainty(0, null), { value: "0", u: null, exponent: 0 });
+});
+
+test("every way to write a negative number has the minus sign", () => {
+  const written = [
+    format.number(-12.3),
+    format.plainNumber(-12.3),
+    format.withUnit(-12.3, "deg/s"),
+    format.count(-1234),
+    format.percent(-0.5),
+    format.fixed(-12.3, 1),
+    format.mean(-12.3, 0.1),
+    format.sizeText(-12.3, "deg/s"),
+    format.sizeText(-0.000014, "1"),
+    format.withUncertainty(-12.3, 0.1, "deg/s"),
+  ];
+  for (const text of written) assert.match(text, /^−\d[^-]*$/);
+});
+
+/** @type {[probability: number, text: string][]} */
+const probabilities = JSON.parse(readFileSync("tests/pages/probabilities.json", "utf8"));
+
+test("what was computed is neither impossible nor certain", () => {
+  for (const [probability, text] of probabilities) assert.equal(format.probabilityText(probability), text);
+});
+
+test("only nothing is 0 %, and only all is 100 %", () => {
+  holds(format.percent, [
+    [[0], "0 %"],
+    [[1], "100 %"],
+    [[0.999], "> 99 %"],
+    [[0.001], "< 1 %"],
+    [[0.4], "40 %"],
+    [[1.5], "150 %"],
+    [[null], "–"],
+  ]);
 });
 
 test("ids and units are words", () => {
@@ -110,8 +153,8 @@ test("evidence is said as odds", () => {
 test("a mean that is rounded to zero has no sign", () => {
   holds(format.mean, [
     [[-0.00004, 1], "0.00"],
-    [[-0.00004, 0.0001], "-0.000040"],
-    [[-0.06, 1], "-0.06"],
+    [[-0.00004, 0.0001], "−0.000040"],
+    [[-0.06, 1], "−0.06"],
   ]);
 });
 

@@ -28,7 +28,7 @@ const SILENT = { ...AIR, kind: "stale", device: "imu", title: "silent", value: 2
 
 test("a strip says reading, limit, distance and age", () => {
   assert.equal(valueText(AIR), "20.0 deg C");
-  assert.equal(limitText(AIR), "-42 to 102 deg C");
+  assert.equal(limitText(AIR), "−42 to 102 deg C");
   assert.equal(distanceText(AIR), "62.0 K left");
   assert.equal(ageText(AIR), "0.4 s old");
   assert.equal(limitText(SILENT), "at most 30 s");

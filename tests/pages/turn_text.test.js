@@ -8,9 +8,9 @@ import { turnText } from "../../labctl/web/static/js/bench/turn_text.js";
 const turn = { phase: "turn", position: "-x", asked_deg: -720, attempt: 1, came_deg: {} };
 
 test("what is asked, and what has come out so far", () => {
-  assert.deepEqual(turnText(turn), { text: "-720 deg about -x, clockwise.", share: 0 });
+  assert.deepEqual(turnText(turn), { text: "−720 deg about -x, clockwise.", share: 0 });
   assert.deepEqual(turnText({ ...turn, came_deg: { imu: -360.4 } }), {
-    text: "-360 deg of -720 deg about -x, clockwise.",
+    text: "−360 deg of −720 deg about -x, clockwise.",
     share: 360.4 / 720,
   });
 });

@@ -11,7 +11,7 @@ import pytest
 from instruments.clock import SystemClock
 from labctl.services.benches import check
 from labctl.services.campaigns import preparation
-from tests.helpers.browser import Faults, Service
+from tests.helpers.browser import Faults, Service, number_of
 from tests.helpers.paced_hand import PacedClock, PacedPerson
 from tests.helpers.paths import RECIPES
 
@@ -198,7 +198,7 @@ def test_a_strip_for_each_limit_says_what_the_service_watches(service: Service, 
         expect(strip).to_have_class("limit-strip good")
     air = next(each for each in watched if each["kind"] == "chamber_limits")
     shown = page.locator('[data-kind="chamber_limits"] .limit-value').inner_text()
-    assert float(shown.split()[0]) == pytest.approx(air["value"], abs=0.5)
+    assert number_of(shown.split()[0]) == pytest.approx(air["value"], abs=0.5)
 
     page.get_by_role("link", name="Wall view").click()
     expect(page.get_by_role("navigation", name="Pages")).to_be_hidden()

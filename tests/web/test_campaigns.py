@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from labctl.services.planning.plan_answer import describe_plan
-from tests.helpers.browser import NARROW, Faults, Service, figure
+from tests.helpers.browser import NARROW, Faults, Service, figure, number_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -159,7 +159,7 @@ def test_a_plan_says_what_further_mountings_are_worth(tmp_path: Path, chromium: 
         for row, more in enumerate(plan.misalignment.further, start=1):
             expect(rows.nth(row)).to_contain_text(more.turned)
             expect(rows.nth(row)).to_contain_text(more.recipe_toml)
-            said = float(rows.nth(row).get_by_role("cell").nth(1).inner_text().replace("−", "-"))
+            said = number_of(rows.nth(row).get_by_role("cell").nth(1).inner_text())
             assert said == pytest.approx(more.expanded, rel=0.05)
         page.close()
     finally:
@@ -232,3 +232,29 @@ def test_a_designed_recipe_is_the_services_and_its_plan_is_shown(service: Servic
     plan = service.post("/api/plans", {"recipe": expected["recipe_toml"]})
     expect(page.get_by_role("region", name="Steps")).to_contain_text(str(plan["datasets"]))
     assert plan["expected_s"] == pytest.approx(3600 * expected["chosen"]["hours"])
+
+
+#: A list of events of two days, on the page.
+EVENTS = """async (given) => {
+  const { eventList } = await import("/static/js/bench/event_list.js");
+  const list = eventList(10);
+  document.querySelector("main").replaceChildren(list);
+  given.forEach((at, k) =>
+    list.add({ at, t_s: 60 * k, level: "info", kind: "note", message: `event ${k}`, device: null, value: null }));
+}"""
+
+
+def test_events_of_several_days_stand_below_their_day(visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/campaigns")
+    page.get_by_role("heading", name="Campaigns", exact=True).wait_for()
+    page.evaluate(EVENTS, ["2026-01-05T12:00:00Z", "2026-01-06T12:00:00Z", "2026-01-06T12:01:00Z"])
+    lines = page.locator("main .events li")
+    expect(lines).to_have_count(5)
+    days = [text for text in lines.all_inner_texts() if text.endswith("2026")]
+    assert days == ["6 Jan 2026", "5 Jan 2026"]
+    assert lines.nth(0).inner_text() == "6 Jan 2026"
+    assert "event 0" in lines.nth(4).inner_text()
+    page.evaluate(EVENTS, ["2026-01-06T12:00:00Z", "2026-01-06T12:01:00Z"])
+    expect(lines).to_have_count(2)  # one day needs no line of its own

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from labctl.plots.temperature_scale import TEMPERATURE_SCALE
-from tests.helpers.browser import NARROW, Service, figure
+from tests.helpers.browser import NARROW, Service, figure, number_of
 from tests.helpers.simulated_recordings import three_axes
 
 if TYPE_CHECKING:
@@ -82,8 +82,8 @@ def check_map(drawn: dict[str, Any], rows: list[dict[str, Any]]) -> None:
                 assert score is not None
                 for dataset in cell:
                     assert number[dataset]["position"] == trace["name"][0]
-                    assert float(x) == pytest.approx(number[dataset]["table_rate_dps"], rel=1e-3)
-                    assert float(y) == pytest.approx(number[dataset]["temperature_c"], abs=0.25)
+                    assert number_of(x) == pytest.approx(number[dataset]["table_rate_dps"], rel=1e-3)
+                    assert number_of(y) == pytest.approx(number[dataset]["temperature_c"], abs=0.25)
                 seen += cell
     assert sorted(seen) == list(range(1, 631))
 

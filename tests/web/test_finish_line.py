@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from labctl.probability_text import probability_text
 from tests.helpers.browser import Faults, Service, figure, settled
 
 if TYPE_CHECKING:
@@ -82,7 +83,9 @@ def test_explore_says_what_its_buttons_do_and_what_an_experiment_can_decide(
         assert set(link.inner_text().lower().split()) <= set(re.findall("[a-z]+", heading.lower())), heading
 
     learn = page.get_by_role("region", name="Which effects are missing")
-    expect(learn).to_contain_text(f"names the cause with a probability of {100 * best['power']:.0f} %")
+    expect(learn).to_contain_text(
+        f"one cause is then named alone with a probability of {probability_text(best['power'])}"
+    )
     sine = learn.get_by_role("listitem").filter(has_text="sine response")
     sine.get_by_role("button", name="What if").click()
     expect(page.get_by_role("heading", name="What if: sine response")).to_be_in_viewport()

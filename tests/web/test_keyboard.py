@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.helpers.browser import Service, figure, settled
+from tests.helpers.browser import Service, figure, number_of, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -41,13 +41,13 @@ def test_a_cell_of_the_map_is_reached_read_and_selected(explored: Page, service:
     from playwright.sync_api import expect
 
     cells = figure(explored, "Residual over floor")["data"]
-    rates = sorted({float(x) for x in cells[0]["x"]})
+    rates = sorted({number_of(x) for x in cells[0]["x"]})
     tab_to(explored, "Residual over floor")
     explored.keyboard.press("ArrowRight")
     line = explored.locator(".keyboard-line").first
-    expect(line).to_contain_text(f"{rates[0]:g} deg/s")
+    expect(line).to_contain_text(f"{rates[0]:g} deg/s".replace("-", "\u2212"))
     explored.keyboard.press("ArrowRight")
-    expect(line).to_contain_text(f"{rates[1]:g} deg/s")
+    expect(line).to_contain_text(f"{rates[1]:g} deg/s".replace("-", "\u2212"))
     explored.keyboard.press("End")
     expect(line).to_contain_text(f"{rates[-1]:g} deg/s")
     explored.keyboard.press("ArrowLeft")

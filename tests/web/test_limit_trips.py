@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from instruments.bench_config import shipped_benches
-from tests.helpers.browser import POLL_MS, Service
+from tests.helpers.browser import POLL_MS, Service, number_of
 from tests.helpers.paced_hand import PacedClock
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def test_a_strip_turns_amber_and_then_red_with_the_tab(service: Service, visit: 
     levels = [state.removeprefix("limit-strip ") for state, *_ in seen]
     assert list(dict.fromkeys(levels)) == ["good", "warn", "bad"]
     for level, (_, value, title, is_red, distance) in zip(levels, seen, strict=True):
-        temperature_c = float(value.split()[0])
+        temperature_c = number_of(value.split()[0])
         share = abs(temperature_c - MAX_C / 2) / (MAX_C / 2)
         assert (level == "bad") == ("BEYOND" in distance)
         if level == "good":

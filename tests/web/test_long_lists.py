@@ -25,17 +25,11 @@ STEP = {"kind": "acquire", "expected_s": 60.0, "rate_dps": 10.0}
 ROWS = 230
 
 
-@pytest.fixture
-def many(service: Service) -> None:
-    """A database with 230 units, recordings and campaigns."""
-    store = service.lab_service.store
+def add_units(service: Service, serials: list[str]) -> None:
+    """Add units with a recording each."""
     info = RecordingInfo.model_validate({"serial": "G", "axes": ["z"], "kind": "points", "started_at": AT})
     document = info.model_dump(mode="json")
-    for _ in range(ROWS):
-        store.campaigns.create(NewCampaign("short", {}, "single-axis-sim", {}, "hash", 60.0, [STEP], ()), AT)
-    serials = [f"G{k:03d}" for k in range(ROWS)]
-    with store._database.writing() as connection:
-        connection.execute(sa.update(tables.campaigns).values(state="done"))
+    with service.lab_service.store._database.writing() as connection:
         connection.execute(
             sa.insert(tables.units),
             [{"serial": serial, "model": "VG-35", "technology": "fog", "first_seen_at": AT} for serial in serials],
@@ -53,6 +47,17 @@ def many(service: Service) -> None:
                 for serial in serials
             ],
         )
+
+
+@pytest.fixture
+def many(service: Service) -> None:
+    """A database with 230 units, recordings and campaigns."""
+    store = service.lab_service.store
+    for _ in range(ROWS):
+        store.campaigns.create(NewCampaign("short", {}, "single-axis-sim", {}, "hash", 60.0, [STEP], ()), AT)
+    with store._database.writing() as connection:
+        connection.execute(sa.update(tables.campaigns).values(state="done"))
+    add_units(service, [f"G{k:03d}" for k in range(ROWS)])
 
 
 @pytest.mark.usefixtures("many")
@@ -89,6 +94,21 @@ def test_a_search_is_in_the_address_and_finds_what_was_not_shown(visit: Callable
     expect(page.get_by_label("Search units")).to_have_value("g22")
     page.get_by_label("Search units").fill("nosuch")
     expect(page.get_by_text("No units hold “nosuch”.")).to_be_visible()
+
+
+def test_units_have_the_same_order_in_every_list(service: Service, visit: Callable[..., Page]) -> None:
+    serials = ["AA2", "A-10", "A-02", "Aa2", "A-2", "A.2", "A-002"]
+    add_units(service, serials)
+    ordered = [row["serial"] for row in service.get("/api/units")]
+    assert ordered == ["A-2", "A-02", "A-002", "A-10", "A.2", "AA2", "Aa2"]
+    page = visit("/units")
+    page.get_by_role("main").locator("tbody tr").nth(6).wait_for()
+    assert page.get_by_role("main").locator("tbody tr td:first-child").all_inner_texts() == ordered
+    page = visit("/explore?unit=A-10")
+    choice = page.get_by_label("Unit")
+    choice.wait_for()
+    assert choice.locator("option").all_inner_texts() == ordered
+    assert choice.input_value() == "A-10"
 
 
 @pytest.mark.usefixtures("many")

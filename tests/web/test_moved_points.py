@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 import pytest
 
-from tests.helpers.browser import Service
+from tests.helpers.browser import Service, number_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page, Request
@@ -31,7 +31,10 @@ def numbers(card: Locator) -> dict[str, str]:
 
 
 def levels(text: str) -> list[float]:
-    return [float(value) for value in re.findall(r"-?\d+(?:\.\d+)?", text.replace("deg/s", "").replace("deg C", ""))]
+    return [
+        number_of(value)
+        for value in re.findall(r"\u2212?\d+(?:\.\d+)?", text.replace("deg/s", "").replace("deg C", ""))
+    ]
 
 
 def check(service: Service, card: Locator, **points: list[float]) -> dict[str, Any]:

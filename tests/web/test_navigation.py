@@ -53,10 +53,10 @@ def test_a_button_that_opens_a_page_opens_it_at_its_top(visit: Callable[..., Pag
     from playwright.sync_api import expect
 
     page = visit("/", size={"width": 390, "height": 400})
-    page.get_by_role("button", name="Simulate a recording").scroll_into_view_if_needed()
+    page.get_by_role("button", name="Simulate a hidden effect").scroll_into_view_if_needed()
     page.evaluate("window.scrollTo(0, document.body.scrollHeight)")
     assert scrolled(page) > 0
-    page.get_by_role("button", name="Simulate a recording").evaluate("button => button.click()")
+    page.get_by_role("button", name="Simulate a hidden effect").evaluate("button => button.click()")
     expect(page).to_have_url(re.compile("/explore"))
     expect(page.get_by_role("heading", level=1)).to_have_text("Explore")
     page.wait_for_function("window.scrollY === 0")

@@ -94,7 +94,7 @@ def test_an_empty_house_leads_to_a_first_calibration_in_one_press(visit: Callabl
     assert service.get("/api/units/OSU-FOG-2024/ladder")["steps"][0]["model"] == "bias_scale"
 
     page.get_by_role("link", name="labctl").click()  # again, from the overview: what is there is opened
-    page.get_by_role("button", name="Tour").click()
+    page.get_by_role("button", name="Take the tour").click()
     page.wait_for_url("**version=1**recording=1**tour=1**")
     assert [row["id"] for row in service.get("/api/recordings?unit=OSU-FOG-2024")] == [1]
     assert [row["version"] for row in service.get("/api/units/OSU-FOG-2024/calibrations")] == [1]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from labctl.recording import Recording
-from tests.helpers.browser import Service, figure
+from tests.helpers.browser import Service, figure, number_of
 from tests.helpers.simulated_recordings import single_axis
 from tests.helpers.static_recordings import resting
 
@@ -59,7 +59,7 @@ def facts_of(card: Locator) -> dict[str, list[str]]:
 
 
 def value(text: str) -> float:
-    return float(text.split(maxsplit=1)[0])
+    return number_of(text.split(maxsplit=1)[0])
 
 
 def digest(readings: Any) -> str:

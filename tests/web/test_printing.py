@@ -51,3 +51,28 @@ def test_every_figure_is_printed_whole_and_in_light_colours(service: Service, vi
     page.evaluate("() => { window.dispatchEvent(new Event('afterprint')); }")
     assert page.locator(".print-line").count() == 0
     assert page.evaluate("() => document.documentElement.dataset.theme") == "dark"
+
+
+#: The headings that are shown, and the headers of cards with them, of which nothing keeps what follows on their page.
+LONE_HEADINGS = """() => [...document.querySelectorAll("main :is(h1, h2, h3)")]
+  .filter((each) => each.getClientRects().length)
+  .map((each) => each.closest(".card-header, .page-header") ?? each)
+  .filter((each) => {
+    const flow = ["block", "list-item"].includes(getComputedStyle(each.parentElement).display);
+    return getComputedStyle(each).breakAfter !== "avoid" || !flow;  // in flex and grid a break is not avoided
+  })
+  .map((each) => each.textContent)"""
+
+
+def test_no_heading_is_left_alone_at_the_end_of_a_page(service: Service, visit: Callable[..., Page]) -> None:
+    made = service.post("/api/recordings/simulated", {"serial": "FOG-0001", "recipe": "short"})
+    fit = {"recording": made["recording"], "effects": ["bias", "scale_factor"]}
+    service.post("/api/units/FOG-0001/calibrations", fit)
+    for address in ("/units/FOG-0001", "/explore?unit=FOG-0001", "/recordings/1", "/campaigns/new"):
+        page = visit(address, alone=True)
+        settled(page)
+        page.emulate_media(media="print")
+        headings = page.locator("main").locator("h1, h2, h3").count()
+        assert headings >= 3, address
+        assert page.evaluate(LONE_HEADINGS) == [], address
+        assert not any(each.is_visible() for each in page.locator(".version-actions summary").all()), address

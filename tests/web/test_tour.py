@@ -19,7 +19,7 @@ def test_the_tour_leads_through_the_page_and_can_be_left(visit: Callable[..., Pa
     from playwright.sync_api import expect
 
     page = visit("/")
-    page.get_by_role("button", name="Show me around").click()
+    page.get_by_role("button", name="Take the tour").click()
     tour = page.get_by_role("region", name="Tour")
     for number, name in enumerate(PARTS, start=1):
         expect(tour).to_contain_text(f"Step {number} of {len(PARTS)}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.helpers.browser import NARROW, Faults, Service
+from tests.helpers.browser import NARROW, Faults, Service, number_of
 from tests.helpers.simulated_recordings import single_axis
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def two_digits(value: float) -> float:
 
 def shown_number(text: str) -> float:
     """Return a number as the page writes it, with a power of ten where it is far from 1."""
-    return float(text.replace(" × 10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
+    return float(text.replace(" × 10", "e").translate(str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")))
 
 
 def cells(region: Locator) -> list[list[str]]:
@@ -74,11 +74,11 @@ def test_the_figures_of_the_page_are_those_of_the_service(
     here = asked(service, fog, 50, 40)
     grid = here["grid"]["axes"]["z"]
     drawn = cells(over)
-    assert [float(row[0]) for row in drawn] == pytest.approx(here["grid"]["temperature_c"], abs=0.051)
+    assert [number_of(row[0]) for row in drawn] == pytest.approx(here["grid"]["temperature_c"], abs=0.051)
     assert len(drawn) == 3
     for row, line in zip(drawn, grid, strict=True):
         assert [float(text) for text in row[1:]] == [two_digits(one["expanded_dps"]) for one in line]
-    heads = [float(text.split()[0]) for text in over.locator("th").all_inner_texts()[1:]]
+    heads = [number_of(text.split()[0]) for text in over.locator("th").all_inner_texts()[1:]]
     assert heads == pytest.approx(here["grid"]["rate_dps"], rel=5e-3)
 
     card.get_by_role("spinbutton", name="Rate").fill("50")
@@ -130,6 +130,38 @@ def test_the_lines_of_the_budget_and_the_pictures_are_those_of_the_service(
     expected = {**over["contributions"], "combined u": over["combined"], "expanded U": over["expanded"]}
     assert drawn == [[f"{name}, deg/s", over["at"], values] for name, values in expected.items()]
     assert figure.locator(".legendtext").count() == len(expected)
+
+
+#: The boxes of a figure's titles, of the names of its legend and of the figure itself, and of what is drawn: left,
+#: right, top, bottom in CSS px.
+PLACES = """plot => {
+  const box = each => (({ left, right, top, bottom }) => [left, right, top, bottom])(each.getBoundingClientRect());
+  const all = names => [...plot.querySelectorAll(names)].map(box);
+  const [titles, names, panels] = [".xtitle, .ytitle", ".legend .traces", ".nsewdrag"].map(all);
+  return { plot: box(plot), titles, names, panel: panels[0] };
+}"""
+
+
+def test_titles_and_legend_of_contributions_are_whole_and_apart(visit: Callable[..., Page], fog: str) -> None:
+    from playwright.sync_api import expect
+
+    page = visit(f"/units/{fog}", size={"width": 1280, "height": 900})
+    card, _, _ = card_of(page)
+    for over in ("rate", "temperature"):
+        figure = card.get_by_role("group", name=f"Contributions, axis z, over {over}")
+        figure.scroll_into_view_if_needed()
+        expect(figure.locator(".legendtext").first).to_be_visible()
+        found = figure.evaluate(PLACES)
+        left, right, top, bottom = found["plot"]
+        texts = [*found["titles"], *found["names"]]
+        assert len(found["titles"]) == 2
+        assert len(found["names"]) > 5
+        assert min(text[0] for text in texts) >= left - 1, found
+        assert max(text[1] for text in texts) <= right + 1, found
+        assert min(text[2] for text in texts) >= top - 1, found
+        assert max(text[3] for text in texts) <= bottom + 1, found
+        assert min(name[2] for name in found["names"]) >= found["titles"][0][3] - 1, found  # below the axis
+        assert found["panel"][3] - found["panel"][2] > (bottom - top) / 3, found  # the legend leaves room to the lines
 
 
 @pytest.mark.parametrize("size", [None, NARROW])

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from labctl.services.planning.plan_answer import describe_plan
-from tests.helpers.browser import Service, figure, settled
+from tests.helpers.browser import Service, figure, number_of, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
@@ -104,7 +104,7 @@ def test_another_shape_is_fitted_again_by_the_service_and_the_fitted_one_comes_b
     knee.fill("36.4")
     knee.dispatch_event("change")
     expect(panel).to_contain_text("Fitted again with this shape.")
-    stated = float(panel.locator("label", has_text="Shape:").locator("span.muted").inner_text().split()[0])
+    stated = number_of(panel.locator("label", has_text="Shape:").locator("span.muted").inner_text().split()[0])
     assert 60 < stated < 80
     expected = service.post(
         "/api/units/OSU-FOG-2024/calibrations/1/preview", {"add": [f"saturation@knee_dps={stated}"]}
@@ -114,3 +114,32 @@ def test_another_shape_is_fitted_again_by_the_service_and_the_fitted_one_comes_b
     assert np.abs(drawn - np.array(expected["residuals"]["residual_dps"])).max() < 0.01
     panel.get_by_role("button", name="Fitted shape").click()
     expect(panel.locator("output").first).to_contain_text(f"{best} deg/s RMS left")
+
+
+#: What of the titles of a figure lies under its tool bar or under another title.
+UNDER = """plot => {
+  const box = each => each.getBoundingClientRect();
+  const titles = [...plot.querySelectorAll(".annotation-text")].map(box);
+  const bar = box(plot.querySelector(".modebar"));
+  const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  const pairs = titles.flatMap((one, k) => [bar, ...titles.slice(k + 1)].filter((other) => meet(one, other)));
+  return { titles: titles.length, bar: bar.height, under: pairs.length };
+}"""
+
+
+@pytest.mark.parametrize("width", [390, 1000, 1280])
+def test_the_title_of_the_map_is_not_under_the_tool_bar(opened: tuple[Page, Locator], width: int) -> None:
+    page, panel = opened
+    page.set_viewport_size({"width": width, "height": 900})
+    drawn = panel.get_by_role("group", name="What would be left over floor")
+    drawn.scroll_into_view_if_needed()
+    drawn.locator(".annotation-text").first.wait_for()
+    panel.get_by_role("slider", name="Size of").fill("0.5")  # drawn again, at this width
+    page.wait_for_function(
+        "plot => plot.querySelector('.main-svg').clientWidth === plot.clientWidth", arg=drawn.element_handle()
+    )
+    drawn.hover()
+    found = drawn.evaluate(UNDER)
+    assert found["titles"] == 1
+    assert found["bar"] > 10
+    assert found["under"] == 0, found

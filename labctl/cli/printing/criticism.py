@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from labctl.cli.output import console, format_number, print_heading, print_warnings, table
 from labctl.cli.printing.joint import print_joint
+from labctl.probability_text import probability_text
 
 if TYPE_CHECKING:
     from labctl.answers.calibrations import ImproveResponse
@@ -76,7 +77,7 @@ def print_criticism(answer: CriticismResponse) -> None:
         console.print(
             f"{purpose} {', '.join(experiment['separates'])}: {experiment['do']} ({experiment['hours']:.1f} h, "
             f"{experiment['information_bit']:.2f} of {experiment['open_bit']:.2f} bit expected, one cause named with a "
-            f"probability of {100 * experiment['power']:.0f} %)",
+            f"probability of {probability_text(experiment['power'])})",
         )
     for sentence in _not_testable(answer):
         console.print(sentence, style="dim", soft_wrap=prints_all)
@@ -94,7 +95,7 @@ def _print_laws(answer: CriticismResponse) -> None:
     print_heading("laws, which describe and name no cause")
     for law in answer.laws:
         errors = f"{format_number(law['rms_after_dps'])} deg/s, held-out {format_number(law['heldout_rms_after_dps'])}"
-        text = f"{100 * law['probability']:.0f} %: {'; '.join(law['formulas'])}: {errors}"
+        text = f"{probability_text(law['probability'])}: {'; '.join(law['formulas'])}: {errors}"
         console.print(text, soft_wrap=not console.is_terminal)
     if answer.law_test is not None:
         console.print(f"to distinguish the first two: {answer.law_test['do']}", soft_wrap=not console.is_terminal)

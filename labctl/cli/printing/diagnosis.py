@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from labctl.cli.output import console, format_number, print_heading, table
+from labctl.probability_text import LEAST, probability_text
 
 if TYPE_CHECKING:
     from labctl.answers.diagnosis import DiagnosisResponse, DiagnosisRound
 
-#: Suspects that are shown in the line of a round, at most; those below this probability only in the table.
-MAX_SHOWN, MIN_PROBABILITY = 4, 0.005
+#: Suspects that are shown in the line of a round, at most; those below `LEAST` only in the table.
+MAX_SHOWN = 4
 #: Columns of the table: the suspects that were most probable in any round.
 MAX_COLUMNS = 6
 
@@ -53,8 +54,8 @@ def _began(answer: DiagnosisResponse) -> str:
 
 
 def _print_round(each: DiagnosisRound) -> None:
-    shown = [(effect, p) for effect, p in each.suspects.items() if p >= MIN_PROBABILITY][:MAX_SHOWN]
-    suspects = ", ".join(f"{effect} {p:.2f}" for effect, p in shown)
+    shown = [(effect, p) for effect, p in each.suspects.items() if p >= LEAST][:MAX_SHOWN]
+    suspects = ", ".join(f"{effect} {probability_text(p)}" for effect, p in shown)
     of = ", ".join(map(str, each.recordings))
     figures = (
         f"residual {format_number(each.rms_dps)} deg/s RMS, held-out {format_number(each.heldout_rms_dps)}, noise "
@@ -90,9 +91,14 @@ def _print_course(answer: DiagnosisResponse) -> None:
     columns = sorted(highest, key=lambda effect: -highest[effect])[:MAX_COLUMNS]
     rows = table("probability of each suspect; –: not listed", "bench h", "verdict", *columns)
     for each in answer.rounds:
-        values = [format_number(each.suspects.get(effect), 2) for effect in columns]
+        values = [_listed(each, effect) for effect in columns]
         rows.add_row(f"{each.spent_hours:.1f}", verdict_text(each), *values)
     console.print(rows)
+
+
+def _listed(each: DiagnosisRound, effect: str) -> str:
+    probability = each.suspects.get(effect)
+    return "–" if probability is None else probability_text(probability)
 
 
 def verdict_text(each: DiagnosisRound) -> str:

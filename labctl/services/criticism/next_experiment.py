@@ -14,6 +14,7 @@ from labctl.answers.criticism import Experiment
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import Criticism, Forecast, OpenQuestion, forecast, open_question, reduce_recording
 from labctl.log import get_logger
+from labctl.probability_text import probability_text
 from labctl.services.planning.attendance import visits_s
 from labctl.services.planning.loading import bench_for, limits_of, load_bench
 from labctl.services.simulation.walks import walked
@@ -229,7 +230,8 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     rank = f"; {of} experiments that this bench can run are ordered by {order}" if of > 1 else ""
     listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
     pair = f"; if it is {leader}, this distinguishes it from {listed}" if told and foreseen.rank[0] > 0 else ""
-    return f"{first}{rank}{pair}; the probability that one cause is then named alone is {expected.names_one:.2f}."
+    naming = f"the probability that one cause is then named alone is {probability_text(expected.names_one)}"
+    return f"{first}{rank}{pair}; {naming}."
 
 
 def _asked(question: OpenQuestion) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from labctl.answers.criticism import Experiment
 from labctl.answers.diagnosis import ChosenExperiment
+from labctl.probability_text import probability_text
 
 
 def choice(experiment: Experiment) -> str:
@@ -16,7 +17,7 @@ def choice(experiment: Experiment) -> str:
 def expected(experiment: ChosenExperiment) -> str:
     """Return what is expected of an experiment."""
     return (
-        f"expected: one cause named alone with a probability of {percent(experiment.power)}, in "
+        f"expected: one cause named alone with a probability of {probability_text(experiment.power)}, in "
         f"{hours(experiment.hours)}"
     )
 
@@ -87,11 +88,6 @@ def hours_spent(named: Sequence[str], of_hours: float, left_hours: float, shorte
 def hours(value: float) -> str:
     """Write hours with their unit."""
     return f"{value:.1f} h"
-
-
-def percent(share: float) -> str:
-    """Write a probability; one below 1 is never written as 100 %."""
-    return f"{min(100 * share, 99.0 if share < 1 else 100.0):.0f} %"
 
 
 def _either(named: Sequence[str]) -> str:

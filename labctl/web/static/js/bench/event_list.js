@@ -36,7 +36,7 @@ export function eventList(most, level = "info", campaign = {}) {
         ? h("li", { class: "muted small" }, `All times here are ${SIMULATED}.`)
         : null,
       from.length
-        ? from.map((event) => eventItem(event, campaign))
+        ? from.flatMap((event, k) => [dayItem(from, k), eventItem(event, campaign)])
         : h("li", { class: "empty" }, all.length ? "No event of this kind has occurred." : "No event has arrived yet."),
       shown.length > most ? h("li", { class: "muted small" }, `and ${shown.length - most} before`) : null,
     );
@@ -54,6 +54,17 @@ export function eventList(most, level = "info", campaign = {}) {
       show();
     },
   });
+}
+
+/**
+ * The day above the first event of it, where the events are of several days.
+ * @param {readonly CampaignEvent[]} events
+ * @param {number} k
+ */
+function dayItem(events, k) {
+  const days = events.map((event) => day(event.at));
+  const isNew = days[0] !== days[days.length - 1] && days[k] !== days[k - 1];
+  return isNew ? h("li", { class: "muted small" }, days[k]) : null;
 }
 
 /**

@@ -1,5 +1,7 @@
 // A turn by hand in words, and how much of it has come out.
 
+import { fixed, plainNumber } from "../core/format.js";
+
 /** @import { Turn } from "../../../types/api.js" */
 
 /**
@@ -12,6 +14,7 @@ export function turnText({ phase, position, asked_deg: asked, attempt, came_deg:
   const which = attempt > 1 ? ` (attempt ${attempt})` : "";
   if (phase === "rest") return { text: `Keep the unit still, axis ${position} pointing up${which}.`, share };
   const sense = asked > 0 ? "counter-clockwise" : "clockwise";
-  const far = angles.length ? `${angles.map((deg) => Math.round(deg)).join(", ")} deg of ${asked} deg` : `${asked} deg`;
+  const whole = `${plainNumber(asked)} deg`;
+  const far = angles.length ? `${angles.map((deg) => fixed(deg, 0)).join(", ")} deg of ${whole}` : whole;
   return { text: `${far} about ${position}, ${sense}${which}.`, share };
 }

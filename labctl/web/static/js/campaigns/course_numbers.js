@@ -1,6 +1,6 @@
 // What a campaign was doing at one time: the sample of its course, its step, its data set.
 
-import { duration, idText, plainNumber } from "../core/format.js";
+import { duration, fixed, idText, plainNumber } from "../core/format.js";
 import { channelUnit } from "../recordings/channels.js";
 
 /** @import { CampaignPlan, Course, DataSets, Outputs } from "../../../types/api.js" */
@@ -58,7 +58,7 @@ export function readingsAt({ course, steps, datasets }, t_s) {
   const step = stepAt(steps, t_s);
   const dataset = step === null ? null : steps.dataset[step];
   /** @param {number | null | undefined} value */
-  const warm = (value) => (typeof value === "number" ? `${value.toFixed(2)} deg C` : "–");
+  const warm = (value) => (typeof value === "number" ? `${fixed(value, 2)} deg C` : "–");
   /** @type {[string, string][]} */
   const rows = [
     ["Time", duration(t_s)],

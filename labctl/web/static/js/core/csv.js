@@ -1,5 +1,7 @@
 // CSV files of figures.
 
+import { MINUS } from "./rounding.js";
+
 /** @import { CsvRows, PlotLayout, PlotTrace } from "../../../types/pages.js" */
 
 /**
@@ -12,9 +14,14 @@ export const fileName = (name) =>
     .replaceAll(/[^a-z0-9]+/g, "-")
     .replaceAll(/^-|-$/g, "");
 
-/** @param {unknown} cell */
-const cellText = (cell) =>
-  /[",\n]/.test(String(cell)) ? `"${String(cell).replaceAll('"', '""')}"` : String(cell ?? "");
+/**
+ * A cell as text; its numbers have the sign that programs read, also where the page wrote them as labels.
+ * @param {unknown} cell
+ */
+function cellText(cell) {
+  const text = String(cell ?? "").replaceAll(MINUS, "-");
+  return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+}
 
 /**
  * Rows as CSV; cells with commas, quotes and line ends are quoted, null and undefined are empty.

@@ -1,6 +1,6 @@
 // Format numbers, sizes, durations and times, each with its unit.
 
-import { roundedToUncertainty } from "./rounding.js";
+import { MINUS, roundedToUncertainty, signed } from "./rounding.js";
 
 /** @typedef {number | null | undefined} Numeric */
 
@@ -12,7 +12,7 @@ import { roundedToUncertainty } from "./rounding.js";
 export const isNumber = (value) => Number.isFinite(value);
 
 /**
- * A number with `digits` significant digits, not in the form 1e-3: 0.00120, 1 234, 4.5e-7.
+ * A number with `digits` significant digits, not in the form 1e-3: 0.00120, 1230, −40.0, 4.5 × 10⁻⁷.
  * @param {Numeric} value
  * @param {number} [digits]
  */
@@ -22,7 +22,7 @@ export function number(value, digits = 3) {
   if (size !== 0 && (size < 1e-5 || size >= 1e7)) return power(value, digits);
   const rounded = Number(value.toPrecision(digits));
   const decimals = size === 0 ? 0 : Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(rounded) || 1)));
-  return rounded.toFixed(Math.min(decimals, 8));
+  return fixed(rounded, Math.min(decimals, 8));
 }
 
 /** @type {Record<string, string>} */
@@ -37,7 +37,7 @@ const SUPERSCRIPTS = {
  */
 function power(value, digits) {
   const [factor, exponent] = value.toExponential(digits - 1).split("e");
-  return `${factor} × 10${superscript(exponent)}`;
+  return `${signed(factor)} × 10${superscript(exponent)}`;
 }
 /** @param {string | number} text */
 const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? sign).join("");
@@ -53,11 +53,12 @@ export function oddsText(nats) {
 }
 
 /**
- * A number without trailing zeros, for settings: -100, 12.5, 0.0042.
+ * A number without trailing zeros, for settings: −100, 12.5, 0.0042.
  * @param {Numeric} value
  * @param {number} [digits]
  */
-export const plainNumber = (value, digits = 4) => (isNumber(value) ? String(Number(value.toPrecision(digits))) : "–");
+export const plainNumber = (value, digits = 4) =>
+  isNumber(value) ? String(Number(value.toPrecision(digits))).replaceAll("-", MINUS) : "–"; // also in 1e-7
 /**
  * @param {Numeric} value
  * @param {string} unit
@@ -65,16 +66,31 @@ export const plainNumber = (value, digits = 4) => (isNumber(value) ? String(Numb
  */
 export const withUnit = (value, unit, digits) => (isNumber(value) ? `${number(value, digits)} ${unit}` : "–");
 /** @param {Numeric} value */
-export const count = (value) => (isNumber(value) ? value.toLocaleString("en-GB") : "–");
-/** @param {Numeric} share */
-export const percent = (share) => (isNumber(share) ? `${Math.round(100 * share)} %` : "–");
+export const count = (value) => (isNumber(value) ? signed(value.toLocaleString("en-GB")) : "–");
+/**
+ * A share in whole percent. 0 % is nothing and 100 % is all: what is a little more or less is "< 1 %" or "> 99 %".
+ * @param {Numeric} share
+ */
+export function percent(share) {
+  if (!isNumber(share)) return "–";
+  return 0 < share && share < 1 ? probabilityText(share) : `${signed(String(Math.round(100 * share)))} %`;
+}
+
+/** Probabilities beyond these are written as bounds: what was computed is neither impossible nor certain. */
+const [LEAST, MOST] = [0.005, 0.995];
+/**
+ * A probability in whole percent: 25 %, < 1 %, > 99 %; never 0 % and never 100 %. `labctl/probability_text.py` is the same.
+ * @param {number} probability
+ */
+export const probabilityText = (probability) =>
+  probability < LEAST ? "< 1 %" : probability < MOST ? `${Math.floor(100 * probability + 0.5)} %` : "> 99 %";
 
 /**
- * A number with so many decimals; one that is rounded to zero has no sign: "-0.0000" is "0.0000".
+ * A number with so many decimals; one that is rounded to zero has no sign: 0.0000.
  * @param {number} value
  * @param {number} decimals
  */
-export const fixed = (value, decimals) => value.toFixed(decimals).replace(/^-(?=[0.]+$)/, "");
+export const fixed = (value, decimals) => signed(value.toFixed(decimals));
 
 /**
  * A mean to one place beyond its spread, so that a column of means lines up; to five digits where there is no spread.

@@ -9,6 +9,7 @@ import { asked, recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { finishLine, stepOf } from "./finish_line.js";
 import { heldOutName } from "./first_models.js";
+import { ticksOf } from "./ladder_ticks.js";
 import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap } from "./residual_map.js";
 
@@ -17,8 +18,8 @@ import { residualMap } from "./residual_map.js";
 
 /** The raw error is hidden at first where it is more than this factor above the fitted errors and would flatten their lines. */
 const RAW_ERROR_RATIO = 10;
-/** Over less than the first factor there may be no round figure with one digit, over less than the second not two. */
-const [FEW_DIGITS, DECADE] = [2, 5];
+/** Room for the words beside the line of the noise floor. */
+const FLOOR_PX = 48;
 
 /**
  * @param {Ladder} ladder
@@ -29,7 +30,6 @@ export function ladderFigure(ladder, motion) {
   const fittedTo = recordingsText({ recording: ladder.recording ?? 0, recordings: ladder.recordings ?? [] });
   const left = heldOutName(motion).replace("at ", "").replace(" left out", "");
   const sizes = steps.flatMap((step) => [step.rms_dps, step.heldout_rms_dps, ladder.noise_floor_dps]).filter(isNumber);
-  const ratio = Math.max(...sizes) / Math.min(...sizes.filter((size) => size > 0));
   const x = steps.map((step) => `v${step.version}`);
   const dwarfs =
     Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) >
@@ -63,8 +63,9 @@ export function ladderFigure(ladder, motion) {
         : []),
     ],
     layout: {
-      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, ...ticksOf(ratio), tickformat: "~g" },
+      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, ...ticksOf(sizes), tickformat: "~g" },
       xaxis: { type: "category" },
+      margin: { l: 58, r: FLOOR_PX, t: 12, b: 44 },
       shapes: ladder.noise_floor_dps
         ? [
             {
@@ -82,12 +83,14 @@ export function ladderFigure(ladder, motion) {
         ? [
             {
               xref: "paper",
-              x: 0.01,
+              x: 1,
+              xshift: 4,
               y: Math.log10(ladder.noise_floor_dps),
-              text: "noise floor",
+              text: "noise<br>floor", // beside the line: on it, it would lie over a version that reaches the floor
+              align: "left",
               showarrow: false,
               xanchor: "left",
-              yanchor: "bottom",
+              yanchor: "middle",
               font: { color: colour("good"), size: 12 },
             },
           ]
@@ -246,9 +249,3 @@ function versionTable(ladder, state) {
     { label: "Versions", selected: (step) => step.version === state.version },
   );
 }
-
-/**
- * Which figures of a logarithmic scale are named: 1, 2 and 5 of each decade, every digit, or as Plotly divides it evenly.
- * @param {number} ratio largest over smallest value on the scale
- */
-const ticksOf = (ratio) => (ratio < FEW_DIGITS ? { nticks: 5 } : { dtick: ratio < DECADE ? "D1" : "D2" });

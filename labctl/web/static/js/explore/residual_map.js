@@ -20,6 +20,10 @@ const DIMMED_BELOW = 2;
 const MIN_FILLED = 0.3;
 /** Height of a panel on a narrow screen, where panels are stacked, px. */
 const PANEL_PX = 210;
+/** A panel has room for its title in whole from this width on; a figure for title and tool bar in one line. */
+const [WHOLE_TITLE_PX, ONE_LINE_PX] = [260, 560];
+/** Height of the tool bar of a figure. */
+const TOOLBAR_PX = 26;
 
 /** @param {Cell} cell */
 const isDim = (cell) => Math.abs(cell.mean) * Math.sqrt(cell.sets.length) < DIMMED_BELOW;
@@ -198,9 +202,12 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
   const draw = () => {
     const { maps, limit, pick = new Set() } = give();
     const several = maps.length > 1;
+    const below = several && window.innerWidth < 760;
+    const width = element.plot.clientWidth;
+    const isShort = width / (several && !below ? maps.length : 1) < WHOLE_TITLE_PX;
     /** @type {PlotLayout} */
     const layout = {
-      margin: { l: 52, r: 8, t: 28, b: 46 },
+      margin: { l: 52, r: 8, t: 28 + (width < ONE_LINE_PX ? TOOLBAR_PX : 0), b: 46 },
       dragmode: onselect ? "select" : false,
       coloraxis: {
         colorscale: DIVERGING,
@@ -209,7 +216,6 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
         colorbar: { title: { text: "residual /<br>noise floor" }, thickness: 12, outlinewidth: 0 },
       },
     };
-    const below = several && window.innerWidth < 760;
     if (below) layout.height = maps.length * PANEL_PX;
     if (several)
       layout.grid = below
@@ -222,7 +228,7 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
       layout[`xaxis${id}`] = below && k < maps.length - 1 ? { ...x, title: undefined } : x; // one title for all panels
       layout[`yaxis${id}`] = y;
       layout.annotations.push({
-        text,
+        text: isShort ? `${map.position} up` : text,
         showarrow: false,
         xref: `x${id} domain`,
         yref: `y${id} domain`,

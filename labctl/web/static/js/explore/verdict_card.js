@@ -1,7 +1,7 @@
 // The verdict in words, and the suspected effects with their evidence.
 
 import { scrollTo, setChildren, h } from "../core/elements.js";
-import { withUncertainty, number, oddsText, percent, idText } from "../core/format.js";
+import { withUncertainty, number, oddsText, percent, probabilityText, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { planAddress } from "../core/routes.js";
 import { equationDetails } from "../effects/equation.js";
@@ -23,9 +23,11 @@ const VERDICTS = {
 };
 /** Evidence at which the meter is full, nats; its length is the logarithm, so that 70 and 20 000 differ. */
 const FULL_NATS = 1e5;
+/** A smaller probability that an experiment names a wrong cause is not worth a word. */
+const MIN_WRONG = 0.005;
 
 const DRAW =
-  "Draw shows the part of the residual that an effect would explain. Add previews a model with the effect; nothing is stored before you make a version.";
+  "“Draw” shows the part of the residual that an effect would explain. “Add” previews a model with the effect; nothing is stored before you make a version.";
 
 /** @param {ExploreState} state */
 export function verdictCard(state) {
@@ -257,7 +259,8 @@ function coefficientText(suspect, axis) {
  * A value with no line break before its uncertainty, nor within its power of ten.
  * @param {string} text
  */
-const unbroken = (text) => text.replaceAll(" ± ", "\u00a0±\u00a0").replaceAll("× ", "×\u00a0");
+const unbroken = (text) =>
+  text.replaceAll(/ (%|± )|([<>]) /g, (gap) => gap.replaceAll(" ", "\u00a0")).replaceAll("× ", "×\u00a0");
 
 /** @param {Criticism} criticism */
 function aliasNotice(criticism) {
@@ -301,7 +304,7 @@ function lawList({ criticism, axis, motion }, onlaw) {
         h(
           "p",
           { class: "muted small" },
-          `${percent(law.probability)} among these laws. RMS with it ${number(law.rms_after_dps)} deg/s, ${heldOutName(motion)} ${number(law.heldout_rms_after_dps)} deg/s.`,
+          `${probabilityText(law.probability)} among these laws. RMS with it ${number(law.rms_after_dps)} deg/s, ${heldOutName(motion)} ${number(law.heldout_rms_after_dps)} deg/s.`,
         ),
         h(
           "ul",
@@ -337,7 +340,8 @@ function experimentList(criticism) {
             {},
             each.do,
             each.hours ? ` (${number(each.hours, 2)} h)` : "",
-            `; names the cause with a probability of ${percent(Math.max(each.power - each.names_wrong, 0))}`,
+            `; one cause is then named alone with a probability of ${unbroken(probabilityText(each.power))}`,
+            each.names_wrong < MIN_WRONG ? "" : `, a wrong one with ${unbroken(probabilityText(each.names_wrong))}`,
           ),
           h("p", { class: "muted small" }, each.why),
           each.toml

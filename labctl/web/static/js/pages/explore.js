@@ -137,9 +137,7 @@ function selectors(units, unit, own, versions, version, chosen) {
   return [
     selectField(
       "Unit",
-      [...new Set([unit.serial, ...units.map((each) => each.serial)])]
-        .sort((a, b) => a.localeCompare(b, "en", { numeric: true }))
-        .map((each) => option(each, each)),
+      listedSerials(units, unit).map((each) => option(each, each)),
       unit.serial,
       (value) => to({ unit: value }),
     ),
@@ -159,6 +157,14 @@ function selectors(units, unit, own, versions, version, chosen) {
     ),
   ].filter(Boolean);
 }
+
+/**
+ * The serial numbers of the list in the order of the service, which every list has. A unit that is not among the first
+ * ones comes after them all.
+ * @param {readonly Unit[]} units
+ * @param {Unit} unit
+ */
+const listedSerials = (units, unit) => [...new Set([...units, unit].map((each) => each.serial))];
 
 /**
  * A unit that has no calibration yet: fit one.

@@ -72,7 +72,7 @@ function recordingTable(rows) {
         title: "Stored",
         cell: (row) => [
           h("span", { class: "nowrap" }, day(row.created_at)),
-          row.simulated_time ? h("span", { class: "muted small secondary" }, SIMULATED) : null,
+          row.simulated_time ? h("span", { class: "muted small secondary nowrap" }, SIMULATED) : null,
         ],
       },
       {

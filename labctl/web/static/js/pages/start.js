@@ -45,13 +45,13 @@ export async function page({ signal }) {
       h(
         "p",
         {},
-        "695 data sets (mean outputs, each at a constant rate and temperature) from a heated rate table, with a first model fitted. Its error is sixteen times the noise; find out why, correct the model, and certify it. Show me around leads through this in five steps.",
+        "695 data sets (mean outputs, each at a constant rate and temperature) from a heated rate table, with a first model fitted. Its error is sixteen times the noise; find out why, correct the model, and certify it. The tour leads through this in five steps.",
       ),
       h(
         "div",
         { class: "row" },
         actButton("Open the real gyro", () => openExample(), { kind: "primary" }),
-        actButton("Show me around", () => openExample("1")),
+        actButton("Take the tour", () => openExample("1")),
       ),
     ),
     h("h2", {}, "Other ways to begin"),
@@ -65,7 +65,7 @@ export async function page({ signal }) {
           {},
           "A simulated gyro with an effect that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect the model lacks.",
         ),
-        actButton("Simulate a recording", openSimulated),
+        actButton("Simulate a hidden effect", openSimulated),
       ),
       card(
         "Import your own data",
@@ -201,7 +201,7 @@ function overview(units, found) {
           h("a", { class: "button", href: "/recordings" }, "All recordings"),
           actButton("Simulate a hidden effect", openSimulated),
           actButton("Open the real gyro", () => openExample()),
-          actButton("Tour", () => openExample("1")),
+          actButton("Take the tour", () => openExample("1")),
         ),
       ),
     ),

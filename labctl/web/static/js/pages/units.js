@@ -93,7 +93,7 @@ const unitTable = (units) =>
       },
     ],
     units,
-    { label: "Units" },
+    { label: "Units", first: "9rem" },
   );
 
 const noUnits = () =>

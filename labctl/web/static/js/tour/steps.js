@@ -20,12 +20,12 @@ export const STEPS = [
   {
     anchor: "#learn",
     title: "Which physical effect is missing",
-    text: "The effects of the catalogue that explain the residual, each with its evidence and the size it would have. Draw shows the part that an effect explains; its name leads to its equation and its source.",
+    text: "The effects of the catalogue that explain the residual, each with its evidence and the size it would have. “Draw” shows the part that an effect explains; its name leads to its equation and its source.",
   },
   {
     anchor: "#add",
     title: "Add it",
-    text: "Add beside a suspect puts it here. Preview fits the changed model and stores nothing; Make version keeps it as the next version. The present version stays as it is.",
+    text: "“Add” beside a suspect puts it here. “Preview” fits the changed model and stores nothing; “Make version” keeps it as the next version. The present version stays as it is.",
   },
   {
     anchor: "#watch",

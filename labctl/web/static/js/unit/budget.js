@@ -3,7 +3,7 @@
 import { h } from "../core/elements.js";
 import { chip, notice, table } from "../core/components.js";
 import { colour, figure } from "../core/figure.js";
-import { number } from "../core/format.js";
+import { number, plainNumber } from "../core/format.js";
 import { contributionTraces } from "./contribution_lines.js";
 
 /** @import { BudgetLine, ContributionsOver, Uncertainty } from "../../../types/api.js" */
@@ -90,13 +90,13 @@ export function contributionFigures(contributions) {
         `Contributions, axis ${axis}, over rate`,
         over.over_rate,
         "rate, deg/s",
-        `${number(over.temperature_c, 3)} deg C`,
+        `Axis ${axis}, at ${plainNumber(over.temperature_c, 3)} deg C`,
       ),
       one(
         `Contributions, axis ${axis}, over temperature`,
         over.over_temperature,
         "temperature, deg C",
-        `${number(over.rate_dps, 4)} deg/s`,
+        `Axis ${axis}, at ${plainNumber(over.rate_dps)} deg/s`,
       ),
     ]),
   );
@@ -127,7 +127,7 @@ function one(name, lines, along, at) {
   };
   return figure(
     name,
-    `Standard uncertainties that the budget combines, at ${at}. Dashed: the expanded uncertainty U. Uncertainties that the bench does not state have no line.`,
+    `${at}: standard uncertainties that the budget combines. Dashed: the expanded uncertainty U. Uncertainties that the bench does not state have no line.`,
     draw,
     { height: innerWidth < NARROW_PX ? "36rem" : "23rem" },
   );

@@ -1,6 +1,6 @@
 // What is shown of the rounds of a diagnosis; no DOM here.
 
-import { instant } from "../core/format.js";
+import { instant, probabilityText } from "../core/format.js";
 
 /** @import { Diagnosis, DiagnosisRound } from "../../../types/api.js" */
 
@@ -71,7 +71,7 @@ export function lineOfRound(round, columns) {
     verdict: round.named.length ? `${round.verdict}: ${round.named.join(", ")}` : round.verdict,
     probabilities: columns.map((effect) => {
       const probability = round.suspects[effect];
-      return probability === undefined ? "–" : probability < 0.005 ? "0" : probability.toFixed(2);
+      return probability === undefined ? "–" : probabilityText(probability);
     }),
     experiment: round.came_text ? `${round.why}. ${round.came_text}` : round.why,
   };

@@ -3,7 +3,7 @@
 import { get } from "../core/http/api.js";
 import { isAbort, messageOf } from "../core/http/errors.js";
 import { h, setChildren } from "../core/elements.js";
-import { number } from "../core/format.js";
+import { fixed, number, plainNumber } from "../core/format.js";
 import { busyIndicator, notice, table } from "../core/components.js";
 import { labelledField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
@@ -92,7 +92,7 @@ function over({ grid, coverage_factor }) {
     table(
       [
         several ? { title: "Axis", cell: (row) => row.axis } : null,
-        { title: "Temperature, deg C", number: true, cell: (row) => row.warm.toFixed(1) },
+        { title: "Temperature, deg C", number: true, cell: (row) => fixed(row.warm, 1) },
         ...grid.rate_dps.map((rate, k) => ({
           title: `${number(rate, 3)} deg/s`,
           number: true,
@@ -124,7 +124,7 @@ function aboutAnyAxis({ any_axis }) {
     h(
       "p",
       { class: "muted small" },
-      `Largest expanded uncertainty, in deg/s, for rate vectors of any direction up to ${number(rows[0][1].reach_dps, 4)} deg/s. The angles of the mountings count in the frame of the case; for a unit whose axes are aligned in use, only their differences count.`,
+      `Largest expanded uncertainty, in deg/s, for rate vectors of any direction up to ${plainNumber(rows[0][1].reach_dps)} deg/s. The angles of the mountings count in the frame of the case; for a unit whose axes are aligned in use, only their differences count.`,
     ),
     table(
       [

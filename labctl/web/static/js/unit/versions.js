@@ -102,9 +102,9 @@ const columnsOf = (unit, issued, explore) => [
         "div",
         { class: "row version-actions" },
         act(unit, row),
+        certificateFiles(unit.serial, row.version, issued),
         h("details", {}, h("summary", {}, "Files"), exportFiles(unit, row.version)),
         fetchedBy(unit.serial, row.version),
-        certificateFiles(unit.serial, row.version, issued),
       ),
   },
 ];
