@@ -120,6 +120,7 @@ def limits_of(bench: BenchFile, *, driven: bool = False, earlier: EarlierTimes |
         air_tau_s=bench.air_tau_s,
         earlier=earlier,
         tilted_positions=bench.tilted_positions,
+        eccentricity=bench.eccentricity,
     )
 
 
