@@ -22,8 +22,8 @@ MAX_RADIUS_MM = 9999
 EXPECTED = (
     "x, -x, y, -y, z or -z; tilted, a sum of body axes such as x+y+z or 3x-4z; with the unit turned on its face x@180, "
     "with the fixture turned on the table x@0/180: whole degrees from 0 to 359; at a known distance from the table's "
-    f"axis zr200: 0 to {MAX_RADIUS_MM} mm, then the level body axis that points away from it, zr200x or zr200-y; at most "
-    f"{MAX_LENGTH} characters"
+    f"axis zr200: 0 to {MAX_RADIUS_MM} mm, then the level body axis that points away from it, zr200x or zr200-y; at "
+    f"most {MAX_LENGTH} characters"
 )
 Vector = tuple[float, float, float]
 _TERM = re.compile(r"([+-]?)(\d{0,3})([xyz])")

@@ -32,7 +32,7 @@ def test_a_position_says_the_distance_in_millimetres(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["zr", "zr12345", "zr200z", "x+yr20x", "zx", "-zr200x@180", "z@180r200"])
 def test_what_says_no_distance_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="is not a position .*zr200"):
+    with pytest.raises(ValueError, match=r"is not a position .*zr200"):
         Position.of(text)
 
 

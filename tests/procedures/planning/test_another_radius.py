@@ -73,5 +73,6 @@ def test_a_diagnosis_may_ask_for_it_where_the_bench_has_it() -> None:
 
 def test_the_question_names_the_distance() -> None:
     asked = mounting_text("zr200x")
-    assert asked.endswith("; the middle of each unit 200 mm from the axis of the table, body axis x pointing away from it")
-    assert mounting_text("zr200").endswith("; the middle of each unit 200 mm from the axis of the table")
+    where = "; the middle of each unit 200 mm from the axis of the table"
+    assert asked.endswith(f"{where}, body axis x pointing away from it")
+    assert mounting_text("zr200").endswith(where)
