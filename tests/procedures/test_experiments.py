@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from instruments import plugins
+from instruments.eccentricity import Eccentricity
 from instruments.plugins import PluginError, PluginGroup
 from labctl.services.criticism.next_experiment import plans_of
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
@@ -33,7 +34,9 @@ def test_labctls_own_blocks_are_found_by_their_entry_point() -> None:
 )
 def test_each_block_makes_a_plan_within_the_limits_that_differs_from_the_recipe(recipe: str, bench: str | None) -> None:
     whole = load_recipe(recipe)
-    limits = replace(limits_of(load_bench(bench or "triaxial-sim")), tilted_positions=("x+y+z",))
+    limits = limits_of(load_bench(bench or "triaxial-sim"))
+    where = Eccentricity(radius_m=0.06, other_radii_m=(0.2,))
+    limits = replace(limits, tilted_positions=("x+y+z",), eccentricity=where)
     made = {block.id: block.changed(whole) for block in BLOCKS}
     assert sum(changed is None for changed in made.values()) <= 3
     for name, changed in made.items():

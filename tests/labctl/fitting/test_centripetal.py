@@ -52,8 +52,8 @@ def columns(effect: str, channels: Channels, **parameters: float) -> dict[str, C
 def test_the_specific_force_points_to_the_axis_where_distance_and_direction_are_known() -> None:
     channels = channels_of(recording(["zr200x", "zr200-y", "zr0x"]))
     fast = channels.take(channels.table_rate_dps() == 400.0)
-    np.testing.assert_allclose(force_g(fast, "x"), [-PULL_G, 0.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(force_g(fast, "y"), [0.0, PULL_G, 0.0], atol=1e-12)
+    assert force_g(fast, "x") == pytest.approx([-PULL_G, 0.0, 0.0], abs=1e-12)
+    assert force_g(fast, "y") == pytest.approx([0.0, PULL_G, 0.0], abs=1e-12)
     np.testing.assert_array_equal(force_g(fast, "z"), 1.0)
 
 
