@@ -19,6 +19,7 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
 
 from instruments.datasheet import Convention, undeclared
+from instruments.eccentricity import Eccentricity
 from instruments.laboratory import Laboratory
 from instruments.positions import Position
 from instruments.standards import Standard
@@ -224,6 +225,7 @@ class BenchFile(Strict):
     standards: tuple[Standard, ...] = ()  #: reference standards, at most one of each quantity and name
     #: Directions of the body that a tilted fixture of the bench brings up, such as "x+y+z"; absent: it has none.
     tilted_positions: tuple[TiltedPosition, ...] = ()
+    eccentricity: Eccentricity | None = None  #: absent: the units' distance from the table's axis is not known
     simulation: SimulationSettings | None = None
     #: Name of a section or gyro ("table", "supply" ...) -> its driver's release, filled in when the drivers are found;
     #: what a file says here is not used.

@@ -17,12 +17,13 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 #: fixture_angle: the unit's axis against its mounting, of each face. tilt: the mounting plate against the axis of
 #: rotation. mounting_repeatability: the unit in one mounting against the same mounting another time.
 #: tilted_fixture_angle: the unit's direction in a tilted mounting against the one that is stated, in each of two
-#: directions. level: the axis of rotation against the vertical. turn_angle: of a turn by hand.
+#: directions. radius: the unit's distance from the axis of rotation, all radii alike. level: the axis of rotation
+#: against the vertical. turn_angle: of a turn by hand.
 Quantity = Literal[
     "clock", "table_rate", "thermometer", "chamber_gradient", "fixture_angle", "tilt", "mounting_repeatability",
-    "tilted_fixture_angle", "level", "supply", "turn_angle",
+    "tilted_fixture_angle", "radius", "level", "supply", "turn_angle",
 ]  # fmt: skip
-Unit = Literal["ppm", "deg/s", "deg C", "deg", "V"]
+Unit = Literal["ppm", "deg/s", "deg C", "deg", "m", "V"]
 Distribution = Literal["normal", "rectangular", "triangular", "u-shaped"]
 
 #: The units that a quantity may be stated in, the usual one first.
@@ -35,6 +36,7 @@ UNITS: dict[Quantity, tuple[Unit, ...]] = {
     "tilt": ("deg",),
     "mounting_repeatability": ("deg",),
     "tilted_fixture_angle": ("deg",),
+    "radius": ("m",),
     "level": ("deg",),
     "supply": ("V",),
     "turn_angle": ("deg",),

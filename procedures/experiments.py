@@ -19,8 +19,8 @@ from procedures.recipe.recipe import Recipe, validated_recipe
 Changes = Mapping[str, object] | None
 #: What an experiment does not take over from the recipe: it is no calibration.
 NOT_TAKEN: Mapping[str, object] = {
-    "fit": None, "verification": None, "profiles": (), "indexing": None, "inverted": None, "power_cycle": None,
-    "supply": None, "ramp": None,
+    "fit": None, "verification": None, "profiles": (), "indexing": None, "inverted": None, "another_radius": None,
+    "power_cycle": None, "supply": None, "ramp": None,
     "replicates": {}, "repeats": 1,
 }  # fmt: skip
 
@@ -160,6 +160,14 @@ def _inverted_at_several(recipe: Recipe) -> Changes:
         "temperatures_c": temperatures, "rates_dps": rates, **_short(recipe), **_one_session(recipe),
         "inverted": {"temperatures_c": temperatures, "rates_dps": rates},
     }  # fmt: skip
+
+
+def _another_radius(recipe: Recipe) -> Changes:
+    if not _turns(recipe):
+        return None
+    rates = few_rates(recipe)
+    other = {"temperatures_c": [at_hand_c(recipe)], "rates_dps": rates}
+    return _at_one(recipe, rates, another_radius=other, **_one_session(recipe))
 
 
 def _turned(recipe: Recipe) -> Changes:
@@ -337,6 +345,11 @@ BLOCKS: tuple[Block, ...] = (
         _inverted_at_several,
     ),
     Block("turned_180", "each position also turned by 180 deg on its fixture and on the table", _turned),
+    Block(
+        "another_radius", "each position also at another distance from the table's axis, in one powered run",
+        _another_radius,
+        needs=("a fixture that can be moved to another distance from the table axis (eccentricity of the bench file)",),
+    ),
     Block(
         "tilted", "each position, and tilted with x+y+z up: three axes turn at once, in one powered run", _tilted,
         needs=("a tilted fixture that brings x+y+z up (tilted_positions of the bench file)",),

@@ -55,7 +55,7 @@ class SampledUnit:
     def _values(self, index: NDArray[np.int64]) -> dict[str, NDArray[np.float64]]:
         """Return channel -> its values, (n,), in the unit of a recording, of the samples `index` (n,)."""
         sample = self._unit.sample(index / self._rate_hz)
-        force = self._world.gravity(index / self._rate_hz)
+        force = self._world.specific_force(index / self._rate_hz, sample.table_dps)
         if self._unit.truth.accel_noise_g > 0:
             force = force + self._unit.truth.accel_noise_g * self._rng.standard_normal(force.shape)
         values = {"temperature_c": sample.temperature_c[:, 0], "supply_v": sample.supply_v}

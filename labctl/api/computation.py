@@ -103,7 +103,8 @@ async def follow(
 
     async def stream() -> AsyncIterator[bytes]:
         try:
-            shown, stage = None, first
+            shown: str | None = None
+            stage: str | None = first
             while stage is not None:
                 if stage != shown:
                     yield _event("stage", StageResponse(stage=stage).model_dump_json())

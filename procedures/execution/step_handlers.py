@@ -132,7 +132,8 @@ def mounting_text(position: str) -> str:
         text += (
             f", and the fixture with the units on the table by {axis_position.fixture_deg} deg from where it was first"
         )
-    return f"{text} (counter-clockwise seen from above)" if axis_position.turned_deg else text
+    text += " (counter-clockwise seen from above)" if axis_position.turned_deg else ""
+    return f"{text}; the middle of each unit {axis_position.off_axis}" if axis_position.off_axis else text
 
 
 def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:

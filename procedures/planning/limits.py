@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from instruments.eccentricity import Eccentricity
 from instruments.errors import InstrumentError
 from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
@@ -43,18 +44,23 @@ class BenchLimits:
     earlier: EarlierTimes | None = None  #: what earlier campaigns of the bench took, for the forecast
     tilted_positions: tuple[str, ...] = ()  #: directions of the body that a tilted fixture brings up
     supply: SupplyLimits | None = None  #: of the units; None: labctl does not set it
+    eccentricity: Eccentricity | None = None  #: the units' distances from the table's axis; None: not known
 
     @classmethod
     def of(
         cls, bench: Bench, *, needs_person: bool = True, air_tau_s: float | None = None,
         earlier: EarlierTimes | None = None, tilted_positions: tuple[str, ...] = (),
+        eccentricity: Eccentricity | None = None,
     ) -> BenchLimits:  # fmt: skip
         """Return the limits of an opened bench, the others as its file says (`BenchFile`)."""
         units = {name: gyro.limits for name, gyro in bench.gyros.items()}
         chamber = None if bench.chamber is None else bench.chamber.limits
-        supply = None if bench.supply is None else bench.supply.limits
         table = (None, None) if bench.table is None else (bench.table.limits, bench.table.achievable_dps)
-        return cls(table[0], chamber, units, table[1], needs_person, True, air_tau_s, earlier, tilted_positions, supply)
+        supply = None if bench.supply is None else bench.supply.limits
+        return cls(
+            table[0], chamber, units, table[1], needs_person, True, air_tau_s, earlier, tilted_positions, supply,
+            eccentricity,
+        )  # fmt: skip
 
     @property
     def max_acceleration_dps2(self) -> float:
@@ -169,6 +175,8 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
     values["profiles"] = tuple(each for each, text in zip(values["profiles"], courses, strict=True) if not text)
     empty += _ramp_complaints(recipe, limits) + _fixture_complaints(recipe, limits)
     empty += _no_supply(recipe, limits)
+    radius_m, complaints_of_radius = _at_another_radius(recipe, limits)
+    empty += complaints_of_radius
     handling = recipe.mounting.handling_c
     if handling is not None and (text := limits.temperature_complaint(handling)):
         empty.append(f"mounting.handling_c {handling:g}: {text}")
@@ -176,7 +184,9 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
         raise PlanRefused(recipe.name, [*beyond, *empty], "Change the recipe.")
     if beyond and not clip:
         raise PlanRefused(recipe.name, beyond, ADVICE)
-    return (Recipe.model_validate(values), tuple(beyond)) if beyond else (recipe, ())
+    if radius_m is not None:
+        values["another_radius"]["radius_m"] = radius_m
+    return (Recipe.model_validate(values), tuple(beyond)) if beyond or radius_m is not None else (recipe, ())
 
 
 def _ramp_complaints(recipe: Recipe, limits: BenchLimits) -> list[str]:
@@ -219,6 +229,28 @@ def _no_supply(recipe: Recipe, limits: BenchLimits) -> list[str]:
     return [text]
 
 
+def _at_another_radius(recipe: Recipe, limits: BenchLimits) -> tuple[float | None, list[str]]:
+    """Return the radius of [another_radius] that the bench has, m, and why it has none."""
+    rules, on = recipe.another_radius, limits.eccentricity
+    if rules is None:
+        return None, []
+    others_m = () if on is None else on.other_radii_m
+    if on is None or not others_m:
+        text = (
+            "another_radius: the bench states no second distance of the units from the axis of the table; where the "
+            "fixture can be moved, add [eccentricity] with radius_m and other_radii_m, in m, to the bench file"
+        )
+        return None, [text]
+    if rules.radius_m is None or rules.radius_m in others_m:
+        return on.furthest_m if rules.radius_m is None else rules.radius_m, []
+    radii_text = ", ".join(f"{radius_m:g}" for radius_m in others_m)
+    text = (
+        f"another_radius.radius_m {rules.radius_m:g}: the bench file states other_radii_m = [{radii_text}] m; name "
+        "one of these, or leave radius_m out"
+    )
+    return None, [text]
+
+
 def _courses_beyond(recipe: Recipe, complaints: list[str | None]) -> list[str]:
     """Return what is wrong with the courses of a recipe; once where no course can be run at all."""
     if CONSTANT_ONLY in complaints:
@@ -230,7 +262,7 @@ def _courses_beyond(recipe: Recipe, complaints: list[str | None]) -> list[str]:
 def _point_lists(recipe: Recipe) -> list[tuple[str, str]]:
     """Return where the recipe lists points, as (table, key)."""
     lists = [("", "temperatures_c"), ("", "rates_dps")]
-    for name in ("indexing", "inverted"):
+    for name in ("indexing", "inverted", "another_radius"):
         if getattr(recipe, name) is not None:
             lists += [(name, "temperatures_c"), (name, "rates_dps")]
     lists += [(name, "rates_dps") for name in ("power_cycle", "ramp", "supply") if getattr(recipe, name) is not None]

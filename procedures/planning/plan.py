@@ -207,6 +207,8 @@ def _refuse_endless(recipe: Recipe) -> None:
         data_sets += len(recipe.positions) * len(recipe.inverted.temperatures_c) * len(recipe.inverted.rates_dps)
     if (supply := recipe.supply) is not None:
         data_sets += recipe.repeats * len(supply.deviations_pct) * len(supply.rates_dps)
+    if (other := recipe.another_radius) is not None:
+        data_sets += len(recipe.positions) * len(other.temperatures_c) * len(other.rates_dps)
     if recipe.power_cycle is not None:
         data_sets += recipe.power_cycle.count * len(recipe.power_cycle.rates_dps)
     if (ramp := recipe.ramp) is not None:

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.eccentricity import MM_PER_M
 from instruments.positions import Position
 from procedures.recipe.recipe import Recipe
-from procedures.recipe.rules import Indexing, Inverted
+from procedures.recipe.rules import AnotherRadius, Indexing, Inverted
 
 
 @dataclass(frozen=True)
@@ -96,17 +97,19 @@ def _blocks(recipe: Recipe) -> list[MountingBlock]:
 
 
 def _turned(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[MountingBlock]:
-    """Return the mountings that follow a mounting in its powered session: turned about the table axis, upside down.
+    """Return the mountings that follow a mounting in its powered session: turned, upside down, at another radius.
 
     A tilted unit is not turned about the table axis: the straight mountings separate the angle of its fixture.
     """
     straight = Position.of(position)
-    tables: list[tuple[Inverted | Indexing, list[Position]]] = []
+    tables: list[tuple[Inverted | Indexing | AnotherRadius, list[Position]]] = []
     if (rules := recipe.indexing) is not None and not straight.is_tilted:
         of_unit = [replace(straight, unit_deg=angle) for angle in rules.unit_deg]
         tables.append((rules, [*of_unit, *(replace(straight, fixture_deg=angle) for angle in rules.fixture_deg)]))
     if recipe.inverted is not None:
         tables.append((recipe.inverted, [straight.upside_down]))
+    if (other := recipe.another_radius) is not None and other.radius_m is not None and not straight.is_tilted:
+        tables.append((other, [straight.at_radius(round(other.radius_m * MM_PER_M))]))
     blocks = []
     for table, positions in tables:
         order_c = table.temperatures_c

@@ -164,13 +164,14 @@ class _StepWriter:
         repower = self.run == 0 or (each and not block.same_session)
         if self.run and repower:
             self.steps.append(PowerOff(run=self.run))
-        self.position = block.position
+        place = self.limits.eccentricity
+        self.position = block.position if place is None else place.mounted(block.position)
         self.mounting += 1
         next_run = self.run + 1 if repower else self.run
         earlier = self.limits.earlier
         by_person_s = _known(None if earlier is None else earlier.mount_s, MOUNTING_S)
         expected_s = by_person_s if self.limits.needs_person else 0.0
-        mount = Mount(position=block.position, mounting=self.mounting, run=next_run, expected_s=expected_s)
+        mount = Mount(position=self.position, mounting=self.mounting, run=next_run, expected_s=expected_s)
         self.steps.append(mount)
         if repower:
             self.power_on()

@@ -19,6 +19,7 @@ from procedures.recipe.fit_rules import FitRules
 from procedures.recipe.profiles import Profile
 from procedures.recipe.rules import (
     AcquireRules,
+    AnotherRadius,
     GuardRules,
     Indexing,
     Inverted,
@@ -46,7 +47,8 @@ LONGEST_KEY = 80
 #: What a recipe of turns by hand has no use for: no table and no chamber is driven.
 _OF_RATES = (
     "temperatures_c", "rates_dps", "order", "temperature_order", "rate_order", "repeats", "soak", "acquire",
-    "replicates", "indexing", "inverted", "power_cycle", "supply", "ramp", "profiles", "verification", "stop",
+    "replicates", "indexing", "inverted", "another_radius", "power_cycle", "supply", "ramp", "profiles",
+    "verification", "stop",
 )  # fmt: skip
 
 
@@ -76,6 +78,7 @@ class Recipe(Table):
     replicates: Replicates = Replicates()
     indexing: Indexing | None = None
     inverted: Inverted | None = None
+    another_radius: AnotherRadius | None = None
     power_cycle: PowerCycle | None = None
     supply: SupplySteps | None = None
     ramp: Ramp | None = None

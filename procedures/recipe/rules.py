@@ -21,6 +21,11 @@ def _position(text: str) -> str:
     position = positions.Position.of(text)
     if position.turned_deg:
         raise ValueError("a recipe states turns about the table axis in its table [indexing]; write the position alone")
+    if position.radius_mm is not None:
+        raise ValueError(
+            "the bench file states the distance from the table's axis, and a recipe another one in its table "
+            "[another_radius]; write the position alone"
+        )
     return str(position)
 
 
@@ -80,6 +85,17 @@ class Replicates(Table):
 class Inverted(Table):
     """Each position once more upside down, in the same powered session."""
 
+    temperatures_c: tuple[Number, ...] = Field(min_length=1)
+    rates_dps: tuple[Number, ...] = Field(min_length=1)
+
+
+class AnotherRadius(Table):
+    """Each position once more at another distance from the table's axis, in the same powered session.
+
+    The centripetal acceleration is in proportion to that distance, an error of the scale factor does not depend on it.
+    """
+
+    radius_m: Number | None = Field(default=None, ge=0)  #: absent: the one of the bench that differs most
     temperatures_c: tuple[Number, ...] = Field(min_length=1)
     rates_dps: tuple[Number, ...] = Field(min_length=1)
 

@@ -12,8 +12,8 @@ from procedures.recipe.recipe import Recipe
 
 #: What a designed recipe does not take over from the one that it is like.
 NOT_TAKEN: Mapping[str, object] = {
-    "fit": None, "verification": None, "profiles": (), "indexing": None, "inverted": None, "power_cycle": None,
-    "supply": None, "ramp": None, "replicates": {}, "repeats": 1, "temperature_order": "as_listed",
+    "fit": None, "verification": None, "profiles": (), "indexing": None, "inverted": None, "another_radius": None,
+    "power_cycle": None, "supply": None, "ramp": None, "replicates": {}, "repeats": 1, "temperature_order": "as_listed",
     "rate_order": "as_listed",
 }  # fmt: skip
 #: A soak without waiting ends when the unit's thermometer has been read for so long, s, whatever it shows, K.

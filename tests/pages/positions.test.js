@@ -48,3 +48,11 @@ test("the axes that are drawn are right-handed, and turn counter-clockwise seen 
     for (const name of level) assert.deepEqual(rounded(cross([0, 0, 1], straight[name])), rounded(turned[name]));
   }
 });
+
+test("the distance from the axis of the table is no part of what points up", () => {
+  assert.deepEqual(
+    [axisOf("zr200x"), endOf("zr200x"), signOf("-zr200-x"), turnedDeg("zr60x@180")],
+    ["z", "z", -1, [180, 0]],
+  );
+  assert.deepEqual([endOf("x+y+zr200"), isTilted("x+y+zr200"), turnedDeg("xr60@0/90")], ["x+y+z", true, [0, 90]]);
+});

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from instruments import plugins
+from instruments.eccentricity import Eccentricity
 from instruments.interfaces.supply import SupplyLimits
 from instruments.plugins import PluginError, PluginGroup
 from labctl.services.criticism.next_experiment import plans_of
@@ -35,8 +36,9 @@ def test_labctls_own_blocks_are_found_by_their_entry_point() -> None:
 def test_each_block_makes_a_plan_within_the_limits_that_differs_from_the_recipe(recipe: str, bench: str | None) -> None:
     whole = load_recipe(recipe)
     supply = SupplyLimits(nominal_v=5.0, min_v=4.5, max_v=5.5, current_limit_a=1.0, tolerance_v=0.05)
-    whole_bench = limits_of(load_bench(bench or "triaxial-sim"))
-    limits = replace(whole_bench, tilted_positions=("x+y+z",), supply=supply)
+    where = Eccentricity(radius_m=0.06, other_radii_m=(0.2,))
+    limits = limits_of(load_bench(bench or "triaxial-sim"))
+    limits = replace(limits, tilted_positions=("x+y+z",), supply=supply, eccentricity=where)
     made = {block.id: block.changed(whole) for block in BLOCKS}
     assert sum(changed is None for changed in made.values()) <= 3
     for name, changed in made.items():

@@ -13,7 +13,7 @@ class GSensitivity(HiddenEffect):
     id, unit, default = "g_sensitivity", "deg/s/g", 0.015
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
-        return self.size * 20.0 * np.arctan(state.g[:, state.rows] / 20.0)
+        return self.size * 20.0 * np.arctan(state.force_g[:, state.rows] / 20.0)
 
 
 class CrossGSensitivity(HiddenEffect):
@@ -22,7 +22,9 @@ class CrossGSensitivity(HiddenEffect):
     id, unit, default = "cross_g_sensitivity", "deg/s/g", 0.015
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
-        across = np.stack([state.g[:, (row + 1) % 3] - 0.6 * state.g[:, (row + 2) % 3] for row in state.rows], axis=1)
+        across = np.stack(
+            [state.force_g[:, (row + 1) % 3] - 0.6 * state.force_g[:, (row + 2) % 3] for row in state.rows], axis=1
+        )
         return self.size * across
 
 
@@ -32,16 +34,20 @@ class GSquaredSensitivity(HiddenEffect):
     id, unit, default = "g_squared_sensitivity", "deg/s/g^2", 0.01
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
-        along = state.g[:, state.rows]
+        along = state.force_g[:, state.rows]
         return self.size * along * along
 
 
 class CentripetalAcceleration(HiddenEffect):
-    """The unit sits off the axis of rotation; size is the error at one g of centripetal acceleration, at 6 cm."""
+    """The unit sits off the axis of rotation; size is the error at one g of centripetal acceleration.
+
+    It is at 6 cm on a bench that does not state where it is.
+    """
 
     id, unit, default = "centripetal_acceleration", "deg/s/g", 0.02
-    radius_m = 0.06
+    usual_radius_m = 0.06
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
         spin = np.deg2rad(state.table_dps)
-        return (self.size * spin * spin * self.radius_m / 9.80665)[:, None]
+        radius_m = self.usual_radius_m if state.radius_m is None else state.radius_m
+        return (self.size * spin * spin * radius_m / 9.80665)[:, None]

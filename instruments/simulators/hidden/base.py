@@ -24,7 +24,9 @@ class State:
     body_dps: Array  #: (n, 3)
     own_dps: Array  #: (n, axes)
     rows: list[int]  #: body axis of each recorded axis
-    g: Array  #: (n, 3)
+    g: Array  #: (n, 3): one g up
+    force_g: Array  #: (n, 3): the same, and the pull towards the axis of the table
+    radius_m: float | None  #: distance from the axis of the table, where the bench states one
     sensor_c: Array
     start_c: float  #: temperature of the whole bench at the start
     deep_c: Array

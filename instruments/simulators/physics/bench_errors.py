@@ -37,6 +37,7 @@ class BenchErrors:
     remounted: tuple[Standard, ...] = ()  #: what each mounting is drawn from
     tilted: tuple[Standard, ...] = ()  #: what the tilted fixture is drawn from, of each direction of its own
     seed: tuple[int, ...] = field(default=(), compare=False)
+    radius_m: float = 0.0  #: of the distance of the units from the axis of the table
 
     @staticmethod
     def drawn(standards: Sequence[Standard], seed: Sequence[int]) -> BenchErrors:
@@ -59,6 +60,7 @@ class BenchErrors:
             tuple(standard for standard in standards if standard.quantity == "mounting_repeatability"),
             tuple(standard for standard in standards if standard.quantity == "tilted_fixture_angle"),
             tuple(seed),
+            float(_summed(standards, "radius", np.random.default_rng([*seed, zlib.crc32(b"radius")]))[0]),
         )
 
     def lean_rad(self, position: Position, mounting: int) -> Lean:

@@ -45,6 +45,16 @@ class BodyFrame:
         g[:, self.up] = self.sign
         return self.in_body(g)
 
+    def outwards(self) -> Array:
+        """Return the direction (3,) along `first`, `second` and `up` that points away from the axis if none is stated.
+
+        The first level axis, of a unit that is not turned on its fixture; a turn leaves it behind.
+        """
+        angle = self.sign * np.radians(self.turned_deg)
+        direction = np.zeros(3)
+        direction[self.first], direction[self.second] = np.cos(angle), -np.sin(angle)
+        return direction
+
     def in_body(self, vectors: Array) -> Array:
         """Return vectors (n, 3) along `first`, `second` and `up` of a tilted mounting in body axes; others as given."""
         return vectors @ np.array(self.rows) if self.rows else vectors

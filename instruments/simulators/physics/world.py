@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
@@ -74,6 +74,8 @@ def _waves(t_s: Array, *waves: tuple[float, float, float]) -> Array:
 
 Array = NDArray[np.float64]
 
+#: One g, m/s^2.
+STANDARD_G = 9.80665
 #: Values for a table and a chamber that a bench does not have: neither ever moves.
 USUAL_STEPS_PER_TURN, USUAL_RAMP_C_PER_MIN = 1600, 1.67
 
@@ -85,6 +87,7 @@ class GyroSample:
     rate_dps: Array  #: (n, axes)
     temperature_c: Array  #: (n, axes)
     supply_v: Array  #: (n,)
+    table_dps: Array  #: (n,) mean over the sampling interval, as the unit feels it
 
 
 def number(settings: Mapping[str, object], name: str, usual: float) -> float:
@@ -122,6 +125,7 @@ class World:
         self._encoder_late_s = number(settings.table, "encoder_late_s", 0.0)
         self._encoder_rng = np.random.default_rng([settings.seed, settings.noise_seed, zlib.crc32(b"encoder")])
         self.position, self.mounting, self.run = Position.of("z"), 0, 0
+        self._usual_radius_m = None if bench.eccentricity is None else bench.eccentricity.radius_m
         self._lean_rad = UPRIGHT  #: of the axis of rotation in the frame of the units
         self.powered_on_s: float | None = None
         truths = {gyro.name: self._make(gyro, settings) for gyro in bench.gyros}
@@ -237,6 +241,29 @@ class World:
             return np.asarray(self.tumbling.attitudes(t_s)[:, 2])
         return BodyFrame.of(self.position).gravity(len(t_s))
 
+    @property
+    def radius_m(self) -> float | None:
+        """The true distance of the units from the axis of the table, m; None on a bench that does not state it."""
+        stated_m = self.position.radius_m
+        if stated_m is None:
+            return self._usual_radius_m
+        return max(stated_m - self.errors.radius_m, 0.0)
+
+    def specific_force(self, t_s: Array, table_dps: Array) -> Array:
+        """Return the specific force in body axes at times and table rates (n,), (n, 3) g: gravity and the way round."""
+        force = self.gravity(t_s)
+        if not self.radius_m or self.tumbling is not None:
+            return force
+        omega = table_dps * (np.pi / 180.0)
+        return force - np.outer(omega * omega * (self.radius_m / STANDARD_G), self._outwards())
+
+    def _outwards(self) -> Array:
+        """Return the unit vector away from the axis of the table, (3,), in the frame of the body."""
+        if (stated := self.position.outwards) is not None:
+            return np.array(stated)
+        frame = BodyFrame.of(replace(self.position, fixture_deg=0))
+        return frame.in_body(frame.outwards())
+
 
 def _memory_of(hidden: list[HiddenEffect]) -> tuple[Array, Array]:
     """Return the moments before now, (k,) s, and their weights, (k,), of all hidden responses one after the other."""
@@ -292,7 +319,8 @@ class SimulatedGyro:
         drift = self._instability.sample(t_s)
         rate = rate + drift + truth.white_dps_rthz * np.sqrt(self.sample_rate_hz) * white[:, :-1]
         thermometer = shown[:, None] + truth.thermometer_noise_c * white[:, -1:]
-        return GyroSample(rate, np.repeat(thermometer, len(truth.axes), axis=1), world.supply_v(t_s, truth.supply_v))
+        warm_c = np.repeat(thermometer, len(truth.axes), axis=1)
+        return GyroSample(rate, warm_c, world.supply_v(t_s, truth.supply_v), table_dps)
 
     def _felt(self, t_s: Array, period_s: float) -> tuple[Array, Array]:
         """Return the table's mean rate over each sampling interval, deg/s, and its angle as they are felt, (n,)."""
@@ -312,6 +340,8 @@ class SimulatedGyro:
             own_dps=body[:, self._rows],
             rows=self._rows,
             g=world.gravity(t_s),
+            force_g=world.specific_force(t_s, table_dps),
+            radius_m=world.radius_m,
             sensor_c=sensor,
             start_c=world.start_c,
             deep_c=world.heat.deep_c(self.settings.name, t_s),

@@ -25,6 +25,7 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import RECORDING, WITHIN_S
+from labctl.recording.positions import comparable
 
 Columns = Mapping[str, NDArray[np.generic]]
 
@@ -128,6 +129,7 @@ def _joined_channels(one: ReducedRecording, two: ReducedRecording) -> Channels:
         counted[name] = int(np.max(np.asarray(before[name]))) - int(np.min(np.asarray(after[name]))) + 1
         after[name] = np.asarray(after[name]) + counted[name]
     columns = {name: np.concatenate([before[name], after[name]]) for name in sorted(names)}
+    columns["position"] = comparable(columns["position"], np.asarray(columns["table_rate_dps"]) != 0)
     rates = {axis: np.concatenate([first.rates[axis], second.rates[axis]]) for axis in first.rates}
     history = _joined_history(first.history, second.history, counted, shift_s)
     if first.profile is None or second.profile is None:

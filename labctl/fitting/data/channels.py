@@ -15,7 +15,7 @@ from labctl.fitting.data.temperature.history import TemperatureHistory, history_
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.columns import RECORDING, WITHIN_S
-from labctl.recording.positions import up_in
+from labctl.recording.positions import comparable, lever_in, radius_in, up_in
 
 if TYPE_CHECKING:
     from labctl.fitting.data.rate_profile import RateProfile
@@ -92,6 +92,14 @@ class Channels:
         """Return how much of a body axis points up along the table axis, (n,): 1, -1, 0, or tilted between them."""
         return up_in(np.asarray(self.columns["position"]), axis)
 
+    def radius_m(self) -> Array:
+        """Return the unit's distance from the table's axis, (n,) m; NaN where it is not known."""
+        return radius_in(np.asarray(self.columns["position"]))
+
+    def lever_m(self, axis: str) -> Array:
+        """Return the part along a body axis of the way from the table's axis to the unit, (n,) m; NaN: not known."""
+        return lever_in(np.asarray(self.columns["position"]), axis)
+
     def positions(self) -> list[tuple[str, NDArray[np.bool_]]]:
         """Return every position that occurs and which rows are in it, (n,)."""
         position = np.asarray(self.columns["position"]).astype(np.str_)
@@ -154,6 +162,7 @@ def channels_of(points: Recording, up_rate_dps: float = 0.0, profile: RateProfil
     """
     columns = with_stand_in(points.columns, len(points))
     columns.setdefault("position", np.full(len(points), points.info.axes[0]))
+    columns["position"] = comparable(np.asarray(columns["position"]), np.asarray(columns["table_rate_dps"]) != 0)
     true = np.asarray(columns["table_rate_dps"], dtype=np.float64) + up_rate_dps
     if "previous_rate_dps" not in columns and points.info.kind == "points":
         before = np.concatenate([[0.0], np.asarray(columns["table_rate_dps"])[:-1]])

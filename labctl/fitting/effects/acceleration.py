@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.effects.equation import Equation, Source, Symbol, term_528
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording.positions import Position
 
 if TYPE_CHECKING:
     from labctl.answers.effect_origin import Origin
@@ -18,6 +20,8 @@ GRAVITY = 9.80665
 #: Specific force along an axis that changes by less, g, is the tilt of a support and the drift of an accelerometer with
 #: temperature, tens of mg for a low-cost one (its data sheet), and no change of pose.
 MIN_CHANGE_G = 0.1
+#: The same of a force that is known from position, rate and distance from the table's axis, and from no accelerometer.
+MIN_KNOWN_CHANGE_G = 0.01
 #: Between these quantiles of a logged force the change counts, so that a knock does not.
 QUANTILES = (0.01, 0.99)
 
@@ -30,11 +34,12 @@ class _Acceleration(Effect):
 
     def undetermined_by(self, channels: Channels, axis: str) -> str:
         changes = {body: change_g(channels, body) for body in self.felt_along(axis)}
-        if not changes or max(changes.values()) >= MIN_CHANGE_G:
+        least_g = least_change_g(channels)
+        if not changes or max(changes.values()) >= least_g:
             return ""
         changes_text = ", ".join(f"{body} by {change:.2g} g" for body, change in changes.items())
         return (
-            f"no change of pose: the specific force changes less than {MIN_CHANGE_G} g ({changes_text}), as a "
+            f"no change of pose: the specific force changes less than {least_g} g ({changes_text}), as a "
             "support tilts "
             "or an accelerometer drifts; measure each axis up and down"
         )
@@ -45,9 +50,34 @@ class _Acceleration(Effect):
 
 
 def force_g(channels: Channels, axis: str) -> Array:
-    """Return the specific force along a body axis, (n,) g: logged, or what gravity gives in each position."""
+    """Return the specific force along a body axis, (n,) g: logged, or what gravity gives in each position.
+
+    Where the position says how far the unit is from the table's axis, and which body axis points away from it, that is
+    with the centripetal acceleration, towards the table's axis.
+    """
     name = f"accel_{axis}_g"
-    return np.asarray(channels[name], dtype=np.float64) if name in channels else channels.up(axis)
+    if name in channels:
+        return np.asarray(channels[name], dtype=np.float64)
+    return channels.up(axis) - np.nan_to_num(pull_g(channels, channels.lever_m(axis)))
+
+
+def pull_g(channels: Channels, distance_m: Array | float) -> Array:
+    """Return the centripetal acceleration, (n,) g, at a distance from the table's axis, (n,) m."""
+    if "table_rate_dps" not in channels:
+        return np.full(len(channels), np.nan)
+    return np.asarray(np.deg2rad(channels.table_rate_dps()) ** 2 * distance_m / GRAVITY)
+
+
+def knows_pull(channels: Channels) -> bool:
+    """Return whether the specific force is known with the centripetal acceleration: in all rows that turn, or none."""
+    lever_m = channels.lever_m(BODY_AXES[0])
+    return "table_rate_dps" in channels and bool(np.any(np.isfinite(lever_m) & (channels.table_rate_dps() != 0)))
+
+
+def least_change_g(channels: Channels) -> float:
+    """Return by how much a specific force has to change, g, to determine a sensitivity to it."""
+    logged = any(f"accel_{axis}_g" in channels for axis in BODY_AXES)
+    return MIN_CHANGE_G if logged or not knows_pull(channels) else MIN_KNOWN_CHANGE_G
 
 
 def change_g(channels: Channels, axis: str) -> float:
@@ -147,12 +177,13 @@ class CentripetalAcceleration(_Acceleration):
     )
     experiment = "the same rates at another radius, or with the unit turned by 180 deg on the table"
     draws = ("table_rate_dps", "map")
+    usual_m: ClassVar[float] = 0.1  #: distance from the table's axis in the columns of rows that do not state it
     equation: ClassVar = Equation(
         "(D[p] if by_position else D) * r / g_n * (pi / 180 * omega_t)**2",
         (
             Symbol(
                 "D[p]",
-                "g-sensitivity in position p, if the unit is 0.1 m off the axis; else times 0.1 m over the distance",
+                "g-sensitivity in position p; where the distance is not known, times that distance over 0.1 m",
                 "deg/s/g",
                 "centripetal_{p}_up",
             ),
@@ -164,7 +195,7 @@ class CentripetalAcceleration(_Acceleration):
         ),
         others=(
             Symbol("p", "position of the unit: the axis that points up", ""),
-            Symbol("r", "distance from the axis of the table", "m"),
+            Symbol("r", "distance from the axis of the table as the position states it, such as zr200; else 0.1", "m"),
             Symbol("g_n", "standard acceleration of gravity", "m/s^2"),
         ),
     )
@@ -179,15 +210,43 @@ class CentripetalAcceleration(_Acceleration):
     def felt_along(self, axis: str) -> tuple[str, ...]:
         return ()  # it follows from the rate
 
+    def undetermined_by(self, channels: Channels, axis: str) -> str:
+        if not knows_pull(channels):
+            return ""
+        return (
+            "the distance from the table's axis and the body axis that points away from it are known, so that the "
+            "centripetal acceleration is part of the specific force; fit g_sensitivity or cross_g_sensitivity"
+        )
+
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        """Return the centripetal acceleration at 0.1 m; its direction in the body may differ between positions."""
-        pull_g = np.deg2rad(channels.table_rate_dps()) ** 2 * 0.1 / GRAVITY
-        if not term.parameters.get("by_position", 1.0):
-            return [Column("centripetal", "deg/s/g", pull_g)]
-        return [
-            Column(f"centripetal_{up_position}_up", "deg/s/g", np.where(rows, pull_g, 0.0))
-            for up_position, rows in channels.positions()
-        ]
+        """Return the centripetal acceleration; its direction in the body may differ between positions.
+
+        Rows whose distance from the table's axis is not known have coefficients of their own beside rows where it is:
+        their distance is neither 0 nor that of the others.
+        """
+        radius_m = channels.radius_m()
+        is_known = np.isfinite(radius_m)
+        pulls_g = pull_g(channels, np.where(is_known, radius_m, self.usual_m))
+        columns = []
+        for name, rows in self._places(channels, by_position=bool(term.parameters.get("by_position", 1.0))):
+            kinds = [("", rows & is_known), ("_unknown_radius" if is_known.any() else "", rows & ~is_known)]
+            columns += [
+                Column(f"{name}{kind}", "deg/s/g", np.where(of_kind, pulls_g, 0.0))
+                for kind, of_kind in kinds
+                if of_kind.any() or not len(channels)
+            ]
+        return columns
+
+    @staticmethod
+    def _places(channels: Channels, *, by_position: bool) -> list[tuple[str, NDArray[np.bool_]]]:
+        """Return what has a coefficient of its own, and its rows (n,): a position, at whatever distance, or all."""
+        if not by_position:
+            return [("centripetal", np.ones(len(channels), dtype=bool))]
+        rows_of: dict[str, NDArray[np.bool_]] = {}
+        for text, rows in channels.positions():
+            name = f"centripetal_{Position.of(text).without_radius}_up"
+            rows_of[name] = rows_of.get(name, np.zeros(len(channels), dtype=bool)) | rows
+        return list(rows_of.items())
 
     def options(self, span: Span) -> list[Term]:
         return by_parameter(self.id, by_position=np.array([0.0, 1.0]))

@@ -67,7 +67,11 @@ CHANNELS: Mapping[str, Symbol] = {
         Symbol("theta", "angle of the table", "deg", "table_angle_deg"),
         Symbol("u", "share of an axis of the body that points up along the table axis: 1, 0 or -1", "1", "position"),
         Symbol(
-            "f", "specific force along an axis of the body: logged, or gravity in that position", "g", "accel_{a}_g"
+            "f",
+            "specific force along an axis of the body: logged, or gravity in that position, and where position says "
+            "how far from the table's axis the unit is, the centripetal acceleration",
+            "g",
+            "accel_{a}_g",
         ),
         Symbol("V", "supply voltage", "V", "supply_v"),
         Symbol("pi", "3.14159...", "1"),

@@ -15,6 +15,7 @@ from labctl.fitting.data.mounting_angles import leaning_rates
 from labctl.fitting.data.response import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
+from labctl.fitting.estimation.common_radius_error import with_radius_error
 from labctl.fitting.estimation.common_turn_error import with_common_error
 from labctl.fitting.estimation.delay_and_bandwidth import (
     first_response,
@@ -111,9 +112,19 @@ def _solve_each(
     for axis in data.outputs:
         design, solution, late = _converged(data, model, axis, fixed[axis] if fixed else None, prior)
         solution = with_common_error(data, axis, design.columns, solution)
+        solution = _with_radius_error(data, model, axis, design, solution)
         fits[axis] = _axis_fit(design, solution, late)
         solutions[axis], nuisance[axis] = replace(solution, white_dps=data.white_dps(axis)), _nuisance(design, solution)
     return AxisSolutions(fits, solutions, nuisance)
+
+
+def _with_radius_error(data: FitData, model: ErrorModel, axis: str, design: AxisDesign, solution: Solution) -> Solution:
+    at = _law_coefficients(design, solution)
+
+    def columns_of(other: FitData) -> NDArray[np.float64]:
+        return axis_design(other, model, axis, at).columns
+
+    return with_radius_error(data, design.columns, columns_of, solution)
 
 
 def _nuisance(design: AxisDesign, solution: Solution) -> Nuisance:

@@ -33,6 +33,7 @@ SECOND = "with the second order (GUM 5.1.2, note)"
 BESIDE_STRAIGHT = "separated from the coefficients by the mountings with each body axis up"
 PLACED_IN_COEFFICIENTS = "in the coefficients, about the axes whose mountings separate angles"
 IN_COEFFICIENTS = "in the coefficients: the fit takes turn_common_u of the recipe"
+OF_COEFFICIENTS = "in the coefficients of g-sensitivity that were found by the centripetal acceleration, not in a rate"
 NO_SENSITIVITY = "its sensitivity is not known: the model has no supply_sensitivity"
 
 
@@ -90,6 +91,7 @@ _SENSITIVITY: dict[tuple[str, str], Callable[[Sensitivities, BenchConditions], A
     ("tilt", "deg"): lambda s, _: RAD_PER_DEG * s.angles["tilt"],
     ("mounting_repeatability", "deg"): lambda s, _: RAD_PER_DEG * s.angles["mounting_repeatability"],
     (TILTED, "deg"): lambda s, _: RAD_PER_DEG * s.angles[TILTED],
+    ("radius", "m"): lambda s, _: np.zeros_like(s.relative_rate),
     ("level", "deg"): lambda s, c: None if c.latitude_deg is None else s.level * _level_dps_per_deg(c.latitude_deg),
     ("supply", "V"): lambda _, __: None,
 }
@@ -127,7 +129,7 @@ def _matters(quantity: str, bench: BenchConditions) -> bool:
     """Return whether a quantity of the bench enters a calibration that was made by such a motion."""
     if quantity == TILTED:
         return bench.motion in {"rates", "profile"} and any(Position.of(each).is_tilted for each in bench.mountings)
-    if quantity in {"clock", "table_rate", *ANGLE_QUANTITIES}:
+    if quantity in {"clock", "table_rate", "radius", *ANGLE_QUANTITIES}:
         return bench.motion in {"rates", "profile"}
     return bench.motion == "turns" if quantity == "turn_angle" else True
 
@@ -161,6 +163,8 @@ def _sensitivity(standard: Standard, bench: BenchConditions, s: Sensitivities) -
         return np.zeros_like(s.temperature), OWN_THERMOMETER
     if standard.quantity == "turn_angle" and bench.turn_common_u is not None:
         return np.zeros_like(s.relative_rate), IN_COEFFICIENTS
+    if standard.quantity == "radius":
+        return np.zeros_like(s.relative_rate), OF_COEFFICIENTS
     if standard.quantity in EVERY_ANGLE and (reason := _why_less(standard.quantity, bench)):
         return _SENSITIVITY[standard.quantity, standard.unit_name](s, bench), reason
     sensitivity = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)

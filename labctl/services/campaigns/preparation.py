@@ -197,7 +197,7 @@ def prepare(
 def _limits(bench: Bench, file: BenchFile, earlier: EarlierTimes | None = None) -> BenchLimits:
     return BenchLimits.of(
         bench, needs_person=file.needs_person, air_tau_s=file.air_tau_s, earlier=earlier,
-        tilted_positions=file.tilted_positions,
+        tilted_positions=file.tilted_positions, eccentricity=file.eccentricity,
     )  # fmt: skip
 
 

@@ -122,6 +122,7 @@ def limits_of(bench: BenchFile, *, driven: bool = False, earlier: EarlierTimes |
         earlier=earlier,
         tilted_positions=bench.tilted_positions,
         supply=_supply_limits(bench),
+        eccentricity=bench.eccentricity,
     )
 
 

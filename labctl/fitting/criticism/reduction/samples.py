@@ -22,6 +22,7 @@ from labctl.recording.columns import OWN_DATASET, RECORDING
 from labctl.recording.decimation import FASTEST_HZ, decimated_columns
 from labctl.recording.output_steps import output_steps, with_quantisation
 from labctl.recording.points import dataset_starts, pieces
+from labctl.recording.positions import comparable
 from labctl.recording.quantisation import QUANTISATION
 
 #: A data set longer than this many median ones is taken in pieces.
@@ -104,7 +105,8 @@ def nodes_of(
     columns["since_begin_s"] = np.maximum(middle - length / 2, 0.0).ravel()
     columns["duration_s"] = length.ravel()
     position = texts["position"][begin] if "position" in texts else np.full(m, recording.info.axes[0])
-    text: dict[str, NDArray[np.str_]] = {"position": np.repeat(np.asarray(position, dtype=np.str_), bins)}
+    position = comparable(np.asarray(position), rate != 0)
+    text: dict[str, NDArray[np.str_]] = {"position": np.repeat(position, bins)}
     true = np.repeat(rate, bins) + up_rate_dps(recording.info)
     columns = with_stand_in(columns, m * bins)
     channels = Channels({**columns, **text}, body_rates(true, text["position"]), history_of(recording))

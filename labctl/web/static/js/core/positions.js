@@ -1,11 +1,11 @@
 // Positions of a unit: `-x` is x down, `x+y+z` a tilted unit; `x@180` the unit turned on its fixture, `x@0/90` the
-// fixture turned on the table.
+// fixture turned on the table; `zr200x` the unit at 200 mm from the axis of the table, body axis x pointing away from it.
 
 /** @typedef {"x" | "y" | "z"} Axis */
 /** @typedef {[number, number, number]} Shares of x, y and z */
 
 const AXES = /** @type {const} */ (["x", "y", "z"]);
-const FORM = /^([^@]*)(?:@(\d+)(?:\/(\d+))?)?$/;
+const FORM = /^([^@r]*)(?:r\d+(?:-?[xyz])?)?(?:@(\d+)(?:\/(\d+))?)?$/;
 const TERM = /([+-]?)(\d*)([xyz])/g;
 
 /** @param {string} position */
