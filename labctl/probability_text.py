@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 #: Probabilities beyond these are written as bounds: what was computed is neither impossible nor certain.
-LEAST, MOST = 0.005, 0.995
+MIN_STATED, MAX_STATED = 0.005, 0.995
 
 
 def probability_text(probability: float) -> str:
@@ -13,6 +13,6 @@ def probability_text(probability: float) -> str:
 
     `probabilityText` in `core/format.js` of the pages does the same; `tests/pages/probabilities.json` holds both.
     """
-    if probability < LEAST:
+    if probability < MIN_STATED:
         return "< 1 %"
-    return f"{math.floor(100.0 * probability + 0.5)} %" if probability < MOST else "> 99 %"
+    return f"{math.floor(100.0 * probability + 0.5)} %" if probability < MAX_STATED else "> 99 %"

@@ -41,6 +41,8 @@ NO_CERTIFICATES = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 #: For requests that run when the service stops, whole seconds.
 GRACE_S = 20
 
+#: The sign of a negative number on a page.
+MINUS = "\u2212"
 #: How often a page is asked whether it is so far, milliseconds; by default at each frame, which it then has to draw.
 POLL_MS = 50
 #: The figure of a name, once Plotly has drawn it.
@@ -212,9 +214,9 @@ def settled(page: Page) -> None:
 
 
 def number_of(text: str) -> float:
-    """Return a number that a page shows: its sign is the minus sign, U+2212."""
+    """Return a number that a page shows: its sign is the minus sign."""
     assert "-" not in text, f"{text!r} has a hyphen where a page has the minus sign"
-    return float(text.replace("\u2212", "-"))
+    return float(text.replace(MINUS, "-"))
 
 
 def figure(page: Page, name: str) -> dict[str, Any]:

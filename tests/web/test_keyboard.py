@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.helpers.browser import Service, figure, number_of, settled
+from tests.helpers.browser import MINUS, Service, figure, number_of, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -77,8 +77,8 @@ def test_the_points_over_a_channel_are_reached_from_left_to_right(explored: Page
     plot.focus()
     explored.keyboard.press("ArrowRight")
     line = plot.locator("xpath=..").locator(".keyboard-line")
-    expect(line).to_contain_text(f"{min(drawn):.5g}"[:6])
+    expect(line).to_contain_text(f"{min(drawn):.5g}"[:6].replace("-", MINUS))
     explored.keyboard.press("End")
-    expect(line).to_contain_text(f"{max(drawn):.5g}"[:6])
+    expect(line).to_contain_text(f"{max(drawn):.5g}"[:6].replace("-", MINUS))
     explored.keyboard.press("Enter")
     expect(failing).to_contain_text("1 data set selected")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from labctl.cli.output import console, format_number, print_heading, table
-from labctl.probability_text import LEAST, probability_text
+from labctl.probability_text import MIN_STATED, probability_text
 
 if TYPE_CHECKING:
     from labctl.answers.diagnosis import DiagnosisResponse, DiagnosisRound
 
-#: Suspects that are shown in the line of a round, at most; those below `LEAST` only in the table.
+#: Suspects that are shown in the line of a round, at most; those below `MIN_STATED` only in the table.
 MAX_SHOWN = 4
 #: Columns of the table: the suspects that were most probable in any round.
 MAX_COLUMNS = 6
@@ -54,7 +54,7 @@ def _began(answer: DiagnosisResponse) -> str:
 
 
 def _print_round(each: DiagnosisRound) -> None:
-    shown = [(effect, p) for effect, p in each.suspects.items() if p >= LEAST][:MAX_SHOWN]
+    shown = [(effect, p) for effect, p in each.suspects.items() if p >= MIN_STATED][:MAX_SHOWN]
     suspects = ", ".join(f"{effect} {probability_text(p)}" for effect, p in shown)
     of = ", ".join(map(str, each.recordings))
     figures = (
