@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from labctl.services.planning.plan_answer import describe_plan
-from tests.helpers.browser import NARROW, Faults, Service, figure, number_of
+from tests.helpers.browser import MINUS, NARROW, Faults, Service, figure, number_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -136,7 +136,7 @@ def assert_course_is_scrubbed(service: Service, page: Page) -> None:
     expect(card).to_contain_text(f"{values[at]:.2f} deg C")
     expect(card).to_contain_text("7: complete")
     (mean,) = (channel["mean"][6] for name, channel in sets["channels"].items() if name.startswith("gyro_"))
-    expect(card).to_contain_text(f"{mean:.7g}".rstrip("0"))
+    expect(card).to_contain_text(f"{mean:.7g}".rstrip("0").replace("-", MINUS))
     card.get_by_text("Two soaks over each other").first.click()
     soaks = [k for k, kind in enumerate(steps["kind"]) if kind == "soak"]
     expect(card.get_by_label("First soak").get_by_role("option")).to_have_count(len(soaks))
