@@ -1,4 +1,4 @@
-"""A probability in words, on every page, in every print and in every sentence: one rounding."""
+"""A probability in words: one rounding on pages, in commands and sentences. Certificates give a risk to two digits."""
 
 from __future__ import annotations
 

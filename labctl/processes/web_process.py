@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 import threading
+from collections.abc import Iterator
 from multiprocessing.connection import Connection
 
 import uvicorn
@@ -139,16 +140,26 @@ def serve(line: Connection, settings: WebSettings) -> None:
     log.info("process.started", version=VERSION, host=settings.at, asks_for_a_key=access.keys)
     threading.Thread(target=_end_with, args=(line,), name="supervisor", daemon=True).start()
     SupervisorWatch(os.getppid(), lambda: _stop_for(settings)).start()
-    with socket.socket(fileno=settings.listener) as listener, contextlib.suppress(KeyboardInterrupt):
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # the server raises it again at its end
-        try:
-            server.run(sockets=[listener])
-        finally:
-            signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the supervisor asks once more, and this process is ending
+    with socket.socket(fileno=settings.listener) as listener, until_sigterm():
+        server.run(sockets=[listener])
     if keys is not None:
         keys.close()
     service.close()
     log.info("process.ended")
+
+
+@contextlib.contextmanager
+def until_sigterm() -> Iterator[None]:
+    """End the block at the first SIGTERM, which the server raises again at its end.
+
+    Later ones are ignored: the supervisor asks twice, and what ends this process is not interrupted.
+    """
+    with contextlib.suppress(KeyboardInterrupt):
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
 
 
 def main() -> int:
