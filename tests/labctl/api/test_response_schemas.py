@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.helpers.openapi import openapi_document
+from tests.helpers.openapi import openapi_document, operations
 
 #: Routes whose answer is no JSON: what it is.
 FILES = {
@@ -35,12 +35,17 @@ def document() -> dict[str, Any]:
 
 def answers(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any] | None]]:
     """Yield every route with the schema of each success; None where it declares none."""
-    for path, operations in document["paths"].items():
-        for method, operation in operations.items():
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
             for status, answer in operation["responses"].items():
                 if status.startswith("2"):
                     contents = list(answer.get("content", {}).values()) or [{}]
                     yield from ((f"{method.upper()} {path}", content.get("schema")) for content in contents)
+
+
+def test_the_operations_by_the_routes_are_those_of_the_document(document: dict[str, Any]) -> None:
+    described = [(method, path) for path, item in document["paths"].items() for method in item]
+    assert operations() == sorted(described)
 
 
 def free_places(schema: object, schemas: dict[str, Any], at: str, seen: set[str]) -> Iterator[str]:
