@@ -63,6 +63,7 @@ def test_exports_state_the_configuration(calibration: Calibration) -> None:
     assert "was set to" not in exported(bare, "c")[0]
 
 
+@pytest.mark.slow
 def test_recordings_of_two_settings_are_not_taken_for_one_unit_in_silence(tmp_path: Path) -> None:
     lab = Lab(tmp_path)
     for number, filter_hz in enumerate(("262", "262", "16")):

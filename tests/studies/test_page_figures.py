@@ -44,6 +44,7 @@ def test_no_kind_of_figure_is_left_out(compared: dict[str, list[tuple[str, float
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_compare_says_what_part_of_the_earth_s_rate_its_errors_contain(tmp_path: Path) -> None:
     """The latitude of the simulated bench is 42.28 deg; a sidereal day has 86,164.1 s."""
     with (

@@ -7,6 +7,7 @@ import pytest
 from studies.rest_verdicts import outcome
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", ["tilt", "walk", "unlogged temperature", "hysteresis"])
 def test_a_record_at_rest_gets_a_true_verdict(cell: str) -> None:
     found = outcome("industrial", cell, 0, records=1)

@@ -47,6 +47,7 @@ def alembic(project: Path, database: Path) -> Alembic:
     return run
 
 
+@pytest.mark.slow
 def test_a_database_is_upgraded_and_is_then_the_tables_of_the_code(alembic: Alembic, database: Path) -> None:
     alembic("upgrade", "head")
     assert f"{migrate.HEAD} (head)" in alembic("current")

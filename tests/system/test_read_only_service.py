@@ -76,6 +76,7 @@ def test_a_port_that_is_in_use_is_not_shared_with_another_service() -> None:
             serve_read_only(request, lambda _: None)
 
 
+@pytest.mark.slow
 def test_a_database_that_is_not_there_is_refused_in_one_line(tmp_path: Path) -> None:
     request = ServeRequest(port=0, read_only=True, database=str(tmp_path / "absent.sqlite"))
     with pytest.raises(StoreError, match="there is no such file, and a service that only reads makes none"):

@@ -12,6 +12,7 @@ import pytest
 from tests.helpers.paths import ROOT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bench", "how", "state"),
     [

@@ -35,6 +35,7 @@ def test_campaign_draft_and_certification_have_the_date_of_the_service(tmp_path:
         assert "at its own speed and date" in refused.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "reason"),
     [

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.timeout(400)
 UNIT = "/api/units/OSU-FOG-2024/calibrations"
 
 
+@pytest.mark.slow
 def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_needed(
     service: Service, visit: Callable[..., Page]
 ) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.timeout(300)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("leave", ["by a link", "by closing the tab"])
 def test_leaving_the_page_cancels_what_it_waits_for(
     visit: Callable[..., Page], service: Service, monkeypatch: pytest.MonkeyPatch, leave: str

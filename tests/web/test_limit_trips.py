@@ -63,6 +63,7 @@ def service(tmp_path: Path) -> Iterator[Service]:
     serving.stop()
 
 
+@pytest.mark.slow
 def test_a_strip_turns_amber_and_then_red_with_the_tab(service: Service, visit: Callable[..., Page]) -> None:
     service.post("/api/campaigns", {"recipe": RECIPE})
     page = visit("/bench")

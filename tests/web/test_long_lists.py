@@ -131,6 +131,7 @@ def test_a_choice_is_in_the_address_and_goes_with_a_search(visit: Callable[..., 
     assert page.url.endswith("/units")
 
 
+@pytest.mark.slow
 def test_the_version_in_force_stands_before_the_newest_ones(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

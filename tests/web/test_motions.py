@@ -40,6 +40,7 @@ def numbers(values: list[float | None]) -> list[float]:
     return [np.nan if value is None else value for value in values]
 
 
+@pytest.mark.slow
 def test_at_rest_both_legs_are_drawn_and_the_map_is_not(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

@@ -78,6 +78,7 @@ def slow_scan(data: bytes, layout: Layout) -> tuple[list[bytes], bytes]:
     return frames, bytes(data[at:])
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(
     kind=st.sampled_from([0x90, 0x94, 0xA7]),

@@ -109,6 +109,7 @@ def test_a_turn_is_its_integral_and_its_uncertainty_that_of_angle_and_noise(clie
     assert set(plain["turns"]["corrected_deg"]) == {None}
 
 
+@pytest.mark.slow
 def test_a_profile_has_delay_and_bandwidth_and_says_how_many_windows_are_drawn(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -26,6 +26,7 @@ def test_whole_logs_of_every_kind_are_imported(client: TestClient, tmp_path: Pat
         assert made.status_code == 201, (kind, made.text)
 
 
+@pytest.mark.slow
 def test_a_damaged_log_is_imported_or_refused_by_its_name(client: TestClient, tmp_path: Path) -> None:
     counted: Counter[int] = Counter()
     for log in damaged_logs(whole_logs(tmp_path), OF_EACH, SEED):
@@ -45,6 +46,7 @@ def is_named(log: DamagedLog, detail: str) -> bool:
     return detail.startswith((log.name, *log.beside, "map"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [kind for kind in CRAFTED if kind != "bomb"])  # a bomb needs the limit of a worker
 def test_a_crafted_file_is_imported_or_refused_by_its_name(client: TestClient, tmp_path: Path, kind: str) -> None:
     for log in hostile_logs(tmp_path, kinds={kind}):

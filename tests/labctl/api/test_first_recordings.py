@@ -133,6 +133,7 @@ def test_nothing_is_hidden_in_a_real_unit(tmp_path: Path) -> None:
         assert real.get("/api/campaigns").json() == []
 
 
+@pytest.mark.slow
 def test_a_resumed_campaign_goes_on_with_the_same_units(tmp_path: Path) -> None:
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     bench = load_bench("single-axis-sim")

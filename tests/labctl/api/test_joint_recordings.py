@@ -24,6 +24,7 @@ def unit(client: TestClient, tmp_path_factory: pytest.TempPathFactory) -> TestCl
     return client
 
 
+@pytest.mark.slow
 def test_several_recordings_in_bodies_and_queries(unit: TestClient) -> None:
     fitted = unit.post(f"{UNIT}/calibrations", json={"recordings": [1, 2], "effects": EFFECTS})
     assert fitted.status_code == 201

@@ -67,6 +67,7 @@ def by_cell(columns: dict[str, list[Any]], *names: str) -> dict[tuple[str, int],
     return dict(zip(keys, zip(*(columns[name] for name in names), strict=True), strict=True))
 
 
+@pytest.mark.slow
 def test_residuals_are_the_rows_behind_the_map(
     client: TestClient, triaxial: Callable[[int], Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,6 +106,7 @@ def test_too_little_for_a_verdict_still_has_rows(client: TestClient, make_points
     assert rows["n"] == [None] * 5
 
 
+@pytest.mark.slow
 def test_a_preview_is_what_improve_makes_and_changes_nothing(
     client: TestClient, make_points: Callable[..., Recording], grid_11_by_11: tuple[np.ndarray, np.ndarray]
 ) -> None:
@@ -160,6 +162,7 @@ def test_recordings_and_their_data_sets(fog: TestClient) -> None:
     assert fog.get("/api/recordings/3/datasets").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_surface_is_what_the_calibration_takes_off(client: TestClient, triaxial: Callable[[int], Any]) -> None:
     add_recording(client, triaxial(3).campaign(3))
     path = "/api/units/SIM-3/calibrations"

@@ -46,6 +46,7 @@ def test_a_number_that_is_none_is_replaced(client: TestClient, given: str) -> No
     assert all(len(number) == 16 for number in numbers)
 
 
+@pytest.mark.slow
 def test_refused_requests_are_bounded_and_counted(client: TestClient, tmp_path: Path) -> None:
     with logged(tmp_path) as records:
         for _ in range(500):

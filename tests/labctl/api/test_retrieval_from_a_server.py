@@ -67,6 +67,7 @@ def version_of(answer: httpx.Response) -> Any:
     return answer.raise_for_status().json()["version"]
 
 
+@pytest.mark.slow
 def test_what_was_changed_elsewhere_is_never_served_as_it_was(client: TestClient, elsewhere: Store) -> None:
     first = client.get(ADDRESS)
     assert (version_of(first), first.headers["x-labctl-state"]) == (1, "in-force")

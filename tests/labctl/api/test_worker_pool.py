@@ -73,6 +73,7 @@ def test_of_many_at_once_so_many_are_computed_and_the_rest_told_when_to_come_bac
             assert int(answer.headers["Retry-After"]) >= 1
 
 
+@pytest.mark.slow
 def test_what_is_quick_never_waits_for_a_worker(service: Service, unit: str, tmp_path: Path) -> None:
     held = fill(service, tmp_path)
     version = f"/api/units/{unit}/calibrations/1"

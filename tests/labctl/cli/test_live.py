@@ -108,6 +108,7 @@ def test_wrong_use_is_one_clear_line(lab: Lab, arguments: tuple[str, ...], said:
     assert not lab.database.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_and_keeps_what_was_read(tmp_path: Path, number: signal.Signals) -> None:
     process = begin(labctl(tmp_path / "lab.sqlite", "live", "--bench", "poses-sim", "--speed", "20", "--json"))

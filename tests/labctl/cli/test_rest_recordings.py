@@ -44,6 +44,7 @@ def test_a_ramp_in_one_data_set_is_fitted_in_windows_and_left_out_leg_by_leg(lab
     assert answer["validity"]["rate_dps"] == [None, None]
 
 
+@pytest.mark.slow
 def test_a_leg_left_out_shows_a_lag_that_leaving_out_temperatures_does_not(lab: Lab) -> None:
     imported(lab, axes=("z",), lag_s=400.0)
     error = lab.json("fit", "REST-1", "--model", "bias_temperature")["error"]

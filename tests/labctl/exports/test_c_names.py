@@ -91,6 +91,7 @@ def export_calibration_of(document: dict[str, object]) -> str:
     return c_header(Calibration(document)).decode()
 
 
+@pytest.mark.slow
 @pytest.mark.needs_cc
 @pytest.mark.parametrize("model", [None, "ojeda2000"])
 def test_one_program_includes_them_all_and_uses_the_right_one(tmp_path: Path, model: str | None) -> None:

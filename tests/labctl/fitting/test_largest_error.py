@@ -38,6 +38,7 @@ def test_widening_for_one_output_is_the_normal_quantile() -> None:
     assert widening(alone) == pytest.approx(norm.ppf(0.5 * (1 + COVERAGE_PROBABILITY)) / 2.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_over_all_directions_it_is_that_of_the_length_of_a_vector() -> None:
     """|E w| over the sphere is largest along E, and its length is chi distributed with three degrees of freedom."""
     directions = np.random.default_rng(1).normal(size=(800, 3))

@@ -35,6 +35,7 @@ def value_and_u(result: FitResult, name: str) -> tuple[float, float]:
     return value, u
 
 
+@pytest.mark.slow
 def test_a_delay_and_a_bandwidth_are_found_and_the_scale_factor_is_not_biased(swept: Recording) -> None:
     result = fit(swept, None, [*PLAIN, "time_delay", "bandwidth"])
     true = {"delay": DELAY_S, "bandwidth": BANDWIDTH_HZ, "scale_factor": SCALE, "bias": BIAS_DPS}

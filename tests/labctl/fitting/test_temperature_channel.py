@@ -99,6 +99,7 @@ def test_without_either_temperature_one_line_says_so() -> None:
 # ---- long data sets ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("as_read", [lambda recording: recording, by_chamber])
 def test_a_temperature_loop_in_one_data_set_is_as_good_as_one_in_many(
     as_read: Callable[[Recording], Recording],

@@ -48,6 +48,7 @@ def test_a_value_widens_no_limit_by_which_it_is_judged() -> None:
     assert found[23].limits[0].sigma < 0.15
 
 
+@pytest.mark.slow
 def test_false_alarms_are_as_rare_as_three_standard_deviations_are() -> None:
     random = np.random.default_rng(1)
     found = judged([ChartPoint(float(value), None) for value in random.normal(0.0, 1.0, 4000)])

@@ -155,6 +155,7 @@ def test_a_process_that_ends_again_and_again_ends_the_service(tmp_path: Path, mo
         os.kill(reported[0].bench_pid, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", ["bench_process", "web_process"])
 def test_a_process_whose_supervisor_ends_before_it_sends_settings_ends_without_a_word(module: str) -> None:
     ours, theirs = socket.socketpair()

@@ -135,6 +135,7 @@ def test_a_recording_that_differs_in_one_reading_is_another(tmp_path: Path) -> N
     assert prints[0] == prints[1] != prints[2]
 
 
+@pytest.mark.slow
 def test_criticise_looks_at_the_readings_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     lab = Lab(tmp_path)

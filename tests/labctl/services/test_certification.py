@@ -50,6 +50,7 @@ def test_an_adequate_version_is_certified_with_its_verdict(lab: Lab) -> None:
     assert (revoked["verdict"], revoked["override"], revoked["objections"]) == (None, None, [])
 
 
+@pytest.mark.slow
 def test_what_lacks_something_is_refused_in_one_line_unless_overridden(lab: Lab) -> None:
     lab.run("fit", FOG, "--effects", "bias,scale_factor")
     before = lab.content()

@@ -50,6 +50,7 @@ def mark(store: Store, **changed: object) -> None:
     set_check_gyro(store, SERIAL, asked, noon(FIRST))
 
 
+@pytest.mark.slow
 def test_a_bench_that_changes_is_alarmed_by_the_history(store: Store) -> None:
     random = np.random.default_rng(4)
     for week in range(MIN_HISTORY + 1):
@@ -73,6 +74,7 @@ def test_a_bench_that_changes_is_alarmed_by_the_history(store: Store) -> None:
     assert scale.points[-1].state in {"in", "warning"}
 
 
+@pytest.mark.slow
 def test_a_change_of_the_scale_factor_is_told_from_one_of_the_bias(store: Store) -> None:
     random = np.random.default_rng(5)
     for week in range(MIN_HISTORY):

@@ -124,6 +124,7 @@ def test_over_http_the_refusal_is_a_problem_document(tmp_path: Path) -> None:
         assert client.get(f"{path}/1").json()["warnings"] == made.json()["warnings"]
 
 
+@pytest.mark.slow
 def test_validity_of_a_stored_recording_is_that_of_its_readings(
     lab: Lab, brought_in: Callable[[Recording], list[dict[str, object]]]
 ) -> None:

@@ -123,6 +123,7 @@ def test_a_change_of_the_model_keeps_what_is_held_until_its_effect_is_added_agai
     assert {step["version"] for step in lab.json("ladder", "ONE")["steps"]} == {1, 2, 3, 4}
 
 
+@pytest.mark.slow
 def test_a_criticism_takes_what_is_held_as_known(lab: Lab) -> None:
     fitted(lab)
     answer = lab.json("criticise", "ONE")

@@ -23,6 +23,7 @@ def lab(tmp_path: Path) -> Lab:
     return made
 
 
+@pytest.mark.slow
 def test_a_version_keeps_all_its_recordings_and_what_they_say_together(lab: Lab) -> None:
     answer = lab.json("fit", "J-1", "--recording", "1,2", "--effects", ",".join(EFFECTS))
     assert (answer["recording"], answer["recordings"]) == (2, [1, 2])
@@ -59,6 +60,7 @@ def test_a_later_recording_is_as_expected_of_a_version_of_several(lab: Lab) -> N
     assert found["expected_dps"] == joint["heldout_rms_dps"]
 
 
+@pytest.mark.slow
 def test_a_criticism_and_a_change_of_several_recordings(lab: Lab) -> None:
     lab.run("fit", "J-1", "--recording", "1,2", "--effects", ",".join(EFFECTS))
     found = lab.json("criticise", "J-1", "--recording", "1,2")

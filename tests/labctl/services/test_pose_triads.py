@@ -53,6 +53,7 @@ def agrees(found: Any, unit: TrueTriads, sensor: str) -> None:
         assert each["u"] < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["accelerometer", "magnetometer"])
 def test_the_alignment_is_told_over_temperature(tmp_path: Path, sensor: str) -> None:
     unit = unit_of(7)
@@ -63,6 +64,7 @@ def test_the_alignment_is_told_over_temperature(tmp_path: Path, sensor: str) -> 
     assert np.all(u[0] < 0.9 * u[1])  # constants leave what the temperature changes as scatter
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["accelerometer", "magnetometer"])
 def test_an_earlier_version_makes_ten_rests_enough(tmp_path: Path, sensor: str) -> None:
     unit = unit_of(8)
@@ -83,6 +85,7 @@ def said_or_text(sensor: str, folder: str) -> str:
     return " ".join(answer(sensor, folder)["text"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["accelerometer", "magnetometer"])
 def test_rests_that_do_not_agree_or_are_too_few_are_named_with_what_to_do(tmp_path: Path, sensor: str) -> None:
     unit = unit_of(9)

@@ -174,6 +174,7 @@ def labctl(location: str) -> Callable[..., Any]:
     return run_command
 
 
+@pytest.mark.slow
 def test_what_a_person_does_on_the_command_line_is_in_it(labctl: Callable[..., Any], location: str) -> None:
     labctl("import", str(EXAMPLES / "osu-fog"))
     labctl("fit", "OSU-FOG-2024", "--effects", "bias,scale_factor")
@@ -314,6 +315,7 @@ class AlwaysThere(BenchRunner):
         return super().start(request, attended=attended)
 
 
+@pytest.mark.slow
 def test_every_act_over_http_leaves_its_row(location: str) -> None:
     """A new operation fails this test until it says here which row it leaves."""
     store = Store(Database(location, write=True))

@@ -71,6 +71,7 @@ def rows_of(location: str) -> dict[str, int]:
         return {name: raw.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in names}
 
 
+@pytest.mark.slow
 def test_another_writer_gets_its_turn_during_an_import(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """20,000 data sets of one reading held the writer for 20 s: 160,000 rows in one transaction."""
     seen = Transactions(monkeypatch, store)

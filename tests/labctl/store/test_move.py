@@ -71,6 +71,7 @@ def test_there_and_back_every_stored_value_is_the_same(source: str, url: str, tm
     assert check(url).findings == check(back).findings == ()
 
 
+@pytest.mark.slow
 def test_the_server_counts_on_from_the_highest_number(source: str, url: str) -> None:
     move_database(source, url)
     with open_store(url, write=True) as store:
@@ -163,6 +164,7 @@ def test_the_command_checks_the_target_and_enters_the_move(source: str, url: str
     )
 
 
+@pytest.mark.slow
 def test_a_backup_of_a_server_is_one_file_of_one_instant_and_is_moved_back(
     source: str, cluster: Cluster, url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -74,6 +74,7 @@ def test_a_hysteresis_that_holds_on_parts_left_out_is_advised() -> None:
     assert [(each["effect"], each["add"]) for each in found.advice] == [("thermal_hysteresis", True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_coarse_steps_are_read_from_the_output_and_not_taken_for_a_law_of_temperature(seed: int) -> None:
     found = criticised(at_rest("tilt", seed=seed, step_dps=0.1))

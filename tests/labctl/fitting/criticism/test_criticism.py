@@ -30,6 +30,7 @@ def test_a_complete_model_is_adequate(seed: int) -> None:
     assert (found.verdict.form, found.verdict.named) == ("adequate", ())
 
 
+@pytest.mark.slow
 def test_three_axes_with_nothing_hidden() -> None:
     assert held(three_axes(4), "yang2018").verdict.form == "adequate"
 
@@ -262,6 +263,7 @@ def test_the_whole_walk(bring: Callable[[Recording], Lab]) -> None:
     assert "█" in lab.run("ladder", "FOG-0001").stdout
 
 
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_bytes(
     bring: Callable[[Recording], Lab], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -136,6 +136,7 @@ def numbers(value: Any) -> int:
     return sum(numbers(part) for part in value) if isinstance(value, list) else 1
 
 
+@pytest.mark.slow
 def test_three_axes_are_compact_and_plain_json() -> None:
     found = views(three_axes(4), "yang2018")
     assert set(found) == {

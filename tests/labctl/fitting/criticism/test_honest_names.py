@@ -66,6 +66,7 @@ def test_a_wave_in_time_is_no_warm_up() -> None:
     assert (verdict.form, verdict.named, verdict.depends_on[0]) == ("unexplained", (), "t_s")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("recipe", "model", "size_dps"), [("gyrostar", "weiss1995", 0.5), ("ojeda2000", "ojeda2000", 0.03)]
 )
@@ -97,6 +98,7 @@ def test_the_place_of_a_step_is_found_and_nothing_where_there_is_none() -> None:
     assert not refined_steps(compare_models(reduce_recording(plain("ojeda2000", 0)), model))
 
 
+@pytest.mark.slow
 def test_a_step_in_time_is_no_re_mounting() -> None:
     """Beside a re-mounting of some wrong shape, waves of the Earth's rate, in the base anyway, are no part of it."""
     recording = KINDS["time_step_bias"].added(plain("informative", 0), 0, 0.03)

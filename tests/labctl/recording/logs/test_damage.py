@@ -80,6 +80,7 @@ def is_part(found: Recording, whole: Recording) -> bool:
     return min(at) >= 0 and bool((np.diff(at) > 0).all())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_damage_anywhere_is_refused_or_said_and_no_reading_is_invented(kind: str, tmp_path: Path) -> None:
     path = KINDS[kind](tmp_path)
@@ -120,6 +121,7 @@ def test_a_log_of_which_most_is_lost_is_refused(tmp_path: Path) -> None:
         imported(path)
 
 
+@pytest.mark.slow
 def test_four_kilobytes_of_damage_cost_as_many_readings_and_the_answers_say_so(tmp_path: Path) -> None:
     path = resting_ulog(tmp_path / "a.ulg", 20_000, instances=1)
     content = bytearray(path.read_bytes())

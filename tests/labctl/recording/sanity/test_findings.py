@@ -68,6 +68,7 @@ def test_large_effects_of_the_catalogue_are_no_finding(hidden: dict[str, float])
     assert inspect_recording(single_axis(2, **hidden)) == []
 
 
+@pytest.mark.slow
 def test_three_axes_at_several_readings_per_second_get_no_finding() -> None:
     assert inspect_recording(three_axes(3, misalignment=0.05)) == []
 

@@ -28,6 +28,7 @@ def test_each_kind_of_fault_is_found(kind: str) -> None:
         assert NAMES[kind] & set(said_of(faulty(kind, seed))), (kind, seed)
 
 
+@pytest.mark.slow
 def test_clean_records_get_no_finding() -> None:
     assert [dict(said_of(clean_record(seed))) for seed in range(301, 316)] == [{}] * 15
 
@@ -110,6 +111,7 @@ def test_coarse_steps_at_rest_are_no_movement(level_dps: float) -> None:
     assert movement(rates, np.arange(6000) / 50.0).is_rest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("every_s", [0.02, 0.5])
 def test_a_bias_that_follows_a_temperature_loop_is_no_movement(every_s: float) -> None:
     """3 deg/s over a loop of 70 min: it leaves its level for many minutes, and takes minutes to do so."""

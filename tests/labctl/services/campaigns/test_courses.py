@@ -77,6 +77,7 @@ def states(store: Store, number: int) -> list[str]:
     return [each.state for each in store.recordings.data_sets(number)]
 
 
+@pytest.mark.slow
 def test_a_course_gives_the_rate_of_each_reading_and_the_fit_uses_it(tmp_path: Path) -> None:
     bench = servo_bench(hidden={"time_delay": 0.02})
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:

@@ -199,6 +199,7 @@ def test_a_unit_that_drops_out_is_written_down_and_its_recording_ends_there(tmp_
     store.close()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_campaign_after_an_interruption(tmp_path: Path) -> None:
     found = []
     for name in ("a", "b"):

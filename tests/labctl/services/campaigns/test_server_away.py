@@ -52,6 +52,7 @@ def ended(runner: BenchRunner) -> CampaignState:
     return job.progress.state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut_at", ["data set", "end"])
 def test_a_campaign_whose_server_was_away_is_resumed_by_itself(
     network: Network, location: str, url: str, monkeypatch: pytest.MonkeyPatch, cut_at: str

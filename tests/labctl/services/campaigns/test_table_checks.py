@@ -92,6 +92,7 @@ def test_with_a_slow_step_clock_the_reference_and_the_fit_are_right(tmp_path: Pa
             assert ("set step_clock_hz = 18181" in message) is (ratio != 1)
 
 
+@pytest.mark.slow
 def test_rates_are_by_all_timed_runs_and_their_scatter_is_in_the_record(tmp_path: Path) -> None:
     """A clock that drifts by 200 ppm/h, behind an adapter that passes bytes on every 4 ms."""
     location = str(tmp_path / "lab.sqlite")
@@ -167,6 +168,7 @@ def test_a_resumed_campaign_compares_its_clock_with_that_before(tmp_path: Path, 
         assert figures["deviation_expanded_ppm"] == pytest.approx(found.expanded_ppm(found.until_s), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [KINDS[0], KINDS[3], KINDS[4]], ids=lambda kind: kind.drift)
 def test_what_a_resumed_campaign_states_of_its_clock_holds_at_least_as_often_as_it_says(kind: Kind) -> None:
     """Behind an adapter of 1 ms, through the bytes: one campaign in twenty may be further off than its U at 95 %."""

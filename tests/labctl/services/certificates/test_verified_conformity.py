@@ -107,6 +107,7 @@ def test_it_states_each_error_that_was_verified(recording: Recording, store: Sto
     assert all(each.expanded_dps <= found.expanded_dps for each in found.results)
 
 
+@pytest.mark.slow
 def test_an_error_that_only_the_verification_shows_fails(recording: Recording, tmp_path: Path) -> None:
     marked = np.asarray(recording.columns["verification"]) != 0
     columns = {n: v + 3.0 * marked if n == "gyro_y" else v for n, v in recording.columns.items()}
@@ -127,6 +128,7 @@ def test_about_its_own_axis_an_output_is_judged_where_it_turned_about_it(store: 
         assert np.abs(others).max() < 0.01  # the Earth's rate
 
 
+@pytest.mark.slow
 def test_a_verification_that_does_not_cover_the_use_decides_nothing(tmp_path: Path) -> None:
     part = Verification(rates=4, positions=("z",))
     recipe = load_recipe("table1-x-table2").model_copy(update={"verification": part})

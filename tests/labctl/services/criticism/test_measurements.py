@@ -38,6 +38,7 @@ def counted(name: str, calls: Counter[str]) -> Callable[..., Any]:
     return count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [None, 1])
 def test_a_criticism_reads_its_recording_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int | None
@@ -68,6 +69,7 @@ def at_rest(minutes: int) -> Recording:
     })  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_criticism_reads_a_long_data_set_at_rest_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its pieces, its static record and its decimated readings are of one reading, and as they were of three."""
     monkeypatch.setattr(forked, "can_fork", lambda: False)
@@ -93,6 +95,7 @@ def test_a_criticism_reads_a_long_data_set_at_rest_once(tmp_path: Path, monkeypa
     assert answer.noise is not None
 
 
+@pytest.mark.slow
 def test_readings_that_a_fork_has_read_give_the_same_criticism(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     answers = []
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:

@@ -72,6 +72,7 @@ def test_a_smaller_u_takes_longer_and_is_never_below_the_bound() -> None:
         assert answer.bound.ratio > 1.0
 
 
+@pytest.mark.slow
 def test_within_hours_it_is_the_best_and_within_too_few_it_is_not_reached() -> None:
     within = designed(hours=2.0)
     assert within.chosen.hours <= 2.0

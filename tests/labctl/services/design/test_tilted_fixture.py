@@ -72,6 +72,7 @@ def test_it_says_what_a_tilted_fixture_saves_and_chooses_it_where_the_bench_has_
         make_plan(parse_recipe(has.recipe_toml), limits_of(BENCH))
 
 
+@pytest.mark.slow
 def test_its_recipe_runs_and_its_fit_finds_the_unit_whatever_the_fixture_is_off_by() -> None:
     recipe = parse_recipe(with_fixture().recipe_toml)
     plan = make_plan(recipe, limits_of(TILTED, driven=True))
@@ -97,6 +98,7 @@ def test_a_fixture_is_of_no_use_to_one_axis_or_a_table_over_temperature() -> Non
     assert designed(TILTED, model="yang2018", u_dps=0.01).tilted is None
 
 
+@pytest.mark.slow
 def test_hours_are_shared_by_the_units_that_fit_on_the_table() -> None:
     assert BENCH.table is not None
     three = BENCH.model_copy(update={"table": BENCH.table.model_copy(update={"places": 3})})

@@ -94,6 +94,7 @@ def events(store: Store) -> list[str]:
     return [event.message for event in store.campaigns.events(1) if event.kind == "draft"]
 
 
+@pytest.mark.slow
 def test_a_draft_is_fitted_compared_judged_and_said_once(store: Store) -> None:
     draft = made(store)
     assert (draft.state, draft.version, draft.certified, draft.at) == ("made", 1, False, NOW)
@@ -128,6 +129,7 @@ def test_limits_are_held_against_the_figures_and_an_unknown_figure_decides_nothi
     assert levels == ["warning"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unjudged")
 def test_the_version_in_force_is_applied_as_it_is_and_the_drift_has_an_uncertainty(store: Store) -> None:
     fit_unit(store, UNIT, FitRequest(effects=["bias", "scale_factor"]), NOW)
@@ -286,6 +288,7 @@ def scheduled(tmp_path: Path) -> Iterator[Callable[[CampaignRequest], LabService
         service.close()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unjudged")
 def test_a_scheduled_campaign_with_hidden_effects_ends_in_a_draft(
     scheduled: Callable[[CampaignRequest], LabService],

@@ -80,6 +80,7 @@ def bench(tmp_path: Path) -> Bench:
     return Bench(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_complete_calibration_becomes_a_recording_and_the_version_that_was_shown(bench: Bench) -> None:
     source = TurnedSource(1)
     answer = bench.run(source)

@@ -56,6 +56,7 @@ def slow_bench() -> BenchFile:
     return resolve(BenchFile.model_validate(record))
 
 
+@pytest.mark.slow
 def test_the_second_campaign_on_a_bench_is_expected_to_take_what_the_first_took(tmp_path: Path) -> None:
     bench = slow_bench()
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:

@@ -37,6 +37,7 @@ def outlook(recipe: Recipe) -> Any:
     return misalignment_outlook(make_plan(recipe, limits_of(BENCH)), BENCH, limits_of(BENCH))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [{}, {"inverted": INVERTED}, {"positions": SIX}, {"indexing": TURNED}, {"indexing": CUBE, "inverted": INVERTED}],

@@ -81,6 +81,7 @@ def test_a_recording_that_only_verifies_has_no_allan_deviation(store: Store) -> 
         allan_unit(store, number, None)
 
 
+@pytest.mark.slow
 def test_without_a_number_the_newest_recording_that_can_be_fitted_is_taken(store: Store) -> None:
     store.recordings.add_import(single_axis(1), AT)
     store.recordings.add_import(marked(single_axis(2)), AT)

@@ -43,6 +43,7 @@ def test_the_published_turns_take_two_commands(lab: Lab) -> None:
     assert "at least 4 more data sets" in lab.run("criticise", "IMUCAL-FERRARIS", status=1).stdout
 
 
+@pytest.mark.slow
 def test_a_session_is_adequate_and_holds_for_the_next_one(lab: Lab, tmp_path: Path) -> None:
     lab.run("import", session(2, tmp_path / "first"))
     lab.run("fit", "HAND", "--model", "turns")

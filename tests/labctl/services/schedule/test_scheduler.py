@@ -45,6 +45,7 @@ def test_a_start_begins_at_its_time_and_once(lab: Lab) -> None:
     assert [answer.state for answer in list_starts(lab.store, ended=True)] == ["ended"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("day", "expected"),
     [

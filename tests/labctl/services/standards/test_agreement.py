@@ -139,6 +139,7 @@ def test_a_campaign_records_what_the_register_predicts(store: Store) -> None:
     assert {each.level for each in events} == {"warning"}
 
 
+@pytest.mark.slow
 def test_budget_file_and_certificate_state_the_same_uncertainty(store: Store) -> None:
     register.certificate(store, "T-1", date(2024, 1, 5), 0.010, due="2026-06-30")
     register.certificate(store, "T-2", date(2025, 1, 5), 0.030, due="2026-06-30")

@@ -170,6 +170,7 @@ def test_a_model_that_is_wrong_does_not_end_a_campaign_however_much_is_measured(
     assert "all steps done" in answer.reason
 
 
+@pytest.mark.slow
 def test_after_an_interruption_the_same_state_is_rebuilt_from_the_database(store: Store, tmp_path: Path) -> None:
     whole = campaign_status(store, 1).reason
     text = recipe(0.0085, repeatability="false")  # a simulated bench ends with its process: two powered runs

@@ -204,6 +204,7 @@ def server(url: str) -> str:
     return url
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_every_edit_is_found_on_a_server(server: str) -> None:
     assert check(server).findings == ()
