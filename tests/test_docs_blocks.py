@@ -36,7 +36,6 @@ def text_of(page: Path) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     "name", [name for name in NAMES if name not in ELSEWHERE and FENCE.search(text_of(ROOT / name))]
 )

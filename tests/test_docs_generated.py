@@ -45,7 +45,6 @@ def build(docs: Path, out: Path) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     assert not build(ROOT / "docs", tmp_path)
     contents = (tmp_path / "index.html").read_text(encoding="utf-8")

@@ -57,7 +57,6 @@ def test_the_block_is_offered_where_the_bench_has_a_supply() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_the_block_is_the_best_experiment_where_the_effect_is_a_suspect() -> None:
     recording = campaign("O", 600, {EFFECT: 0.03})  # of a supply that is not regulated: its wander shows a little
     model, _ = preset_for(MODELS["O"], []).build(fit_data_of(recording))
@@ -88,7 +87,6 @@ def test_the_simulated_unit_feels_the_simulated_supply() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("hidden", [{EFFECT: SIZE}, {}], ids=["hidden", "nothing hidden"])
 def test_a_constant_voltage_is_silent_and_the_steps_name_the_effect_alone(
     tmp_path: Path, hidden: dict[str, float]

@@ -15,9 +15,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from labctl.api.connection_limits import RESERVED, ConnectionLimits
 from labctl.api.connection_table import ConnectionTable
 from labctl.api.http_protocol import bounded_http
+from tests.helpers.patience import WAIT_S
 
-#: Longer than any limit of a test; a test that waits so long fails.
-WAIT_S = 20.0
 CHUNK = bytes(1 << 16)
 
 

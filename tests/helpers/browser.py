@@ -26,6 +26,7 @@ from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
+from tests.helpers.patience import WAIT_S
 from tests.helpers.waiting import wait_until
 
 if TYPE_CHECKING:
@@ -33,8 +34,7 @@ if TYPE_CHECKING:
 
 WIDE, NARROW = {"width": 1280, "height": 860}, {"width": 390, "height": 844}
 #: How long a page may take before a test gives up: a busy machine is slow, not wrong.
-PATIENCE_MS = 45_000
-REQUEST_S = 120.0
+PATIENCE_MS = round(1000 * WAIT_S)
 LOOPBACK = "127.0.0.1"
 #: For plain HTTP: otherwise each client reads the certificates of all authorities, 25 ms.
 NO_CERTIFICATES = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
@@ -135,8 +135,8 @@ class Service:
         self._server = Server(uvicorn.Config(app, log_level="error", lifespan="on", timeout_graceful_shutdown=GRACE_S))
         self._thread = threading.Thread(target=self._server.serve_until_stopped, args=(listener,), name="test service")
         self._thread.start()
-        self._http = httpx.Client(base_url=self.url, timeout=REQUEST_S, verify=NO_CERTIFICATES)
-        assert self._server.ready.wait(REQUEST_S)
+        self._http = httpx.Client(base_url=self.url, timeout=WAIT_S, verify=NO_CERTIFICATES)
+        assert self._server.ready.wait(WAIT_S)
         assert self._server.started
 
     def stop(self) -> None:
@@ -144,7 +144,7 @@ class Service:
         self._http.close()  # else the server waits for this connection
         self.lab_service.end_soon()
         self._server.should_exit = True
-        self._thread.join(REQUEST_S)
+        self._thread.join(WAIT_S)
         assert not self._thread.is_alive()
 
     def post(self, path: str, body: object) -> Any:

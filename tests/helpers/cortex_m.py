@@ -6,6 +6,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
+from tests.helpers.patience import WAIT_S
+
 COMPILER, EMULATOR, BOARD = "arm-none-eabi-gcc", "qemu-system-arm", "mps2-an386"
 INSTALL_CORTEX_M = "on Debian: apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
 #: The vector table: a stack below the end of the board's RAM, and a reset that switches the floating-point unit on.
@@ -48,7 +50,7 @@ def on_cortex_m(folder: Path, *flags: str) -> str:
     subprocess.run(build, cwd=folder, check=True, capture_output=True, text=True)
     run = [EMULATOR, "-M", BOARD, "-nographic", "-monitor", "none", "-serial", "none", "-icount", "shift=0",
            "-semihosting-config", "enable=on,target=native", "-kernel", "main.elf"]  # fmt: skip
-    done = subprocess.run(run, cwd=folder, check=True, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(run, cwd=folder, check=True, capture_output=True, text=True, timeout=WAIT_S)
     return done.stdout or done.stderr
 
 

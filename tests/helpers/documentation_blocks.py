@@ -19,7 +19,7 @@ from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser, SkipP
 
 from tests.helpers.forked_commands import ForkedCommand, shell_command
 from tests.helpers.paths import ROOT
-from tests.helpers.processes import WAIT_S
+from tests.helpers.patience import WAIT_S
 from tests.helpers.signal_defaults import default_signals
 
 PAGES = sorted(

@@ -17,12 +17,9 @@ import httpx
 
 from labctl.store import holder_of, is_url, open_store
 from tests.helpers.forked_commands import ForkedCommand, run_labctl
+from tests.helpers.patience import WAIT_S
 from tests.helpers.signal_defaults import default_signals
 from tests.helpers.waiting import before_next_request
-
-#: For what a process does on a busy machine.
-WAIT_S = 100.0
-REQUEST_S = 30.0
 
 
 def labctl(database: Path | str, *arguments: str) -> list[str]:
@@ -89,7 +86,7 @@ class ServiceProcess:
         reported = json.loads(first_line(self.process))
         self.url = reported["url"]
         self.bench_pid, self.web_pid = reported["bench_pid"], reported["web_pid"]
-        self.http = httpx.Client(base_url=self.url, timeout=REQUEST_S)
+        self.http = httpx.Client(base_url=self.url, timeout=WAIT_S)
 
     def run(self, *arguments: str, status: int = 0, key: str = "") -> subprocess.CompletedProcess[str]:
         """Run a command to its end, which must be with this exit status."""

@@ -13,7 +13,8 @@ from typing import Any
 import tomli_w
 
 from instruments.bench_config import read_bench
-from tests.helpers.processes import WAIT_S, begin, begin_loaded, first_line, kill, labctl
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import begin, begin_loaded, first_line, kill, labctl
 
 #: Time-outs are seconds of the bench. The faster it runs, the shorter the stall of a busy machine that breaks a link.
 SPEED = 4.0

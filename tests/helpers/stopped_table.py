@@ -10,7 +10,8 @@ import httpx
 
 from labctl.answers.campaigns import BENCH_CHECKS
 from labctl.store import AuditRow, open_store
-from tests.helpers.processes import WAIT_S, ServiceProcess
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import ServiceProcess
 from tests.helpers.simulator_process import FIRST_DPS, RECIPE, Simulator
 from tests.helpers.waiting import before_next_request
 

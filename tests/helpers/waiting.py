@@ -7,7 +7,8 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-WAIT_S = 60.0  #: for the next event
+from tests.helpers.patience import WAIT_S
+
 QUIET_S = 0.2  #: without an event: time to check
 POLL_INTERVAL_S = 0.002  #: between two checks of what reports nothing
 ASK_S = 0.05  #: between two requests to another process

@@ -14,6 +14,7 @@ from instruments import plugins
 from instruments.plugins import PluginError, PluginGroup, UnknownPlugin, instance_of
 from tests.helpers.distributions import distribution
 from tests.helpers.paths import ROOT
+from tests.helpers.patience import WAIT_S
 
 GROUP = "labctl.widgets"
 
@@ -154,5 +155,5 @@ print(plugins.installed.cache_info().currsize, *loaded)
 
 def test_help_reads_no_metadata_of_plug_ins_and_imports_no_driver() -> None:
     command = [sys.executable, "-c", HELP]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=WAIT_S)
     assert done.stdout.split() == ["0"]

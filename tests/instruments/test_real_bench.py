@@ -13,6 +13,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import LinkError
 from tests.helpers.paths import ROOT
+from tests.helpers.patience import WAIT_S
 
 LOADED = """
 import sys
@@ -28,7 +29,9 @@ print(*sorted(name for name in sys.modules if name.startswith({package!r})))
 def loaded_by(bench: str, package: str = "instruments.simulators") -> list[str]:
     """Return the modules of a package that a fresh process has loaded after it opened a bench."""
     code = LOADED.format(bench=bench, package=package)
-    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60)
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True, timeout=WAIT_S
+    )
     return run.stdout.split()
 
 
@@ -59,7 +62,7 @@ print(*sorted(name for name in set(sys.modules) - before if name.startswith("ins
 
 def test_once_a_bench_is_open_no_driver_and_no_simulator_is_imported() -> None:
     run = subprocess.run(
-        [sys.executable, "-c", LATER], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", LATER], cwd=ROOT, capture_output=True, text=True, check=True, timeout=WAIT_S
     )
     assert run.stdout.split() == []
 

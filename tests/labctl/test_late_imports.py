@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from labctl.store import open_store
+from tests.helpers.patience import WAIT_S
 
 LATE = ("labctl.papers", "labctl.services.reproduction", "labctl.plots.papers")
 #: What a bench process drives without: it starts sooner, and is started again sooner.
@@ -37,7 +38,7 @@ print(*sorted(sys.modules))
 def loaded(*modules: str, late: tuple[str, ...] = LATE) -> list[str]:
     """Return which of the late modules a new process has after these imports."""
     found = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *modules], capture_output=True, text=True, check=True, timeout=120
+        [sys.executable, "-c", PROGRAM, *modules], capture_output=True, text=True, check=True, timeout=WAIT_S
     )
     return [name for name in found.stdout.split() if name.startswith(late)]
 
@@ -85,7 +86,7 @@ def test_a_command_that_lists_loads_what_it_prints_alone(
         with open_store(database[1], write=True):  # which is made, and needs more
             pass
     command = [sys.executable, "-c", COMMAND, *arguments, *database]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=WAIT_S)
     modules = done.stdout.rpartition("loaded: ")[2].split()
     assert "labctl.cli.app" in modules
     assert [name for name in modules if any(name == each or name.startswith(f"{each}.") for each in late)] == []

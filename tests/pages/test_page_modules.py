@@ -12,6 +12,7 @@ import pytest
 
 from labctl.api import create_app
 from tests.helpers.paths import ROOT
+from tests.helpers.patience import WAIT_S
 
 MODULES = ROOT / "labctl" / "web" / "static" / "js"
 TOOLS = ROOT / "node_modules" / ".bin"
@@ -22,7 +23,7 @@ needs_tools = pytest.mark.skipif(not TOOLS.is_dir(), reason="no packages for the
 
 def run(*words: str) -> None:
     """Run a command in the repository; what it said is the message of a failure."""
-    ended = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, timeout=100)
+    ended = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, timeout=WAIT_S)
     assert ended.returncode == 0, ended.stdout + ended.stderr
 
 

@@ -23,8 +23,6 @@ from tests.helpers.paths import RECIPES
 from tests.helpers.processes import ServiceProcess
 from tests.helpers.waiting import before_next_request
 
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
-
 NAMES = ("bench-a", "bench-b", "bench-c")
 KILLED = 1
 #: At a hundred times its pace a bench takes a server that is away for a second for instruments silent for 100 s.

@@ -14,15 +14,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.patience import WAIT_S
 from tests.helpers.processes import ServiceProcess, running
-
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 OPEN_FILES, HALF_SENT = 256, 300
 MIB = 1 << 20
 #: An endless header is sent no further than this, bytes.
 MAX_SENT = 64 * MIB
-WAIT_S = 60.0
 
 
 @pytest.fixture

@@ -12,7 +12,6 @@ from labctl.store import open_store
 from tests.helpers.drafted_recipe import DRAFTED
 from tests.helpers.processes import ServiceProcess, running
 
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 FAST = ("--speed", "0")
 UNIT = "FOG-0001"
 

@@ -20,11 +20,10 @@ from labctl.answers.admin import KeyRequest, Role
 from labctl.services.admin.api_keys import create_key
 from labctl.store import open_store
 from studies.postgresql_cluster import Cluster
-from tests.helpers.processes import WAIT_S, ServiceProcess, running
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import ServiceProcess, running
 from tests.helpers.simulator_process import Simulator
 from tests.helpers.stopped_table import ended, stopped, stops, turning
-
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 #: More requests that wait for the database than any pool of threads of the web process has threads.
 CROWD = 60

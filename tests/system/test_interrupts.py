@@ -8,10 +8,9 @@ from contextlib import suppress
 
 import pytest
 
-from tests.helpers.processes import WAIT_S, end_of
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import end_of
 from tests.helpers.simulator_process import FIRST_DPS, Simulator
-
-pytestmark = pytest.mark.timeout(400)
 
 DATABASE = "lab.sqlite"
 SAFE = "campaign 1 was stopped; bench single-axis-sim is safe"

@@ -8,10 +8,9 @@ from typing import Any
 
 import pytest
 
-from tests.helpers.processes import WAIT_S, ServiceProcess, end_of, running
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import ServiceProcess, end_of, running
 from tests.helpers.waiting import before_next_request
-
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 #: Campaigns that are far from their end when they are stopped.
 RECIPES = {"triaxial-sim": "quick-triaxial", "single-axis-sim": "ojeda2000"}

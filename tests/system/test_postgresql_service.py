@@ -14,8 +14,6 @@ from studies.postgresql_cluster import Cluster
 from tests.helpers.paths import RECIPES
 from tests.helpers.processes import ServiceProcess, end_of, running
 
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
-
 #: At a hundred times its pace a bench takes a server that is away for a second for instruments silent for 100 s.
 PATIENT = (RECIPES / "short.toml").read_text(encoding="utf-8").replace("[soak]", "[guards]\nstale_s = 6000\n[soak]")
 

@@ -10,7 +10,6 @@ from studies import process_kill
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_a_real_process_is_killed_over_pty_and_tcp_and_its_heir_finishes(tmp_path: Path) -> None:
     with process_kill.simulators(tmp_path) as bench:
         heir = process_kill.kill_once(tmp_path, bench, 8.0)

@@ -20,10 +20,9 @@ from labctl.processes.settings import ServeRequest
 from labctl.services.admin.api_keys import create_key
 from labctl.store import open_store
 from studies.postgresql_cluster import Cluster
-from tests.helpers.processes import REQUEST_S, begin_loaded, first_line, kill
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import begin_loaded, first_line, kill
 from tests.helpers.waiting import eventually
-
-pytestmark = pytest.mark.timeout(300)
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 LAB = "http://lab.example:8420"
@@ -43,7 +42,7 @@ def test_two_processes_serve_a_replica_and_a_killed_one_is_replaced(cluster: Clu
             assert ready["bench_pid"] is None
             assert len(set(ready["web_pids"])) == 2
             with httpx.Client(
-                base_url=ready["url"], timeout=REQUEST_S, headers={"Authorization": f"Bearer {key}"}
+                base_url=ready["url"], timeout=WAIT_S, headers={"Authorization": f"Bearer {key}"}
             ) as http:
                 health = http.get("/health").json()
                 assert (health["read_only"], health["replica"]["is_connected"]) == (True, True)
@@ -55,10 +54,10 @@ def test_two_processes_serve_a_replica_and_a_killed_one_is_replaced(cluster: Clu
                 assert http.get("/api/audit").json()[-1]["subject"] == "key later"
             os.kill(ready["web_pids"][0], signal.SIGKILL)
             for _ in range(8):  # connections that the kernel gives to the socket of either process
-                answer = httpx.get(f"{ready['url']}/health", timeout=REQUEST_S)
+                answer = httpx.get(f"{ready['url']}/health", timeout=WAIT_S)
                 assert answer.json()["status"] == "ok"
             service.send_signal(signal.SIGTERM)
-            assert service.wait(REQUEST_S) == 0
+            assert service.wait(WAIT_S) == 0
         finally:
             kill(service)
 

@@ -16,10 +16,9 @@ import httpx
 import pytest
 
 from labctl.store import holder_of
-from tests.helpers.processes import WAIT_S, ServiceProcess, begin_loaded, first_line, running
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import ServiceProcess, begin_loaded, first_line, running
 from tests.helpers.waiting import before_next_request
-
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 #: Slow enough that a campaign lasts while processes start again.
 SPEED = ("--speed", "10")

@@ -17,9 +17,8 @@ from labctl.services.admin.api_keys import create_key
 from labctl.store import open_store
 from tests.helpers.forked_commands import run_labctl
 from tests.helpers.log_records import Record
-from tests.helpers.processes import WAIT_S, ServiceProcess, end_of, running
-
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import ServiceProcess, end_of, running
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 CAMPAIGN = {"json": {"recipe": "short"}, "headers": {"X-Request-ID": "begin-1"}}

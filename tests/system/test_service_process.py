@@ -19,10 +19,9 @@ from labctl.config import os_user
 from labctl.services.admin.api_keys import create_key
 from labctl.store import check, holder_of, open_store
 from tests.helpers.paths import EXAMPLES
-from tests.helpers.processes import WAIT_S, ServiceProcess, end_of, labctl, running
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import ServiceProcess, end_of, labctl, running
 from tests.helpers.waiting import before_next_request
-
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
@@ -109,7 +108,7 @@ def begun(service: ServiceProcess, start: int) -> Any:
 def test_sigterm_ends_the_campaign_in_the_safe_state(service: ServiceProcess) -> None:
     campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
     service.process.send_signal(signal.SIGTERM)
-    assert service.process.wait(timeout=60) in {0, -signal.SIGTERM}
+    assert service.process.wait(timeout=WAIT_S) in {0, -signal.SIGTERM}
     answer = json.loads(service.run("campaign", "status", str(campaign), "--json").stdout)
     assert answer["state"] == "aborted"
     assert "the service stops" in answer["reason"]
@@ -121,7 +120,7 @@ def test_a_listener_does_not_keep_a_service_from_making_its_bench_safe(service: 
         next(reported)
         service.process.send_signal(signal.SIGTERM)
         assert "event: state" in list(reported)  # the stream ends by itself, with the campaign
-    assert service.process.wait(timeout=60) == 0
+    assert service.process.wait(timeout=WAIT_S) == 0
     with open_store(str(service.database), write=False) as store:
         row = store.campaigns.get(campaign)
     assert (row.state, "the service stops" in row.reason) == ("aborted", True)
@@ -143,7 +142,7 @@ def test_a_request_that_never_ends_does_not_either(service: ServiceProcess) -> N
             assert "event: state" in list(reported)  # the stream ends with the campaign
         assert end_of(service.database, campaign)[0] == "aborted"
         service.process.send_signal(signal.SIGINT)
-        assert service.process.wait(timeout=60) == 0
+        assert service.process.wait(timeout=WAIT_S) == 0
     assert holder_of(str(service.database)) is None
 
 

@@ -11,7 +11,6 @@ from tests.helpers.drafted_recipe import DRAFTED
 from tests.helpers.lab import Lab
 from tests.helpers.processes import running
 
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 DAY = "2031-11-23"
 UNIT = "FOG-0001"
 

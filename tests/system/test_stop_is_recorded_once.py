@@ -8,14 +8,12 @@ import threading
 from pathlib import Path
 
 import httpx
-import pytest
 
-from tests.helpers.processes import WAIT_S, running
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import running
 from tests.helpers.simulator_process import Simulator
 from tests.helpers.stopped_table import ABORT, ended, stopped, stops, turning, wait_until
 from tests.helpers.waiting import before_next_request
-
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 
 def test_a_stop_that_is_passed_on_to_the_web_process_is_recorded_once(tmp_path: Path) -> None:

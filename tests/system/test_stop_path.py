@@ -20,12 +20,11 @@ import pytest
 from labctl.processes.supervisor import SILENT_S
 from labctl.processes.supervisor_watch import is_stopped
 from labctl.store import open_store
-from tests.helpers.processes import WAIT_S, ServiceProcess, running
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import ServiceProcess, running
 from tests.helpers.simulator_process import Simulator
 from tests.helpers.stopped_table import ABORT, START, turning, wait_until
 from tests.helpers.waiting import before_next_request, eventually
-
-pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 
 @pytest.fixture

@@ -16,9 +16,9 @@ from labctl.cli import terminal_operator
 from labctl.cli.terminal_operator import TerminalOperator
 from labctl.config import os_user
 from procedures.contracts.operator import HumanOperator, Prompt
+from tests.helpers.patience import WAIT_S
 
 QUESTION = Prompt("q1", "mount", "turn the units")
-WAIT_S = 30.0
 
 
 class Terminal:

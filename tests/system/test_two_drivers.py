@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import signal
 
-import pytest
-
 from tests.helpers.forked_commands import run_labctl
-from tests.helpers.processes import WAIT_S
+from tests.helpers.patience import WAIT_S
 from tests.helpers.simulator_process import FIRST_DPS, SECOND_DPS, Simulator
 
 
@@ -16,7 +14,6 @@ def speed_command(rate_dps: float) -> str:
     return f"!1sp1,{round(2_000_000 * 0.225 / rate_dps)}"
 
 
-@pytest.mark.timeout(400)
 def test_the_second_is_refused_and_takes_over_when_the_first_is_killed(simulator: Simulator) -> None:
     first = simulator.drive(FIRST_DPS, "lab.sqlite")
     simulator.wait_for("!1m1")

@@ -75,7 +75,6 @@ def data_sets(database: Path, campaign: int) -> Mapping[str, NDArray[Any]]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
 def test_the_same_data_sets_within_noise(far_bench: Path, tmp_path: Path) -> None:
     recipe = tmp_path / "two-processes.toml"
     recipe.write_text(RECIPE)

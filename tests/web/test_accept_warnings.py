@@ -14,7 +14,6 @@ from tests.helpers.spoilt import at_one_dataset, spoilt, wrong_rate
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 FOG = "FOG-0001"
 
 

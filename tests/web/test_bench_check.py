@@ -15,7 +15,6 @@ from tests.helpers.browser import NARROW, Service
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 WORDS = {"good": "in order", "doubtful": "doubtful", "bad": "wrong"}
 DRAWN = """() => [...document.querySelectorAll(".wiring-row")].map((row) => ({
   device: row.querySelector("strong").textContent,

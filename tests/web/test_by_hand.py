@@ -17,7 +17,6 @@ from tests.helpers.paced_hand import PacedHand
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 
 RECIPE = """
 name = "one-turn"

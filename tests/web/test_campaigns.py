@@ -15,8 +15,6 @@ from tests.helpers.browser import MINUS, NARROW, Faults, Service, figure, number
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-pytestmark = pytest.mark.timeout(300)
-
 
 def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect

@@ -18,7 +18,6 @@ from tests.helpers.drafted_recipe import DRAFTED
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
-pytestmark = pytest.mark.timeout(400)
 UNIT = "FOG-0001"
 LABORATORY = ORDER["laboratory"]
 #: Data sets so near to each other, in rate and temperature, that the uncertainty of the model is known.

@@ -22,7 +22,6 @@ from tests.helpers.certificates import AT, SERIAL, add_version, request
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(200)
 FIRST, SECOND = "ICL-2027-0001", "ICL-2027-0002"
 
 

@@ -12,7 +12,6 @@ from tests.helpers.browser import Service
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 UNIT = "/api/units/OSU-FOG-2024/calibrations"
 
 

@@ -12,7 +12,6 @@ from tests.helpers.browser import NARROW, Service, settled
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
-pytestmark = pytest.mark.timeout(400)
 #: The element as the browser has it, and how large it is drawn.
 READ = """math => ({
   xml: new XMLSerializer().serializeToString(math),

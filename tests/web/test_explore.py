@@ -14,8 +14,6 @@ from tests.helpers.browser import Service
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
-
 
 @pytest.fixture(scope="module")
 def template(furnish: Callable[..., Path]) -> Path:

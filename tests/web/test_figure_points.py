@@ -18,8 +18,6 @@ from tests.helpers.simulated_recordings import single_axis
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
-pytestmark = pytest.mark.timeout(400)
-
 
 @pytest.fixture
 def recording(service: Service) -> Recording:

@@ -15,7 +15,6 @@ from tests.helpers.browser import Faults, Service, figure, settled
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 #: Keep every text that the counter shows, from the moment that it is on the page.
 WATCH = """() => {
   window.counted = [];

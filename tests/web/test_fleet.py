@@ -16,7 +16,6 @@ from tests.helpers.browser import NARROW, Service
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 #: Units of the type; every fourth one is of the batch that differs, and was measured later.

@@ -18,7 +18,6 @@ from tests.helpers.processes import ServiceProcess, running
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
 
-pytestmark = pytest.mark.timeout(300)
 #: Promised: from the moment when the service falls silent.
 STALE_MS = 5000
 #: A process that was ended is replaced within this, on a busy machine too.

@@ -13,7 +13,6 @@ from tests.helpers.browser import MINUS, Service, figure, number_of, settled
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 MAX_TABS = 60
 
 

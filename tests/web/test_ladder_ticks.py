@@ -11,7 +11,6 @@ import pytest
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 #: The error ladder with these errors of its versions, drawn on the page; the figures on its axis.
 LADDER = """async (errors) => {
   const { ladderFigure } = await import("/static/js/explore/error_ladder.js");

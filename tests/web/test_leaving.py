@@ -13,8 +13,6 @@ from tests.helpers.held_criticism import STAGE, HeldCriticism
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize("leave", ["by a link", "by closing the tab"])

@@ -15,7 +15,6 @@ from tests.helpers.paced_hand import PacedClock
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 #: The unit warms itself by a kelvin: in air of 33 deg C it passes its limit, and the campaign goes on with a warning.
 MAX_C = 33.1
 RECIPE = """format = "labctl-recipe/1"

@@ -19,7 +19,6 @@ from tests.helpers.paced_feed import PacedFeed
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 READINGS_PER_BLOCK = 50
 
 

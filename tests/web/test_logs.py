@@ -7,15 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pytest
-
 from tests.helpers.browser import Faults, Service
 from tests.helpers.written_logs import at_rest, csv_text, moved, resting_ulog, spiked_on_table
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 
 DROP = """async ([name, coded]) => {
   const bytes = Uint8Array.from(atob(coded), (character) => character.charCodeAt(0));

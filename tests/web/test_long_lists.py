@@ -18,7 +18,6 @@ from tests.helpers.certifying import OVERRIDE
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 STEP = {"kind": "acquire", "expected_s": 60.0, "rate_dps": 10.0}

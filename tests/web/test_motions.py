@@ -20,8 +20,6 @@ from tests.helpers.rest import at_rest
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
-
 
 def fitted(service: Service, recording: Recording, **fit: Any) -> tuple[str, dict[str, Any]]:
     """Store a recording, fit it; returns the path of the explore page and what the version shows by motion."""

@@ -15,7 +15,6 @@ from tests.helpers.browser import MINUS, Service, number_of
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page, Request
 
-pytestmark = pytest.mark.timeout(300)
 PATH = "/api/designs/evaluation"
 RECIPE = """format = "labctl-recipe/1"
 name = "few"

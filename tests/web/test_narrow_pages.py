@@ -15,7 +15,6 @@ from tests.helpers.simulated_recordings import single_axis
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 LONG = ("GYRO-" + "X" * 20 + "-" + "0123456789" * 4)[:64]
 PAGES = ("/", "/units", f"/units/{LONG}", "/recordings", "/recordings/1", "/fleet", f"/explore?unit={LONG}&version=2")
 

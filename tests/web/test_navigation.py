@@ -14,7 +14,6 @@ from tests.helpers.browser import Faults, Service, settled
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 
 LOW = {"width": 900, "height": 420}
 

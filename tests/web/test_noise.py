@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import httpx
-import pytest
 
 from labctl.recording import write_recording
 from tests.helpers.browser import Service
+from tests.helpers.patience import WAIT_S
 from tests.helpers.rest import at_rest
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
-
-pytestmark = pytest.mark.timeout(300)
 
 
 def test_two_records_are_drawn_over_each_other_with_the_data_sheet(
@@ -29,7 +27,7 @@ def test_two_records_are_drawn_over_each_other_with_the_data_sheet(
         sheet = {"bias_stability_dps": 0.002}
         write_recording(at_rest(("z",), thermometer=False, minutes=20.0, serial=serial, datasheet=sheet), folder, "csv")
         files = [("files", (file.name, file.read_bytes())) for file in sorted(folder.iterdir())]
-        httpx.post(f"{service.url}/api/recordings", files=files, timeout=60).raise_for_status()
+        httpx.post(f"{service.url}/api/recordings", files=files, timeout=WAIT_S).raise_for_status()
     page = visit("/recordings")
     page.get_by_role("link", name="Compare noise at rest").click()
     page.get_by_label("Recording 1, A-1").check()

@@ -22,6 +22,7 @@ from tests.helpers.browser import NARROW, PATIENCE_MS, WIDE, Faults, Service
 from tests.helpers.forked_commands import run_labctl
 from tests.helpers.paced_hand import PacedClock, PacedPerson
 from tests.helpers.paths import RECIPES
+from tests.helpers.patience import WAIT_S
 from tests.helpers.processes import ServiceProcess, running
 from tests.helpers.simulator_process import FIRST_DPS, RECIPE
 from tests.helpers.waiting import before_next_request
@@ -29,7 +30,6 @@ from tests.helpers.waiting import before_next_request
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Route
 
-pytestmark = pytest.mark.timeout(300)
 
 TITLE = "NOT STOPPED. Use the stop switch."
 ABORT = "**/api/campaigns/1/abort"
@@ -132,7 +132,7 @@ def test_a_key_that_may_not_stop_is_said_and_another_one_stops(
             for role in (Role.VIEWER, Role.OPERATOR)
         )
         headers = {"Authorization": f"Bearer {operator}"}
-        httpx.post(f"{service.url}/api/campaigns", json={"recipe": LONG}, headers=headers, timeout=60)
+        httpx.post(f"{service.url}/api/campaigns", json={"recipe": LONG}, headers=headers, timeout=WAIT_S)
         context = chromium.new_context()
         context.set_default_timeout(PATIENCE_MS)
         context.add_init_script(
@@ -185,7 +185,7 @@ def kill(service: ServiceProcess) -> None:
     service.process.wait()
     while True:
         try:
-            httpx.get(service.url, timeout=30)
+            httpx.get(service.url, timeout=WAIT_S)
             return
         except httpx.TransportError:
             before_next_request()

@@ -14,7 +14,6 @@ from tests.helpers.certifying import OVERRIDE
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 #: As long as a serial number can be, without a place to break it.
 LONG_SERIAL = ("GYRO-" + "0123456789ABCDEF" * 4)[:64]
 

@@ -20,7 +20,6 @@ from tests.helpers.static_recordings import resting
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
-pytestmark = pytest.mark.timeout(400)
 STILL = np.random.default_rng(7).normal(0.3, 0.01, 4000)
 CLICK = "(plot, [series, k]) => plot.emit('plotly_click', { points: [{ curveNumber: series, pointNumber: k }] })"
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import pytest
-
 from tests.helpers.browser import Service, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 #: Of A4 upright within margins of 10 mm, CSS px.
 PAPER_PX = 718
 #: For each figure on paper: whether it is drawn, and how far its drawing reaches beyond the paper.

@@ -16,8 +16,6 @@ from tests.helpers.unnamed_error import with_wave
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
-
 
 @pytest.fixture(scope="module")
 def template(furnish: Callable[..., Path]) -> Path:

@@ -6,14 +6,11 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import pytest
-
 from tests.helpers.browser import Faults, Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 LAB = "http://lab.example:8420"
 #: What no visible button of a page says.
 ACTS = re.compile(

@@ -13,8 +13,6 @@ from tests.helpers.browser import Service
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
-
 
 @pytest.fixture
 def real(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,6 @@ from tests.helpers.lab import Lab
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 UNIT = "FOG-0001"
 YEARS = (2026, 2027, 2028)
 BIAS_DPS_PER_YEAR, SCALE_FACTOR_PER_YEAR = 0.1, 2e-3

@@ -8,14 +8,11 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pytest
-
 from tests.helpers.browser import NARROW, Faults, Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 FOG = Path(str(resources.files("labctl"))) / "examples" / "osu-fog"
 
 DROP = """async (files) => {

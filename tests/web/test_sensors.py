@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pytest
 from scipy import stats
 from typer.testing import CliRunner
 
@@ -22,8 +21,6 @@ from tests.helpers.turned_triads import unit_of, write_turned
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
-
-pytestmark = pytest.mark.timeout(300)
 
 
 #: A cell such as (-1.23 ± 0.45) × 10⁻⁵ g.

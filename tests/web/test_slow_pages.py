@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import pytest
-
 from tests.helpers.browser import Service, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page, Route
-
-pytestmark = pytest.mark.timeout(300)
 
 
 def test_a_slow_page_shows_its_name_what_it_waits_for_and_can_be_left(visit: Callable[..., Page]) -> None:

@@ -13,7 +13,6 @@ from tests.helpers.browser import NARROW, Service
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
-pytestmark = pytest.mark.timeout(400)
 UNIT = "OSU-FOG-2024"
 
 

@@ -13,8 +13,6 @@ from tests.helpers.browser import Service
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
-
 
 @pytest.mark.slow
 def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: Callable[..., Page]) -> None:

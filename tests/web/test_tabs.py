@@ -13,7 +13,6 @@ from tests.helpers.paths import RECIPES
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 #: More than the connections that a browser keeps to one service over HTTP/1.1.
 TABS = 8
 HIDDEN = """hidden => {

@@ -16,7 +16,6 @@ from tests.helpers.joint_recordings import EFFECTS, recordings
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 UNIT = "/api/units/J-1"
 
 

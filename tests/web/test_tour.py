@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import pytest
-
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(400)
 #: What each step is about, by the name of its part of the page.
 PARTS = ("Verdict", "Where the model fails", "Which effects are missing", "Add it", "Error of the versions")
 

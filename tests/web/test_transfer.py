@@ -13,7 +13,6 @@ from tests.helpers.browser import Service
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.timeout(300)
 
 FIRST_VISIT_BYTES = 1_500_000
 #: Of a unit with 121 data sets; in proportion to the 50 kB of one with 630.

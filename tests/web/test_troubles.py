@@ -11,13 +11,13 @@ import pytest
 
 from labctl.answers.admin import KeyRequest, Role
 from labctl.services.commands.registry import CREATE_KEY
-from tests.helpers.browser import Faults, Service, settled
+from tests.helpers.browser import PATIENCE_MS, Faults, Service, settled
 from tests.helpers.paths import EXAMPLES
+from tests.helpers.patience import WAIT_S
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-pytestmark = pytest.mark.timeout(300)
 UNIT = "/api/units/OSU-FOG-2024/calibrations"
 
 
@@ -108,7 +108,7 @@ def guarded(tmp_path: Path) -> Iterator[tuple[Service, str, str]]:
     ]
     headers = {"Authorization": f"Bearer {made[1]}"}
     for path, body in (("/api/recordings/example", {"name": "osu-fog"}), (UNIT, {"model": "bias_scale"})):
-        httpx.post(service.url + path, json=body, headers=headers, timeout=120).raise_for_status()
+        httpx.post(service.url + path, json=body, headers=headers, timeout=WAIT_S).raise_for_status()
     yield service, made[0], made[1]
     service.stop()
 
@@ -118,7 +118,7 @@ def test_a_viewer_may_look_and_preview_and_nothing_else(guarded: tuple[Service, 
 
     service, viewer, _ = guarded
     context = chromium.new_context()
-    context.set_default_timeout(45_000)
+    context.set_default_timeout(PATIENCE_MS)
     page = context.new_page()
     page.goto(f"{service.url}/explore?unit=OSU-FOG-2024&version=1")
     asked = page.get_by_role("dialog")
@@ -131,5 +131,5 @@ def test_a_viewer_may_look_and_preview_and_nothing_else(guarded: tuple[Service, 
     page.get_by_role("button", name="Make version 2").click()
     expect(page.get_by_role("alert")).to_contain_text("operator")
     headers = {"Authorization": f"Bearer {viewer}"}
-    assert len(httpx.get(service.url + UNIT, headers=headers, timeout=30).json()) == 1
+    assert len(httpx.get(service.url + UNIT, headers=headers, timeout=WAIT_S).json()) == 1
     context.close()

@@ -13,7 +13,6 @@ from tests.helpers.simulated_recordings import single_axis
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
-pytestmark = pytest.mark.timeout(400)
 FOG, PUBLISHED = "FOG-0001", "WEISS-ENV05S"
 CARD = "Uncertainty in use (k = 2)"
 

@@ -18,7 +18,6 @@ from tests.helpers.browser import Service, figure, number_of, settled
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
-pytestmark = pytest.mark.timeout(400)
 RMS = re.compile(r"([0-9.]+) deg/s RMS left on axis z, over 695 data sets")
 
 

@@ -24,7 +24,8 @@ from labctl.stop.instruments_stop import stop_instruments
 from labctl.store import open_store
 from tests.helpers.forked_commands import run_labctl
 from tests.helpers.paths import ROOT
-from tests.helpers.processes import WAIT_S, first_line
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import first_line
 
 SPEED = 3.0
 DESCRIPTIONS = ROOT / "examples" / "line-instruments"

@@ -18,9 +18,7 @@ from umodbus.client.serial import rtu as umodbus_rtu
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import SystemClock
 from instruments.simulators.server import SimulationServer
-
-#: A busy machine is no slow instrument, s.
-PATIENCE_S = 10.0
+from tests.helpers.patience import WAIT_S
 
 
 def served(name: str) -> Iterator[tuple[BenchFile, Any]]:
@@ -59,7 +57,7 @@ def test_minimalmodbus_and_an_f4(f4: tuple[str, Any]) -> None:
     port, simulated = f4
     instrument = minimalmodbus.Instrument(port, 1)
     assert instrument.serial is not None
-    instrument.serial.timeout = PATIENCE_S
+    instrument.serial.timeout = WAIT_S
     try:
         assert instrument.read_register(0) == 5270
         assert instrument.read_register(100, 1, signed=True) == pytest.approx(25.0, abs=0.2)
@@ -79,7 +77,7 @@ def test_modbus_tk_and_an_f4(f4: tuple[str, Any]) -> None:
     port, simulated = f4
     with serial.Serial(port, 19200) as line:
         master = modbus_rtu.RtuMaster(line)
-        master.set_timeout(PATIENCE_S)
+        master.set_timeout(WAIT_S)
         assert master.execute(1, defines.READ_HOLDING_REGISTERS, 606, 1) == (1,)
         assert master.execute(1, defines.WRITE_SINGLE_REGISTER, 300, output_value=400) == (300, 400)
         assert master.execute(1, defines.READ_INPUT_REGISTERS, 300, 1) == (400,)
@@ -88,7 +86,7 @@ def test_modbus_tk_and_an_f4(f4: tuple[str, Any]) -> None:
 
 def test_umodbus_and_an_f4(f4: tuple[str, Any]) -> None:
     port, simulated = f4
-    with serial.Serial(port, 19200, timeout=PATIENCE_S) as line:
+    with serial.Serial(port, 19200, timeout=WAIT_S) as line:
         assert umodbus_rtu.send_message(umodbus_rtu.read_holding_registers(1, 602, 2), line) == [65136, 1200]
         assert umodbus_rtu.send_message(umodbus_rtu.write_multiple_registers(1, 300, [410]), line) == 1
         assert simulated.setpoint == 410
@@ -96,7 +94,7 @@ def test_umodbus_and_an_f4(f4: tuple[str, Any]) -> None:
 
 def test_pymodbustcp_and_an_f4t(f4t: tuple[int, Any]) -> None:
     port, simulated = f4t
-    client = ModbusClient("127.0.0.1", port, unit_id=1, timeout=PATIENCE_S, auto_close=False)
+    client = ModbusClient("127.0.0.1", port, unit_id=1, timeout=WAIT_S, auto_close=False)
     try:
         assert client.read_holding_registers(16, 3) == [ord(letter) for letter in "F4T"]
         assert client.read_holding_registers(2782, 2) == words_of(25.0)
@@ -110,7 +108,7 @@ def test_pymodbustcp_and_an_f4t(f4t: tuple[int, Any]) -> None:
 
 def test_modbus_tk_and_an_adam(adam: tuple[int, Any]) -> None:
     port, _ = adam
-    master = modbus_tcp.TcpMaster("127.0.0.1", port, timeout_in_sec=PATIENCE_S)
+    master = modbus_tcp.TcpMaster("127.0.0.1", port, timeout_in_sec=WAIT_S)
     try:
         assert master.execute(1, defines.READ_INPUT_REGISTERS, 210, 1) == (0x6017,)
         codes = master.execute(1, defines.READ_INPUT_REGISTERS, 0, 8)
@@ -121,5 +119,5 @@ def test_modbus_tk_and_an_adam(adam: tuple[int, Any]) -> None:
 
 def test_umodbus_and_an_adam(adam: tuple[int, Any]) -> None:
     port, _ = adam
-    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as line:
+    with socket.create_connection(("127.0.0.1", port), timeout=WAIT_S) as line:
         assert umodbus_tcp.send_message(umodbus_tcp.read_input_registers(1, 200, 2), line) == [0x0147, 0x0147]

@@ -11,7 +11,8 @@ from time import monotonic
 import pytest
 
 from labctl.api.connection_limits import ConnectionLimits
-from tests.helpers.bounded_server import WAIT_S, BoundedServer, bounded_server, request, rest_of
+from tests.helpers.bounded_server import BoundedServer, bounded_server, request, rest_of
+from tests.helpers.patience import WAIT_S
 
 SHORT = ConnectionLimits(header_s=0.4, stalled_s=0.6, idle_s=1, look_s=0.05, refused_s=0.3)
 POST = request("/body", "Content-Length: 100", method="POST")

@@ -13,12 +13,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from labctl.services.criticism import evaluation
-from tests.helpers.browser import REQUEST_S, Service
+from tests.helpers.browser import Service
 from tests.helpers.held_criticism import HeldCriticism
+from tests.helpers.patience import WAIT_S
 from tests.helpers.service import add_recording
 from tests.helpers.simulated_recordings import single_axis
-
-WAIT_S = 60.0
 
 
 def events_of(text: str) -> list[tuple[str, Any]]:
@@ -83,7 +82,7 @@ class Client:
 
     def __init__(self, url: str) -> None:
         address = httpx.URL(url)
-        self._socket = socket.create_connection((address.host, address.port), timeout=REQUEST_S)
+        self._socket = socket.create_connection((address.host, address.port), timeout=WAIT_S)
         self._socket.sendall(f"GET {address.path} HTTP/1.1\r\nHost: {address.host}\r\n\r\n".encode())
 
     def followed(self) -> None:

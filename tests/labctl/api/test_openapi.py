@@ -33,13 +33,12 @@ from labctl.store.connection.database import Database
 from tests.helpers.certifying import REASON
 from tests.helpers.openapi import openapi_document, operations
 from tests.helpers.paths import EXAMPLES
+from tests.helpers.patience import WAIT_S
 
 UNIT = "OSU-FOG-2024"
 THERE = {"serial": UNIT, "version": 1, "recording": 1}
 #: Seconds of work each: of these only few reach a version that is there.
 COSTLY = ("/criticism", "/improve", "/preview", "/residuals", "/pictures", "/assessment", "/certify")
-#: An answer may take this long on a busy machine, s: a criticism is computed for some.
-PATIENCE_S = 120.0
 #: Of each operation, in a run of the quick tests and of all; drawn from the same seed every time.
 FEW, MANY, SEED = 4, 20, 1
 
@@ -99,7 +98,7 @@ def ask(case: Any, application: Any, statuses: set[int]) -> None:
         dear = 16 if name == "version" and case.path.endswith(COSTLY) else 2
         if name in case.path_parameters and zlib.crc32(str(case.path_parameters[name]).encode()) % dear == 0:
             case.path_parameters[name] = there
-    answer = case.call(app=application, timeout=PATIENCE_S)
+    answer = case.call(app=application, timeout=WAIT_S)
     statuses.add(answer.status_code)
     assert answer.status_code < 500, f"{case.as_curl_command()}\n{answer.text}"
     if answer.status_code >= 400:

@@ -13,8 +13,9 @@ import pytest
 from labctl.fitting.effects import read_formulas
 from labctl.services.computation import InWorkers, Limits
 from labctl.services.criticism.criticise import criticise_unit
-from tests.helpers.browser import REQUEST_S, Service
+from tests.helpers.browser import Service
 from tests.helpers.computations import PIPE, Held, die_in_a_worker, hold, hold_request
+from tests.helpers.patience import WAIT_S
 from tests.helpers.simulated_recordings import single_axis
 
 LIMITS = Limits(at_once=2, waiting=3, niceness=0)
@@ -59,8 +60,8 @@ def test_of_many_at_once_so_many_are_computed_and_the_rest_told_when_to_come_bac
     path = f"{service.url}/api/units/{unit}/calibrations/1/criticism"
     formulas = [f"own: table_rate_dps**{5 + number}" for number in range(CLIENTS)]
     with ThreadPoolExecutor(CLIENTS) as clients, httpx.Client(limits=httpx.Limits(max_connections=CLIENTS)) as http:
-        asked = [clients.submit(http.get, path, params={"formula": each}, timeout=REQUEST_S) for each in formulas]
-        answers = [each.result(REQUEST_S) for each in asked]
+        asked = [clients.submit(http.get, path, params={"formula": each}, timeout=WAIT_S) for each in formulas]
+        answers = [each.result(WAIT_S) for each in asked]
     statuses = [answer.status_code for answer in answers]
     assert set(statuses) == {200, 429}
     assert statuses.count(200) >= LIMITS.at_once + LIMITS.waiting
@@ -79,7 +80,7 @@ def test_what_is_quick_never_waits_for_a_worker(service: Service, unit: str, tmp
     version = f"/api/units/{unit}/calibrations/1"
     with ThreadPoolExecutor(CLIENTS) as clients:
         for _ in range(CLIENTS):
-            clients.submit(httpx.get, service.url + f"{version}/criticism", timeout=REQUEST_S)
+            clients.submit(httpx.get, service.url + f"{version}/criticism", timeout=WAIT_S)
         for path in ("/health", f"/api/units/{unit}/calibration?version=1", f"{version}/surface", "/"):
             assert httpx.get(service.url + path, timeout=10.0).status_code == 200
     refused = [
@@ -100,7 +101,7 @@ def test_a_client_that_leaves_ends_its_worker(
     held = Held(tmp_path)
     monkeypatch.setenv(PIPE, held.pipe)
     monkeypatch.setattr(f"labctl.api.routers.calibrations.{name}", hold_request)
-    with socket.create_connection(("127.0.0.1", service.port), timeout=REQUEST_S) as client:
+    with socket.create_connection(("127.0.0.1", service.port), timeout=WAIT_S) as client:
         path = f"/api/units/{unit}/calibrations/1/{end}"
         client.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
         held.wait_for_begin()
@@ -110,6 +111,6 @@ def test_a_client_that_leaves_ends_its_worker(
 
 def test_a_worker_that_dies_is_a_problem_document(service: Service, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("labctl.api.routers.calibrations.verify_unit", die_in_a_worker)
-    answer = httpx.get(f"{service.url}/api/units/{unit}/calibrations/1/verification", timeout=REQUEST_S)
+    answer = httpx.get(f"{service.url}/api/units/{unit}/calibrations/1/verification", timeout=WAIT_S)
     assert (answer.status_code, answer.json()["type"]) == (503, "urn:labctl:problem:computation-ended")
     assert "memory" in answer.json()["detail"]

@@ -14,7 +14,8 @@ from labctl.fitting.live import PoseRequest
 from labctl.fitting.live.directions import DIRECTIONS
 from labctl.services.live import feeds
 from tests.helpers.lab import Lab
-from tests.helpers.processes import WAIT_S, begin, kill, labctl
+from tests.helpers.patience import WAIT_S
+from tests.helpers.processes import begin, kill, labctl
 from tests.helpers.turned_unit import TurnedUnit
 
 NAMES = ("t_s", *(f"gyro_{a}" for a in "xyz"), *(f"accel_{a}_g" for a in "xyz"))

@@ -25,6 +25,7 @@ from labctl.log.repetition import MAX_FOREIGN, WINDOW_S, RepetitionLimit
 from labctl.log.settings import LEVELS, is_read_by_a_person, level_asked
 from labctl.log.setup import held_back, running_log
 from tests.helpers.log_records import logged
+from tests.helpers.patience import WAIT_S
 
 log = get_logger()
 
@@ -218,7 +219,7 @@ get_logger().info("begun")
 
 def run(program: str, **options: Any) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", PROGRAM.format(program)], text=True, check=False, timeout=60, **options
+        [sys.executable, "-c", PROGRAM.format(program)], text=True, check=False, timeout=WAIT_S, **options
     )
 
 
@@ -239,7 +240,7 @@ def test_a_process_without_standard_error_goes_on_and_writes_into_no_other_file(
     )
     done = subprocess.run(
         ["/bin/sh", "-c", 'exec 2>&-; exec "$0" -c "$1"', sys.executable, program],
-        check=False, timeout=60, stdout=subprocess.PIPE,
+        check=False, timeout=WAIT_S, stdout=subprocess.PIPE,
     )  # fmt: skip
     assert done.returncode == 0
     assert (tmp_path / "data").read_text(encoding="utf-8") == "data"

@@ -19,8 +19,8 @@ from labctl.processes.rpc import RpcClient, RpcServer
 from labctl.processes.supervision import Supervision
 from labctl.services.local_bench import LocalBench
 from labctl.store import Store
+from tests.helpers.patience import WAIT_S
 
-WAIT_S = 20.0
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 RENEW, RENEWAL = "store.Leases.renew", ("bench", "owner", AT, AT)
 

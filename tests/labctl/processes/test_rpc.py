@@ -21,8 +21,7 @@ from labctl.processes.documents import LONGEST_BYTES, BadDocument, receive
 from labctl.processes.rpc import Answer, Respond, RpcClient, RpcServer, answer_with
 from labctl.processes.rpc_methods import Call, RpcMethod, parameter, supervisor_method
 from tests.helpers.log_records import logged
-
-WAIT_S = 20.0
+from tests.helpers.patience import WAIT_S
 
 
 def method_of(name: str) -> RpcMethod:

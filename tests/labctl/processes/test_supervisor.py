@@ -26,6 +26,7 @@ from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.lab_service import LabService
 from labctl.store import holder_of, open_store
 from procedures.execution.signals import ENDING
+from tests.helpers.patience import WAIT_S
 
 
 def handlers() -> dict[signal.Signals, object]:
@@ -163,5 +164,5 @@ def test_a_process_whose_supervisor_ends_before_it_sends_settings_ends_without_a
         command = [sys.executable, "-m", f"labctl.processes.{module}", str(theirs.fileno())]
         process = subprocess.Popen(command, pass_fds=[theirs.fileno()], stderr=subprocess.PIPE, text=True)
     ours.close()
-    _, said = process.communicate(timeout=120)
+    _, said = process.communicate(timeout=WAIT_S)
     assert (process.returncode, said) == (1, "")

@@ -10,8 +10,7 @@ import pytest
 
 from labctl.progress import Cancelled, report_stage, reporting_to
 from labctl.services.single_flight import single_flight
-
-WAIT_S = 30.0
+from tests.helpers.patience import WAIT_S
 
 
 class Client:

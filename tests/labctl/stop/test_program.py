@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from labctl.stop.places import BenchPlace, DriverNote, known_places, place_of
+from tests.helpers.patience import WAIT_S
 
 #: What Python's own start may load for an installation from a working tree.
 STARTED = {"_virtualenv", "sitecustomize", "usercustomize"}
@@ -25,7 +26,7 @@ def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
 
 def stop(environment: dict[str, str], *words: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "labctl", "stop", *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=WAIT_S)
 
 
 def test_it_loads_the_standard_library_alone() -> None:

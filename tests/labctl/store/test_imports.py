@@ -22,6 +22,7 @@ from labctl.recording import Recording, data_set_limits, to_points
 from labctl.store import Imports, Store, check, import_parts, migrate, migrate_database, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.one_row_sets import AT, one_row_sets
+from tests.helpers.patience import WAIT_S
 
 #: What may come in one transaction beside the rows of its part: the sign of life, the audit row and its head.
 BESIDE = 5
@@ -238,7 +239,7 @@ def test_a_process_that_is_killed_inside_an_import(location: str) -> None:
             Imports.add_part, _ = dying, parts.clear()
             store.recordings.add_import(one_row_sets(300, "NEW"), AT)
     """
-    ended = subprocess.run([sys.executable, "-c", program, location], check=False, timeout=60)
+    ended = subprocess.run([sys.executable, "-c", program, location], check=False, timeout=WAIT_S)
     assert ended.returncode == -signal.SIGKILL
     assert rows_of(location)["data_sets"] > 50
     nothing_seen(location)

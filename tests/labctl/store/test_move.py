@@ -24,7 +24,6 @@ from labctl.store.integrity.move import move_database
 from labctl.store.schema import tables
 from studies.postgresql_cluster import Cluster
 
-pytestmark = pytest.mark.timeout(300)
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
 

@@ -48,8 +48,6 @@ from tests.helpers.drifting_units import add_drifting_unit
 from tests.helpers.log_records import logged
 from tests.helpers.schedule_lab import Lab
 
-pytestmark = pytest.mark.timeout(300)
-
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
 

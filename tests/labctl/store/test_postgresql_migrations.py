@@ -17,8 +17,6 @@ from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 from tests.helpers.corpus import ENTRIES, Entry
 
-pytestmark = pytest.mark.timeout(300)
-
 #: Written by the migration itself, with its date and what follows from it; the leases of processes that have ended.
 DATED = {"manifests", "manifest_head", "leases"}
 

@@ -30,6 +30,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.store import BenchRow, Store, open_store
 from labctl.store.connection.database import Database
 from labctl.store.repositories.benches import Benches
+from tests.helpers.patience import WAIT_S
 
 BENCH = load_bench("single-axis-sim")
 TABLE, CHAMBER = BENCH.table.port, BENCH.chamber.host or BENCH.chamber.port or ""
@@ -244,7 +245,7 @@ def test_a_service_tries_when_it_starts_in_the_background_and_before_it_ends(loc
         patched.setattr(confirmation, "open_bench", opening)
         service.start()
         for _ in range(5):
-            assert tried.acquire(timeout=60.0)
+            assert tried.acquire(timeout=WAIT_S)
     runner.safe_state.end_soon()
     real.heal(TABLE)
     service.close()

@@ -43,7 +43,6 @@ def whole() -> tuple[int, Any]:
         return crash_recovery.undisturbed(Path(folder))
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("number", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, KILLS))])
 def test_a_kill_at_any_instant_loses_nothing_and_repeats_nothing(whole: tuple[int, Any], number: int) -> None:
     instants, expected = whole

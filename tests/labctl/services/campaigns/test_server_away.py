@@ -21,7 +21,6 @@ from studies.network_cut import Network, network_to
 from studies.postgresql_cluster import Cluster
 
 pytestmark = [
-    pytest.mark.timeout(300),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning"),
 ]
 BENCH = load_bench("single-axis-sim")

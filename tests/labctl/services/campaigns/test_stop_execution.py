@@ -16,8 +16,7 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.planning.loading import load_bench
 from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
-
-WAIT_S = 60.0
+from tests.helpers.patience import WAIT_S
 
 
 @pytest.fixture

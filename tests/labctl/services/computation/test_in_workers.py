@@ -17,8 +17,8 @@ from labctl.progress import Cancelled, reporting_to
 from labctl.services.computation import InThreads, InWorkers, Limits
 from labctl.store import Store, open_store
 from tests.helpers import computations as work
+from tests.helpers.patience import WAIT_S
 
-WAIT_S = 60.0
 LIMITS = Limits(at_once=1, waiting=2, memory_mib=64, niceness=1)
 
 

@@ -26,7 +26,6 @@ def lab(tmp_path: Path) -> Lab:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
 def test_gravity_is_told_from_run_and_mounting_by_the_inverted_mounting(lab: Lab) -> None:
     """Yang's three positions, each powered and mounted anew, then each upside down inside one powered run."""
     first = lab.json("criticise", "STIM-0001", "--next", str(lab.folder / "next.toml"))

@@ -205,7 +205,6 @@ def server(url: str) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_every_edit_is_found_on_a_server(server: str) -> None:
     assert check(server).findings == ()
     head = check(server).head
