@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 OutputUnitName = Literal["deg/s", "rad/s", "deg/h", "V", "mV", "count", "arb"]
 UNITS: frozenset[str] = frozenset(get_args(OutputUnitName))
@@ -20,15 +20,21 @@ class NominalOutput(NamedTuple):
     scale: float  #: output per deg/s, in `unit` per deg/s; finite and not 0
 
 
-def nominal_output(document: Mapping[str, Any]) -> NominalOutput:
-    """Return the line that a document states; raises ValueError or TypeError for one that cannot be used."""
+def nominal_output(document: Mapping[str, object]) -> NominalOutput:
+    """Return the line that a document states. Raises ValueError, TypeError, AttributeError for one that is no line."""
     unit = document.get("unit", "deg/s")
     if unit not in UNITS or not set(document) <= set(NominalOutput._fields):
         raise ValueError(f"{str(document)[:80]} is no output with unit, offset and scale; correct it")
     scale = document["scale"] if "scale" in document else default_scale(unit)
-    line = NominalOutput(unit, float(document.get("offset", 0.0)), float(scale))
+    line = NominalOutput(str(unit), _number(document.get("offset", 0.0)), _number(scale))
     require_usable(line.offset, line.scale)
     return line
+
+
+def _number(value: object) -> float:
+    if not isinstance(value, int | float | str):
+        raise TypeError(f"{str(value)[:80]} is no number; correct it")
+    return float(value)
 
 
 def default_scale(unit: object) -> float:

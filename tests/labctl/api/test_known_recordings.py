@@ -1,4 +1,4 @@
-"""A page that has what it shows of a recording is told at once when another process has changed the recording."""
+"""A page has what it shows of a recording, and gets it anew as soon as another process has changed the recording."""
 
 from __future__ import annotations
 
