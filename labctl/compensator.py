@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from instruments.clock import Clock, SystemClock
 from labctl.calibration import Calibration, read_calibration
 from labctl.calibration.certification import LeftOutWarning, warn
-from labctl.calibration.document import output_lines, read_source
+from labctl.calibration.document import read_source
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.temperature.channel import STAND_IN_C
@@ -94,8 +94,9 @@ class Compensator:
         self._outside = outside
         self._low_c, self._high_c = calibration.temperature_c
         self._slow, self._fast = output_limits_dps(calibration)
-        offsets, scales = output_lines(calibration)
-        self._offset, self._scale = np.array(offsets), np.array(scales)
+        lines = calibration.output
+        self._offset = np.array([lines[axis].offset for axis in self.axes])
+        self._scale = np.array([lines[axis].scale for axis in self.axes])
         rest, self._memory = split_memory(calibration.fitted, self.axes)
         self._model = rest
         self._correct = correction(rest, self.axes)

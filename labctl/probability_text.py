@@ -1,4 +1,4 @@
-"""A probability in words: one rounding on pages, in commands and sentences. Certificates give a risk to two digits."""
+"""A probability in words: one rounding on pages, in commands and sentences, and one of the risks on certificates."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 
 #: Probabilities beyond these are written as bounds: what was computed is neither impossible nor certain.
 MIN_STATED, MAX_STATED = 0.005, 0.995
+#: A risk of a wrong decision beyond these is written as a bound.
+MIN_RISK, MAX_RISK = 1e-4, 0.99
 
 
 def probability_text(probability: float) -> str:
@@ -16,3 +18,13 @@ def probability_text(probability: float) -> str:
     if probability < MIN_STATED:
         return "< 1 %"
     return f"{math.floor(100.0 * probability + 0.5)} %" if probability < MAX_STATED else "> 99 %"
+
+
+def risk_text(risk: float) -> str:
+    """Write the risk of a wrong decision on conformity (JCGM 106:2012) to two digits of percent: 0.12 %.
+
+    A limit is set for it, such as 2.5 %, so whole percent would not show on which side of the limit it is.
+    """
+    if risk < MIN_RISK:
+        return f"below {100.0 * MIN_RISK:g} %"
+    return f"{100.0 * risk:.2g} %" if risk < MAX_RISK else f"above {100.0 * MAX_RISK:g} %"

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from instruments.bench_config import ChamberSettings
 from instruments.protocols.modbus_registers import Register, WordOrder
-from instruments.protocols.text_lines.chamber_settings import line_address
+from instruments.protocols.port_or_host import PortOrHostSettings
 
 SOURCE = "SiLab-Bonn/basil 85c4116"
 RESOLUTION_C = 0.1
@@ -49,7 +49,7 @@ MAPS: dict[str, BinderMap] = {
 }
 
 
-class BinderSettings(ChamberSettings):
+class BinderSettings(PortOrHostSettings, ChamberSettings):
     """A serial port, or a host whose adapter carries Modbus RTU, and the controller."""
 
     tcp_port: int = 10001
@@ -57,14 +57,3 @@ class BinderSettings(ChamberSettings):
     baudrate: int = Field(default=9600, gt=0)
     address: int = Field(default=1, ge=1, le=247)
     word_order: WordOrder = "little"
-
-    @model_validator(mode="after")
-    def _has_address(self) -> BinderSettings:
-        if (self.port is None) == (self.host is None):
-            raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
-        return self
-
-    @property
-    def address_url(self) -> str:
-        """Address of the port."""
-        return line_address(self.port, self.host, self.tcp_port)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, Field, JsonValue, model_validator
+from pydantic import Field, JsonValue, model_validator
 
 from instruments.bench_config import ChamberSettings, ReferenceSettings, Strict
+from instruments.protocols.port_or_host import PortOrHostSettings
 from instruments.protocols.serial_options import SerialOptions
-from instruments.protocols.text_lines.chamber_settings import line_address
 
 
-class LibraryOptions(BaseModel):
+class LibraryOptions(PortOrHostSettings):
     """Which class, and how it is reached."""
 
     library: Literal["pymeasure", "msl-equipment"] = "pymeasure"
@@ -28,21 +28,14 @@ class LibraryOptions(BaseModel):
     #: Attribute that states its identity; None: the usual one of the class, where it has one; empty: none is asked.
     identity: str | None = None
 
-    @model_validator(mode="after")
-    def _has_address(self) -> LibraryOptions:
-        if self.library == "msl-equipment":
-            if not self.address:
-                raise ValueError(
-                    'key address is missing; write it in the syntax of msl-equipment, such as "TCP::10.0.0.7::2000"'
-                )
-        elif (getattr(self, "port", None) is None) == (getattr(self, "host", None) is None):
-            raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
-        return self
-
-    @property
-    def address_url(self) -> str:
-        """Address of the port (pymeasure)."""
-        return line_address(getattr(self, "port", None), getattr(self, "host", None), self.tcp_port)
+    def _require_address(self) -> None:
+        """Raise ValueError where the library does not know how the instrument is reached."""
+        if self.library == "pymeasure":
+            super()._require_address()
+        elif not self.address:
+            raise ValueError(
+                'key address is missing; write it in the syntax of msl-equipment, such as "TCP::10.0.0.7::2000"'
+            )
 
 
 class LibraryChamberSettings(LibraryOptions, ChamberSettings):

@@ -11,11 +11,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from instruments.bench_config import SupplySettings
+from instruments.protocols.port_or_host import PortOrHostSettings
 from instruments.protocols.serial_options import SerialOptions
-from instruments.protocols.text_lines.chamber_settings import line_address
 from instruments.protocols.text_lines.line_syntax import LineSyntax
 
 #: Commands come no faster than this, s: the supply has no handshake.
@@ -49,7 +49,7 @@ MODELS: Mapping[str, Mapping[int, ChannelRange]] = {
 }  # fmt: skip
 
 
-class Dp800Settings(SupplySettings):
+class Dp800Settings(PortOrHostSettings, SupplySettings):
     """A Rigol DP800 on its LAN interface or its RS-232 port."""
 
     tcp_port: int = 5555
@@ -57,17 +57,6 @@ class Dp800Settings(SupplySettings):
     options: SerialOptions = Field(default_factory=SerialOptions)
     channel: int = Field(default=1, ge=1, le=3)
     serial: str = ""  #: of the supply; compared with what it says of itself
-
-    @model_validator(mode="after")
-    def _has_address(self) -> Dp800Settings:
-        if (self.port is None) == (self.host is None):
-            raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
-        return self
-
-    @property
-    def address_url(self) -> str:
-        """Address of the port."""
-        return line_address(self.port, self.host, self.tcp_port)
 
 
 def model_in(reply: str) -> str:

@@ -59,7 +59,10 @@ class BenchStatus(ResponseModel):
     """A bench, what its last safe state could not confirm, and which process drives it."""
 
     name: BenchName
-    last_used_at: datetime = Field(description="Time at which the bench was last used.")
+    last_used_at: datetime | None = Field(
+        description="Time at which a campaign was last begun on the bench; null: none was, but a process has reserved "
+        "the bench."
+    )
     unconfirmed: str = Field(
         default="",
         description="What the last safe state could not confirm; kept until a person has inspected and "

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labctl.answers.output_units import RATE_UNITS, OutputUnitName
+from labctl.answers.output_units import OutputUnitName, default_scale, require_usable
 
 Axis = Literal["x", "y", "z"]
 #: What moves the unit, and so what its true rate is known from: `rates` a table, at one rate in each data set; `rest`
@@ -38,18 +37,12 @@ class OutputUnit(BaseModel):
     @classmethod
     def _default_scale(cls, document: Any) -> Any:
         if isinstance(document, dict) and "scale" not in document:
-            unit = document.get("unit", "deg/s")
-            if unit in RATE_UNITS:
-                return {**document, "scale": RATE_UNITS[unit]}
-            raise ValueError(f"unit {unit!r} needs a scale: the output's change, in that unit, per deg/s")
+            return {**document, "scale": default_scale(document.get("unit", "deg/s"))}
         return document
 
     @model_validator(mode="after")
     def _usable(self) -> OutputUnit:
-        if self.scale == 0 or not math.isfinite(self.scale) or not math.isfinite(self.offset):
-            raise ValueError(
-                f"scale = {self.scale} and offset must be finite numbers, and scale must not be 0; correct them"
-            )
+        require_usable(self.offset, self.scale)
         return self
 
 

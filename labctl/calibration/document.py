@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, cast, get_args
+from typing import TYPE_CHECKING, cast
 
 from instruments.configuration import changed
-from labctl.answers.output_units import OutputUnitName
+from labctl.answers.output_units import NominalOutput, nominal_output
 from labctl.calibration.certification import Certification, read_certification
 from labctl.canonical_json import canonical, canonical_and_hash
 from labctl.errors import BadCalibrationFile, OtherConfiguration
@@ -24,13 +24,11 @@ if TYPE_CHECKING:  # types alone; some need pydantic, which costs as much to loa
     from pathlib import Path
 
     from labctl.answers.calibration_file import CalibrationJson
-    from labctl.answers.recording_head import OutputUnit
     from labctl.fitting.uncertainty.conditions import BenchConditions
 
 SCHEMA = "labctl-calibration/1"
 #: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
 MAX_BYTES = 64 << 20
-UNITS = frozenset(get_args(OutputUnitName))
 
 
 @dataclass(frozen=True)
@@ -100,13 +98,11 @@ class Calibration:
             return None if bench_json is None else BenchConditions.from_json(bench_json)
 
     @property
-    def output(self) -> dict[str, OutputUnit]:
+    def output(self) -> dict[str, NominalOutput]:
         """How each axis's output becomes a rate before it is corrected."""
-        from labctl.answers.recording_head import OutputUnit  # noqa: PLC0415  needs pydantic
-
         with _reading("output"):
-            units = {axis: OutputUnit.model_validate(output) for axis, output in self.document["output"].items()}
-            return units | {axis: units[axis] for axis in self.axes}  # each axis has one
+            lines = {axis: nominal_output(output) for axis, output in self.document["output"].items()}
+            return lines | {axis: lines[axis] for axis in self.axes}  # each axis has one
 
     @property
     def temperature_c(self) -> tuple[float, float]:
@@ -153,32 +149,6 @@ class Calibration:
     def to_bytes(self) -> bytes:
         """Return the bytes that are stored and served, always the same."""
         return canonical(self.document) + b"\n"
-
-
-def output_lines(calibration: Calibration) -> tuple[list[float], list[float]]:
-    """Return offset and scale of each axis's output: rate_dps = (output - offset) / scale.
-
-    What labctl writes is read without pydantic, which is most of the time in which a robot's program loads a file;
-    `Calibration.output` reads the rest, or raises BadCalibrationFile.
-    """
-    stated = [_stated_line(calibration, axis) for axis in calibration.axes]
-    if None in stated:
-        units = calibration.output
-        stated = [(units[axis].offset, units[axis].scale) for axis in calibration.axes]
-    lines = [line for line in stated if line is not None]
-    return [offset for offset, _ in lines], [scale for _, scale in lines]
-
-
-def _stated_line(calibration: Calibration, axis: str) -> tuple[float, float] | None:
-    """Return offset and scale of an output where both are finite and its unit is known; the scale is not 0."""
-    with _reading("output"):
-        unit = calibration.document["output"][axis]
-        if set(unit) != {"unit", "offset", "scale"} or unit["unit"] not in UNITS:
-            return None
-        offset, scale = unit["offset"], unit["scale"]
-        if not (isinstance(offset, float) and isinstance(scale, float)):
-            return None
-        return (offset, scale) if math.isfinite(offset) and math.isfinite(scale) and scale != 0.0 else None
 
 
 def limits(pair: Sequence[float | None]) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from labctl.certificates.document import (
     StateOfItem,
 )
 from labctl.certificates.units import readable
+from labctl.probability_text import risk_text
 
 #: Digits of an uncertainty (GUM 7.2.6), and of a number without one.
 U_DIGITS, DIGITS = 2, 4
@@ -31,8 +32,6 @@ PLACES = {
     "other": "at another place",
 }
 MINUS = "−"
-#: A probability below this is written as a bound.
-MIN_RISK = 1e-4
 #: Marks a standard uncertainty without the standards of the bench.
 FIT_ALONE = " *"
 
@@ -313,13 +312,6 @@ def _conformity(certificate: Certificate) -> Mapping[str, object] | None:
             "results": [_verified(result) for result in judged.results]}  # fmt: skip
 
 
-def percent(probability: float) -> str:
-    """Return a probability in percent, to two digits; one that is too small to matter as a bound."""
-    if probability < MIN_RISK:
-        return f"below {100.0 * MIN_RISK:g} %"
-    return f"{100.0 * probability:.2g} %" if probability < 0.99 else "above 99 %"
-
-
 def _outcome(passed: bool) -> str:
     return "PASS" if passed else "FAIL"
 
@@ -328,4 +320,4 @@ def _verified(result: ConformityResult) -> list[str]:
     error, expanded = rounded(result.error_dps, result.expanded_dps)
     temperature_text = "–" if result.temperature_c is None else _number(result.temperature_c)
     rates = [_number(rate) for rate in result.rates_dps]
-    return [result.output, temperature_text, *rates, error, expanded, percent(result.risk), _outcome(result.passed)]
+    return [result.output, temperature_text, *rates, error, expanded, risk_text(result.risk), _outcome(result.passed)]

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from labctl.errors import BadInput
+from labctl.probability_text import risk_text
 
 YEAR = timedelta(days=365.25)
 #: Share of the limit within which an error extends the interval (ILAC-G24, method 1).
@@ -109,7 +110,7 @@ def interval_for_risk(error: float, u: float, rate: Rate, limit: float, target: 
     longest = float(allowed[-1]) if len(allowed) else 0.0
     chosen = float(np.clip(longest, MIN_YEARS, MAX_YEARS))
     at_end = float(risk_at(chosen, error, u, rate, limit))
-    return Interval(chosen, "keep", at_end, f"the risk at its end is {100 * at_end:.2g} % by the predicted drift")
+    return Interval(chosen, "keep", at_end, f"the risk at its end is {risk_text(at_end)} by the predicted drift")
 
 
 def staircase(

@@ -7,7 +7,6 @@ nothing that a caller sends. The folder (mode 0700) keeps other users out.
 from __future__ import annotations
 
 import contextlib
-import socket
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from labctl.errors import BadInput, BenchSilent
 from labctl.log import get_logger
 from labctl.processes.documents import BadDocument, answer, receive, refusal, value_of
 from labctl.processes.rpc_methods import Call, MethodOf, RpcMethod, read_call
+from labctl.stop.acceptor import Acceptor
 
 log = get_logger()
 
@@ -72,36 +72,21 @@ class RpcServer:
 
     def __init__(self, path: Path, respond: Respond, method_of: MethodOf) -> None:
         """`method_of` has the types of a call by its name."""
-        self._path, self._respond, self._method_of = path, respond, method_of
+        self._respond, self._method_of = respond, method_of
         self._listener = Listener(str(path), "AF_UNIX", backlog=BACKLOG)
-        self._over = False
-        self._thread = threading.Thread(target=self._accept, name=f"calls-{path.name}", daemon=True)
+        self._acceptor = Acceptor(path, f"calls-{path.name}", self._listener.accept, self._begin)
 
     def start(self) -> None:
         """Answer from now on."""
-        self._thread.start()
+        self._acceptor.start()
 
     def close(self) -> None:
         """Answer no caller that comes from now on."""
-        self._over = True
-        with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as waker:
-            waker.connect(str(self._path))  # a thread that waits for a caller gets this one
-        if self._thread.is_alive():
-            self._thread.join()
+        self._acceptor.close()
         self._listener.close()
 
-    def _accept(self) -> None:
-        while True:
-            try:
-                connection = self._listener.accept()
-            except OSError:
-                if self._over:
-                    return
-                continue
-            if self._over:
-                connection.close()
-                return
-            threading.Thread(target=self._serve, args=(connection,), name="call", daemon=True).start()
+    def _begin(self, connection: Connection) -> None:
+        threading.Thread(target=self._serve, args=(connection,), name="call", daemon=True).start()
 
     def _serve(self, connection: Connection) -> None:
         try:

@@ -76,7 +76,7 @@ def _of_calibration(path: Path, calibration: Calibration) -> FixedCoefficients:
         "file": str(path)[-LONGEST:],
         "reference_temperature_c": fitted.model.reference.temperature_c,
         "argument": fitted.model.argument,
-        "output": calibration.output,
+        "output": {axis: line._asdict() for axis, line in calibration.output.items()},
         "only_of_model": True,
         **{axis: _coefficients(fitted, fit) for axis, fit in fitted.axes.items()},
     }

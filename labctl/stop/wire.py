@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from instruments.clock import SystemClock
+from labctl.stop.acceptor import Acceptor
 from labctl.stop.latch import StopRequest
 
 Phase = Literal["asked", "heard", "waiting", "stands", "failed"]
@@ -73,34 +74,21 @@ class StopServer:
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
         self._listener.bind(str(path))
         self._listener.listen(BACKLOG)
-        self._over = False
-        self._thread = threading.Thread(target=self._accept, name=f"stop-{path.name}", daemon=True)
+        self._acceptor = Acceptor(path, f"stop-{path.name}", self._accept, self._begin)
 
     def start(self) -> None:
         """Answer from now on."""
-        self._thread.start()
+        self._acceptor.start()
 
     def close(self) -> None:
         """Answer no caller that comes from now on. Safe to call twice."""
-        self._over = True
-        with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as waker:
-            waker.connect(str(self._path))  # a thread that waits for a caller gets this one
-        if self._thread.is_alive():
-            self._thread.join()
+        self._acceptor.close()
         self._listener.close()
         with contextlib.suppress(OSError):
             self._path.unlink()
 
-    def _accept(self) -> None:
-        while not self._over:
-            try:
-                caller, _ = self._listener.accept()
-            except OSError:
-                continue
-            if self._over:
-                caller.close()
-                return
-            self._begin(caller)
+    def _accept(self) -> socket.socket:
+        return self._listener.accept()[0]
 
     def _begin(self, caller: socket.socket) -> None:
         try:

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
 from labctl.calibration import Calibration, hash_of, read_calibration
-from labctl.calibration.document import output_lines
 from labctl.compensator import Compensator
 from labctl.errors import BadCalibrationFile
 from labctl.exports import export_calibration
-from labctl.recording import Recording
+from labctl.recording import OutputUnit, Recording
 from tests.helpers.calibrations import calibrated
 from tests.helpers.lab import Lab
 from tests.helpers.recordings import Triaxial
@@ -135,6 +135,7 @@ def test_the_command_line_ends_in_one_line(calibration: Calibration, tmp_path: P
         ({"unit": "mV"}, False),
         ({"unit": "furlong", "offset": 0.0, "scale": 1.0}, False),
         ({"unit": ["V"], "offset": 0.0, "scale": 1.0}, False),
+        ({"unit": ["V"]}, False),
         ({"unit": "V", "offset": 0.0, "scale": 0.0}, False),
         ({"unit": "V", "offset": float("inf"), "scale": 1.0}, False),
         ({"unit": "V", "offset": 0.0, "scale": 1.0, "more": 1.0}, False),
@@ -146,15 +147,12 @@ def test_a_compensator_reads_outputs_as_models_do(calibration: Calibration, unit
     """What is read without pydantic is what pydantic makes of it, and the rest is refused as pydantic refuses it."""
     spoilt = Calibration({**calibration.document, "output": dict.fromkeys(calibration.axes, unit)})
 
-    def by_models() -> list[tuple[float, float]]:
-        return [(of_axis.offset, of_axis.scale) for of_axis in map(spoilt.output.__getitem__, spoilt.axes)]
-
-    def by_numbers() -> list[tuple[float, float]]:
-        return list(zip(*output_lines(spoilt), strict=True))
-
     if is_usable:
-        assert by_numbers() == by_models()
+        model = OutputUnit.model_validate(unit)
+        assert spoilt.output == dict.fromkeys(calibration.axes, (model.unit, model.offset, model.scale))
         return
-    for read in (by_numbers, by_models):
+    with pytest.raises(ValidationError):
+        OutputUnit.model_validate(unit)
+    for read in (lambda: spoilt.output, lambda: Compensator(spoilt)):
         with pytest.raises(BadCalibrationFile, match="its output cannot be read"):
             read()

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from labctl.probability_text import probability_text
+from labctl.probability_text import probability_text, risk_text
 
 #: The pages' `probabilityText` is tested with the same cases.
 CASES = json.loads(Path("tests/pages/probabilities.json").read_text(encoding="utf-8"))
@@ -26,3 +26,21 @@ def test_no_probability_is_written_as_impossible_or_certain(probability: float) 
     assert text not in {"0 %", "100 %"}
     number = float(text.strip("<> %"))
     assert abs(number - 100.0 * probability) <= (1.0 if text[0] in "<>" else 0.5 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("risk", "text"),
+    [
+        (0.0, "below 0.01 %"),
+        (9.9e-5, "below 0.01 %"),
+        (1e-4, "0.01 %"),
+        (0.00123, "0.12 %"),
+        (0.025, "2.5 %"),
+        (0.5, "50 %"),
+        (0.989, "99 %"),
+        (0.99, "above 99 %"),
+        (1.0, "above 99 %"),
+    ],
+)
+def test_a_risk_is_written_to_two_digits(risk: float, text: str) -> None:
+    assert risk_text(risk) == text

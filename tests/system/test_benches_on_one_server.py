@@ -93,6 +93,11 @@ def test_a_service_that_is_killed_is_known_to_be_gone_and_resumes_alone(
     laboratory: Laboratory, cluster: Cluster
 ) -> None:
     services, database = laboratory.services, laboratory.database
+    for service in services:  # before any campaign
+        rows = get(service, "/api/benches/status")
+        assert [(row["name"], row["last_used_at"], row["driver"]["url"]) for row in rows] == [
+            (name, None, other.url) for name, other in zip(NAMES, services, strict=True)
+        ]
     campaigns = [
         int(each.http.post("/api/campaigns", json={"recipe": PATIENT}).raise_for_status().json()["id"])
         for each in services

@@ -30,14 +30,10 @@ class AcutrolLink:
     ) -> None:
         self._device, self._ports, self._clock, self._opened = device, ports, clock, opened
         self._baudrate = settings.baudrate
-        self.url = settings.port or self._socket(settings.host or "", settings.tcp_port)
+        self.url = settings.address_url
         self._port: SerialPort | None = None
         self._headed: bool | None = None
         self._unsure = False  #: whether a late or damaged reply may still come
-
-    @staticmethod
-    def _socket(host: str, tcp_port: int) -> str:
-        return host if "://" in host else f"socket://{host}:{tcp_port}"
 
     def close(self) -> None:
         """Close the link; safe to call twice."""

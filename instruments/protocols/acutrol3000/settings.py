@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from instruments.bench_config import TableSettings
+from instruments.protocols.port_or_host import PortOrHostSettings
 
 
-class Acutrol3000Settings(TableSettings):
+class Acutrol3000Settings(PortOrHostSettings, TableSettings):
     """Address, axis and reference of a servo table."""
 
     follows_courses: ClassVar[bool] = True
+    address_error: ClassVar[str] = "give either host (Ethernet) or port (serial) for the controller, not both"
 
     tcp_port: int = 9878  #: with `host`; a serial `port` leads to the same stream through a device server
     baudrate: int = 9600
@@ -26,9 +28,3 @@ class Acutrol3000Settings(TableSettings):
     still_dps: float = Field(default=0.01, gt=0)  #: the estimated rate of a table at rest is below
     home_dps: float = Field(default=30.0, gt=0)  #: rate of homing; never beyond max_rate_dps
     reset_interlocks: bool = False  #: a frozen interlock fault is reset by labctl; else a person does so
-
-    @model_validator(mode="after")
-    def _one_address(self) -> Acutrol3000Settings:
-        if (self.port is None) == (self.host is None):
-            raise ValueError("give either host (Ethernet) or port (serial) for the controller, not both")
-        return self

@@ -10,11 +10,12 @@ from typing import Literal
 from pydantic import Field, field_validator, model_validator
 
 from instruments.bench_config import TableSettings, is_simulated_address
+from instruments.protocols.port_or_host import PortOrHostSettings
 from instruments.protocols.request_reply.chamber import ChamberDescription
 from instruments.protocols.request_reply.parts import Description
 from instruments.protocols.request_reply.table import TableDescription
 from instruments.protocols.serial_options import SerialOptions
-from instruments.protocols.text_lines.chamber_settings import LineChamberSettings, line_address
+from instruments.protocols.text_lines.chamber_settings import LineChamberSettings
 from instruments.toml_documents import read_toml
 
 Parameters = dict[str, str | int | float]
@@ -102,7 +103,7 @@ class DescribedChamberSettings(LineChamberSettings):
         return self
 
 
-class DescribedTableSettings(TableSettings):
+class DescribedTableSettings(PortOrHostSettings, TableSettings):
     """A table and its description."""
 
     format: TableDescription
@@ -120,8 +121,6 @@ class DescribedTableSettings(TableSettings):
 
     @model_validator(mode="after")
     def _usable(self) -> DescribedTableSettings:
-        if (self.port is None) == (self.host is None):
-            raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
         require_tcp_port(self.host, self.tcp_port)
         parameters_of(self.format, self.parameters)
         for what, unit, requested, limit in (
@@ -139,11 +138,6 @@ class DescribedTableSettings(TableSettings):
                 'in its description); set reference = "demanded"'
             )
         return self
-
-    @property
-    def address_url(self) -> str:
-        """Address of the port."""
-        return line_address(self.port, self.host, self.tcp_port)
 
 
 def require_tcp_port(host: str | None, tcp_port: int) -> None:

@@ -4,39 +4,20 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from instruments.bench_config import ChamberSettings, is_simulated_address
+from instruments.bench_config import ChamberSettings
+from instruments.protocols.port_or_host import PortOrHostSettings
 from instruments.protocols.serial_options import SerialOptions
 
 
-def line_address(port: str | None, host: str | None, tcp_port: int) -> str:
-    """Return the address of a port: a serial one, or a TCP socket of a host; empty where neither is given."""
-    if port is not None:
-        return port
-    if host is None or is_simulated_address(host):
-        return host or ""
-    return f"socket://{host}:{tcp_port}"
-
-
-class LineChamberSettings(ChamberSettings):
+class LineChamberSettings(PortOrHostSettings, ChamberSettings):
     """A serial port, or a host and its TCP port."""
 
     baudrate: int = Field(default=9600, gt=0)
     options: SerialOptions = Field(default_factory=SerialOptions)
     #: What the safe state is: the safe set point, or that and then heating and cooling switched off.
     safe_state: Literal["setpoint", "off"] = "setpoint"
-
-    @model_validator(mode="after")
-    def _has_address(self) -> LineChamberSettings:
-        if (self.port is None) == (self.host is None):
-            raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
-        return self
-
-    @property
-    def address_url(self) -> str:
-        """Address of the port."""
-        return line_address(self.port, self.host, self.tcp_port)
 
 
 class EspecSettings(LineChamberSettings):

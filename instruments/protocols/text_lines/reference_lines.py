@@ -11,10 +11,10 @@ from typing import Any
 from pydantic import Field, field_validator, model_validator
 
 from instruments.bench_config import ReferenceSettings
+from instruments.protocols.port_or_host import PortOrHostSettings
 from instruments.protocols.request_reply.reference import ReferenceDescription
 from instruments.protocols.request_reply.settings import found_description, with_line
 from instruments.protocols.serial_options import SerialOptions
-from instruments.protocols.text_lines.chamber_settings import line_address
 from instruments.protocols.text_lines.quantity import CELSIUS, Quantity
 
 
@@ -60,7 +60,7 @@ MODELS: dict[str, ReferenceModel] = {
 }  # fmt: skip
 
 
-class LineReferenceSettings(ReferenceSettings):
+class LineReferenceSettings(PortOrHostSettings, ReferenceSettings):
     """A model that is known, a description of another, or identity and quantities of any other."""
 
     format: ReferenceDescription | None = None
@@ -100,8 +100,6 @@ class LineReferenceSettings(ReferenceSettings):
 
     @model_validator(mode="after")
     def _is_complete(self) -> LineReferenceSettings:
-        if (self.port is None) == (self.host is None):
-            raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
         if self.model and self.format is not None:
             raise ValueError("model and format both say which instrument it is; keep one of the two")
         if not self.model and not self.quantities:
@@ -126,4 +124,4 @@ class LineReferenceSettings(ReferenceSettings):
     @property
     def address_url(self) -> str:
         """Address of the port."""
-        return line_address(self.port, self.host, self.known.tcp_port)
+        return self._address_url(self.known.tcp_port)

@@ -30,7 +30,8 @@ def benches(service: ServiceDep) -> list[BenchResponse]:
 
 @router.get("/benches/status", summary="Benches, and unconfirmed safe states")
 def bench_states(service: ServiceDep) -> list[BenchStatus]:
-    """Every bench of this database, with what its last safe state could not confirm."""
+    """Every bench of this database that was used or that a service drives, with what its last safe state could not
+    confirm."""
     return bench_statuses(service.store)
 
 

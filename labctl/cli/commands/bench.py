@@ -150,9 +150,10 @@ def wiggle(
 
 @app.command("status")
 def status(as_json: Json = False, database: Database = None) -> None:
-    """List the benches: their last safe state, what a lost process left, and which service drives each; exit 1 where
-    a bench is not confirmed safe or its service is gone.
+    """List the benches that were used or are driven: their last safe state, what a lost process left, and which service
+    drives each; exit 1 where a bench is not confirmed safe or its service is gone.
     """
+    from labctl.cli.printing.benches import print_status
     from labctl.services.campaigns.bench_status import bench_statuses
     from labctl.services.read_access import open_readonly
 
@@ -162,23 +163,7 @@ def status(as_json: Json = False, database: Database = None) -> None:
         print_json(benches)
     else:
         for bench in benches:
-            remarks = [
-                bench.unconfirmed,
-                *(f"not in its safe state; campaigns that did not end: {campaign}" for campaign in bench.left),
-            ]
-            if bench.attempts:
-                remarks.insert(
-                    1, f"labctl tried {bench.attempts} more times to set the safe state, last at {bench.attempted_at}"
-                )
-            if bench.confirmed_at:
-                remarks.insert(
-                    2,
-                    f"labctl confirmed the safe state at {bench.confirmed_at}; a person must still inspect the "
-                    "bench, then run `labctl bench clear`",
-                )
-            driver = None if bench.driver is None else bench.driver.text
-            for line in filter(None, [*(remarks if any(remarks) else ["the safe state is confirmed"]), driver]):
-                console.print(f"{bench.name:18} {line}", soft_wrap=True)
+            print_status(bench)
     if any(bench.unconfirmed or bench.left or (bench.driver and not bench.driver.alive) for bench in benches):
         raise typer.Exit(1)
 

@@ -38,18 +38,25 @@ def clear_bench(store: Store, name: str, request: ClearRequest, at: datetime) ->
 
 
 def bench_statuses(store: Store) -> list[BenchStatus]:
-    """Return every bench that was used, with the campaigns that were left on it by a process that is gone.
+    """Return every bench that was used or that a process has reserved, by name.
 
-    Those of simulated benches are left out: such a bench ended with its process.
+    Each has the campaigns that were left on it by a process that is gone. Those of simulated benches are left out: such
+    a bench ended with its process.
     """
     campaigns_left: dict[str, list[str]] = {}
     for answer in abandoned_campaigns(store):
         if outlives_its_process(store.campaigns.get(answer.id)):
             campaigns_left.setdefault(answer.bench, []).append(describe_interrupted(answer))
     drivers = bench_drivers(store)
+    known = {row.name: bench_status(store, row) for row in store.benches.all()}
     return [
-        bench_status(store, row).model_copy(
-            update={"left": campaigns_left.get(row.name, []), "driver": drivers.get(row.name)}
+        (known.get(name) or _of_unused(store, name)).model_copy(
+            update={"left": campaigns_left.get(name, []), "driver": drivers.get(name)}
         )
-        for row in store.benches.all()
+        for name in sorted(known.keys() | drivers.keys())
     ]
+
+
+def _of_unused(store: Store, name: str) -> BenchStatus:
+    """Return a bench that no campaign was ever begun on."""
+    return BenchStatus(name=name, last_used_at=None, stop=BenchStops(store, name).describe())

@@ -6,8 +6,8 @@ import math
 
 from labctl.answers.certificates import OrderedConformity
 from labctl.certificates.document import AnyAxisResult, Conformity, ConformityResult, ResultPoint, StabilityResult
-from labctl.certificates.readable import percent
 from labctl.errors import BadInput
+from labctl.probability_text import risk_text
 from labctl.services.certificates.evidence import Errors, VerifiedError
 from labctl.services.certificates.stability import until_date
 
@@ -166,7 +166,7 @@ def _risk(decided: tuple[ConformityResult, ...]) -> str:
         return ""
     return (
         "; where it was verified, the probability that the error is beyond the limit is "
-        f"{percent(max(each.risk for each in decided))} (JCGM 106:2012, no prior knowledge of the error)"
+        f"{risk_text(max(each.risk for each in decided))} (JCGM 106:2012, no prior knowledge of the error)"
     )
 
 

@@ -37,6 +37,7 @@ class ExperimentStart:
     bench: BenchFile
     confirmed_by: str  #: person who confirmed that a real bench is clear; empty: none has yet
     since: datetime  #: when it was decided, or confirmed
+    begins_at: datetime | None = None  #: a time to come, at which it is to begin; None: as soon as the bench is free
 
     @property
     def name(self) -> str:
@@ -66,6 +67,7 @@ class Laboratory(Protocol):
     def start(self, experiment: ExperimentStart) -> None:
         """Start a campaign, or run it to its end; one that was asked for already is not started again.
 
+        One that begins later is entered into a schedule, where there is one.
         Raises one of `REFUSALS` where the bench cannot do it, NotBegun, LabctlError.
         """
         ...
@@ -137,10 +139,10 @@ class DiagnosisRunner:
         """Start the campaign of a round, have it go on, or write down its end."""
         experiment = ChosenExperiment.model_validate(last.experiment)
         if (campaign := self._campaign(row, last)) is None:
-            if row.begins_at is not None and self._now() < row.begins_at:
-                return False
+            later = row.begins_at if row.begins_at is not None and self._now() < row.begins_at else None
+            start = ExperimentStart(experiment.toml, _bench(row), last.confirmed_by, last.since, later)
             try:
-                self._laboratory.start(ExperimentStart(experiment.toml, _bench(row), last.confirmed_by, last.since))
+                self._laboratory.start(start)
             except REFUSALS as error:
                 self._conclude(row, last, "cannot_be_done", sentences.not_done(str(error)))
                 return True

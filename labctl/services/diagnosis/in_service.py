@@ -12,6 +12,7 @@ from labctl.answers.campaigns import BENCH_CHECKS, CampaignRequest
 from labctl.answers.criticism import CriticismResponse
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.diagnosis.advance import CannotBeDone, ExperimentStart, NotBegun
+from labctl.services.schedule.times import NOW
 from labctl.store import CampaignRow, StartRow, Store
 
 
@@ -37,13 +38,17 @@ class ServiceLaboratory:
         return self._criticise(serial, version, tuple(recordings))
 
     def start(self, experiment: ExperimentStart) -> None:
-        """Enter a campaign into the schedule, as soon as the bench is free; where it is there, see how it fares."""
+        """Enter a campaign into the schedule, for its time or as soon as the bench is free.
+
+        Where it is there, see how it fares.
+        """
         entry = self._entry(experiment)
         if entry is not None:
             self._refuse_failed(entry)
             return
         request = CampaignRequest(
-            recipe=experiment.recipe, fit=False, at="now", hide=hidden_in(experiment.bench),
+            recipe=experiment.recipe, fit=False, hide=hidden_in(experiment.bench),
+            at=NOW if experiment.begins_at is None else experiment.begins_at.isoformat(),
             confirmed_by=experiment.confirmed_by, checks=list(BENCH_CHECKS) if experiment.confirmed_by else [],
         )  # fmt: skip
         self._schedule(request)

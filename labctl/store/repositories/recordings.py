@@ -181,12 +181,13 @@ class Recordings:
     def fingerprint(self, recording: int, *, complete: bool = False, head: RecordingRow | None = None) -> str:
         """Return a digest of all that a recording holds now: equal only where every answer about it is.
 
+        The whole rows of data sets count: rates of data sets that were measured are corrected by a timed step clock.
         With `complete` of its complete data sets alone, so that it stays while the next one is measured. `head` is the
         recording's head where it was read already.
         """
         head = head or self.get(recording)
         d, b, e = tables.data_sets.c, tables.sample_blocks.c, tables.environment.c
-        sets = sa.select(d.number, d.state, d.n).where(d.recording_id == recording).order_by(d.number)
+        sets = sa.select(tables.data_sets).where(d.recording_id == recording).order_by(d.number)
         packed = sa.select(b.number, b.seq, b.n, b.crc32).where(b.recording_id == recording)
         if complete:
             is_complete = sa.and_(d.recording_id == recording, d.state == "complete")

@@ -679,7 +679,8 @@ export interface paths {
         };
         /**
          * Benches, and unconfirmed safe states
-         * @description Every bench of this database, with what its last safe state could not confirm.
+         * @description Every bench of this database that was used or that a service drives, with what its last safe state could not
+         *     confirm.
          */
         get: operations["bench_states_api_benches_status_get"];
         put?: never;
@@ -3964,10 +3965,9 @@ export interface components {
             name: string;
             /**
              * Last Used At
-             * Format: date-time
-             * @description Time at which the bench was last used.
+             * @description Time at which a campaign was last begun on the bench; null: none was, but a process has reserved the bench.
              */
-            last_used_at: string;
+            last_used_at: string | null;
             /**
              * Unconfirmed
              * @description What the last safe state could not confirm; kept until a person has inspected and cleared the bench; empty when all is well.

@@ -80,6 +80,14 @@ def test_it_goes_on_until_one_cause_is_left(location: str) -> None:
     assert campaigns(location) == ["diagnosis-1-round-2", "diagnosis-1-round-3", "short"]
 
 
+def test_one_for_later_is_left_to_a_service(location: str) -> None:
+    before = campaigns(location)
+    begun, _ = begin_here(location, UNIT, DiagnosisRequest(at="2099-01-01T22:00Z"), None)
+    answer = diagnosis(location, one_after_two).run(begun.id)
+    assert (answer.state, [each.came for each in answer.rounds]) == ("measuring", [None])
+    assert campaigns(location) == before
+
+
 def test_its_campaigns_are_on_the_same_units_on_other_days(location: str) -> None:
     run(location)
     with open_store(location, write=False) as store:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
+from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import BENCH_CHECKS
 from labctl.answers.criticism import CriticismResponse
 from labctl.api import create_app
 from labctl.client import Client
@@ -17,6 +20,8 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
+from labctl.services.schedule.queue import list_starts
+from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S, Scheduler
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.diagnoses import NOW, UNIT, criticism, experiment
@@ -48,12 +53,17 @@ class Service:
         self.lab = LabService(self.store, self.clock, self.runner)
         self.http = TestClient(create_app(self.lab))
 
+    @property
+    def scheduler(self) -> Scheduler:
+        """The schedule of the bench."""
+        assert isinstance(self.lab.bench_access, LocalBench)
+        assert self.lab.bench_access.scheduler is not None
+        return self.lab.bench_access.scheduler
+
     def tick(self) -> None:
         """Make the moves that can be made now, and run what the schedule begins to its end."""
         self.lab._diagnoses.tick()
-        assert isinstance(self.lab.bench_access, LocalBench)
-        assert self.lab.bench_access.scheduler is not None
-        self.lab.bench_access.scheduler.tick()
+        self.scheduler.tick()
         eventually(lambda: not self.runner.busy)
 
     def post(self, path: str, status: int = 200, **body: object) -> Any:
@@ -80,15 +90,55 @@ def test_a_diagnosis_for_the_night_judges_at_once_and_begins_no_experiment_befor
     for _ in range(3):
         service.tick()
     waits = service.http.get(f"/api/diagnoses/{started['id']}").json()
-    assert (waits["state"], len(waits["rounds"]), waits["rounds"][0]["campaign"]) == ("measuring", 1, None)
+    assert [each["came"] for each in waits["rounds"]] == ["cannot_be_done", None], "the bench does not reach 500 deg C"
+    assert (waits["state"], waits["rounds"][1]["campaign"]) == ("measuring", None)
     assert waits["next"].startswith("have the service of bench single-axis-sim running")
-    assert waits["next"].endswith("of round 1, not before 2026-11-01 21:00 UTC")
+    assert waits["next"].endswith("of round 2, not before 2026-11-01 21:00 UTC")
     assert len(service.http.get("/api/campaigns").json()) == campaigns
+    [listed] = list_starts(service.store, ended=False)
+    assert (listed.recipe, listed.state, listed.bench) == ("diagnosis-1-round-2", "waiting", "single-axis-sim")
+    assert listed.due_at == datetime(2026, 11, 1, 21, tzinfo=UTC)
+    assert [each["id"] for each in service.http.get("/api/schedule").json()] == [listed.id]
     service.clock.sleep(21 * 3600.0 + 1.0)
     for _ in range(4):
         service.tick()
     answer = service.http.get(f"/api/diagnoses/{started['id']}").json()
     assert (answer["state"], answer["outcome"], answer["named"]) == ("done", "one_cause", ["warm_up"])
+
+
+def test_a_diagnosis_that_is_ended_before_its_time_leaves_the_schedule(service: Service) -> None:
+    number = service.post(f"/api/units/{UNIT}/diagnoses", 201, at="2026-11-01T22:00Z")["id"]
+    service.tick()
+    assert [each.state for each in list_starts(service.store, ended=False)] == ["waiting"]
+    service.post(f"/api/diagnoses/{number}/end", reason="not tonight")
+    assert list_starts(service.store, ended=False) == []
+    service.clock.sleep(23 * 3600.0)
+    service.tick()
+    assert service.store.campaigns.newest().id == 1
+
+
+def test_a_confirmation_of_the_evening_does_not_begin_an_experiment_hours_late(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a real bench the confirmation is of the time that was given; the rule is that of every scheduled start."""
+    monkeypatch.setattr(service.scheduler, "_late_limit_s", REAL_BENCH_LATE_LIMIT_S)
+    monkeypatch.setattr(BenchFile, "is_simulated", property(lambda _: False))
+    number = service.post(f"/api/units/{UNIT}/diagnoses", 201, at="2026-11-01T22:00Z")["id"]
+    service.lab._diagnoses.tick()
+    answer = {"round": 1, "by": "Ann", "checks": list(BENCH_CHECKS)}
+    assert service.post(f"/api/diagnoses/{number}/confirm", **answer)["state"] == "measuring"
+    service.lab._diagnoses.tick()
+    refused = service.http.get(f"/api/diagnoses/{number}").json()
+    assert [each["came"] for each in refused["rounds"]] == ["cannot_be_done", None]
+    service.post(f"/api/diagnoses/{number}/confirm", **{**answer, "round": 2})
+    service.lab._diagnoses.tick()
+    assert [each.confirmed_by for each in list_starts(service.store, ended=False)] == ["Ann"]
+    service.clock.sleep(24 * 3600.0)
+    service.scheduler.tick()
+    service.lab._diagnoses.tick()
+    late = service.http.get(f"/api/diagnoses/{number}").json()
+    assert (late["state"], late["rounds"][1]["confirmed_by"]) == ("awaiting_confirmation", "")
+    assert service.store.campaigns.newest().id == 1
 
 
 def test_a_service_carries_a_diagnosis_out(service: Service) -> None:
