@@ -32,12 +32,9 @@ Mask = NDArray[np.bool_]
 def held_out_recordings(data: FitData, term: Term) -> list[Mask]:
     """Return what is left out in turn of several recordings, masks (m,), to check an effect."""
     of = np.asarray(data.channels[RECORDING])
-    driving = _driving(data, term)
-    masks: list[Mask] = []
-    for number in np.unique(of):
-        whole = of == number
-        masks += _in_parts(whole, driving) if any(_is_beyond(values, whole) for values in driving) else [whole]
-    return masks
+    driving, wholes = _driving(data, term), [of == number for number in np.unique(of)]
+    alone = [whole for whole in wholes if any(_is_beyond(values, whole) for values in driving)]
+    return [part for whole in alone for part in _in_parts(whole, driving)] or wholes
 
 
 def _driving(data: FitData, term: Term) -> list[Array]:
