@@ -56,6 +56,14 @@ class Known:
         shrunk = self.g / (1 + self.g)
         return np.asarray(0.5 * self.gain(products) * shrunk - 0.5 * self.directions * np.log1p(self.g))
 
+    def draw(self, products: Array, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return n draws, (n, w), of the coefficients as products (w,) with the data leave them."""
+        if self.drawn is not None:
+            return self.drawn.draw(products, n, rng)
+        shrunk = self.g / (1 + self.g)
+        mean = shrunk * self.factor @ (self.factor.T @ products)
+        return np.asarray(mean + rng.standard_normal((n, self.directions)) @ (np.sqrt(shrunk) * self.factor.T))
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -146,18 +154,21 @@ class AxisForecast:
         shapes, now = self.shapes_of(effect), self._now(effect)
         if shapes:
             chosen = rng.choice(len(shapes), n, p=np.exp(now - logsumexp(now)))
-            shrunk = self.g[0] / (1 + self.g[0])
             for i, shape in enumerate(shapes):
                 rows = np.flatnonzero(chosen == i)
-                factor = shape.now.factor
-                mean = shrunk * factor @ (factor.T @ self._b_now[shape.columns])
-                free = rng.standard_normal((len(rows), shape.now.directions)) @ (np.sqrt(shrunk) * factor.T)
-                coefficients = mean + free
-                if np.any(shape.new) and not np.all(shape.new):  # the next mounting is another draw of the same kind
-                    size = np.sqrt(np.mean(coefficients[:, ~shape.new] ** 2, axis=1, keepdims=True))
-                    coefficients[:, shape.new] = size * rng.standard_normal((len(rows), int(shape.new.sum())))
-                products[rows] += coefficients @ self._response[:, shape.columns].T
+                coefficients = shape.now.draw(self._b_now[shape.columns], len(rows), rng)
+                products[rows] += self._with_new(shape, coefficients, rng) @ self._response[:, shape.columns].T
         return Outcomes(self, products)
+
+    @staticmethod
+    def _with_new(
+        shape: Shape, coefficients: NDArray[np.float64], rng: np.random.Generator
+    ) -> NDArray[np.float64]:  # fmt: skip
+        """Return coefficients (n, w), those of mountings still to come drawn with the size of those that were seen."""
+        if shape.now.drawn is None and np.any(shape.new) and not np.all(shape.new):
+            size = np.sqrt(np.mean(coefficients[:, ~shape.new] ** 2, axis=1, keepdims=True))
+            coefficients[:, shape.new] = size * rng.standard_normal((len(coefficients), int(shape.new.sum())))
+        return coefficients
 
     def reproduced(self, fitted: Fitted, rival: str, outcomes: Outcomes, k: int) -> tuple[float, int]:
         """Return the part of a fitted signal, in chi2, that a rival's best shape reproduces, and how many more

@@ -29,8 +29,8 @@ class DrawnShifts:
     The coefficients of an option are the shifts less the first one, which is a draw too.
     """
 
-    root: NDArray[np.float64]  #: (w, r) from products with the data to those in each direction
-    known: Array  #: (r,) what is known in each direction, 1/(deg/s)^2 for a coefficient in deg/s
+    root: NDArray[np.float64]  #: (w, w) from an amplitude of variance 1 in each direction to the coefficients
+    known: Array  #: (w,) what is known of each amplitude, 1/(deg/s)^2 for a coefficient in deg/s; 0: nothing
     variances: Array  #: (s,) of the draws
 
     @staticmethod
@@ -46,12 +46,28 @@ class DrawnShifts:
         best = float(known.max(initial=0.0))
         seen = known > max(UNSEEN * best, 0.0)
         variances = np.geomspace(1.0, max(g, 1.0), SIZES) / best if np.any(seen) else np.zeros(1)
-        return DrawnShifts((factor @ vectors)[:, seen], known[seen], variances)
+        return DrawnShifts(factor @ vectors, np.where(seen, known, 0.0), variances)
 
     def log_bf(self, products: NDArray[np.float64]) -> Array:
         """Return the log Bayes factor (...) against the base for products (..., w) of the columns with the data."""
-        squares = (products @ self.root) ** 2  # (..., r)
-        spread = 1.0 + self.variances[:, None] * self.known  # (s, r)
-        gain = squares @ (self.variances[:, None] / spread).T  # (..., s)
-        each = 0.5 * gain - 0.5 * np.log(spread).sum(axis=1)
-        return np.asarray(logsumexp(each, axis=-1) - np.log(len(self.variances)))
+        return np.asarray(logsumexp(self._log_bf_by_size(products), axis=-1) - np.log(len(self.variances)))
+
+    def draw(self, products: Array, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return n draws, (n, w), of the coefficients as products (w,) of the columns with the data leave them.
+
+        Their standard deviation is drawn first. Shifts that the data do not show, as those still to come, have it.
+        """
+        log_p = self._log_bf_by_size(products)
+        variance = rng.choice(self.variances, n, p=np.exp(log_p - logsumexp(log_p)))[:, None]
+        left = variance / (1.0 + variance * self.known)
+        amplitudes = left * self._amplitudes(products) + np.sqrt(left) * rng.standard_normal((n, len(self.known)))
+        return np.asarray(amplitudes @ self.root.T)
+
+    def _amplitudes(self, products: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(self.known > 0, products @ self.root, 0.0)
+
+    def _log_bf_by_size(self, products: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the log Bayes factor for each standard deviation, (..., s)."""
+        spread = 1.0 + self.variances[:, None] * self.known  # (s, w)
+        gain = self._amplitudes(products) ** 2 @ (self.variances[:, None] / spread).T  # (..., s)
+        return np.asarray(0.5 * gain - 0.5 * np.log(spread).sum(axis=1))

@@ -66,3 +66,18 @@ def test_it_takes_many_products_at_once() -> None:
     products = rng.normal(size=(7, 2))
     found = DrawnShifts.of(columns.T @ columns, G)
     np.testing.assert_allclose(found.log_bf(products), [float(found.log_bf(each)) for each in products])
+
+
+def test_shifts_still_to_come_are_drawn_as_large_as_those_that_were_seen() -> None:
+    rng = np.random.default_rng(5)
+    true_dps, known = 2e-3, 1e8  # each run is known to 1e-4 deg/s
+    runs, more = 40, 3
+    shifts = true_dps * rng.standard_normal(runs)
+    gram = np.zeros((runs - 1 + more, runs - 1 + more))
+    gram[: runs - 1, : runs - 1] = known * (np.eye(runs - 1) - 1.0 / runs)  # beside a constant
+    products = gram @ np.concatenate([shifts[1:] - shifts[0], np.zeros(more)])
+    draws = DrawnShifts.of(gram, G).draw(products, 4000, rng)
+    seen, new = draws[:, : runs - 1], draws[:, runs - 1 :]
+    np.testing.assert_allclose(seen.mean(axis=0), shifts[1:] - shifts[0], atol=3e-4)
+    between = new[:, 0] - new[:, 1]  # two draws, without the first run's
+    assert np.std(between) == pytest.approx(np.sqrt(2.0) * true_dps, rel=0.3)
