@@ -81,15 +81,15 @@ def shift_contrasts(channels: Channels, axis: str, placed_rad: float = 0.0) -> t
     with the angles of mountings. The bias of a recording is one: what differs between its powered runs, or mountings,
     is what effects of gravity, of the runs and of the mountings compete for, as in a single recording.
     """
-    kinds: dict[tuple[ShiftKind, str], list[Array]] = {}
     of_recording: dict[int, Array] = {}
+    kinds: dict[tuple[ShiftKind, str], list[Array]] = {}
     for shift in shifts_of(channels, axis):
         if shift.kind == "turn_on":
-            of_recording[shift.recording] = of_recording.get(shift.recording, 0.0) + shift.values
+            of_recording[shift.recording] = of_recording.get(shift.recording, np.zeros(len(channels))) + shift.values
         else:
             kinds.setdefault((shift.kind, shift.along), []).append(shift.values)
     if of_recording:
-        kinds["turn_on", ""] = list(of_recording.values())
+        kinds = {("turn_on", ""): list(of_recording.values()), **kinds}
     angles = angle_columns(channels, axis, placed_rad)
     columns, largest = [angles.values], angles.size.tolist()
     for (kind, _), values in kinds.items():
