@@ -1,4 +1,4 @@
-"""A probability in words: one rounding on pages, in commands and sentences. Certificates give a risk to two digits."""
+"""Probabilities and shares in words: one rounding on pages, in commands and sentences. A certificate's risk has two digits."""
 
 from __future__ import annotations
 
@@ -16,3 +16,13 @@ def probability_text(probability: float) -> str:
     if probability < MIN_STATED:
         return "< 1 %"
     return f"{math.floor(100.0 * probability + 0.5)} %" if probability < MAX_STATED else "> 99 %"
+
+
+def share_text(share: float) -> str:
+    """Write a share in whole percent: 0 % is nothing and 100 % is all; a little more or less is "< 1 %" or "> 99 %".
+
+    `percent` in `core/format.js` of the pages does the same; `tests/pages/shares.json` holds both.
+    """
+    if 0.0 < share < 1.0:
+        return probability_text(share)
+    return f"{math.floor(100.0 * share + 0.5)} %"

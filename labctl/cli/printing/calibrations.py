@@ -9,6 +9,7 @@ from labctl.answers.certification import CertificationResponse, ReleaseRequestRe
 from labctl.cli.output import console, format_number, print_heading, print_warnings, table
 from labctl.cli.printing.joint import print_joint
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
+from labctl.probability_text import share_text
 
 if TYPE_CHECKING:
     from labctl.answers.calibrations import FitResponse
@@ -93,7 +94,7 @@ def print_poses(poses: PosesJson) -> None:
     console.print(
         f"{rests['count']} rests in {rests['poses']} poses; {moves['used']} of {moves['count']} turns used; gravity "
         f"after a turn off by {moves['residual_deg']:.2g} deg, held out by {held_out['rms_deg']:.2g} deg, "
-        f"{100 * held_out['within_2u']:.0f} % of it within U = 2 u; as exported, one bias and no g-sensitivity: "
+        f"{share_text(held_out['within_2u'])} of it within U = 2 u; as exported, one bias and no g-sensitivity: "
         f"{moves['applied_rms_dps']:.2g} deg/s RMS",
         soft_wrap=True,
     )

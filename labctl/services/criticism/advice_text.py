@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from labctl.answers.criticism import Advice, Experiment
 from labctl.fitting.criticism import Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
+from labctl.probability_text import share_text
 from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
 
 #: From this share of the variance of several axes on, their slow courses are one.
@@ -26,7 +27,7 @@ def not_logged(criticism: Criticism) -> str:
     sizes = ", ".join(f"{axis} {size:.2g} deg/s" for axis, size in slow["rms_dps"].items())
     together = slow["common"]
     common = (
-        f"; one course explains {100 * together:.0f} % of it on all axes"
+        f"; one course explains {share_text(together)} of it on all axes"
         if together is not None and together >= COMMON
         else ""
     )
@@ -107,7 +108,7 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
     share = first["information_bit"] / first["open_bit"]
     text = (
         "No experiment that this bench can run is expected to name the cause; most is learned from this one, "
-        f"{100 * share:.0f} % of the missing information: {first['do']}."
+        f"{share_text(share)} of the missing information: {first['do']}."
     )
     return [text]
 

@@ -1,7 +1,7 @@
 // Visibility report: which effects a plan could detect and which not, before anything is measured.
 
 import { h } from "../core/elements.js";
-import { sizeText, idText } from "../core/format.js";
+import { percent, sizeText, idText } from "../core/format.js";
 import { notice, table } from "../core/components.js";
 
 /** @import { Visibility } from "../../../types/api.js" */
@@ -34,7 +34,7 @@ export function visibilityReport(rows) {
       seen.map((row) =>
         h(
           "li",
-          { title: `${Math.round(100 * row.share)} % of it is not absorbed by the usual model` },
+          { title: `${percent(row.share)} of it is not absorbed by the usual model` },
           effectLink(row),
           h("span", { class: "nowrap" }, smallestSize(row)),
         ),

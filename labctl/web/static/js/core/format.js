@@ -1,6 +1,7 @@
 // Format numbers, sizes, durations and times, each with its unit.
 
 import { MINUS, roundedToUncertainty, signed } from "./rounding.js";
+import { superscript } from "./typeset.js";
 
 /** @typedef {number | null | undefined} Numeric */
 
@@ -25,12 +26,6 @@ export function number(value, digits = 3) {
   return fixed(rounded, Math.min(decimals, 8));
 }
 
-/** @type {Record<string, string>} */
-const SUPERSCRIPTS = {
-  "-": "⁻",
-  "+": "",
-  ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])),
-};
 /**
  * @param {number} value
  * @param {number} digits
@@ -39,9 +34,6 @@ function power(value, digits) {
   const [factor, exponent] = value.toExponential(digits - 1).split("e");
   return `${signed(factor)} × 10${superscript(exponent)}`;
 }
-/** @param {string | number} text */
-const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? sign).join("");
-
 /**
  * The odds for an effect as people say them; `nats` is the natural logarithm of the Bayes factor.
  * @param {number} nats

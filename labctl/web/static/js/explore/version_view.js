@@ -2,11 +2,12 @@
 
 import { get, getFollowed, post } from "../core/http/api.js";
 import { isAbort } from "../core/http/errors.js";
+import { whenItMayPass } from "../core/http/recovery.js";
 import { setChildren, h } from "../core/elements.js";
 import { actButton, busyIndicator, errorPage, notice } from "../core/components.js";
 import { option, toggleGroup } from "../core/fields.js";
 import { idText } from "../core/format.js";
-import { navigate } from "../core/router.js";
+import { navigate, show } from "../core/router.js";
 import { planAddress } from "../core/routes.js";
 import { jointCard } from "../joint/card.js";
 import { asked as askedFor } from "./chosen_recordings.js";
@@ -77,14 +78,14 @@ export function versionView(given) {
       if (query.tour) import("../tour/tour.js").then(({ showTour }) => showTour(place, signal));
       else if (location.hash) document.getElementById(location.hash.slice(1))?.scrollIntoView();
     })
-    .catch(
-      (error) =>
-        !isAbort(error) &&
-        setChildren(
-          place,
-          errorPage(error, () => navigate(location.pathname + location.search)),
-        ),
-    );
+    .catch((error) => {
+      if (isAbort(error)) return;
+      setChildren(
+        place,
+        errorPage(error, () => show()),
+      );
+      whenItMayPass(error, signal, () => show({ quiet: true }));
+    });
   return place;
 }
 

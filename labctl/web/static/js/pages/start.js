@@ -2,6 +2,7 @@
 
 import { get, getPart, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
+import { percent } from "../core/format.js";
 import { actButton, card, pageHeader } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
@@ -157,7 +158,7 @@ function overview(units, found) {
               {},
               presentWords(
                 running
-                  ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.`
+                  ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${percent(running.progress)} done.`
                   : benches[0].unconfirmed
                     ? `${benches[0].name} was not confirmed safe; inspect the bench.`
                     : `${benches[0].name} is free.`,

@@ -1,7 +1,7 @@
 // What has happened since the evening before, and what waits for a person: one row for each, the most urgent first. Units
 // that are due have a list of their own.
 
-import { number } from "../core/format.js";
+import { number, percent } from "../core/format.js";
 import { stateText } from "../campaigns/states.js";
 
 /** @import { Bench, Campaign, Scheduled } from "../../../types/api.js" */
@@ -119,7 +119,7 @@ function campaignNews(campaign) {
   if (campaign.active) {
     const late = campaign.state === "running" ? "" : `, ${state}`;
     return [
-      { ...base, kind: late ? "warn" : "accent", text: `${name}: ${percentOf(campaign)} done${late}.`, href: "/bench" },
+      { ...base, kind: late ? "warn" : "accent", text: `${name}: ${percent(campaign.progress)} done${late}.`, href: "/bench" },
     ];
   }
   if (campaign.state === "done") {
@@ -128,9 +128,6 @@ function campaignNews(campaign) {
   }
   return [{ ...base, kind: "bad", text: `${name}: ${state}${campaign.reason ? `: ${campaign.reason}` : "."}` }];
 }
-
-/** @param {Campaign} campaign */
-const percentOf = ({ progress }) => `${Math.round(100 * progress)} %`;
 
 /**
  * The calibrations that a campaign ended in, and what a person decides of each.
