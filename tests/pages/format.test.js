@@ -74,6 +74,21 @@ test("a size without a unit is a share", () => {
   ]);
 });
 
+/** @type {[unit: string, values: (number | null)[], name: string, factor: number, shown: string][]} */
+const units = JSON.parse(readFileSync("tests/pages/shown_units.json", "utf8"));
+
+test("all quantities of a kind are shown in one unit", () => {
+  for (const [unit, values, name, factor, shown] of units)
+    assert.deepEqual(format.shownUnit(unit, values, name), [factor, shown]);
+  const rows = [
+    { name: "scale_factor", value: 0.02, unit: "1" },
+    { name: "scale_factor", value: 0.0003, unit: "1" },
+    { name: "misalignment_y", value: 0.02, unit: "1" },
+  ];
+  const texts = rows.map((row) => format.withUncertainty(row.value, 2e-5, "1", format.shownOf(rows, row)));
+  assert.deepEqual(texts, ["2.0000 ± 0.0020 %", "0.0300 ± 0.0020 %", "20.000 ± 0.020 mrad"]);
+});
+
 test("a result and its uncertainty end at the same place", () => {
   holds(format.withUncertainty, [
     [[0.0002013, 0.0000031, "1"], "201.3 ± 3.1 ppm"],

@@ -8,6 +8,7 @@ from labctl.answers.criticism import Advice, Experiment
 from labctl.fitting.criticism import Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
 from labctl.probability_text import share_text
+from labctl.shown_unit import shown_unit
 from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
 
 #: From this share of the variance of several axes on, their slow courses are one.
@@ -84,8 +85,9 @@ def _doubt(name: str, suspect: Suspect | None, criticism: Criticism, technology:
         return f"{name} would have a size that is not physical for {technology}"
     values = next(iter(next(iter(suspect.coefficients.values())).values()))
     usual = CATALOGUE[name].ranges.get(technology) if name in CATALOGUE else None
-    size = f"its size would be {values['value']:.2g} {values['unit']}"
-    limit = f", where {usual[0]:g} to {usual[1]:g} is usual for {technology}" if usual else ""
+    factor, unit = shown_unit(values["unit"], [values["value"]], name)
+    size = f"its size would be {factor * values['value']:.2g} {unit}"
+    limit = f", where {factor * usual[0]:g} to {factor * usual[1]:g} is usual for {technology}" if usual else ""
     before = criticism.base.error.rms_dps if criticism.base is not None else None
     after = suspect.after.error.rms_dps if suspect.after is not None else None
     change = ""
