@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from labctl.answers.criticism import Advice, Experiment
 from labctl.fitting.criticism import Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
-from labctl.probability_text import share_text
+from labctl.probability_text import probability_text
 from labctl.shown_unit import shown_unit
 from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
 
@@ -28,7 +28,7 @@ def not_logged(criticism: Criticism) -> str:
     sizes = ", ".join(f"{axis} {size:.2g} deg/s" for axis, size in slow["rms_dps"].items())
     together = slow["common"]
     common = (
-        f"; one course explains {share_text(together)} of it on all axes"
+        f"; one course explains {probability_text(together)} of it on all axes"
         if together is not None and together >= COMMON
         else ""
     )
@@ -110,7 +110,7 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
     share = first["information_bit"] / first["open_bit"]
     text = (
         "No experiment that this bench can run is expected to name the cause; most is learned from this one, "
-        f"{share_text(share)} of the missing information: {first['do']}."
+        f"{probability_text(share)} of the missing information: {first['do']}."
     )
     return [text]
 

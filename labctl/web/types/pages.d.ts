@@ -59,6 +59,7 @@ export interface Column<Row> {
   title: string | Node;
   number?: boolean;
   prose?: boolean;
+  acts?: boolean;
   cell: (row: Row) => Child;
 }
 

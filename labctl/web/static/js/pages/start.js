@@ -167,7 +167,7 @@ function overview(units, found) {
           : h("p", {}, "This service drives no bench."),
         h(
           "div",
-          { class: "row" },
+          { class: "buttons" },
           h("a", { class: "button primary", href: "/bench" }, "To the bench"),
           h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"),
           h("a", { class: "button act", href: "/live" }, "Calibrate live"),
@@ -197,7 +197,7 @@ function overview(units, found) {
         "Data",
         h(
           "div",
-          { class: "row" },
+          { class: "buttons" },
           h("a", { class: "button act", href: "/recordings" }, "Import a recording"),
           h("a", { class: "button", href: "/recordings" }, "All recordings"),
           actButton("Simulate a hidden effect", openSimulated),
