@@ -1,4 +1,4 @@
-"""Probabilities and shares in words: one rounding on pages, in commands and sentences. A certificate's risk has two digits."""
+"""Probabilities and shares: one rounding on pages, in commands and sentences. A certificate's risk has 2 digits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The units in which quantities are shown: one rule for pages, commands and the pages of certificates. Stored are SI units."""
+"""The units in which quantities are shown: one rule for the web pages, the commands and the printed certificates."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def shown_unit(unit: str, values: Iterable[float | None], name: str = "") -> Sho
     """Return the unit in which all quantities of one kind are shown, so that a column of them compares.
 
     Plain numbers (`unit` "1") are angles in mrad for a misalignment; other shares are in %, or in ppm where none of
-    `values` reaches 1 %. `shownUnit` in `core/format.js` of the pages does the same; `tests/pages/shown_units.json` holds
-    both.
+    `values` reaches 1 %. `shownUnit` in `core/format.js` of the pages does the same; `tests/pages/shown_units.json`
+    holds both.
     """
     if unit != "1":
         return ShownUnit(1.0, unit)

@@ -301,9 +301,7 @@ def list_(search: Search = "", limit: Limit = None, as_json: Json = False, datab
     rows = table("", "id", "recipe", "bench", "state", "started", "progress", numbers=1)
     for answer in answers:
         started = f"{answer.started_at:%Y-%m-%d %H:%M}" if answer.started_at else "–"
-        rows.add_row(
-            str(answer.id), answer.recipe, answer.bench, answer.state, started, share_text(answer.progress)
-        )
+        rows.add_row(str(answer.id), answer.recipe, answer.bench, answer.state, started, share_text(answer.progress))
     console.print(rows)
     print_part(len(answers), page.total, "campaigns")
 

@@ -207,8 +207,8 @@ def _print_mountings(angles: MisalignmentOutlook) -> None:
     console.print(f"  misalignment: U {at_best} at best, by fixture and table", soft_wrap=True)
     for more in angles.further:
         console.print(
-            f"    {factor * more.expanded:.2g} {unit} with {more.turned}: mountings: {more.mountings} more, time: {hours(more.more_s)} "
-            "more; the recipe then has",
+            f"    {factor * more.expanded:.2g} {unit} with {more.turned}: mountings: {more.mountings} more, time: "
+            f"{hours(more.more_s)} more; the recipe then has",
             soft_wrap=True,
         )  # fmt: skip
         for line in more.recipe_toml.splitlines():

@@ -8,8 +8,8 @@ from labctl.answers.criticism import Advice, Experiment
 from labctl.fitting.criticism import Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
 from labctl.probability_text import probability_text
-from labctl.shown_unit import shown_unit
 from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
+from labctl.shown_unit import shown_unit
 
 #: From this share of the variance of several axes on, their slow courses are one.
 COMMON = 0.8

@@ -135,6 +135,8 @@ export interface Figure extends HTMLElement {
   redraw: () => unknown;
   /** Draw now, so wide in px; null: as wide as the page lets it be. */
   drawAt: (width: number | null) => void;
+  /** Put a picture of a figure in three dimensions beside it, for paper; null: it is flat, and prints as it is. */
+  solidPicture: (width: number) => Promise<HTMLElement | null>;
   ondrawn?: (plot: Plot) => void;
 }
 

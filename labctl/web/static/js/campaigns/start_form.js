@@ -200,5 +200,6 @@ export function startForm(bench, order) {
       place,
     ),
   );
+  element.classList.add("screen-only");
   return Object.assign(element, { id: "begin", look });
 }
