@@ -139,8 +139,8 @@ def test_the_lines_of_the_budget_and_the_pictures_are_those_of_the_service(
     for k, value in enumerate(others):
         assert value == pytest.approx(math.hypot(*(values[k] for values in left_out if values[k] is not None)))
     assert figure.locator(".legendtext").count() == len(drawn)
-    assert figure.locator(".xtitle").inner_text() == "rate, deg/s"
-    assert figure.locator(".ytitle").inner_text() == "standard uncertainty, deg/s"
+    assert figure.locator(".xtitle").text_content() == "rate, deg/s"
+    assert figure.locator(".ytitle").text_content() == "standard uncertainty, deg/s"
     with page.expect_download() as download:
         card.get_by_role("button", name="Save Contributions, axis z, over rate as CSV").click()
     _, heading, *rows = download.value.path().read_text().splitlines()
