@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from labctl.recording import Recording
-from tests.helpers.browser import Service, figure, settled
+from tests.helpers.browser import MINUS, Service, figure, settled
 from tests.helpers.simulated_recordings import single_axis
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def test_a_click_on_a_point_shows_its_readings_and_the_same_computed_from_them(
     text = card.inner_text()
     assert f"Recomputed from {len(readings)} raw readings: equal." in text
     assert hashlib.sha256(readings.astype("<f8").tobytes()).hexdigest() in text
-    formula = card.locator(".formula").inner_text()
+    formula = card.locator(".formula").inner_text().replace(MINUS, "-")
     output, rate, model, residual = map(
         float, re.findall(r"(?<![\w.])-?\d[\d.e+-]*(?= |$)", formula.partition("error = ")[2])
     )
