@@ -96,7 +96,7 @@ export function versionView(given) {
  * @param {Version} calibration
  */
 function comparingText({ axes }) {
-  const axis = Object.keys(axes).length > 1 ? "minutes for several axes" : "up to a minute for one axis";
+  const axis = Object.keys(axes).length > 1 ? "minutes for several axes" : "about a minute for one axis";
   return `labctl is comparing the model with every reading. A first comparison takes ${axis}; one that was made before is shown at once.`;
 }
 
