@@ -1,4 +1,4 @@
-"""A probability in words: one rounding on pages, in commands and sentences, and one of the risks on certificates."""
+"""Probabilities and shares: one rounding on pages, in commands and sentences, and one of risks on certificates."""
 
 from __future__ import annotations
 
@@ -28,3 +28,13 @@ def risk_text(risk: float) -> str:
     if risk < MIN_RISK:
         return f"below {100.0 * MIN_RISK:g} %"
     return f"{100.0 * risk:.2g} %" if risk < MAX_RISK else f"above {100.0 * MAX_RISK:g} %"
+
+
+def share_text(share: float) -> str:
+    """Write a share in whole percent: 0 % is nothing and 100 % is all; a little more or less is "< 1 %" or "> 99 %".
+
+    `percent` in `core/format.js` of the pages does the same; `tests/pages/shares.json` holds both.
+    """
+    if 0.0 < share < 1.0:
+        return probability_text(share)
+    return f"{math.floor(100.0 * share + 0.5)} %"

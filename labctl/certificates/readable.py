@@ -21,6 +21,7 @@ from labctl.certificates.document import (
 )
 from labctl.certificates.units import readable
 from labctl.probability_text import risk_text
+from labctl.shown_unit import shown_unit
 
 #: Digits of an uncertainty (GUM 7.2.6), and of a number without one.
 U_DIGITS, DIGITS = 2, 4
@@ -80,7 +81,7 @@ def _pages(record: Certificate) -> dict[str, object]:
             _state("As left, after adjustment", record.as_left),
         ],
         "adjustment": record.adjustment,
-        "coefficients": [_coefficient(coefficient) for coefficient in record.coefficients],
+        "coefficients": [_coefficient(coefficient, record.coefficients) for coefficient in record.coefficients],
         "sensors": [_sensor(sensor) for sensor in record.sensors],
         "conformity": _conformity(record),
         "external": record.external,
@@ -257,11 +258,13 @@ def _any_axis_text(certificate: Certificate) -> str:
     )
 
 
-def _coefficient(coefficient: CoefficientResult) -> list[str]:
-    value, u = rounded(coefficient.value, coefficient.u or 0.0)
+def _coefficient(coefficient: CoefficientResult, others: Sequence[CoefficientResult]) -> list[str]:
+    alike = [each.value for each in others if each.name == coefficient.name]
+    factor, unit = shown_unit(coefficient.unit, alike, coefficient.name)
+    value, u = rounded(factor * coefficient.value, factor * (coefficient.u or 0.0))
     temperature_text = "" if coefficient.temperature_c is None else _number(coefficient.temperature_c)
     of_fit = "" if coefficient.has_standards or u == "–" else FIT_ALONE
-    return [coefficient.axis, coefficient.name_text, temperature_text, value, u + of_fit, readable(coefficient.unit)]
+    return [coefficient.axis, coefficient.name_text, temperature_text, value, u + of_fit, readable(unit)]
 
 
 def _sensor(result: SensorResult) -> Mapping[str, object]:

@@ -17,6 +17,7 @@ from labctl.fitting.magnetometer.calibrate import AXES, MAX_LEFT_OUT, Magnetomet
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.poses.at_rest.rests import find_rests, rest_of_each
 from labctl.fitting.poses.readings import PoseReadings, readings_of
+from labctl.probability_text import share_text
 from labctl.recording.data_files import read_table
 from labctl.recording.files import read_recording
 from labctl.services.pose_triads import Earlier, require_one, solved_of
@@ -197,7 +198,7 @@ def _text(result: Magnetometer, *, has_field: bool) -> Iterator[str]:
         return
     if result.left_out_share > MAX_LEFT_OUT:
         yield (
-            f"{100 * result.left_out_share:.0f} % of the readings are on no ellipsoid with the others: the field was "
+            f"{share_text(result.left_out_share)} of the readings are on no ellipsoid with the others: the field was "
             "disturbed while the unit turned"
         )
     else:

@@ -33,7 +33,6 @@ def together(effect: str, seed: int, *blocks: str) -> Criticism:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("effect", "blocks"),
     [
@@ -48,6 +47,5 @@ def test_an_effect_between_mountings_is_named_alone_after_its_experiments(effect
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_a_unit_without_shifts_stays_adequate() -> None:
     assert together("", 140_005, "upside_down x4", "power_cycles x4").verdict.form == "adequate"

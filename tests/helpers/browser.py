@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import re
 import socket
 import ssl
 import threading
@@ -211,6 +212,19 @@ def settled(page: Page) -> None:
     """Wait until the page has what it asked for."""
     page.wait_for_selector("main h1")
     page.wait_for_function("() => !document.querySelector('main[aria-busy], .busy')", polling=POLL_MS)
+
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def on_page(text: str) -> str:
+    """Return a text of the service as a page writes it: with the minus sign, and powers of ten."""
+
+    def power(found: re.Match[str]) -> str:
+        return f"{found[1]} × 10{str(int(found[2])).translate(SUPERSCRIPTS)}"
+
+    text = re.sub(r"(?<![\w.-])(-?\d+(?:\.\d+)?)e([+-]?\d+)(?![\w.]*\w)", power, text)
+    return re.sub(r"(?<![\w-])-(?=\d)", MINUS, text)
 
 
 def number_of(text: str) -> float:

@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from labctl.probability_text import probability_text, risk_text
+from labctl.probability_text import probability_text, risk_text, share_text
 
 #: The pages' `probabilityText` is tested with the same cases.
 CASES = json.loads(Path("tests/pages/probabilities.json").read_text(encoding="utf-8"))
+#: The pages' `percent` is tested with the same cases.
+SHARES = json.loads(Path("tests/pages/shares.json").read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize(("probability", "text"), CASES)
@@ -44,3 +46,14 @@ def test_no_probability_is_written_as_impossible_or_certain(probability: float) 
 )
 def test_a_risk_is_written_to_two_digits(risk: float, text: str) -> None:
     assert risk_text(risk) == text
+
+
+@pytest.mark.parametrize(("share", "text"), SHARES)
+def test_a_share_is_written_as_on_the_pages(share: float, text: str) -> None:
+    assert share_text(share) == text
+
+
+@given(st.floats(0.0, 1.0))
+def test_only_nothing_is_0_percent_and_only_all_is_100(share: float) -> None:
+    assert (share_text(share) == "0 %") == (share == 0.0)
+    assert (share_text(share) == "100 %") == (share == 1.0)

@@ -49,6 +49,20 @@ test("the evening before begins at 18:00 of the day before", () => {
   assert.equal(beginOf("week", NOW), new Date(2026, 10, 19, 8, 30).getTime());
 });
 
+test("campaigns are listed by their start, the newest first, whatever the clocks of their benches say", () => {
+  const ends = ["16:42", "15:38", "18:31"];
+  const done = ends.map((end, k) =>
+    campaign({
+      id: k + 1,
+      simulated_time: true,
+      ended_at: `2026-01-05T${end}:00.000Z`,
+      started_at: "2026-01-05T08:00:00Z",
+    }),
+  );
+  const about = news([...done].reverse()).map((row) => row.about);
+  assert.deepEqual(about, ["Campaign 3", "Campaign 2", "Campaign 1"]);
+});
+
 test("a campaign that ended before is not new; one that still runs or waits is", () => {
   const old = campaign({ id: 2, ended_at: LAST_WEEK });
   const runs = campaign({ id: 3, state: "running", active: true, ended: false, ended_at: null, progress: 0.4 });

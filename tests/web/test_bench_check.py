@@ -10,7 +10,7 @@ import pytest
 import tomli_w
 
 from instruments.bench_config import read_bench
-from tests.helpers.browser import NARROW, Service
+from tests.helpers.browser import NARROW, Service, on_page
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -60,8 +60,8 @@ def test_what_is_drawn_is_what_the_check_answered(service: Service, visit: Calla
             "state": each["state"],
             "port": each["address"],
             "findings": [
-                *(finding["text"] for finding in each["findings"] if finding["state"] != "good"),
-                *(finding["text"] for finding in each["findings"] if finding["state"] == "good"),
+                *(on_page(finding["text"]) for finding in each["findings"] if finding["state"] != "good"),
+                *(on_page(finding["text"]) for finding in each["findings"] if finding["state"] == "good"),
             ],
         }
         for each in answer["devices"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.helpers.browser import NARROW, Service, settled
+from tests.helpers.browser import NARROW, Service, on_page, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
@@ -54,7 +54,7 @@ def check_equation(place: Locator, effect: dict[str, Any]) -> None:
     for base, index in place.locator(".equation msub").evaluate_all(SCRIPTS):
         assert index > base + 2, "a subscript stands on the line, as a factor would"
     for k, symbol in enumerate(effect["equation"]["symbols"], 1):
-        assert symbol["meaning"] in rows.nth(k).inner_text()
+        assert on_page(symbol["meaning"]) in rows.nth(k).inner_text()
     for source in effect["sources"]:
         assert f"{source['work']}: {source['place']}" in place.inner_text()
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from labctl.recording import Recording
-from tests.helpers.browser import Service, figure, settled
+from tests.helpers.browser import MINUS, Service, figure, settled
 from tests.helpers.simulated_recordings import single_axis
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def test_a_click_on_a_point_shows_its_readings_and_the_same_computed_from_them(
     text = card.inner_text()
     assert f"Recomputed from {len(readings)} raw readings: equal." in text
     assert hashlib.sha256(readings.astype("<f8").tobytes()).hexdigest() in text
-    formula = card.locator(".formula").inner_text()
+    formula = card.locator(".formula").inner_text().replace(MINUS, "-")
     output, rate, model, residual = map(
         float, re.findall(r"(?<![\w.])-?\d[\d.e+-]*(?= |$)", formula.partition("error = ")[2])
     )
@@ -99,7 +99,7 @@ def test_a_link_opens_exactly_that_point_and_a_cell_gives_it(
     page, failing = opened(visit, f"unit={serial}&axis=z&pick=9")
     card = page.get_by_role("region", name="Point: data set 9")
     link = copied(page, card, "Copy link")
-    formula = card.locator(".formula").inner_text()
+    formula = card.locator(".formula").inner_text().replace(MINUS, "-")
     point = ran(copied(page, card, "Copy notebook cell"))["point"]
     assert point.formula == formula
     assert point.equal

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pytest
+
 from tests.helpers.browser import Service, settled
+from tests.helpers.printed_page import sheets_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -50,26 +55,75 @@ def test_every_figure_is_printed_whole_and_in_light_colours(service: Service, vi
     assert page.evaluate("() => document.documentElement.dataset.theme") == "dark"
 
 
-#: The headings that are shown, and the headers of cards with them, of which nothing keeps what follows on their page.
-LONE_HEADINGS = """() => [...document.querySelectorAll("main :is(h1, h2, h3)")]
-  .filter((each) => each.getClientRects().length)
-  .map((each) => each.closest(".card-header, .page-header") ?? each)
-  .filter((each) => {
-    const flow = ["block", "list-item"].includes(getComputedStyle(each.parentElement).display);
-    return getComputedStyle(each).breakAfter !== "avoid" || !flow;  // in flex and grid a break is not avoided
-  })
-  .map((each) => each.textContent)"""
-
-
-def test_no_heading_is_left_alone_at_the_end_of_a_page(service: Service, visit: Callable[..., Page]) -> None:
+@pytest.fixture
+def fitted(service: Service) -> Service:
     made = service.post("/api/recordings/simulated", {"serial": "FOG-0001", "recipe": "short"})
     fit = {"recording": made["recording"], "effects": ["bias", "scale_factor"]}
     service.post("/api/units/FOG-0001/calibrations", fit)
-    for address in ("/units/FOG-0001", "/explore?unit=FOG-0001", "/recordings/1", "/campaigns/new"):
-        page = visit(address, alone=True)
-        settled(page)
-        page.emulate_media(media="print")
-        headings = page.locator("main").locator("h1, h2, h3").count()
-        assert headings >= 3, address
-        assert page.evaluate(LONE_HEADINGS) == [], address
-        assert not any(each.is_visible() for each in page.locator(".version-actions summary").all()), address
+    return service
+
+
+HEADINGS = """() => [...document.querySelectorAll("main :is(h1, h2, h3)")].map((each) => each.textContent.trim())"""
+
+
+@pytest.mark.parametrize("address", ["/units/FOG-0001", "/explore?unit=FOG-0001", "/recordings/1", "/campaigns/new"])
+@pytest.mark.usefixtures("fitted")
+def test_no_heading_is_left_alone_at_the_end_of_a_sheet(
+    visit: Callable[..., Page], tmp_path: Path, address: str
+) -> None:
+    page = visit(address, alone=True)
+    settled(page)
+    headings = set(page.evaluate(HEADINGS))
+    assert len(headings) >= 3
+    sheets = sheets_of(page, tmp_path)
+    printed = {line for lines in sheets for line in lines}
+    assert len(headings & printed) >= 2, "the headings are on paper"
+    assert [lines[-1] for lines in sheets if lines and lines[-1] in headings] == []
+
+
+@pytest.mark.usefixtures("fitted")
+def test_tables_are_printed_as_tables_and_without_their_buttons(visit: Callable[..., Page], tmp_path: Path) -> None:
+    page = visit("/units/FOG-0001", alone=True)
+    settled(page)
+    lines = [line for sheet in sheets_of(page, tmp_path) for line in sheet]
+    assert any(re.search(r"Version +Model +Made +RMS", line) for line in lines), lines
+    row = next(k for k, line in enumerate(lines) if re.search(r"Version +Model +Made +RMS", line)) + 1
+    assert re.search(r"^1 .* 0\.\d+ +0\.\d+$", lines[row]), lines  # its errors stand on the line of the version
+    text = "\n".join(lines)
+    for button in ("Certify: put in force", "Action", "Download JSON", "File format"):
+        assert button not in text
+
+
+PRINTED = """() => {
+  window.print = async () => {
+    const pictures = [...document.querySelectorAll(".print-picture")];
+    const canvas = document.createElement("canvas");
+    const context = canvas.getContext("2d");
+    window.printed = await Promise.all(pictures.map(async (picture) => {
+      await picture.decode();
+      [canvas.width, canvas.height] = [picture.naturalWidth, picture.naturalHeight];
+      context.drawImage(picture, 0, 0);
+      const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+      const colours = new Set();
+      for (let k = 0; k < data.length; k += 4) if (data[k + 3]) colours.add(data.slice(k, k + 3).join());
+      return colours.size;
+    }));
+  };
+}"""
+#: Colours of a surface that is drawn, of which an empty scene has only those of its axes.
+MIN_COLOURS = 50
+
+
+@pytest.mark.usefixtures("fitted")
+def test_ctrl_p_prints_a_figure_in_three_dimensions_that_was_never_scrolled_to(visit: Callable[..., Page]) -> None:
+    page = visit("/explore?unit=FOG-0001&view=surface", alone=True, size={"width": 1280, "height": 300})
+    settled(page)
+    surface = page.locator('.plot[aria-label^="Measured and modelled error"], .plot[aria-label*="urface"]').first
+    surface.wait_for(state="attached")
+    page.evaluate(PRINTED)
+    page.keyboard.press("Control+p")
+    page.wait_for_function("() => window.printed")
+    colours = page.evaluate("window.printed")
+    assert len(colours) == 1
+    assert colours[0] > MIN_COLOURS
+    page.wait_for_function("() => !document.querySelector('.print-picture')")

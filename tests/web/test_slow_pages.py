@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from tests.helpers.browser import Service, settled
+import pytest
+
+from tests.helpers.browser import Faults, Service, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page, Route
@@ -41,3 +43,43 @@ def test_a_page_that_arrives_late_takes_the_place_of_its_frame(service: Service,
     route.continue_()
     expect(page.get_by_role("link", name="FOG-0001")).to_be_visible()
     expect(page.locator("main")).not_to_contain_text("Waiting for the service")
+
+
+BUSY = {"type": "about:blank", "title": "Busy", "status": 503, "detail": "too many requests at once; ask again"}
+
+
+@pytest.mark.parametrize("address", ["/units", "/explore?unit=FOG-0001"])
+def test_a_page_that_was_refused_for_a_while_comes_by_itself(
+    service: Service, visit: Callable[..., Page], faults: Faults, address: str
+) -> None:
+    from playwright.sync_api import expect
+
+    made = service.post("/api/recordings/simulated", {"serial": "FOG-0001", "recipe": "short"})
+    fit = {"recording": made["recording"], "effects": ["bias", "scale_factor"]}
+    service.post("/api/units/FOG-0001/calibrations", fit)
+    page = visit("/effects")
+    settled(page)
+    refused = 2
+
+    def answer(route: Route) -> None:
+        nonlocal refused
+        refused -= 1
+        if refused >= 0:
+            route.fulfill(status=503, headers={"Retry-After": "1"}, json=BUSY)
+        else:
+            route.continue_()
+
+    asked = "**/criticism/events*" if "explore" in address else "**/api/units?*"
+    page.route(asked, answer)
+    page.evaluate("address => { const link = document.createElement('a'); link.href = address; "
+                  "document.body.append(link); link.click(); }", address)  # fmt: skip
+    expect(page.locator("main")).to_contain_text(BUSY["detail"])
+    expect(page.get_by_role("button", name="Try again")).to_be_visible()
+    there = (
+        page.get_by_role("region", name="Verdict")
+        if "explore" in address
+        else page.get_by_role("link", name="FOG-0001")
+    )
+    expect(there).to_be_visible()
+    assert refused < 0
+    faults.clear()  # the browser itself logs each refusal

@@ -25,6 +25,7 @@ from labctl.cli.options import (
 )
 from labctl.cli.output import console, print_json, print_part, table
 from labctl.cli.printing.campaigns import print_campaign, print_plan, print_started
+from labctl.probability_text import share_text
 
 if TYPE_CHECKING:
     pass
@@ -300,9 +301,7 @@ def list_(search: Search = "", limit: Limit = None, as_json: Json = False, datab
     rows = table("", "id", "recipe", "bench", "state", "started", "progress", numbers=1)
     for answer in answers:
         started = f"{answer.started_at:%Y-%m-%d %H:%M}" if answer.started_at else "–"
-        rows.add_row(
-            str(answer.id), answer.recipe, answer.bench, answer.state, started, f"{100 * answer.progress:.0f} %"
-        )
+        rows.add_row(str(answer.id), answer.recipe, answer.bench, answer.state, started, share_text(answer.progress))
     console.print(rows)
     print_part(len(answers), page.total, "campaigns")
 

@@ -9,6 +9,8 @@ from labctl.answers.certification import CertificationResponse, ReleaseRequestRe
 from labctl.cli.output import console, format_number, print_heading, print_warnings, table
 from labctl.cli.printing.joint import print_joint
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
+from labctl.probability_text import share_text
+from labctl.shown_unit import ShownUnit, shown_unit
 
 if TYPE_CHECKING:
     from labctl.answers.calibrations import FitResponse
@@ -41,12 +43,13 @@ def print_fit(answer: FitResponse) -> None:
         coefficients = content["coefficients"]
         if isinstance(nodes := coefficients.get("temperature_c"), list):
             print_heading(f"\naxis {axis}", f": a table over {len(nodes)} temperatures")
-            print_table(coefficients)
+            print_table(coefficients, answer)
             continue
         rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
         for name, entry in coefficients.items():
-            (value, *_), (u, *_), unit_symbol = _at_nodes(entry)
-            shown = rounded_to_uncertainty(value, u)
+            (value, *_), (u, *_), _ = _at_nodes(entry)
+            factor, unit_symbol = _unit_of(name, answer)
+            shown = rounded_to_uncertainty(factor * value, None if u is None else factor * u)
             rows.add_row(name, unit_symbol, shown.value + shown.power, shown.u + shown.power if shown.u else "-")
         console.print(rows)
     for effect, quantities in answer.shapes.items():
@@ -93,7 +96,7 @@ def print_poses(poses: PosesJson) -> None:
     console.print(
         f"{rests['count']} rests in {rests['poses']} poses; {moves['used']} of {moves['count']} turns used; gravity "
         f"after a turn off by {moves['residual_deg']:.2g} deg, held out by {held_out['rms_deg']:.2g} deg, "
-        f"{100 * held_out['within_2u']:.0f} % of it within U = 2 u; as exported, one bias and no g-sensitivity: "
+        f"{share_text(held_out['within_2u'])} of it within U = 2 u; as exported, one bias and no g-sensitivity: "
         f"{moves['applied_rms_dps']:.2g} deg/s RMS",
         soft_wrap=True,
     )
@@ -167,19 +170,28 @@ def _print_objections(answer: CertificationResponse) -> None:
         console.print(f"  overridden: {each['text']}", style="bold red", soft_wrap=True)
 
 
-def print_table(coefficients: Coefficients) -> None:
+def print_table(coefficients: Coefficients, answer: FitResponse) -> None:
     """Print a coefficient table over temperature, one row per temperature, rounded to their uncertainties."""
     nodes, _, _ = _at_nodes(coefficients["temperature_c"])
     names = [name for name in coefficients if name != "temperature_c"]
-    rows = table("", "deg C", *names, numbers=len(names) + 1)
+    units = {name: _unit_of(name, answer) for name in names}
+    titles = [f"{name}, {units[name].unit}" for name in names]
+    rows = table("", "deg C", *titles, numbers=len(names) + 1)
     for index, node in enumerate(nodes):
-        rows.add_row(f"{node:.2f}", *(_cell(coefficients[name], index) for name in names))
+        rows.add_row(f"{node:.2f}", *(_cell(coefficients[name], index, units[name].factor) for name in names))
     console.print(rows)
 
 
-def _cell(entry: Entry, index: int) -> str:
+def _unit_of(name: str, answer: FitResponse) -> ShownUnit:
+    """Return the unit in which a coefficient is printed on all axes."""
+    entries = [_at_nodes(axis["coefficients"][name]) for axis in answer.axes.values() if name in axis["coefficients"]]
+    return shown_unit(entries[0][2], [value for values, _, _ in entries for value in values], name)
+
+
+def _cell(entry: Entry, index: int, factor: float) -> str:
     values, us, _ = _at_nodes(entry)
-    shown = rounded_to_uncertainty(values[index], us[index])
+    u = us[index]
+    shown = rounded_to_uncertainty(factor * values[index], None if u is None else factor * u)
     return shown.value + shown.power
 
 

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from labctl.cli.output import console, format_number, print_heading, print_json, table
 from labctl.cli.turn_text import turn_text
+from labctl.shown_unit import shown_unit
 from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 
 if TYPE_CHECKING:
@@ -201,11 +202,13 @@ def print_start(answer: ScheduledResponse) -> None:
 
 def _print_mountings(angles: MisalignmentOutlook) -> None:
     """Print how well a misalignment can be known, and what further mountings are worth."""
-    console.print(f"  misalignment: U {angles.expanded:.2g} rad at best, by fixture and table", soft_wrap=True)
+    factor, unit = shown_unit("1", [angles.expanded], "misalignment")
+    at_best = f"{factor * angles.expanded:.2g} {unit}"
+    console.print(f"  misalignment: U {at_best} at best, by fixture and table", soft_wrap=True)
     for more in angles.further:
         console.print(
-            f"    {more.expanded:.2g} with {more.turned}: mountings: {more.mountings} more, time: {hours(more.more_s)} "
-            "more; the recipe then has",
+            f"    {factor * more.expanded:.2g} {unit} with {more.turned}: mountings: {more.mountings} more, time: "
+            f"{hours(more.more_s)} more; the recipe then has",
             soft_wrap=True,
         )  # fmt: skip
         for line in more.recipe_toml.splitlines():

@@ -23,6 +23,7 @@ from labctl.fitting.effects import CATALOGUE, Span, Term
 from labctl.fitting.estimation.thermal_flows import NONE, STRUCTURES, Axis, LeftOut, best_taus, left_out_by, pooled
 from labctl.fitting.estimation.thermal_response import SEEN, ThermalResponse, stretches_of, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.probability_text import share_text
 
 LAG = "thermal_lag"
 #: The members beside the lag, and all of them.
@@ -111,8 +112,8 @@ class ThermalFamily:
         if self.is_certain:
             return ""
         return (
-            f"it takes {100 * (1 - self.after.chi2 / self.before.chi2):.0f} % of the chi2 of these stretches, and less "
-            f"than {100 * (1 - MAX_REMAINING):.0f} % may be the wrong shape of something else"
+            f"it takes {share_text(1.0 - self.after.chi2 / self.before.chi2)} of the chi2 of these stretches, and less "
+            f"than {share_text(1.0 - MAX_REMAINING)} may be the wrong shape of something else"
         )
 
     @property

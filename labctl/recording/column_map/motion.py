@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.answers.recording_head import Motion
+from labctl.probability_text import share_text
 from labctl.recording.column_map.movement import Movement, poses
 from labctl.recording.columns import BY_NAME, needed
 from labctl.recording.info import RecordingInfo
@@ -47,7 +48,7 @@ def free_motion(columns: Columns, movement: Movement, t_s: Array, at_rest: Seque
     poses_text = f"; its accelerometer shows {n} poses at rest, {MIN_POSES} are needed" if n else ""
     spread = f"its output varies by {movement.spread_dps:.3g} deg/s"
     return (
-        f"the unit moves in {100 * movement.share:.0f} % of the time ({spread}) and no column gives the rate or the "
+        f"the unit moves in {share_text(movement.share)} of the time ({spread}) and no column gives the rate or the "
         f"angle{poses_text}: free motion without a reference cannot calibrate a gyro; add a column with the table's "
         "rate "
         "(table_rate_dps), the angle of each turn (turn_deg), an accelerometer with rests in at least "

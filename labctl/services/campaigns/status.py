@@ -17,6 +17,7 @@ from labctl.answers.campaign_parts import (
     WatchedLimitResponse,
 )
 from labctl.answers.campaigns import CampaignResponse, EventResponse
+from labctl.probability_text import share_text
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.benches.driving_process import driven_benches
 from labctl.services.benches.identity import reported_in
@@ -174,7 +175,7 @@ def abandoned_campaigns(store: Store) -> list[CampaignResponse]:
 
 def how_far(answer: CampaignResponse) -> str:
     """Describe how far an interrupted campaign was."""
-    return f"campaign {answer.id} was interrupted at {100 * answer.progress:.0f} %"
+    return f"campaign {answer.id} was interrupted at {share_text(answer.progress)}"
 
 
 def describe_interrupted(answer: CampaignResponse) -> str:

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from labctl.answers.criticism import Advice, Experiment
 from labctl.fitting.criticism import Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
+from labctl.probability_text import probability_text
 from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
+from labctl.shown_unit import shown_unit
 
 #: From this share of the variance of several axes on, their slow courses are one.
 COMMON = 0.8
@@ -26,7 +28,7 @@ def not_logged(criticism: Criticism) -> str:
     sizes = ", ".join(f"{axis} {size:.2g} deg/s" for axis, size in slow["rms_dps"].items())
     together = slow["common"]
     common = (
-        f"; one course explains {100 * together:.0f} % of it on all axes"
+        f"; one course explains {probability_text(together)} of it on all axes"
         if together is not None and together >= COMMON
         else ""
     )
@@ -83,8 +85,9 @@ def _doubt(name: str, suspect: Suspect | None, criticism: Criticism, technology:
         return f"{name} would have a size that is not physical for {technology}"
     values = next(iter(next(iter(suspect.coefficients.values())).values()))
     usual = CATALOGUE[name].ranges.get(technology) if name in CATALOGUE else None
-    size = f"its size would be {values['value']:.2g} {values['unit']}"
-    limit = f", where {usual[0]:g} to {usual[1]:g} is usual for {technology}" if usual else ""
+    factor, unit = shown_unit(values["unit"], [values["value"]], name)
+    size = f"its size would be {factor * values['value']:.2g} {unit}"
+    limit = f", where {factor * usual[0]:g} to {factor * usual[1]:g} is usual for {technology}" if usual else ""
     before = criticism.base.error.rms_dps if criticism.base is not None else None
     after = suspect.after.error.rms_dps if suspect.after is not None else None
     change = ""
@@ -107,7 +110,7 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
     share = first["information_bit"] / first["open_bit"]
     text = (
         "No experiment that this bench can run is expected to name the cause; most is learned from this one, "
-        f"{100 * share:.0f} % of the missing information: {first['do']}."
+        f"{probability_text(share)} of the missing information: {first['do']}."
     )
     return [text]
 

@@ -20,6 +20,7 @@ from labctl.fitting.criticism import (
 )
 from labctl.fitting.data.noise_floor import correlation_times
 from labctl.fitting.effects import CATALOGUE, kind_of
+from labctl.probability_text import probability_text
 from labctl.services.criticism.advice_text import (
     advice_sentences,
     coarse_steps,
@@ -196,11 +197,10 @@ def _remainder(verdict: Verdict) -> str:
     left = verdict.remainder
     assert left is not None
     share, channels = float(left["share"]), left["depends_on"]
-    explained = f"{100 * (1 - share):.1f}".rstrip("0").rstrip(".")
     follows = f", and follows {channels[0]}" if channels else ""
     return (
         f"{' and '.join(group[0] for group in verdict.groups)} {'explains' if len(verdict.groups) == 1 else 'explain'} "
-        f"{explained} % of the excess over the noise floor; the remaining residual is "
+        f"{probability_text(1.0 - share)} of the excess over the noise floor; the remaining residual is "
         f"{float(left['over_floor']):.1f} times the noise floor{follows}."
     )
 

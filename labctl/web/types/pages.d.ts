@@ -59,6 +59,7 @@ export interface Column<Row> {
   title: string | Node;
   number?: boolean;
   prose?: boolean;
+  acts?: boolean;
   cell: (row: Row) => Child;
 }
 
@@ -134,6 +135,8 @@ export interface Figure extends HTMLElement {
   redraw: () => unknown;
   /** Draw now, so wide in px; null: as wide as the page lets it be. */
   drawAt: (width: number | null) => void;
+  /** Put a picture of a figure in three dimensions beside it, for paper; null: it is flat, and prints as it is. */
+  solidPicture: (width: number) => Promise<HTMLElement | null>;
   ondrawn?: (plot: Plot) => void;
 }
 

@@ -143,7 +143,9 @@ def test_no_u_is_smaller_than_that_of_the_mountings(documents: dict[str, Any]) -
 
 def test_the_page_prints_what_the_document_says(documents: dict[str, Any]) -> None:
     for row, each in zip(documents["page"]["coefficients"], documents["json"]["coefficients"], strict=True):
-        value, u = (float(text.replace("−", "-").rstrip(" *")) for text in row[3:5])
+        factor = {"mrad": 1e3, "ppm": 1e6, "%": 1e2}.get(row[5], 1.0)
+        value, u = (float(text.replace("−", "-").rstrip(" *")) / factor for text in row[3:5])
+        assert (row[5] == "mrad") == each["name"].startswith("misalignment")
         assert each["u"] <= u <= 1.1 * each["u"]
         assert value == pytest.approx(each["value"], abs=u)
     points = {(str(table["axis"]), *row[:2]): row for table in documents["page"]["results"] for row in table["rows"]}

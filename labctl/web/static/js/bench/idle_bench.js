@@ -81,7 +81,7 @@ export function idleBench(bench, last, next) {
       ),
       h(
         "div",
-        { class: "row" },
+        { class: "buttons" },
         linkButton("Plan a campaign", "/campaigns/new", "primary"),
         linkButton("All campaigns", "/campaigns"),
         linkButton("Calibrate live", "/live"),

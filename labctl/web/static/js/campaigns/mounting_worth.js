@@ -2,9 +2,11 @@
 
 import { table } from "../core/components.js";
 import { h } from "../core/elements.js";
-import { duration, number } from "../core/format.js";
+import { duration, number, shownUnit } from "../core/format.js";
 
 /** @import { Plan } from "../../../types/api.js" */
+
+const [MRAD] = shownUnit("1", [], "misalignment");
 
 /**
  * Nothing where no unit turns across one of its outputs, or the bench states no angle.
@@ -16,12 +18,12 @@ export function mountingWorth(outlook) {
   return h(
     "details",
     {},
-    h("summary", {}, `Misalignment: U ${number(expanded, 2)} rad at best, by fixture and table`),
+    h("summary", {}, `Misalignment: U ${number(MRAD * expanded, 2)} mrad at best, by fixture and table`),
     further.length
       ? table(
           [
             { title: "With", cell: (each) => each.turned },
-            { title: "U, rad", cell: (each) => number(each.expanded, 2) },
+            { title: "U, mrad", cell: (each) => number(MRAD * each.expanded, 2) },
             { title: "More mountings", cell: (each) => String(each.mountings) },
             { title: "More time", cell: (each) => duration(each.more_s) },
             { title: "Table of the recipe then", cell: (each) => h("pre", { class: "small" }, each.recipe_toml) },

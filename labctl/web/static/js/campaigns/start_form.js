@@ -177,12 +177,8 @@ export function startForm(bench, order) {
         { class: "muted" },
         "Simulates a recording of this plan and imports it immediately. No bench moves, and no campaign is stored.",
       ),
-      h(
-        "div",
-        { class: "row", style: "align-items: end" },
-        labelledField("Seed", seed, "Seed of the random numbers; the same seed gives the same recording."),
-        actButton("Simulate the recording", simulated, { kind: "primary large" }),
-      ),
+      labelledField("Seed", seed, "Seed of the random numbers; the same seed gives the same recording."),
+      h("div", { class: "row" }, actButton("Simulate the recording", simulated, { kind: "primary large" })),
     ],
   };
   const show = () => setChildren(place, FORMS[chosen]());
@@ -204,5 +200,6 @@ export function startForm(bench, order) {
       place,
     ),
   );
+  element.classList.add("screen-only");
   return Object.assign(element, { id: "begin", look });
 }

@@ -1,7 +1,7 @@
 // Visibility report: which effects a plan could detect and which not, before anything is measured.
 
 import { h } from "../core/elements.js";
-import { sizeText, idText } from "../core/format.js";
+import { percent, shownUnit, sizeText, idText } from "../core/format.js";
 import { notice, table } from "../core/components.js";
 
 /** @import { Visibility } from "../../../types/api.js" */
@@ -13,7 +13,8 @@ const ABSORBED_SHARE = 0.02;
 const effectLink = (row) => h("a", { href: `/effects/${row.effect}` }, idText(row.effect));
 
 /** @param {Visibility} row */
-const smallestSize = (row) => (row.smallest_size === null ? "–" : sizeText(row.smallest_size, row.unit));
+const smallestSize = ({ effect, smallest_size, unit }) =>
+  sizeText(smallest_size, unit, shownUnit(unit, [smallest_size], effect));
 
 /** @param {readonly Visibility[]} rows */
 export function visibilityReport(rows) {
@@ -34,7 +35,7 @@ export function visibilityReport(rows) {
       seen.map((row) =>
         h(
           "li",
-          { title: `${Math.round(100 * row.share)} % of it is not absorbed by the usual model` },
+          { title: `${percent(row.share)} of it is not absorbed by the usual model` },
           effectLink(row),
           h("span", { class: "nowrap" }, smallestSize(row)),
         ),

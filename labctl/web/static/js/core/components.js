@@ -114,8 +114,12 @@ export const emptyState = (...children) => h("div", { class: "empty stack" }, ..
 /** @param {string} text */
 export const busyIndicator = (text) => h("p", { class: "busy muted", role: "status" }, text);
 
+/** @param {{ number?: boolean, prose?: boolean, acts?: boolean }} column */
+const kindOf = ({ number, prose, acts }) => (number ? "number" : prose ? "prose" : acts ? "acts" : null);
+
 /**
- * A table: columns are {title, number?, prose?, cell(row)}, each with a title: a screen reader says it with every cell.
+ * A table: columns are {title, number?, prose?, acts?, cell(row)}, each with a title: a screen reader says it with every
+ * cell. One that `acts` has buttons alone, and is not printed.
  * On a phone its rows become cards, unless they are `dense`.
  * @template Row
  * @param {readonly (Column<Row> | null)[]} columns
@@ -136,7 +140,7 @@ export function table(columns, rows, { label, selected, onrow, first, dense } = 
         h(
           "tr",
           {},
-          shown.map((c) => h("th", { class: c.number ? "number" : null, scope: "col" }, c.title)),
+          shown.map((c) => h("th", { class: kindOf(c), scope: "col" }, c.title)),
         ),
       ),
       h(
@@ -151,7 +155,7 @@ export function table(columns, rows, { label, selected, onrow, first, dense } = 
               return h(
                 "td",
                 {
-                  class: c.number ? "number" : c.prose ? "prose" : null,
+                  class: kindOf(c),
                   "data-title": typeof c.title === "string" && c.title ? c.title : null,
                   "data-blank": content === "–" ? "yes" : null, // on a card, a line that says nothing is left out
                 },

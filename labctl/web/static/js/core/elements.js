@@ -1,11 +1,17 @@
 // DOM elements: create, fill, identify, observe.
 
+import { typeset } from "./typeset.js";
+
 /** @import { Attributes, Child, SvgAttributes } from "../../../types/pages.js" */
 
 const SVG = "http://www.w3.org/2000/svg";
 
+/** What these elements hold is code: it is shown as it stands. */
+const CODE = new Set(["CODE", "PRE", "TEXTAREA", "KBD"]);
+
 /**
  * Create an element: `h("a", {href, class, onclick, "aria-label"}, ...children)`. Null, undefined and false are left out.
+ * Texts are typeset, except in code.
  * @template {keyof HTMLElementTagNameMap} Tag
  * @param {Tag} tag
  * @param {Attributes} [attributes]
@@ -40,7 +46,7 @@ function applyAttributes(element, attributes, children) {
       Object.assign(element, { [name]: value });
     else element.setAttribute(name, value === true ? "" : String(value));
   }
-  element.append(...shown(children));
+  element.append(...shown(children, element));
   return element;
 }
 
@@ -51,18 +57,20 @@ function applyAttributes(element, attributes, children) {
  * @param {...Child} children
  */
 export function setChildren(element, ...children) {
-  element.replaceChildren(...shown(children));
+  element.replaceChildren(...shown(children, element));
   return element;
 }
 
 /**
  * @param {Child} child
+ * @param {Element} element that it is put into
  * @returns {(Node | string)[]}
  */
-function shown(child) {
-  if (Array.isArray(child)) return child.flatMap(shown);
+function shown(child, element) {
+  if (Array.isArray(child)) return child.flatMap((each) => shown(each, element));
   if (child === null || child === undefined || child === false) return [];
-  return [child instanceof Node ? child : String(child)];
+  if (child instanceof Node) return [child];
+  return [CODE.has(element.tagName) ? String(child) : typeset(String(child))];
 }
 
 let numbers = 0;

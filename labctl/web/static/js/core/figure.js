@@ -27,8 +27,10 @@ const config = (data) => ({
   displaylogo: false,
   responsive: true,
   displayModeBar: "hover",
-  modeBarButtons: data.some((trace) => /surface|3d/.test(trace.type)) ? TOOLS_3D : TOOLS,
+  modeBarButtons: isSolid(data) ? TOOLS_3D : TOOLS,
 });
+/** @param {readonly PlotTrace[]} data */
+const isSolid = (data) => data.some((trace) => /surface|3d/.test(trace.type));
 
 /**
  * @param {PlotLayout} layout
@@ -100,7 +102,7 @@ function withLine({ data = [], layout = {} }, text) {
  * Create a figure. `draw()` gives {data, layout}; it is called again when the theme changes.
  * `csv()` gives [[heading, ...], [value, ...], ...]; without it the traces' own x, y, z are saved.
  * Return an element with `.update()` (draw), `.redraw()` (draw again, if it was drawn), `.drawAt(width)` (draw now, for
- * paper), `.plot` (Plotly's element) and `.ondrawn(plot)`, a callback for the first drawing.
+ * paper), `.solidPicture(width)` (a picture of a figure in three dimensions, for paper), `.plot` (Plotly's element) and `.ondrawn(plot)`, a callback for the first drawing.
  * @param {string} name
  * @param {string | null} caption
  * @param {() => Picture} draw
@@ -147,7 +149,7 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
         cell ? cellButton(name, cell) : null,
       ),
     ),
-    { plot, update, redraw: () => plot.data && update(), drawAt },
+    { plot, update, redraw: () => plot.data && update(), drawAt, solidPicture },
   );
 
   /** What the page shows figures of, as it says in `data-source`: "unit A1, version 2 (0f3a...), recording 7". */
@@ -207,6 +209,20 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
     const picture = draw();
     const Plotly = loadedFor(picture.data);
     if (Plotly) drawWith(Plotly, picture, width);
+  }
+
+  /**
+   * Put a picture of a figure in three dimensions beside it, which stands for it on paper; null for a flat one.
+   * @param {number} width
+   */
+  async function solidPicture(width) {
+    if (!plot.data || !isSolid(plot.data)) return null;
+    const Plotly = await loadPlotly(plot.data);
+    const height = Math.max(plot.clientHeight, 300);
+    const src = await Plotly.toImage(plot, { format: "png", width, height, scale: 2 });
+    const picture = h("img", { class: "print-picture", src, alt: name });
+    plot.after(picture);
+    return picture;
   }
   showIfAsked(element, slug);
   whenNearViewport(element, update); // draw on demand: a page with ten figures opens as fast as one with two

@@ -1,6 +1,7 @@
 // Format numbers, sizes, durations and times, each with its unit.
 
 import { MINUS, roundedToUncertainty, signed } from "./rounding.js";
+import { superscript } from "./typeset.js";
 
 /** @typedef {number | null | undefined} Numeric */
 
@@ -25,12 +26,6 @@ export function number(value, digits = 3) {
   return fixed(rounded, Math.min(decimals, 8));
 }
 
-/** @type {Record<string, string>} */
-const SUPERSCRIPTS = {
-  "-": "⁻",
-  "+": "",
-  ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])),
-};
 /**
  * @param {number} value
  * @param {number} digits
@@ -39,9 +34,6 @@ function power(value, digits) {
   const [factor, exponent] = value.toExponential(digits - 1).split("e");
   return `${signed(factor)} × 10${superscript(exponent)}`;
 }
-/** @param {string | number} text */
-const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? sign).join("");
-
 /**
  * The odds for an effect as people say them; `nats` is the natural logarithm of the Bayes factor.
  * @param {number} nats
@@ -150,16 +142,49 @@ export const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1
 export const unitText = (unit) =>
   unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => superscript(power));
 
+/** A share of this size or more is written in %, less in ppm. */
+const MIN_PERCENT = 0.01;
+
+/** @typedef {readonly [factor: number, unit: string]} ShownUnit a shown number is the stored one times the factor */
+
 /**
- * A size with its unit; a plain number is a share of the rate, or of the full effect: 14 ppm, 2.7 %.
+ * The unit in which all quantities of one kind are shown, so that a column of them compares: of plain numbers, angles of a
+ * misalignment are in mrad, other shares in %, or in ppm where none reaches 1 %. `labctl/shown_unit.py` is the same.
+ * @param {string | null | undefined} unit
+ * @param {readonly Numeric[]} values
+ * @param {string} [name] of the coefficient or effect
+ * @returns {ShownUnit}
+ */
+export function shownUnit(unit, values, name = "") {
+  if (unit !== "1") return [1, unitText(unit)];
+  if (name.startsWith("misalignment")) return [1e3, "mrad"];
+  const largest = Math.max(0, ...values.filter(isNumber).map(Math.abs));
+  return largest >= MIN_PERCENT ? [100, "%"] : [1e6, "ppm"];
+}
+
+/**
+ * The unit in which a row of a table is shown: the same for all rows of its name, on all axes, and of all misalignments.
+ * @template {{ name: string, value: number, unit: string }} Row
+ * @param {readonly Row[]} rows
+ * @param {Row} row
+ */
+export const shownOf = (rows, { name, unit }) =>
+  shownUnit(
+    unit,
+    rows.filter((each) => each.name === name).map((each) => each.value),
+    name,
+  );
+
+/**
+ * A size with its unit: 14 ppm, 2.7 %, 0.31 mrad, 0.0042 deg/s.
  * @param {Numeric} value
  * @param {string | null | undefined} unit
- * @param {number} [digits]
+ * @param {ShownUnit} [shown] that of its column
  */
-export function sizeText(value, unit, digits = 2) {
+export function sizeText(value, unit, [factor, own] = shownUnit(unit, [value])) {
   if (!isNumber(value)) return "–";
-  if (unit !== "1") return `${value === 0 ? "0" : number(value, digits)} ${unitText(unit)}`;
-  return Math.abs(value) >= 0.01 ? `${plainNumber(100 * value, digits)} %` : `${plainNumber(1e6 * value, digits)} ppm`;
+  const text = value === 0 ? "0" : unit === "1" ? plainNumber(factor * value, 2) : number(factor * value, 2);
+  return `${text} ${own}`;
 }
 
 /**
@@ -167,9 +192,9 @@ export function sizeText(value, unit, digits = 2) {
  * @param {number} value
  * @param {number | null} expanded
  * @param {string} unit
+ * @param {ShownUnit} [shown] that of its column
  */
-export function resultTexts(value, expanded, unit) {
-  const [factor, own] = unit !== "1" ? [1, unitText(unit)] : Math.abs(value) >= 0.01 ? [100, "%"] : [1e6, "ppm"];
+export function resultTexts(value, expanded, unit, [factor, own] = shownUnit(unit, [value])) {
   const {
     value: middle,
     u: half,
@@ -183,10 +208,12 @@ export function resultTexts(value, expanded, unit) {
  * @param {Numeric} value
  * @param {number | null} expanded
  * @param {string} unit
+ * @param {ShownUnit} [shown] that of its column
  */
-export function withUncertainty(value, expanded, unit) {
+export function withUncertainty(value, expanded, unit, shown) {
   if (!isNumber(value)) return "–";
-  const { middle, half, power, suffix } = resultTexts(value, expanded !== null && expanded > 0 ? expanded : null, unit);
+  const known = expanded !== null && expanded > 0 ? expanded : null;
+  const { middle, half, power, suffix } = resultTexts(value, known, unit, shown);
   const text = half === null ? middle : `${middle} ± ${half}`;
   return [power ? (half === null ? `${text} ${power}` : `(${text}) ${power}`) : text, suffix].filter(Boolean).join(" ");
 }

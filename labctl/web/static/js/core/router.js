@@ -1,6 +1,7 @@
 // Client-side router: the address determines what the page shows.
 
-import { Unreachable, isAbort } from "./http/errors.js";
+import { isAbort } from "./http/errors.js";
+import { whenItMayPass } from "./http/recovery.js";
 import { framed } from "./page_frame.js";
 import { changedQuery, matchRoute, routeOf } from "./routes.js";
 import { setPageName } from "./tab_mark.js";
@@ -68,8 +69,11 @@ export function updateQuery(choice) {
 /** @returns {Query} */
 export const query = () => Object.fromEntries(new URLSearchParams(location.search));
 
-/** Show the page of the current address. */
-export async function show() {
+/**
+ * Show the page of the current address. `quiet`: what is shown stays until the page is there.
+ * @param {{ quiet?: boolean }} [options]
+ */
+export async function show({ quiet = false } = {}) {
   pageAbort.abort();
   pageAbort = new AbortController();
   const { signal } = pageAbort;
@@ -79,7 +83,7 @@ export async function show() {
   const found = matchRoute(routes, location.pathname);
   window.dispatchEvent(new CustomEvent("labctl:moved"));
   main.setAttribute("aria-busy", "true");
-  const endFrame = framed(main, found?.name ?? "labctl");
+  const endFrame = quiet ? () => {} : framed(main, found?.name ?? "labctl");
   signal.addEventListener("abort", endFrame);
   try {
     const module = await (found ? found.load() : import("../pages/not_found.js"));
@@ -103,15 +107,17 @@ export async function show() {
 }
 
 /**
- * Show an error in place of the page. A page whose service did not answer is shown as soon as it is heard.
+ * Show an error in place of the page; where it may pass, the page is shown as soon as the service can answer it.
  * @param {HTMLElement} main
  * @param {unknown} error
  * @param {AbortSignal} signal
  */
 async function showError(main, error, signal) {
   const { errorPage } = await import("./components.js");
-  main.replaceChildren(errorPage(error, show));
-  if (error instanceof Unreachable) window.addEventListener("labctl:heard", show, { signal, once: true });
+  const hadFocus = main !== document.activeElement && main.contains(document.activeElement);
+  main.replaceChildren(errorPage(error, () => show()));
+  if (hadFocus) main.querySelector("button")?.focus({ preventScroll: true });
+  whenItMayPass(error, signal, () => show({ quiet: true }));
 }
 
 /**

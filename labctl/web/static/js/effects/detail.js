@@ -1,7 +1,7 @@
 // The page of one effect.
 
 import { h } from "../core/elements.js";
-import { plainNumber, sizeText, unitText, idText } from "../core/format.js";
+import { plainNumber, shownUnit, sizeText, unitText, idText } from "../core/format.js";
 import { card, chip, pageHeader, notice, table } from "../core/components.js";
 import { linkButton } from "../bench/actions.js";
 import { signatureFigure } from "./signature_plot.js";
@@ -157,8 +157,14 @@ function sizeCard(effect) {
       "How large it is",
       h("p", { class: "muted" }, "The catalogue lists no plausible sizes for this effect."),
     );
+  const unit = effect.unit ?? "";
+  const shown = shownUnit(
+    unit,
+    rows.flatMap(([, range]) => range),
+    effect.id,
+  );
   /** @param {number} value */
-  const sizeCell = (value) => h("span", { class: "nowrap" }, sizeText(value, effect.unit ?? ""));
+  const sizeCell = (value) => h("span", { class: "nowrap" }, sizeText(value, unit, shown));
   return card(
     "How large it is",
     table(
@@ -174,7 +180,7 @@ function sizeCard(effect) {
       "p",
       { class: "muted small" },
       effect.unit === "1"
-        ? "Values without a unit or in ppm (millionths) are ratios: to the rate, or, where the coefficient scales another effect, to that effect."
+        ? "Values in % or ppm (millionths) are ratios: to the rate, or, where the coefficient scales another effect, to that effect."
         : "Plausible sizes of its first coefficient.",
     ),
   );

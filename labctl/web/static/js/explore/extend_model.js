@@ -207,7 +207,7 @@ export function extendModel(state, effects) {
     ),
     h(
       "div",
-      { class: "columns", style: "--column-min: 14rem" },
+      { class: "columns screen-only", style: "--column-min: 14rem" },
       pick,
       drop,
       labelledField("A formula of your own", formula, "name: expression over channels, one in a line"),

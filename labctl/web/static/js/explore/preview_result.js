@@ -2,7 +2,7 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { idText, sizeText } from "../core/format.js";
+import { idText, shownUnit, sizeText } from "../core/format.js";
 import { channelTitle, inDatasetOrder, scaled, setText, shownText } from "./dataset_rows.js";
 import { selectedRows } from "./residual_map.js";
 
@@ -105,21 +105,22 @@ export function plausibility(state, found, change, effects) {
         "ul",
         { class: "plain" },
         hint,
-        ranges.map(({ id, ...range }) =>
-          h(
+        ranges.map(({ id, from, to, inside }) => {
+          const shown = shownUnit(unitOf(id), [from, to], id);
+          return h(
             "li",
             {},
             `${idText(id)}: `,
-            range.inside
+            inside
               ? h("span", { class: "good-text" }, "of a usual size")
               : h("span", { class: "bad-text" }, "larger than is usual"),
             h(
               "span",
               { class: "muted" },
-              ` (usual: ${sizeText(range.from, unitOf(id))} to ${sizeText(range.to, unitOf(id))})`,
+              ` (usual: ${sizeText(from, unitOf(id), shown)} to ${sizeText(to, unitOf(id), shown)})`,
             ),
-          ),
-        ),
+          );
+        }),
       )
     : null;
 }

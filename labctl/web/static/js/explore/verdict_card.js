@@ -1,7 +1,7 @@
 // The verdict in words, and the suspected effects with their evidence.
 
 import { scrollTo, setChildren, h } from "../core/elements.js";
-import { withUncertainty, number, oddsText, percent, probabilityText, idText } from "../core/format.js";
+import { withUncertainty, number, oddsText, probabilityText, idText, shownUnit } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { planAddress } from "../core/routes.js";
 import { equationDetails } from "../effects/equation.js";
@@ -86,7 +86,7 @@ const chanceText = (p) =>
     ? null
     : p < 1e-6
       ? "noise alone does not leave this"
-      : `noise alone leaves this in ${number(100 * p, 2)} % of cases`;
+      : `noise alone leaves this in ${p < 0.01 ? `${number(100 * p, 2)} %` : probabilityText(p)} of cases`;
 
 /**
  * @param {ExploreState} state
@@ -160,7 +160,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
           evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
           evidenceItem(
             "Explains",
-            h("span", { class: "number" }, percent(s.share_removed)),
+            h("span", { class: "number" }, probabilityText(s.share_removed)),
             h("span", { class: "muted small" }, "of the error above the noise"),
           ),
           evidenceItem(
@@ -241,7 +241,9 @@ function coefficientText(suspect, axis) {
         { class: "small" },
         h("span", { class: "muted" }, idText(name)),
         " ",
-        unbroken(withUncertainty(value, u === null ? null : 2 * u, unit)),
+        unbroken(
+          withUncertainty(value, u === null ? null : 2 * u, unit, shownUnit(unit, valuesOf(suspect, name), name)),
+        ),
       ),
     )
     .concat(
@@ -254,6 +256,13 @@ function coefficientText(suspect, axis) {
       ),
     );
 }
+
+/**
+ * The values of a coefficient on all axes: they are shown in one unit.
+ * @param {Suspect} suspect
+ * @param {string} name
+ */
+const valuesOf = ({ coefficients }, name) => Object.values(coefficients).map((own) => own[name]?.value);
 
 /**
  * A value with no line break before its uncertainty, nor within its power of ten.
@@ -340,8 +349,9 @@ function experimentList(criticism) {
             {},
             each.do,
             each.hours ? ` (${number(each.hours, 2)} h)` : "",
-            `; one cause is then named alone with a probability of ${unbroken(probabilityText(each.power))}`,
-            each.names_wrong < MIN_WRONG ? "" : `, a wrong one with ${unbroken(probabilityText(each.names_wrong))}`,
+            each.names_wrong < MIN_WRONG
+              ? ""
+              : `; a wrong cause is then named with a probability of ${unbroken(probabilityText(each.names_wrong))}`,
           ),
           h("p", { class: "muted small" }, each.why),
           each.toml

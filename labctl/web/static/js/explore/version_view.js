@@ -2,11 +2,12 @@
 
 import { get, getFollowed, post } from "../core/http/api.js";
 import { isAbort } from "../core/http/errors.js";
+import { whenItMayPass } from "../core/http/recovery.js";
 import { setChildren, h } from "../core/elements.js";
 import { actButton, busyIndicator, errorPage, notice } from "../core/components.js";
 import { option, toggleGroup } from "../core/fields.js";
-import { idText } from "../core/format.js";
-import { navigate } from "../core/router.js";
+import { duration, idText } from "../core/format.js";
+import { navigate, show } from "../core/router.js";
 import { planAddress } from "../core/routes.js";
 import { jointCard } from "../joint/card.js";
 import { asked as askedFor } from "./chosen_recordings.js";
@@ -33,6 +34,8 @@ const SECTIONS = [
   ["watch", "Versions"],
 ];
 
+const COUNT_MS = 1000;
+
 /**
  * @typedef {object} Given
  * @property {Unit} unit
@@ -48,44 +51,68 @@ const SECTIONS = [
 export function versionView(given) {
   const { unit, calibration, chosen, query, signal } = given;
   const stage = h("p", { class: "muted", "aria-live": "polite" });
+  const since = h("p", { class: "muted small" });
   const finish = takeKept(unit.serial, calibration.version);
   const place = h(
     "div",
     { class: "page" },
     finish?.element ?? null,
-    h(
-      "div",
-      { class: "card" },
-      busyIndicator("labctl is comparing the model with every reading. The first comparison takes some seconds."),
-      stage,
-    ),
+    h("div", { class: "card" }, busyIndicator(comparingText(calibration)), stage, since),
   );
+  const endWait = countWait(since, signal);
+  let steps = 0;
   const path = { serial: unit.serial, version: calibration.version };
   const asking = Promise.all([
     getFollowed("/api/units/{serial}/calibrations/{version}/criticism/events", {
       path,
       query: askedFor(chosen),
       signal,
-      onstage: (name) => setChildren(stage, `${name} …`),
+      onstage: (name) => setChildren(stage, `Step ${(steps += 1)}: ${name} …`),
     }),
     get("/api/effects", { signal }),
   ]);
   asking
     .then(([criticism, catalogue]) => {
+      endWait();
       setChildren(place, finish?.element ?? null, sections(given, criticism, catalogue.effects));
       finish?.settle(nextSteps(given, criticism));
       if (query.tour) import("../tour/tour.js").then(({ showTour }) => showTour(place, signal));
       else if (location.hash) document.getElementById(location.hash.slice(1))?.scrollIntoView();
     })
-    .catch(
-      (error) =>
-        !isAbort(error) &&
-        setChildren(
-          place,
-          errorPage(error, () => navigate(location.pathname + location.search)),
-        ),
-    );
+    .catch((error) => {
+      endWait();
+      if (isAbort(error)) return;
+      setChildren(
+        place,
+        errorPage(error, () => show()),
+      );
+      whenItMayPass(error, signal, () => show({ quiet: true }));
+    });
   return place;
+}
+
+/**
+ * What is done, and how long it may take: each axis is compared for itself and with the others.
+ * @param {Version} calibration
+ */
+function comparingText({ axes }) {
+  const axis = Object.keys(axes).length > 1 ? "minutes for several axes" : "about a minute for one axis";
+  return `labctl is comparing the model with every reading. A first comparison takes ${axis}; one that was made before is shown at once.`;
+}
+
+/**
+ * Show how long the comparison has taken so far; return a function that ends it.
+ * @param {HTMLElement} place
+ * @param {AbortSignal} signal
+ */
+function countWait(place, signal) {
+  const began = performance.now();
+  const counting = setInterval(() => {
+    setChildren(place, `${duration((performance.now() - began) / 1000)} so far. Leaving the page cancels it.`);
+  }, COUNT_MS);
+  const end = () => clearInterval(counting);
+  signal.addEventListener("abort", end, { once: true });
+  return end;
 }
 
 /**

@@ -1,7 +1,7 @@
 // What several recordings say together: repeatability, agreement, each predicted by the others.
 
 import { h } from "../core/elements.js";
-import { idText, number, sizeText } from "../core/format.js";
+import { idText, number, shownUnit, sizeText } from "../core/format.js";
 import { cardWithHeader, chip, notice, table } from "../core/components.js";
 import { shiftFigures } from "./shifts.js";
 
@@ -31,18 +31,35 @@ export function jointParts(joint) {
 function repeatability(joint) {
   const rows = Object.entries(joint.repeatability).flatMap(([axis, each]) => each.map((one) => ({ axis, ...one })));
   if (!rows.length) return null;
+  /**
+   * One unit for all of a kind, on all axes.
+   * @param {typeof rows[number]} row
+   * @param {number | null} value
+   */
+  const size = ({ term, unit }, value) => {
+    const alike = rows.filter((each) => each.term === term);
+    return sizeText(
+      value,
+      unit,
+      shownUnit(
+        unit,
+        alike.map((each) => each.value),
+        term,
+      ),
+    );
+  };
   return [
     h("h3", {}, "Repeatability"),
     table(
       [
         { title: "Axis", cell: (row) => row.axis },
         { title: "What", prose: true, cell: (row) => row.term },
-        { title: "Standard deviation", number: true, cell: (row) => sizeText(row.value, row.unit) },
-        { title: "u", number: true, cell: (row) => sizeText(row.u, row.unit) },
+        { title: "Standard deviation", number: true, cell: (row) => size(row, row.value) },
+        { title: "u", number: true, cell: (row) => size(row, row.u) },
         {
           title: "95 %",
           number: true,
-          cell: (row) => `${sizeText(row.low, row.unit)} to ${sizeText(row.high, row.unit)}`,
+          cell: (row) => `${size(row, row.low)} to ${size(row, row.high)}`,
         },
         { title: "Chance of noise alone", number: true, cell: (row) => chance(row.p_value) },
         { title: "Shift", cell: (row) => (row.seen ? chip("seen", "warn") : chip("not seen", "good")) },

@@ -2,6 +2,7 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
+import { shownUnit } from "../core/format.js";
 
 /** @import { Joint } from "../../../types/api.js" */
 /** @import { PlotTrace } from "../../../types/pages.js" */
@@ -21,8 +22,8 @@ export function shiftFigures(joint) {
     { class: "columns", style: "--column-min: 20rem" },
     terms.map((term) => {
       const kinds = all.filter((one) => one.term === term);
-      const share = kinds[0].unit === "1";
-      const factor = share ? 1e6 : 1;
+      const values = kinds.flatMap(({ shifts }) => shifts.map(({ value }) => value));
+      const [factor, unit] = shownUnit(kinds[0].unit, values, term);
       /** @returns {{ data: PlotTrace[], layout: object }} */
       const draw = () => ({
         data: kinds.map(({ axis, shifts }) => ({
@@ -35,12 +36,12 @@ export function shiftFigures(joint) {
           y: shifts.map(({ value }) => factor * value),
           error_y: { type: "data", array: shifts.map(({ u }) => K * factor * u), thickness: 1, width: 3 },
           marker: { size: 8, color: axisColour(axis) },
-          hovertemplate: `%{x}: %{y:.4g} ${share ? "ppm" : kinds[0].unit}<extra>axis ${axis}</extra>`,
+          hovertemplate: `%{x}: %{y:.4g} ${unit}<extra>axis ${axis}</extra>`,
         })),
         layout: {
           xaxis: { type: "category" },
           yaxis: {
-            title: { text: `off the common value, ${share ? "ppm" : kinds[0].unit}` },
+            title: { text: `off the common value, ${unit}` },
             zeroline: true,
             zerolinecolor: colour("text-muted"),
           },

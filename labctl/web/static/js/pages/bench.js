@@ -126,7 +126,7 @@ function watchForChange(unconfirmed, signal) {
     }
   }, POLL_MS);
   signal.addEventListener("abort", () => clearInterval(looking));
-  window.addEventListener("labctl:fresh", show, { signal });
+  window.addEventListener("labctl:fresh", () => show(), { signal });
 }
 
 /**

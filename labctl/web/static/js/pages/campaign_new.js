@@ -70,7 +70,9 @@ export async function page({ query, signal }) {
     const given = AbortSignal.any([signal, asked.signal]);
     setChildren(
       found,
-      busyIndicator("Computing which effects the plan can detect; for a long plan this takes some seconds."),
+      busyIndicator(
+        "Computing which effects the plan can detect. Every data set counts: a plan of hundreds takes longer.",
+      ),
     );
     try {
       const answer = await post("/api/plans", { body: { recipe: source(), clip }, signal: given });

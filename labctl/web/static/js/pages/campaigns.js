@@ -193,6 +193,7 @@ function scheduleCard(rows, again) {
         },
         {
           title: h("span", { class: "visually-hidden" }, "Cancel"),
+          acts: true,
           cell: (row) =>
             actButton(
               row.state === "missed" ? "Remove" : "Cancel",

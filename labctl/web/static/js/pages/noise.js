@@ -16,10 +16,14 @@ import { allanPoint, askedAllan } from "../recordings/allan.js";
 
 /** @typedef {Pick<RecordingRow, "id" | "serial">} Row */
 /** @typedef {{ row: Row, found: Allan | null, why: string }} Record */
+/** @typedef {{ id: number, why: string }} LeftOut a recording that was asked for and cannot be drawn */
 
 const MOST = 8;
+/** What a recording without every reading holds, in words. @type {{ [kind: string]: string }} */
+const HELD = { points: "only means of data sets", coefficients: "only published coefficients" };
 const COLOURS = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#888888", "#222255"];
 const DASHES = ["solid", "dash", "dot"];
+const DASH_NAMES = ["solid", "dashed", "dotted"];
 
 /** @param {PageContext} context */
 export async function page({ query, signal }) {
@@ -27,8 +31,14 @@ export async function page({ query, signal }) {
   const known = new Map();
   /** @type {Map<number, HTMLInputElement>} */
   const boxes = new Map();
-  const asked = (query.recordings ?? "").split(",").filter(Boolean).map(Number).slice(0, MOST);
-  const first = (await Promise.all(asked.map((id) => rowOf(id, signal)))).filter((row) => row !== null);
+  const asked = [...new Set((query.recordings ?? "").split(",").filter(Boolean).map(Number))];
+  const read = await Promise.all(asked.slice(0, MOST).map((id) => rowOf(id, signal)));
+  const first = read.flatMap((each) => ("serial" in each ? [each] : []));
+  /** @type {LeftOut[]} */
+  let leftOut = [
+    ...read.flatMap((each) => ("why" in each ? [each] : [])),
+    ...asked.slice(MOST).map((id) => ({ id, why: `at most ${MOST} are drawn at once.` })),
+  ];
   for (const row of first) known.set(row.id, row);
   let chosen = first.map((row) => row.id);
   const place = h("div", { class: "stack" });
@@ -36,10 +46,12 @@ export async function page({ query, signal }) {
     loadInto(place, "Working out the Allan deviations", async () => {
       const rows = [...chosen].sort((a, b) => b - a).flatMap((id) => known.get(id) ?? []);
       const records = await Promise.all(rows.map((row) => recordOf(row, signal)));
-      return records.length ? overlay(records) : emptyState("Choose one recording or more.");
+      if (!records.length && !leftOut.length) return emptyState("Choose one recording or more.");
+      return [leftOutNotice(records, leftOut), overlay(records)];
     });
   /** @param {number} id */
   const toggle = (id) => {
+    leftOut = []; // what the address asked for is no longer what is shown
     chosen = chosen.includes(id) ? chosen.filter((each) => each !== id) : [...chosen, id].slice(-MOST);
     for (const [each, box] of boxes) box.checked = chosen.includes(each);
     updateQuery({ recordings: chosen.join(",") });
@@ -71,7 +83,7 @@ export async function page({ query, signal }) {
       "An Allan deviation needs every reading, but all recordings hold only means. Import a recording with all readings.",
     ),
   });
-  if (chosen.length) show();
+  if (asked.length) show();
   else setChildren(place, emptyState("Choose one recording or more."));
   return h(
     "div",
@@ -83,20 +95,37 @@ export async function page({ query, signal }) {
 }
 
 /**
- * A recording that the address of the page names; null for one that is not there, or holds no readings.
+ * A recording that the address of the page names; or why it cannot be drawn: it is not there, or holds no readings.
  * @param {number} id
  * @param {AbortSignal} signal
- * @returns {Promise<Row | null>}
+ * @returns {Promise<Row | LeftOut>}
  */
 async function rowOf(id, signal) {
   try {
     const path = { recording: id };
     const found = await get("/api/recordings/{recording}", { path, query: { points: false }, signal });
-    return found.kind === "samples" ? { id, serial: found.serial } : null;
+    if (found.kind === "samples") return { id, serial: found.serial };
+    return { id, why: `it holds ${HELD[found.kind] ?? found.kind}, and an Allan deviation needs every reading.` };
   } catch (error) {
-    if (error instanceof Problem && error.status < 500) return null;
+    if (error instanceof Problem && error.status < 500) return { id, why: error.message };
     throw error;
   }
+}
+
+/**
+ * How many of the recordings that were asked for are drawn, and why the others are not; nothing where all are.
+ * @param {readonly Record[]} records
+ * @param {readonly LeftOut[]} others
+ */
+function leftOutNotice(records, others) {
+  const all = [...records.filter(({ found }) => !found).map(({ row, why }) => ({ id: row.id, why })), ...others];
+  if (!all.length) return null;
+  const asked = records.length + others.length;
+  return notice(
+    "warn",
+    h("p", {}, h("strong", {}, `${asked - all.length} of ${asked} recordings are drawn.`)),
+    all.map(({ id, why }) => h("p", {}, `Recording ${id}: ${why}`)),
+  );
 }
 
 /**
@@ -129,10 +158,16 @@ function overlay(records) {
         y: noise.deviation_dps,
         line: { color: COLOURS[k % COLOURS.length], dash: DASHES[n % DASHES.length], width: 2 },
         marker: { size: 4 },
-        name: `${row.id} ${row.serial}, ${axis}`,
+        name: `${row.id} ${row.serial}`, // one name for all axes of a recording: their dashes are in the caption
+        legendgroup: `recording ${row.id}`,
+        showlegend: n === 0,
         hovertemplate: `${row.serial} ${axis}: %{y:.3~g} deg/s over %{x:.3~g} s<extra></extra>`,
       })),
-      ...records.flatMap(({ row, found }, k) => datasheetLines(row, found, COLOURS[k % COLOURS.length])),
+      ...records.flatMap(({ row, found }, k) =>
+        records.findIndex((each) => each.row.serial === row.serial && each.found) === k
+          ? datasheetLines(row, found, COLOURS[k % COLOURS.length])
+          : [],
+      ),
     ],
     layout: {
       xaxis: { type: "log", title: { text: "averaging time, s" } },
@@ -150,7 +185,7 @@ function overlay(records) {
   const drawn = lines.length
     ? figure(
         "Allan deviations",
-        "Thin lines: figures of the data sheet, if known. Click a point to see what it is made of.",
+        `${dashText(lines)}Thin lines: the unit's data sheet, if known. Click a point to see what it is made of.`,
         draw,
         { height: "26rem", csv },
       )
@@ -164,7 +199,6 @@ function overlay(records) {
     (key) => records.map(({ row, found }) => found && askedAllan(key, row.id, null, found)).find(Boolean) ?? null,
   );
   return [
-    ...records.filter(({ found }) => !found).map(({ row, why }) => notice("", `Recording ${row.id}: ${why}`)),
     drawn,
     place.element,
     lines.length
@@ -198,14 +232,27 @@ function datasheetLines(row, found, colour) {
   const { angle_random_walk_dps_rthz: walk, bias_stability_dps: stability } = found?.datasheet ?? {};
   if (walk) laws.push(["angle random walk", (t) => walk / Math.sqrt(t)]);
   if (stability) laws.push(["bias stability", () => stability]);
-  return laws.map(([what, law]) => ({
+  return laws.map(([what, law], k) => ({
     type: "scatter",
     mode: "lines",
     x: tau,
     y: tau.map((t) => (t === null ? null : law(t))),
     line: { color: colour, width: 1 },
-    name: `${row.serial}, data sheet: ${what}`,
+    name: `${row.serial}, data sheet`,
+    legendgroup: `data sheet ${row.serial}`,
+    showlegend: k === 0,
+    hovertemplate: `${row.serial}, data sheet: ${what}<extra></extra>`,
   }));
+}
+
+/**
+ * Which dash is of which axis, where there are several.
+ * @param {readonly { axis: string, n: number }[]} lines
+ */
+function dashText(lines) {
+  const axes = new Map(lines.map(({ axis, n }) => [axis, DASH_NAMES[n % DASHES.length]]));
+  if (axes.size < 2) return "";
+  return `Axes: ${[...axes].map(([axis, dash]) => `${axis} ${dash}`).join(", ")}. `;
 }
 
 /** @param {NoiseFigure} noise */

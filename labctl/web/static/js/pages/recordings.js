@@ -77,6 +77,7 @@ function recordingTable(rows) {
       },
       {
         title: h("span", { class: "visually-hidden" }, "Explore"),
+        acts: true,
         cell: (row) =>
           h(
             "a",

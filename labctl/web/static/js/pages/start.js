@@ -2,6 +2,7 @@
 
 import { get, getPart, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
+import { percent } from "../core/format.js";
 import { actButton, card, pageHeader } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
@@ -157,7 +158,7 @@ function overview(units, found) {
               {},
               presentWords(
                 running
-                  ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.`
+                  ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${percent(running.progress)} done.`
                   : benches[0].unconfirmed
                     ? `${benches[0].name} was not confirmed safe; inspect the bench.`
                     : `${benches[0].name} is free.`,
@@ -166,7 +167,7 @@ function overview(units, found) {
           : h("p", {}, "This service drives no bench."),
         h(
           "div",
-          { class: "row" },
+          { class: "buttons" },
           h("a", { class: "button primary", href: "/bench" }, "To the bench"),
           h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"),
           h("a", { class: "button act", href: "/live" }, "Calibrate live"),
@@ -196,7 +197,7 @@ function overview(units, found) {
         "Data",
         h(
           "div",
-          { class: "row" },
+          { class: "buttons" },
           h("a", { class: "button act", href: "/recordings" }, "Import a recording"),
           h("a", { class: "button", href: "/recordings" }, "All recordings"),
           actButton("Simulate a hidden effect", openSimulated),

@@ -115,7 +115,7 @@ export function importForm(taken) {
 
   return h(
     "section",
-    { class: "card stack", "aria-label": "Import" },
+    { class: "card stack screen-only", "aria-label": "Import" },
     h("h2", {}, "Import"),
     readOnlyNote("Nothing is imported here"),
     zone,

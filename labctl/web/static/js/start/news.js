@@ -1,7 +1,7 @@
 // What has happened since the evening before, and what waits for a person: one row for each, the most urgent first. Units
 // that are due have a list of their own.
 
-import { number } from "../core/format.js";
+import { number, percent } from "../core/format.js";
 import { stateText } from "../campaigns/states.js";
 
 /** @import { Bench, Campaign, Scheduled } from "../../../types/api.js" */
@@ -17,6 +17,7 @@ import { stateText } from "../campaigns/states.js";
  * @property {string} href
  * @property {string} act
  * @property {string | null} at
+ * @property {number | null} campaign its number: campaigns are numbered in the order of their starts
  * @property {number | null} share
  * @property {number | null} over_floor
  */
@@ -70,14 +71,24 @@ export function newsOf({ campaigns, benches, schedule }, span, now) {
     ...recent.filter((each) => each.ended).flatMap(draftNews),
     ...schedule.flatMap((start) => missedNews(start, isNew)),
   ];
-  return news.sort((a, b) => URGENCY[a.kind] - URGENCY[b.kind] || Date.parse(b.at ?? "0") - Date.parse(a.at ?? "0"));
+  return news.sort((a, b) => URGENCY[a.kind] - URGENCY[b.kind] || orderOf(a, b));
 }
+
+const LAST = Number.MAX_SAFE_INTEGER;
+/**
+ * The newest start first, whatever its clock says: that of each simulated bench begins at the same date. What is of no
+ * campaign stands first, the newest first.
+ * @param {News} a
+ * @param {News} b
+ */
+const orderOf = (a, b) =>
+  (b.campaign ?? LAST) - (a.campaign ?? LAST) || Date.parse(b.at ?? "0") - Date.parse(a.at ?? "0");
 
 /** @param {string} serial */
 const unitPage = (serial) => `/units/${encodeURIComponent(serial)}`;
 
 /** What a row has that is about neither a campaign nor a draft. */
-const PLAIN = { at: null, share: null, over_floor: null };
+const PLAIN = { at: null, campaign: null, share: null, over_floor: null };
 
 /**
  * @param {Bench} bench
@@ -107,6 +118,7 @@ function campaignNews(campaign) {
     href: `/campaigns/${campaign.id}`,
     act: "Open",
     at: campaign.ended_at ?? campaign.started_at,
+    campaign: campaign.id,
     share: campaign.progress,
     over_floor: null,
   };
@@ -119,7 +131,12 @@ function campaignNews(campaign) {
   if (campaign.active) {
     const late = campaign.state === "running" ? "" : `, ${state}`;
     return [
-      { ...base, kind: late ? "warn" : "accent", text: `${name}: ${percentOf(campaign)} done${late}.`, href: "/bench" },
+      {
+        ...base,
+        kind: late ? "warn" : "accent",
+        text: `${name}: ${percent(campaign.progress)} done${late}.`,
+        href: "/bench",
+      },
     ];
   }
   if (campaign.state === "done") {
@@ -129,9 +146,6 @@ function campaignNews(campaign) {
   return [{ ...base, kind: "bad", text: `${name}: ${state}${campaign.reason ? `: ${campaign.reason}` : "."}` }];
 }
 
-/** @param {Campaign} campaign */
-const percentOf = ({ progress }) => `${Math.round(100 * progress)} %`;
-
 /**
  * The calibrations that a campaign ended in, and what a person decides of each.
  * @param {Campaign} campaign
@@ -139,7 +153,7 @@ const percentOf = ({ progress }) => `${Math.round(100 * progress)} %`;
  */
 function draftNews(campaign) {
   return campaign.drafts.flatMap((draft) => {
-    const base = { about: draft.serial, at: draft.at, share: null, over_floor: null };
+    const base = { about: draft.serial, at: draft.at, campaign: draft.campaign, share: null, over_floor: null };
     if (draft.state === "failed")
       return [
         {

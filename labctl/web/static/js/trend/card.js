@@ -2,7 +2,7 @@
 
 import { get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { day, number, sizeText, withUncertainty } from "../core/format.js";
+import { day, number, shownUnit, sizeText, withUncertainty } from "../core/format.js";
 import { cardWithHeader, chip, loadInto, table } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
@@ -11,6 +11,7 @@ import { driftFigure, errorFigure } from "./figures.js";
 import { askedTrend } from "./point.js";
 
 /** @import { CalibrationRow, Drift, Trend } from "../../../types/api.js" */
+/** @import { ShownUnit } from "../core/format.js" */
 
 const K = 2;
 /** @type {Record<string, string>} */
@@ -103,6 +104,16 @@ function drifts(trend) {
     const between = `${day(each.earliest)} to ${each.latest ? day(each.latest) : "not within 50 years"}`;
     return [day(each.expected), each.earliest ? h("div", { class: "muted small" }, `95 %: ${between}`) : null];
   };
+  /**
+   * The unit of a row, and the one in which all of its kind are shown.
+   * @param {Drift} row
+   * @returns {[unit: string, shown: ShownUnit]}
+   */
+  const unitsOf = ({ what, unit }) => {
+    const own = unit.replace("/year", "");
+    const alike = trend.drifts.filter((each) => each.what === what).map((each) => each.per_year);
+    return [own, shownUnit(own, alike, what)];
+  };
   return table(
     [
       { title: "Axis", cell: (row) => row.axis },
@@ -110,20 +121,18 @@ function drifts(trend) {
       {
         title: "Drift per year, k = 2",
         number: true,
-        cell: (row) => withUncertainty(row.per_year, row.u === null ? null : K * row.u, row.unit.replace("/year", "")),
+        cell: (row) => withUncertainty(row.per_year, row.u === null ? null : K * row.u, ...unitsOf(row)),
       },
       {
         title: "95 %, Student's t",
         number: true,
-        cell: (row) => {
-          const unit = row.unit.replace("/year", "");
-          return row.low === null ? "–" : `${sizeText(row.low, unit)} to ${sizeText(row.high, unit)}`;
-        },
+        cell: (row) =>
+          row.low === null ? "–" : `${sizeText(row.low, ...unitsOf(row))} to ${sizeText(row.high, ...unitsOf(row))}`,
       },
       {
         title: "Repeatability",
         number: true,
-        cell: (row) => sizeText(row.repeatability, row.unit.replace("/year", "")),
+        cell: (row) => sizeText(row.repeatability, ...unitsOf(row)),
       },
       {
         title: "Significance",

@@ -4,7 +4,7 @@ import { h } from "../core/elements.js";
 import { chip, notice, table } from "../core/components.js";
 import { colour, figure } from "../core/figure.js";
 import { number, plainNumber } from "../core/format.js";
-import { contributionTraces } from "./contribution_lines.js";
+import { contributionRows, contributionTraces } from "./contribution_lines.js";
 
 /** @import { BudgetLine, ContributionsOver, Uncertainty } from "../../../types/api.js" */
 /** @import { PlotTrace } from "../../../types/pages.js" */
@@ -84,7 +84,7 @@ function contributionOf(line) {
 export function contributionFigures(contributions) {
   return h(
     "div",
-    { class: "columns", style: "--column-min: 44rem" }, // as wide as the legend of twelve sources needs to be low
+    { class: "columns", style: "--column-min: 27rem" },
     Object.entries(contributions).flatMap(([axis, over]) => [
       one(
         `Contributions, axis ${axis}, over rate`,
@@ -127,8 +127,8 @@ function one(name, lines, along, at) {
   };
   return figure(
     name,
-    `${at}: standard uncertainties that the budget combines. Dashed: the expanded uncertainty U. Uncertainties that the bench does not state have no line.`,
+    `${at}: the largest standard uncertainties of the budget, the others together (root of the sum of their squares). Dashed: the expanded uncertainty U. Uncertainties that the bench does not state have no line.`,
     draw,
-    { height: innerWidth < NARROW_PX ? "36rem" : "23rem" },
+    { height: innerWidth < NARROW_PX ? "26rem" : "21rem", csv: () => contributionRows(lines, along) },
   );
 }

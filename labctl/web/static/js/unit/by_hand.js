@@ -1,7 +1,7 @@
 // What a calibration by hand says beside the gyro's coefficients: the accelerometer, rests and turns.
 
 import { h } from "../core/elements.js";
-import { number, withUncertainty } from "../core/format.js";
+import { number, shownOf, withUncertainty } from "../core/format.js";
 import { table } from "../core/components.js";
 
 /** @import { Version } from "../../../types/api.js" */
@@ -27,7 +27,11 @@ export function byHand({ poses }) {
       [
         { title: "Axis", cell: (row) => row.axis },
         { title: "Coefficient", cell: (row) => h("code", {}, row.name) },
-        { title: "Value, k = 2", number: true, cell: (row) => withUncertainty(row.value, K * row.u, row.unit) },
+        {
+          title: "Value, k = 2",
+          number: true,
+          cell: (row) => withUncertainty(row.value, K * row.u, row.unit, shownOf(rows, row)),
+        },
       ],
       rows,
       { dense: true, label: "Coefficients of the accelerometer" },

@@ -2,7 +2,7 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { number, resultTexts, unitText, idText, withUncertainty } from "../core/format.js";
+import { number, resultTexts, idText, shownOf, shownUnit, withUncertainty } from "../core/format.js";
 import { factList, table } from "../core/components.js";
 import { byHand } from "./by_hand.js";
 import { coefficientColumns, isSingle } from "./coefficient_table.js";
@@ -10,6 +10,7 @@ import { heldText } from "./held.js";
 
 /** @import { Coefficient, Version } from "../../../types/api.js" */
 /** @import { CoefficientColumn } from "./coefficient_table.js" */
+/** @import { ShownUnit } from "../core/format.js" */
 
 /** @type {["rms_dps" | "heldout_rms_dps" | "noise_floor_dps", string][]} */
 const ERRORS = [
@@ -64,17 +65,6 @@ export function coefficients(first, second) {
 }
 
 /**
- * Factor and unit to display values in: plain numbers as shares in %, in ppm below 1 %.
- * @param {readonly number[]} values
- * @param {string} unit
- * @returns {[factor: number, unit: string]}
- */
-function scaleOf(values, unit) {
-  if (unit !== "1") return [1, unitText(unit)];
-  return Math.max(...values.map(Math.abs)) < 0.01 ? [1e6, "ppm"] : [100, "%"];
-}
-
-/**
  * One plot per coefficient: its value over temperature with expanded uncertainty, one colour per axis.
  * @param {Version} first
  * @param {Version | null} second
@@ -107,9 +97,10 @@ function overTemperature(first, second) {
 function columnsFigure(name, columns, front) {
   const { unit } = columns[0];
   const several = columns.some(({ version }) => version !== front);
-  const [factor, shown] = scaleOf(
-    columns.flatMap(({ value }) => value),
+  const [factor, shown] = shownUnit(
     unit,
+    columns.flatMap(({ value }) => value),
+    name,
   );
   /** @param {VersionColumn} column */
   const line = ({ axis, version, temperature_c, value, u }) => {
@@ -154,9 +145,10 @@ function columnsFigure(name, columns, front) {
 /**
  * A coefficient with its expanded uncertainty: texts of the same place, and the unit.
  * @param {Coefficient} coefficient
+ * @param {ShownUnit} shown that of all coefficients of this kind
  */
-function shownResult({ value, u, unit }) {
-  const { middle, half, power, suffix } = resultTexts(value, u === null ? null : K * u, unit);
+function shownResult({ value, u, unit }, shown) {
+  const { middle, half, power, suffix } = resultTexts(value, u === null ? null : K * u, unit, shown);
   return {
     value: power ? `${middle} ${power}` : middle,
     u: half === null ? "–" : power ? `${half} ${power}` : half,
@@ -173,23 +165,30 @@ function list(first, second) {
     Object.entries(own).flatMap(([name, found]) => {
       const other = second?.axes[axis]?.coefficients[name];
       if (!isSingle(found)) return [];
-      return [{ axis, name, ...found, shown: shownResult(found), beside: isSingle(other) ? other : null }];
+      return [{ axis, name, ...found, beside: isSingle(other) ? other : null }];
     }),
   );
+  /** @param {typeof rows[number]} row */
+  const texts = (row) => shownResult(row, shownOf(rows, row));
   return table(
     [
       { title: "Axis", cell: (row) => row.axis },
       { title: "Coefficient", cell: (row) => h("code", {}, row.name) },
-      { title: "Value", number: true, cell: (row) => row.shown.value },
-      { title: "Expanded uncertainty, k = 2", number: true, cell: (row) => row.shown.u },
-      { title: "Unit", cell: (row) => row.shown.unit },
+      { title: "Value", number: true, cell: (row) => texts(row).value },
+      { title: "Expanded uncertainty, k = 2", number: true, cell: (row) => texts(row).u },
+      { title: "Unit", cell: (row) => texts(row).unit },
       second
         ? {
             title: `Version ${second.version}`,
             number: true,
             cell: (row) =>
               row.beside
-                ? withUncertainty(row.beside.value, row.beside.u === null ? null : K * row.beside.u, row.beside.unit)
+                ? withUncertainty(
+                    row.beside.value,
+                    row.beside.u === null ? null : K * row.beside.u,
+                    row.beside.unit,
+                    shownOf(rows, row),
+                  )
                 : "–",
           }
         : null,

@@ -54,6 +54,6 @@ export function inForce(unit, rows, force) {
     left !== null && left < 0
       ? notice("bad", "The date until which this calibration is valid has passed; calibrate the unit again.")
       : null,
-    exportFiles(unit, null),
+    h("div", { class: "screen-only" }, exportFiles(unit, null)),
   );
 }

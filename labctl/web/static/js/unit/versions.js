@@ -97,6 +97,7 @@ const columnsOf = (unit, issued, explore) => [
   { title: "RMS at temperatures left out, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
   {
     title: "Action",
+    acts: true,
     cell: (row) =>
       h(
         "div",

@@ -39,7 +39,7 @@ async function request(path, options) {
   if (response.ok) return response;
   const document = await response.json().catch(() => ({ title: response.statusText, status: response.status }));
   if (response.status === 401) window.dispatchEvent(new CustomEvent("labctl:key", { detail: document.detail }));
-  throw new Problem({ status: response.status, ...document });
+  throw new Problem({ status: response.status, ...document }, Number(response.headers.get("Retry-After")) || 0);
 }
 
 /**

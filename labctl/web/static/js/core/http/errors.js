@@ -4,9 +4,13 @@
 
 /** A problem document of the service (RFC 9457): `status`, `type`, `title`, and `detail` as the message. */
 export class Problem extends Error {
-  /** @param {ProblemDocument} document */
-  constructor(document) {
+  /**
+   * @param {ProblemDocument} document
+   * @param {number} [retry_after_s] when to ask again, where the service says so
+   */
+  constructor(document, retry_after_s = 0) {
     super(document.detail || document.title || "the service gave no reason");
+    this.retry_after_s = retry_after_s;
     this.status = document.status;
     this.type = document.type;
     this.title = document.title;

@@ -1,0 +1,25 @@
+// Texts as a page writes them: the service and the commands write signs of mathematics in ASCII.
+
+import { MINUS } from "./rounding.js";
+
+/** @type {Record<string, string>} */
+const SUPERSCRIPTS = { "-": "⁻", ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])) };
+/** @param {string | number} text */
+export const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? "").join("");
+
+/** A number as programs write it: 5e-05. A part of a name or of a hash is none. */
+const POWER = /(?<![\w.-])(-?\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?![\w.]*\w)/g;
+/** A plus or minus before a number, and the sign of a negative number; not the hyphen of a word, a range or a date. */
+const [PLUS_MINUS, NEGATIVE] = [/\+-(?=\s*\d)/g, /(?<![\w-])-(?=\d)/g];
+
+/**
+ * A text with the minus sign, ± and powers of ten: "+-90 deg/s, -5e-05" is "±90 deg/s, −5 × 10⁻⁵".
+ * @param {string} text
+ */
+export function typeset(text) {
+  if (!text.includes("-") && !text.includes("e+")) return text;
+  return text
+    .replace(POWER, (_, factor, sign, power) => `${factor} × 10${superscript(sign + power)}`)
+    .replace(PLUS_MINUS, "±")
+    .replace(NEGATIVE, MINUS);
+}

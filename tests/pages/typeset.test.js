@@ -1,0 +1,42 @@
+// Texts as a page writes them: signs of mathematics, not ASCII; names, dates and ranges as they are.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { superscript, typeset } from "../../labctl/web/static/js/core/typeset.js";
+
+test("numbers have the minus sign, plus or minus is one sign, and powers are of ten", () => {
+  /** @type {[text: string, shown: string][]} */
+  const cases = [
+    ["-40 to 85 deg C", "−40 to 85 deg C"],
+    ["rates from -100 to 100", "rates from −100 to 100"],
+    ["[-0.5, 0.5] and (-3)", "[−0.5, 0.5] and (−3)"],
+    ["one axis, +-90 deg/s every 15", "one axis, ±90 deg/s every 15"],
+    ["1.2 +- 0.3 deg/s", "1.2 ± 0.3 deg/s"],
+    ["noise 5e-05 deg/s", "noise 5 × 10⁻⁵ deg/s"],
+    ["bias -1.25e-06.", "bias −1.25 × 10⁻⁶."],
+    ["2e+06 readings", "2 × 10⁶ readings"],
+  ];
+  for (const [text, shown] of cases) assert.equal(typeset(text), shown);
+});
+
+test("names, dates, ranges, files and hashes stay as they are", () => {
+  for (const text of [
+    "FOG-0001",
+    "ojeda2000-121",
+    "2026-11-29 03:15",
+    "data sets 3-12",
+    "closed-loop",
+    "7c9e-4a5b-129e-4111",
+    "log_1e-3.csv",
+    "run-2e-05.csv",
+    "--add",
+    "page",
+  ])
+    assert.equal(typeset(text), text);
+});
+
+test("a power is raised, its plus sign left out", () => {
+  assert.equal(superscript("-12"), "⁻¹²");
+  assert.equal(superscript("+3"), "³");
+  assert.equal(superscript(6), "⁶");
+});
