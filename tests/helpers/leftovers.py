@@ -14,6 +14,7 @@ END_S = 10.0
 #: Threads of pools that a library keeps for the next call, by the beginning of their name.
 POOLS = (
     "AnyIO worker thread",  # of a service that several tests share: ends with its event loop
+    "asyncio_",  # of the same loop, for those who look for events: `asyncio.run` waits for it
     "lookup",  # of such a service too: ends when the service is closed
 )
 
