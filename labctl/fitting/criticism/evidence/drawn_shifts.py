@@ -46,7 +46,7 @@ class DrawnShifts:
         best = float(known.max(initial=0.0))
         seen = known > max(UNSEEN * best, 0.0)
         variances = np.geomspace(1.0, max(g, 1.0), SIZES) / best if np.any(seen) else np.zeros(1)
-        return DrawnShifts(factor @ vectors, np.where(seen, known, 0.0), variances)
+        return DrawnShifts(np.asarray(factor @ vectors, dtype=np.float64), np.where(seen, known, 0.0), variances)
 
     def log_bf(self, products: NDArray[np.float64]) -> Array:
         """Return the log Bayes factor (...) against the base for products (..., w) of the columns with the data."""

@@ -174,6 +174,8 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
 
   const rows = () => csv?.() ?? traceRows(plot.data ?? [], plot.layout);
   let waiting = false;
+  /** @type {number | null} */
+  let paper_px = null; // an update that ends while the page is printed keeps the width of the paper
   async function update() {
     if (waiting) return;
     waiting = true;
@@ -181,19 +183,18 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
     await new Promise(requestAnimationFrame);
     waiting = false;
     const picture = draw();
-    await drawWith(await loadPlotly(picture.data), picture, null);
+    await drawWith(await loadPlotly(picture.data), picture);
     performance.mark("labctl:picture");
   }
 
   /**
    * @param {Plotly} Plotly
    * @param {Picture} picture
-   * @param {number | null} width px; null: as wide as the page lets it be
    */
-  async function drawWith(Plotly, { data, layout = {} }, width) {
+  async function drawWith(Plotly, { data, layout = {} }) {
     setDrawnBy(plot, Plotly);
     const first = !plot.data;
-    const sized = width === null ? { autosize: true } : { autosize: false, width };
+    const sized = paper_px === null ? { autosize: true } : { autosize: false, width: paper_px };
     await Plotly.react(plot, data, { ...themedLayout(layout), ...sized }, config(data));
     if (first) {
       drawnFigures.add(element);
@@ -203,12 +204,13 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
 
   /**
    * Draw at once where Plotly is loaded: a page that is about to be printed does not wait.
-   * @param {number | null} width
+   * @param {number | null} width px; null: as wide as the page lets it be
    */
   function drawAt(width) {
+    paper_px = width;
     const picture = draw();
     const Plotly = loadedFor(picture.data);
-    if (Plotly) drawWith(Plotly, picture, width);
+    if (Plotly) drawWith(Plotly, picture);
   }
 
   /**

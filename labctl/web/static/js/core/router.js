@@ -1,7 +1,8 @@
 // Client-side router: the address determines what the page shows.
 
-import { isAbort } from "./http/errors.js";
-import { whenItMayPass } from "./http/recovery.js";
+import { setTrouble } from "./freshness/line.js";
+import { isAbort, Problem } from "./http/errors.js";
+import { waitOf, whenItMayPass } from "./http/recovery.js";
 import { framed } from "./page_frame.js";
 import { changedQuery, matchRoute, routeOf } from "./routes.js";
 import { setPageName } from "./tab_mark.js";
@@ -117,6 +118,7 @@ async function showError(main, error, signal) {
   const hadFocus = main !== document.activeElement && main.contains(document.activeElement);
   main.replaceChildren(errorPage(error, () => show()));
   if (hadFocus) main.querySelector("button")?.focus({ preventScroll: true });
+  if (error instanceof Problem && waitOf(error) !== null) setTrouble(error.message);
   whenItMayPass(error, signal, () => show({ quiet: true }));
 }
 
