@@ -154,11 +154,12 @@ def test_a_plan_says_what_further_mountings_are_worth(tmp_path: Path, chromium: 
         plan = describe_plan("quick-triaxial", "triaxial-sim", clip=False)
         assert plan.misalignment is not None
         expect(rows).to_have_count(1 + len(plan.misalignment.further))
+        expect(rows.first.get_by_role("columnheader").nth(1)).to_have_text("U, mrad")
         for row, more in enumerate(plan.misalignment.further, start=1):
             expect(rows.nth(row)).to_contain_text(more.turned)
             expect(rows.nth(row)).to_contain_text(more.recipe_toml)
             said = number_of(rows.nth(row).get_by_role("cell").nth(1).inner_text())
-            assert said == pytest.approx(more.expanded, rel=0.05)
+            assert said / 1e3 == pytest.approx(more.expanded, rel=0.05)
         page.close()
     finally:
         serving.stop()

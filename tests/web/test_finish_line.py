@@ -83,7 +83,7 @@ def test_explore_says_what_its_buttons_do_and_what_an_experiment_can_decide(
 
     learn = page.get_by_role("region", name="Which effects are missing")
     expect(learn).to_contain_text(
-        f"one cause is then named alone with a probability of {probability_text(best['power'])}"
+        f"the probability that one cause is then named alone is {probability_text(best['power'])}"
     )
     sine = learn.get_by_role("listitem").filter(has_text="sine response")
     sine.get_by_role("button", name="What if").click()
