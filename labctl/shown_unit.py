@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
+import re
 from typing import NamedTuple
 
-#: A share of this size or more is written in %, less in ppm.
-MIN_PERCENT = 0.01
+#: Plain numbers that are small angles: how their names begin.
+ANGLES = ("misalignment", "non_orthogonality")
+#: Plain numbers that are parts of a whole other than the rate: of a band, a step, a law, or of the steps of a table.
+PARTS = (
+    "dead_band", "missed_steps", "quantization", "saturation", "sine_response", "start_from_rate", "start_of_rate",
+    "start_transient",
+)  # fmt: skip
+#: Plain numbers near 1, or elements of a matrix with ones on its diagonal: they stay as they are.
+RATIOS = ("soft iron",)
 
 
 class ShownUnit(NamedTuple):
@@ -17,16 +23,34 @@ class ShownUnit(NamedTuple):
     unit: str
 
 
-def shown_unit(unit: str, values: Iterable[float | None], name: str = "") -> ShownUnit:
-    """Return the unit in which all quantities of one kind are shown, so that a column of them compares.
+def _begins_with(stems: tuple[str, ...]) -> re.Pattern[str]:
+    """Return what a name matches that begins with one of `stems`, behind an axis or not: x.misalignment_y."""
+    return re.compile(rf"(?:[xyz][. ])?(?:{'|'.join(stems)})(?![a-z])")
 
-    Plain numbers (`unit` "1") are angles in mrad for a misalignment; other shares are in %, or in ppm where none of
-    `values` reaches 1 %. `shownUnit` in `core/format.js` of the pages does the same; `tests/pages/shown_units.json`
+
+_KINDS = (
+    (_begins_with(ANGLES), ShownUnit(1e3, "mrad")),
+    (_begins_with(PARTS), ShownUnit(1e2, "%")),
+    (_begins_with(RATIOS), ShownUnit(1.0, "1")),
+)
+
+
+def shown_unit(unit: str, name: str) -> ShownUnit:
+    """Return the unit in which a quantity is shown, whatever its value: the same on every page and in every print.
+
+    `name` is that of the coefficient or effect. Of plain numbers (`unit` "1") angles (`ANGLES`) are in mrad, parts of
+    a whole (`PARTS`) in %, `RATIOS` as they are, and all others, which are relative to the rate, in ppm. An angle in
+    rad is in mrad. `shownUnit` in `core/shown_unit.js` of the pages does the same; `tests/pages/shown_units.json`
     holds both.
     """
+    if unit == "rad":
+        return ShownUnit(1e3, "mrad")
     if unit != "1":
         return ShownUnit(1.0, unit)
-    if name.startswith("misalignment"):
-        return ShownUnit(1e3, "mrad")
-    sizes = [abs(value) for value in values if value is not None and math.isfinite(value)]
-    return ShownUnit(1e2, "%") if max(sizes, default=0.0) >= MIN_PERCENT else ShownUnit(1e6, "ppm")
+    return next((shown for pattern, shown in _KINDS if pattern.match(name)), ShownUnit(1e6, "ppm"))
+
+
+def size_text(value: float, unit: str, name: str, digits: int = 2) -> str:
+    """Write a quantity with `digits` significant digits in the unit in which it is shown: 0.31 mrad."""
+    factor, shown = shown_unit(unit, name)
+    return f"{factor * value:.{digits}g} {shown}"

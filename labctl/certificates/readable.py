@@ -258,9 +258,8 @@ def _any_axis_text(certificate: Certificate) -> str:
     )
 
 
-def _coefficient(coefficient: CoefficientResult, others: Sequence[CoefficientResult]) -> list[str]:
-    alike = [each.value for each in others if each.name == coefficient.name]
-    factor, unit = shown_unit(coefficient.unit, alike, coefficient.name)
+def _coefficient(coefficient: CoefficientResult) -> list[str]:
+    factor, unit = shown_unit(coefficient.unit, coefficient.name)
     value, u = rounded(factor * coefficient.value, factor * (coefficient.u or 0.0))
     temperature_text = "" if coefficient.temperature_c is None else _number(coefficient.temperature_c)
     of_fit = "" if coefficient.has_standards or u == "–" else FIT_ALONE

@@ -1,20 +1,39 @@
-"""The units in which quantities are shown: one for all quantities of a kind, the same on pages and in commands."""
+"""The units in which quantities are shown: each quantity has one, the same on pages, in commands and on certificates."""
 
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
-from labctl.shown_unit import shown_unit
+from labctl.fitting.effects import CATALOGUE
+from labctl.shown_unit import shown_unit, size_text
 
 #: The pages' `shownUnit` is tested with the same cases.
 CASES = json.loads(Path("tests/pages/shown_units.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize(("unit", "values", "name", "factor", "shown"), CASES)
-def test_a_kind_of_quantities_is_shown_in_one_unit(
-    unit: str, values: list[float | None], name: str, factor: float, shown: str
-) -> None:
-    assert shown_unit(unit, values, name) == (factor, shown)
+@pytest.mark.parametrize(("unit", "name", "factor", "shown"), CASES)
+def test_a_quantity_is_shown_in_one_unit(unit: str, name: str, factor: float, shown: str) -> None:
+    assert shown_unit(unit, name) == (factor, shown)
+
+
+def test_the_cases_contain_every_plain_number_of_the_catalogue() -> None:
+    names = {name for unit, name, _, _ in CASES if unit == "1"}
+    symbols = [
+        (effect, symbol)
+        for effect, each in CATALOGUE.items()
+        if each.equation is not None
+        for symbol in each.equation.coefficients
+        if symbol.unit == "1"
+    ]
+    for effect, symbol in symbols:
+        pattern = re.sub(r"\\\{\w+\\\}", r"\\w+", re.escape(symbol.name))
+        assert any(re.fullmatch(pattern, name) for name in names), (effect, symbol.name)
+    assert len(symbols) >= 10
+
+
+def test_an_angle_is_the_same_number_as_a_coefficient_and_as_a_change_between_mountings() -> None:
+    assert size_text(0.00031, "1", "misalignment_y") == size_text(0.00031, "rad", "alignment") == "0.31 mrad"

@@ -6,6 +6,7 @@ import { test } from "node:test";
 
 import * as format from "../../labctl/web/static/js/core/format.js";
 import { roundedToUncertainty } from "../../labctl/web/static/js/core/rounding.js";
+import { shownUnit, unitText } from "../../labctl/web/static/js/core/shown_unit.js";
 import { timeUnit } from "../../labctl/web/static/js/core/time_unit.js";
 
 /** @type {(act: (...given: any[]) => unknown, cases: [given: unknown[], text: string][]) => void} */
@@ -66,27 +67,28 @@ test("a duration is in the two units that matter", () => {
 
 test("a size without a unit is a share", () => {
   holds(format.sizeText, [
-    [[0.000014, "1"], "14 ppm"],
-    [[0.027, "1"], "2.7 %"],
-    [[0.5, "(deg/s)^-1"], "0.50 (deg/s)⁻¹"],
-    [[0, "deg/s"], "0 deg/s"],
-    [[NaN, "1"], "–"],
+    [[0.000014, "1", "scale_factor"], "14 ppm"],
+    [[0.027, "1", "scale_factor"], "27000 ppm"],
+    [[0.027, "1", "dead_band"], "2.7 %"],
+    [[0.5, "(deg/s)^-1", "scale_factor_r2"], "0.50 (deg/s)⁻¹"],
+    [[0, "deg/s", "bias"], "0 deg/s"],
+    [[NaN, "1", "scale_factor"], "–"],
   ]);
 });
 
-/** @type {[unit: string, values: (number | null)[], name: string, factor: number, shown: string][]} */
+/** @type {[unit: string, name: string, factor: number, shown: string][]} */
 const units = JSON.parse(readFileSync("tests/pages/shown_units.json", "utf8"));
 
-test("all quantities of a kind are shown in one unit", () => {
-  for (const [unit, values, name, factor, shown] of units)
-    assert.deepEqual(format.shownUnit(unit, values, name), [factor, shown]);
+test("a quantity is shown in one unit, whatever its size", () => {
+  for (const [unit, name, factor, shown] of units)
+    assert.deepEqual(shownUnit(unit, name), [factor, unitText(shown)], name);
   const rows = [
-    { name: "scale_factor", value: 0.02, unit: "1" },
-    { name: "scale_factor", value: 0.0003, unit: "1" },
-    { name: "misalignment_y", value: 0.02, unit: "1" },
+    { name: "scale_factor", value: 0.02 },
+    { name: "scale_factor", value: 0.0003 },
+    { name: "misalignment_y", value: 0.02 },
   ];
-  const texts = rows.map((row) => format.withUncertainty(row.value, 2e-5, "1", format.shownOf(rows, row)));
-  assert.deepEqual(texts, ["2.0000 ± 0.0020 %", "0.0300 ± 0.0020 %", "20.000 ± 0.020 mrad"]);
+  const texts = rows.map(({ value, name }) => format.withUncertainty(value, 2e-5, "1", name));
+  assert.deepEqual(texts, ["20000 ± 20 ppm", "300 ± 20 ppm", "20.000 ± 0.020 mrad"]);
 });
 
 test("a result and its uncertainty end at the same place", () => {
@@ -117,8 +119,8 @@ test("every way to write a negative number has the minus sign", () => {
     format.percent(-0.5),
     format.fixed(-12.3, 1),
     format.mean(-12.3, 0.1),
-    format.sizeText(-12.3, "deg/s"),
-    format.sizeText(-0.000014, "1"),
+    format.sizeText(-12.3, "deg/s", "bias"),
+    format.sizeText(-0.000014, "1", "scale_factor"),
     format.withUncertainty(-12.3, 0.1, "deg/s"),
   ];
   for (const text of written) assert.match(text, /^−\d[^-]*$/);
@@ -141,8 +143,8 @@ test("only nothing is 0 %, and only all is 100 %", () => {
 
 test("ids and units are words", () => {
   assert.equal(format.idText("scale_factor_asymmetry"), "scale factor asymmetry");
-  assert.equal(format.unitText("deg/s^2"), "deg/s²");
-  assert.equal(format.unitText("1"), "");
+  assert.equal(unitText("deg/s^2"), "deg/s²");
+  assert.equal(unitText("1"), "");
 });
 
 test("a time axis is in hours, minutes or seconds", () => {

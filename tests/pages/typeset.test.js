@@ -2,6 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { withNames } from "../../labctl/web/static/js/core/names.js";
 import { superscript, typeset } from "../../labctl/web/static/js/core/typeset.js";
 
 test("numbers have the minus sign, plus or minus is one sign, and powers are of ten", () => {
@@ -39,4 +40,13 @@ test("a power is raised, its plus sign left out", () => {
   assert.equal(superscript("-12"), "⁻¹²");
   assert.equal(superscript("+3"), "³");
   assert.equal(superscript(6), "⁶");
+});
+
+test("names that people have given stay as they are, wherever they stand in a text", () => {
+  assert.equal(typeset("A -7: bias -7 deg/s"), "A −7: bias −7 deg/s");
+  withNames([{ serial: "A -7", recipe: { name: "soak +-40" }, files: [{ name: "run -3 1e-3.csv" }], note: "at -5" }]);
+  assert.equal(typeset("A -7: bias -7 deg/s"), "A -7: bias −7 deg/s");
+  assert.equal(typeset("soak +-40 goes to +-40 deg C"), "soak +-40 goes to ±40 deg C");
+  assert.equal(typeset("run -3 1e-3.csv (-3 deg C)"), "run -3 1e-3.csv (−3 deg C)");
+  assert.equal(typeset("at -5"), "at −5"); // no name
 });

@@ -88,8 +88,9 @@ def print_poses(poses: PosesJson) -> None:
     rows = table("accelerometer", "axis", "coefficient", "unit", "value", "u", numbers=2)
     for axis, coefficients in poses["accelerometer"]["axes"].items():
         for name, entry in coefficients.items():
-            shown = rounded_to_uncertainty(entry["value"], entry["u"])
-            rows.add_row(axis, name, entry["unit"], shown.value + shown.power, (shown.u or "-") + shown.power)
+            factor, unit_symbol = shown_unit(entry["unit"], name)
+            shown = rounded_to_uncertainty(factor * entry["value"], factor * entry["u"])
+            rows.add_row(axis, name, unit_symbol, shown.value + shown.power, (shown.u or "-") + shown.power)
     console.print(rows)
     if (alignment := poses.get("alignment")) is not None:
         console.print(alignment_text(alignment), soft_wrap=True)
@@ -185,7 +186,7 @@ def print_table(coefficients: Coefficients, answer: FitResponse) -> None:
 def _unit_of(name: str, answer: FitResponse) -> ShownUnit:
     """Return the unit in which a coefficient is printed on all axes."""
     entries = [_at_nodes(axis["coefficients"][name]) for axis in answer.axes.values() if name in axis["coefficients"]]
-    return shown_unit(entries[0][2], [value for values, _, _ in entries for value in values], name)
+    return shown_unit(entries[0][2], name)
 
 
 def _cell(entry: Entry, index: int, factor: float) -> str:

@@ -51,7 +51,9 @@ def print_plan(answer: PlanResponse) -> None:
     rows = table("\neffects that this plan could detect", "effect", "visible share", "from size", "unit", numbers=3)
     for line in answer.visibility:
         if line.visible:
-            rows.add_row(line.effect, format_number(line.share, 2), format_number(line.smallest_size, 2), line.unit)
+            factor, unit_symbol = shown_unit(line.unit, line.effect)
+            smallest = None if line.smallest_size is None else factor * line.smallest_size
+            rows.add_row(line.effect, format_number(line.share, 2), format_number(smallest, 2), unit_symbol)
     console.print(rows)
     hidden = table("\nand what not", "effect", "because of", "experiment that would detect it")
     for line in answer.visibility:
@@ -202,7 +204,7 @@ def print_start(answer: ScheduledResponse) -> None:
 
 def _print_mountings(angles: MisalignmentOutlook) -> None:
     """Print how well a misalignment can be known, and what further mountings are worth."""
-    factor, unit = shown_unit("1", [angles.expanded], "misalignment")
+    factor, unit = shown_unit("1", "misalignment")
     at_best = f"{factor * angles.expanded:.2g} {unit}"
     console.print(f"  misalignment: U {at_best} at best, by fixture and table", soft_wrap=True)
     for more in angles.further:

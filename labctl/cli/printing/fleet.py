@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Self
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from labctl.cli.output import console, format_number, stderr, table
+from labctl.shown_unit import shown_unit
 from labctl.texts import counted
 
 if TYPE_CHECKING:
@@ -128,9 +129,14 @@ def print_report(answer: FleetReportResponse) -> None:
     if answer.coefficients:
         rows = table("", "coefficient", "unit", "mean", "U", "spread", "u of a unit", numbers=4)
         for each in answer.coefficients:
+            factor, unit_symbol = shown_unit(each.unit, each.name)
+            mean, u_mean, spread, of_one = (
+                None if figure is None else factor * figure
+                for figure in (each.mean, each.expanded_u_mean, each.spread, each.median_u)
+            )
             rows.add_row(
-                each.name, each.unit, format_number(each.mean), format_number(each.expanded_u_mean, 2),
-                format_number(each.spread, 3), format_number(each.median_u, 2),
+                each.name, unit_symbol, format_number(mean), format_number(u_mean, 2), format_number(spread, 3),
+                format_number(of_one, 2),
             )  # fmt: skip
         console.print(rows)
     for outlier in answer.outliers[:MAX_OUTLIERS]:

@@ -8,6 +8,7 @@ from rich.control import Control
 from rich.segment import ControlType
 
 from labctl.cli.output import console, stderr
+from labctl.shown_unit import size_text
 
 if TYPE_CHECKING:
     from labctl.answers.live import LiveResponse
@@ -69,7 +70,8 @@ def _progress(state: LiveState) -> str:
     worst = state.worst
     if worst is not None:
         parts.append(
-            f"largest U: {worst.name} of {worst.axis}, {_with_unit(worst.expanded, worst.unit)} (limit {worst.limit:g})"
+            f"largest U: {worst.name} of {worst.axis}, {size_text(worst.expanded, worst.unit, worst.name)} (limit "
+            f"{size_text(worst.limit, worst.unit, worst.name)})"
         )
     elif not state.covered and state.t_s > BEGINNING_S:
         parts.append(state.missing[-1])
@@ -78,10 +80,6 @@ def _progress(state: LiveState) -> str:
     if state.damaged or state.lost:
         parts.append(f"{state.damaged} lines or frames damaged, {state.lost} readings lost")
     return "; ".join(parts)
-
-
-def _with_unit(value: float, unit_symbol: str) -> str:
-    return f"{value:.2g}" if unit_symbol == "1" else f"{value:.2g} {unit_symbol}"
 
 
 def print_live(answer: LiveResponse) -> None:
@@ -96,10 +94,11 @@ def print_live(answer: LiveResponse) -> None:
         print_fit(answer.fit)
         return
     for coefficient in answer.coefficients:
-        limit = "" if coefficient.limit is None else f", limit {coefficient.limit:g}"
+        unit_symbol, name = coefficient.unit, coefficient.name
+        limit = "" if coefficient.limit is None else f", limit {size_text(coefficient.limit, unit_symbol, name)}"
         console.print(
-            f"{coefficient.axis} {coefficient.name}: {_with_unit(coefficient.value, coefficient.unit)}, U = "
-            f"{coefficient.expanded:.2g} (k = 2{limit})"
+            f"{coefficient.axis} {name}: {size_text(coefficient.value, unit_symbol, name)}, U = "
+            f"{size_text(coefficient.expanded, unit_symbol, name)} (k = 2{limit})"
         )
     console.print(f"not complete: {answer.text}" if not answer.complete else f"no version: {answer.refused}")
     for text in answer.missing:

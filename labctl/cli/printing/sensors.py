@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from labctl.cli.output import console, format_number, table
+from labctl.shown_unit import shown_unit
 
 if TYPE_CHECKING:
     from labctl.answers.accelerometer import AccelerometerResponse
@@ -21,8 +22,9 @@ def print_sensor(answer: AccelerometerResponse | MagnetometerResponse) -> None:
     name = "accelerometer" if isinstance(answer, AccelerometerResponse) else "magnetometer"
     rows = table(name, "coefficient", "unit", "value", "u", "U, 95.45 %", numbers=2)
     for each in coefficients_of(answer):
-        numbers = format_number(each.value, 5), format_number(each.u, 2), format_number(each.expanded, 2)
-        rows.add_row(each.name, each.unit, *numbers)
+        factor, unit_symbol = shown_unit(each.unit, each.name)
+        shown = [factor * each.value, factor * each.u, factor * each.expanded]
+        rows.add_row(each.name, unit_symbol, *map(format_number, shown, (5, 2, 2)))
     console.print(rows)
     _print_verdict(answer)
     _print_extent(answer)

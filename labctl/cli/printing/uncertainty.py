@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from labctl.cli.output import console, format_number, stderr, table
+from labctl.shown_unit import shown_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -114,8 +115,13 @@ def _print_coefficients(answer: UncertaintyResponse) -> None:
             parts = [line["contribution"] for line in one["lines"] if line["source"] not in EVALUATED]
             known = [part for part in parts if part is not None]
             standards = sum(part**2 for part in known) ** 0.5 if known else None
+            factor, unit_symbol = shown_unit(one["unit"], name)
+            value, combined, expanded, of_standards = (
+                None if each is None else factor * each
+                for each in (one["value"], one["combined"], one["expanded"], standards)
+            )
             rows.add_row(
-                f"{axis} {name}", one["unit"], format_number(one["value"]), format_number(one["combined"], 2),
-                format_number(one["k"], 3), format_number(one["expanded"], 2), format_number(standards, 2),
+                f"{axis} {name}", unit_symbol, format_number(value), format_number(combined, 2),
+                format_number(one["k"], 3), format_number(expanded, 2), format_number(of_standards, 2),
             )  # fmt: skip
     console.print(rows)

@@ -23,6 +23,7 @@ from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.models.presets import Preset
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.least_squares import Solution
+from labctl.shown_unit import shown_unit
 
 #: The effects that a shift between recordings adds to, by kind of shift.
 SHIFTED = {kind.effect: kind for kind in KINDS.values()}
@@ -236,14 +237,15 @@ def _of_shifts(repeatability: Mapping[str, list[RepeatabilityJson]]) -> Iterator
         for line in lines:
             if not line["freedom"]:
                 continue
-            unit_symbol = "" if line["unit"] == "1" else f" {line['unit']}"
+            factor, unit_symbol = shown_unit(line["unit"], line["term"])
+            low, high = factor * line["low"], factor * line["high"]
             if not line["seen"]:
-                yield f"Axis {axis}: no {line['term']}, beyond the noise; at most {line['high']:.2g}{unit_symbol}."
+                yield f"Axis {axis}: no {line['term']}, beyond the noise; at most {high:.2g} {unit_symbol}."
                 continue
-            values = [shift["value"] for shift in line["shifts"]]
-            size = f"{line['value']:.2g}{unit_symbol} (95 %: {line['low']:.2g} to {line['high']:.2g})"
+            values = [factor * shift["value"] for shift in line["shifts"]]
+            size = f"{factor * line['value']:.2g} {unit_symbol} (95 %: {low:.2g} to {high:.2g})"
             yield (
-                f"Axis {axis}: shifts of up to {max(values) - min(values):.2g}{unit_symbol} between the recordings "
+                f"Axis {axis}: shifts of up to {max(values) - min(values):.2g} {unit_symbol} between the recordings "
                 f"({_probability(line['p_value'])}) are {line['term']}: standard deviation {size}. These shifts are "
                 "neither a drift nor part of the calibration."
             )

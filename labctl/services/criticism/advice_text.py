@@ -85,7 +85,7 @@ def _doubt(name: str, suspect: Suspect | None, criticism: Criticism, technology:
         return f"{name} would have a size that is not physical for {technology}"
     values = next(iter(next(iter(suspect.coefficients.values())).values()))
     usual = CATALOGUE[name].ranges.get(technology) if name in CATALOGUE else None
-    factor, unit = shown_unit(values["unit"], [values["value"]], name)
+    factor, unit = shown_unit(values["unit"], name)
     size = f"its size would be {factor * values['value']:.2g} {unit}"
     limit = f", where {factor * usual[0]:g} to {factor * usual[1]:g} is usual for {technology}" if usual else ""
     before = criticism.base.error.rms_dps if criticism.base is not None else None

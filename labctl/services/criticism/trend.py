@@ -26,6 +26,7 @@ from labctl.services.criticism.verification.of_version import (
     mounting_angles_of,
 )
 from labctl.services.criticism.versions import version_of
+from labctl.shown_unit import shown_unit
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 #: Recordings that begin less than this after the end of an earlier one are of one occasion.
@@ -287,12 +288,15 @@ def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
         yield f"{points} {word} in time: a drift needs two recordings, and its uncertainty three."
     for drift in drifts:
         text = f"Axis {drift.axis}, {drift.what}" if drift.axis != "all" else "RMS error over all axes"
+        factor, unit_symbol = shown_unit(drift.unit.removesuffix("/year"), drift.what)
+        per_year = f"{factor * drift.per_year:.2g} {unit_symbol}/year"
         if drift.u is None or drift.low is None or drift.high is None:
-            figure = f"{text}: {drift.per_year:.2g} {drift.unit}"
+            figure = f"{text}: {per_year}"
             yield f"{figure} from two recordings; its uncertainty needs {MIN_POINTS} recordings."
         else:
             is_drift = "drifts by" if drift.significant else "no drift beyond repeatability:"
-            yield f"{text}: {is_drift} {drift.per_year:.2g} {drift.unit} (95 %: {drift.low:.2g} to {drift.high:.2g})."
+            low, high = factor * drift.low, factor * drift.high
+            yield f"{text}: {is_drift} {per_year} (95 %: {low:.2g} to {high:.2g})."
 
 
 def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[str]:

@@ -22,6 +22,7 @@ from labctl.fitting.fleet.type_evidence import TypeEffect, judged
 from labctl.fitting.fleet.type_sums import TypeSums
 from labctl.fitting.fleet.unit_coefficients import UnitCoefficients
 from labctl.services.fleet.evidence import sums_in
+from labctl.shown_unit import shown_unit, size_text
 from labctl.store import Store
 from labctl.texts import counted
 
@@ -90,7 +91,9 @@ def population_in(units: Sequence[UnitCoefficients]) -> Compared:
 
 def _group(effect: GroupEffect) -> FleetGroup:
     named, per = ", ".join(effect.coefficients), " per year" if effect.factor == DATE else ""
-    by = f"{effect.shift:.3g} {effect.unit}{per} (u = {effect.u:.2g}, {effect.units} units, p = {effect.p_value:.1g})"
+    factor, unit_symbol = shown_unit(effect.unit, next(iter(effect.coefficients), ""))
+    shift, u = f"{factor * effect.shift:.3g} {unit_symbol}{per}", f"{factor * effect.u:.2g}"
+    by = f"{shift} (u = {u}, {effect.units} units, p = {effect.p_value:.1g})"
     if effect.factor == DATE:
         text = f"{named} changes with the date of the measurement by {by}."
     elif effect.is_of_bench:
@@ -157,7 +160,10 @@ def _missing(effect: TypeEffect) -> FleetMissing:
         FleetSize(axis=s.axis, name=s.name, unit=s.unit, mean=s.mean, u_mean=s.u_mean, spread=s.spread)
         for s in effect.sizes
     ]
-    size = "; ".join(f"{s.axis}.{s.name} {s.mean:.3g} {s.unit} (u = {s.u_mean:.2g})" for s in sizes[:3])
+    size = "; ".join(
+        f"{s.axis}.{s.name} {size_text(s.mean, s.unit, s.name, 3)} (u = {size_text(s.u_mean, s.unit, s.name)})"
+        for s in sizes[:3]
+    )
     who = "The type is missing" if effect.of_bench is None else f"Bench {effect.of_bench} adds to all its units"
     text = (
         f"{who} {' or '.join(effect.group)}: {size}; the Bayes factor of all units together is "

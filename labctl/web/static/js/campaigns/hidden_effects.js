@@ -1,7 +1,8 @@
 // Form for a simulated bench: choose an effect to hide in the simulated unit.
 
 import { setChildren, h } from "../core/elements.js";
-import { number, shownUnit, sizeText, unitText, idText } from "../core/format.js";
+import { number, sizeText, idText } from "../core/format.js";
+import { unitText } from "../core/shown_unit.js";
 import { labelledField, option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 
@@ -40,7 +41,7 @@ export function hiddenEffectForm(effects, asked, chosen) {
     });
     const hint =
       can?.visible && can.smallest_size
-        ? `This plan detects the effect if its size is at least ${number(can.smallest_size, 2)} ${unit || `(${sizeText(can.smallest_size, "1", shownUnit("1", [can.smallest_size], can.effect))})`} on.`
+        ? `This plan detects the effect if its size is at least ${number(can.smallest_size, 2)} ${unit || `(${sizeText(can.smallest_size, "1", can.effect)})`} on.`
         : can
           ? "This plan cannot detect the effect."
           : null;

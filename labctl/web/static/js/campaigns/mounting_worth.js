@@ -2,11 +2,12 @@
 
 import { table } from "../core/components.js";
 import { h } from "../core/elements.js";
-import { duration, number, shownUnit } from "../core/format.js";
+import { duration, number } from "../core/format.js";
+import { shownUnit } from "../core/shown_unit.js";
 
 /** @import { Plan } from "../../../types/api.js" */
 
-const [MRAD] = shownUnit("1", [], "misalignment");
+const [MRAD] = shownUnit("1", "misalignment");
 
 /**
  * Nothing where no unit turns across one of its outputs, or the bench states no angle.

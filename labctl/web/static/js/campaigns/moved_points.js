@@ -3,7 +3,7 @@
 import { post } from "../core/http/api.js";
 import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
-import { count, idText, number, plainNumber, shownUnit, sizeText } from "../core/format.js";
+import { count, idText, number, plainNumber, sizeText } from "../core/format.js";
 import { button, factList, loadInto, notice } from "../core/components.js";
 import { pointPlan } from "./point_plan.js";
 import { shownRange } from "./point_numbers.js";
@@ -138,7 +138,7 @@ function seenText({ visibility }) {
   const names = able.map(({ effect, smallest_size, unit }) =>
     smallest_size === null
       ? idText(effect)
-      : `${idText(effect)} from ${sizeText(smallest_size, unit, shownUnit(unit, [smallest_size], effect))}`,
+      : `${idText(effect)} from ${sizeText(smallest_size, unit, effect)}`,
   );
   return `This plan can detect ${able.length} of ${all.length} effects${names.length ? `: ${names.join(", ")}` : ""}.`;
 }

@@ -1,7 +1,7 @@
 // Visibility report: which effects a plan could detect and which not, before anything is measured.
 
 import { h } from "../core/elements.js";
-import { percent, shownUnit, sizeText, idText } from "../core/format.js";
+import { percent, sizeText, idText } from "../core/format.js";
 import { notice, table } from "../core/components.js";
 
 /** @import { Visibility } from "../../../types/api.js" */
@@ -14,7 +14,7 @@ const effectLink = (row) => h("a", { href: `/effects/${row.effect}` }, idText(ro
 
 /** @param {Visibility} row */
 const smallestSize = ({ effect, smallest_size, unit }) =>
-  sizeText(smallest_size, unit, shownUnit(unit, [smallest_size], effect));
+  sizeText(smallest_size, unit, effect);
 
 /** @param {readonly Visibility[]} rows */
 export function visibilityReport(rows) {

@@ -1,6 +1,7 @@
 // Format numbers, sizes, durations and times, each with its unit.
 
 import { MINUS, roundedToUncertainty, signed } from "./rounding.js";
+import { shownUnit } from "./shown_unit.js";
 import { superscript } from "./typeset.js";
 
 /** @typedef {number | null | undefined} Numeric */
@@ -136,55 +137,16 @@ export const idText = (id) => String(id).replaceAll("_", " ");
 export const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /**
- * A unit as text: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none.
- * @param {string | null | undefined} unit
- */
-export const unitText = (unit) =>
-  unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => superscript(power));
-
-/** A share of this size or more is written in %, less in ppm. */
-const MIN_PERCENT = 0.01;
-
-/** @typedef {readonly [factor: number, unit: string]} ShownUnit a shown number is the stored one times the factor */
-
-/**
- * The unit in which all quantities of one kind are shown, so that a column of them compares: of plain numbers, angles of a
- * misalignment are in mrad, other shares in %, or in ppm where none reaches 1 %. `labctl/shown_unit.py` is the same.
- * @param {string | null | undefined} unit
- * @param {readonly Numeric[]} values
- * @param {string} [name] of the coefficient or effect
- * @returns {ShownUnit}
- */
-export function shownUnit(unit, values, name = "") {
-  if (unit !== "1") return [1, unitText(unit)];
-  if (name.startsWith("misalignment")) return [1e3, "mrad"];
-  const largest = Math.max(0, ...values.filter(isNumber).map(Math.abs));
-  return largest >= MIN_PERCENT ? [100, "%"] : [1e6, "ppm"];
-}
-
-/**
- * The unit in which a row of a table is shown: the same for all rows of its name, on all axes, and of all misalignments.
- * @template {{ name: string, value: number, unit: string }} Row
- * @param {readonly Row[]} rows
- * @param {Row} row
- */
-export const shownOf = (rows, { name, unit }) =>
-  shownUnit(
-    unit,
-    rows.filter((each) => each.name === name).map((each) => each.value),
-    name,
-  );
-
-/**
  * A size with its unit: 14 ppm, 2.7 %, 0.31 mrad, 0.0042 deg/s.
  * @param {Numeric} value
  * @param {string | null | undefined} unit
- * @param {ShownUnit} [shown] that of its column
+ * @param {string} name of the coefficient or effect
  */
-export function sizeText(value, unit, [factor, own] = shownUnit(unit, [value])) {
+export function sizeText(value, unit, name) {
   if (!isNumber(value)) return "–";
-  const text = value === 0 ? "0" : unit === "1" ? plainNumber(factor * value, 2) : number(factor * value, 2);
-  return `${text} ${own}`;
+  const [factor, shown] = shownUnit(unit, name);
+  const text = value === 0 ? "0" : factor === 1 ? number(value, 2) : plainNumber(factor * value, 2);
+  return `${text} ${shown}`;
 }
 
 /**
@@ -192,9 +154,10 @@ export function sizeText(value, unit, [factor, own] = shownUnit(unit, [value])) 
  * @param {number} value
  * @param {number | null} expanded
  * @param {string} unit
- * @param {ShownUnit} [shown] that of its column
+ * @param {string} [name] of the coefficient or effect, where it is one
  */
-export function resultTexts(value, expanded, unit, [factor, own] = shownUnit(unit, [value])) {
+export function resultTexts(value, expanded, unit, name = "") {
+  const [factor, own] = shownUnit(unit, name);
   const {
     value: middle,
     u: half,
@@ -208,12 +171,12 @@ export function resultTexts(value, expanded, unit, [factor, own] = shownUnit(uni
  * @param {Numeric} value
  * @param {number | null} expanded
  * @param {string} unit
- * @param {ShownUnit} [shown] that of its column
+ * @param {string} [name] of the coefficient or effect, where it is one
  */
-export function withUncertainty(value, expanded, unit, shown) {
+export function withUncertainty(value, expanded, unit, name) {
   if (!isNumber(value)) return "–";
   const known = expanded !== null && expanded > 0 ? expanded : null;
-  const { middle, half, power, suffix } = resultTexts(value, known, unit, shown);
+  const { middle, half, power, suffix } = resultTexts(value, known, unit, name);
   const text = half === null ? middle : `${middle} ± ${half}`;
   return [power ? (half === null ? `${text} ${power}` : `(${text}) ${power}`) : text, suffix].filter(Boolean).join(" ");
 }

@@ -1,5 +1,6 @@
 // Texts as a page writes them: the service and the commands write signs of mathematics in ASCII.
 
+import { splitAtNames } from "./names.js";
 import { MINUS } from "./rounding.js";
 
 /** @type {Record<string, string>} */
@@ -13,11 +14,19 @@ const POWER = /(?<![\w.-])(-?\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?![\w.]*\w)/g;
 const [PLUS_MINUS, NEGATIVE] = [/\+-(?=\s*\d)/g, /(?<![\w-])-(?=\d)/g];
 
 /**
- * A text with the minus sign, ± and powers of ten: "+-90 deg/s, -5e-05" is "±90 deg/s, −5 × 10⁻⁵".
+ * A text with the minus sign, ± and powers of ten: "+-90 deg/s, -5e-05" is "±90 deg/s, −5 × 10⁻⁵". Names that people
+ * have given stay as they are.
  * @param {string} text
  */
 export function typeset(text) {
   if (!text.includes("-") && !text.includes("e+")) return text;
+  return splitAtNames(text)
+    .map((part, k) => (k % 2 ? part : withSigns(part)))
+    .join("");
+}
+
+/** @param {string} text */
+function withSigns(text) {
   return text
     .replace(POWER, (_, factor, sign, power) => `${factor} × 10${superscript(sign + power)}`)
     .replace(PLUS_MINUS, "±")

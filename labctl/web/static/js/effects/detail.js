@@ -1,7 +1,8 @@
 // The page of one effect.
 
 import { h } from "../core/elements.js";
-import { plainNumber, shownUnit, sizeText, unitText, idText } from "../core/format.js";
+import { plainNumber, sizeText, idText } from "../core/format.js";
+import { unitText } from "../core/shown_unit.js";
 import { card, chip, pageHeader, notice, table } from "../core/components.js";
 import { linkButton } from "../bench/actions.js";
 import { signatureFigure } from "./signature_plot.js";
@@ -158,13 +159,8 @@ function sizeCard(effect) {
       h("p", { class: "muted" }, "The catalogue lists no plausible sizes for this effect."),
     );
   const unit = effect.unit ?? "";
-  const shown = shownUnit(
-    unit,
-    rows.flatMap(([, range]) => range),
-    effect.id,
-  );
   /** @param {number} value */
-  const sizeCell = (value) => h("span", { class: "nowrap" }, sizeText(value, unit, shown));
+  const sizeCell = (value) => h("span", { class: "nowrap" }, sizeText(value, unit, effect.id));
   return card(
     "How large it is",
     table(

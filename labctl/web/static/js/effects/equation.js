@@ -1,7 +1,8 @@
 // The equation of an effect as the catalogue states it, each symbol explained, and where it is from.
 
 import { h } from "../core/elements.js";
-import { idText, unitText } from "../core/format.js";
+import { idText } from "../core/format.js";
+import { unitText } from "../core/shown_unit.js";
 import { table } from "../core/components.js";
 
 /** @import { Effect } from "../../../types/api.js" */

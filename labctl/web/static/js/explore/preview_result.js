@@ -2,7 +2,7 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { idText, shownUnit, sizeText } from "../core/format.js";
+import { idText, sizeText } from "../core/format.js";
 import { channelTitle, inDatasetOrder, scaled, setText, shownText } from "./dataset_rows.js";
 import { selectedRows } from "./residual_map.js";
 
@@ -106,7 +106,6 @@ export function plausibility(state, found, change, effects) {
         { class: "plain" },
         hint,
         ranges.map(({ id, from, to, inside }) => {
-          const shown = shownUnit(unitOf(id), [from, to], id);
           return h(
             "li",
             {},
@@ -117,7 +116,7 @@ export function plausibility(state, found, change, effects) {
             h(
               "span",
               { class: "muted" },
-              ` (usual: ${sizeText(from, unitOf(id), shown)} to ${sizeText(to, unitOf(id), shown)})`,
+              ` (usual: ${sizeText(from, unitOf(id), id)} to ${sizeText(to, unitOf(id), id)})`,
             ),
           );
         }),

@@ -1,7 +1,7 @@
 // The verdict in words, and the suspected effects with their evidence.
 
 import { scrollTo, setChildren, h } from "../core/elements.js";
-import { withUncertainty, number, oddsText, probabilityText, idText, shownUnit } from "../core/format.js";
+import { withUncertainty, number, oddsText, probabilityText, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { planAddress } from "../core/routes.js";
 import { equationDetails } from "../effects/equation.js";
@@ -242,7 +242,7 @@ function coefficientText(suspect, axis) {
         h("span", { class: "muted" }, idText(name)),
         " ",
         unbroken(
-          withUncertainty(value, u === null ? null : 2 * u, unit, shownUnit(unit, valuesOf(suspect, name), name)),
+          withUncertainty(value, u === null ? null : 2 * u, unit, name),
         ),
       ),
     )
@@ -256,13 +256,6 @@ function coefficientText(suspect, axis) {
       ),
     );
 }
-
-/**
- * The values of a coefficient on all axes: they are shown in one unit.
- * @param {Suspect} suspect
- * @param {string} name
- */
-const valuesOf = ({ coefficients }, name) => Object.values(coefficients).map((own) => own[name]?.value);
 
 /**
  * A value with no line break before its uncertainty, nor within its power of ten.

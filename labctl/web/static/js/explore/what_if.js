@@ -3,7 +3,7 @@
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { faded } from "../core/colour_scales.js";
-import { idText, isNumber, number, percent, shownUnit, withUncertainty } from "../core/format.js";
+import { idText, isNumber, number, percent, withUncertainty } from "../core/format.js";
 import { notice } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { planAddress } from "../core/routes.js";
@@ -138,7 +138,7 @@ function sizeWords(suspect, state, { share, isFitted }, left) {
   const sizes = coefficients.map(([name, { value, unit }]) =>
     coefficients.length > 1
       ? null
-      : `${idText(name)} ${withUncertainty(share * value, null, unit, shownUnit(unit, [value], name))}`,
+      : `${idText(name)} ${withUncertainty(share * value, null, unit, name)}`,
   );
   const size = [`${percent(share)} of the fitted size`, ...sizes].filter(Boolean).join(", ");
   const of = shownText(state.criticism) ?? `${left.length} data sets`;

@@ -4,7 +4,8 @@ import { cardWithHeader, table } from "../core/components.js";
 import { h, setChildren } from "../core/elements.js";
 import { labelledField, selectField } from "../core/fields.js";
 import { colour, figure } from "../core/figure.js";
-import { count, unitText, withUnit } from "../core/format.js";
+import { count, idText, withUnit } from "../core/format.js";
+import { shownUnit } from "../core/shown_unit.js";
 import { get } from "../core/http/api.js";
 import { brushed } from "./brushed.js";
 
@@ -84,6 +85,7 @@ function drawn(chart) {
  * @returns {Picture}
  */
 function pictureOf(chart) {
+  const [factor, unit] = shownUnit(chart.unit, chart.name);
   const levels = [...new Set(chart.points.map(({ level }) => level))];
   const colours = ["axis-x", "axis-y", "axis-z", "accent", "bad", "warn"].map(colour);
   return {
@@ -94,24 +96,24 @@ function pictureOf(chart) {
         mode: "markers",
         name: level || "not stated",
         x: own.map(({ at }) => at),
-        y: own.map(({ mean }) => mean),
+        y: own.map(({ mean }) => factor * mean),
         customdata: own.map(({ units }) => units),
         error_y: {
           type: "data",
           symmetric: false,
-          array: own.map(({ high, mean }) => high - mean),
-          arrayminus: own.map(({ low, mean }) => mean - low),
+          array: own.map(({ high, mean }) => factor * (high - mean)),
+          arrayminus: own.map(({ low, mean }) => factor * (mean - low)),
           thickness: 1,
           width: 0,
         },
         marker: { size: 8, color: colours[k % colours.length], symbol: SYMBOLS[k % SYMBOLS.length] },
-        hovertemplate: `%{x|%d %b %Y}: %{y:.4g} ${unitText(chart.unit)}<br>%{customdata} units<extra>${level || "not stated"}</extra>`,
+        hovertemplate: `%{x|%d %b %Y}: %{y:.4g} ${unit}<br>%{customdata} units<extra>${level || "not stated"}</extra>`,
       };
     }),
     layout: {
       dragmode: "select",
       xaxis: { type: "date" },
-      yaxis: { title: { text: [chart.name, unitText(chart.unit)].filter(Boolean).join(", ") } },
+      yaxis: { title: { text: [idText(chart.name), unit].filter(Boolean).join(", ") } },
       showlegend: levels.length > 1 && levels.length <= 12,
     },
   };
@@ -121,14 +123,16 @@ function pictureOf(chart) {
  * @param {FleetChart} chart
  * @param {ReturnType<typeof brushed>} groups
  */
-const groupTable = (chart, groups) =>
-  table(
+function groupTable(chart, groups) {
+  const [factor, unit] = shownUnit(chart.unit, chart.name);
+  return table(
     [
       { title: chart.factor, cell: ({ level }) => level || "not stated" },
       { title: "Units", number: true, cell: ({ units }) => count(units) },
-      { title: "Mean", number: true, cell: ({ mean }) => withUnit(mean, unitText(chart.unit), 4) },
-      { title: "Beside all others", number: true, cell: ({ off }) => withUnit(off, unitText(chart.unit), 2) },
+      { title: "Mean", number: true, cell: ({ mean }) => withUnit(factor * mean, unit, 4) },
+      { title: "Beside all others", number: true, cell: ({ off }) => withUnit(factor * off, unit, 2) },
     ],
     groups.slice(0, 50),
     { label: "Groups in the chosen time" },
   );
+}

@@ -2,7 +2,8 @@
 
 import { card, cardWithHeader, table, chip } from "../core/components.js";
 import { h } from "../core/elements.js";
-import { count, idText, number, withUnit } from "../core/format.js";
+import { count, idText, withUnit } from "../core/format.js";
+import { shownUnit } from "../core/shown_unit.js";
 import { bars } from "./bars.js";
 
 /** @import { FleetReport } from "../../../types/api.js" */
@@ -56,6 +57,17 @@ const saidCard = (report) =>
     report.text.map((sentence) => h("p", {}, sentence)),
   );
 
+/**
+ * @param {number | null} value
+ * @param {string} unit
+ * @param {string} name of the coefficient
+ * @param {number} digits
+ */
+function inUnit(value, unit, name, digits) {
+  const [factor, shown] = shownUnit(unit, name);
+  return withUnit(value === null ? null : factor * value, shown, digits);
+}
+
 /** @param {FleetReport} report */
 function coefficientCard(report) {
   if (!report.coefficients.length) return null;
@@ -65,10 +77,10 @@ function coefficientCard(report) {
     table(
       [
         { title: "Coefficient", cell: ({ name }) => name },
-        { title: "Mean", number: true, cell: ({ mean, unit }) => withUnit(mean, unit, 4) },
-        { title: "U of the mean", number: true, cell: ({ expanded_u_mean }) => number(expanded_u_mean, 2) },
-        { title: "Spread", number: true, cell: ({ spread }) => number(spread, 3) },
-        { title: "u of a unit", number: true, cell: ({ median_u }) => number(median_u, 2) },
+        { title: "Mean", number: true, cell: ({ name, mean, unit }) => inUnit(mean, unit, name, 4) },
+        { title: "U of the mean", number: true, cell: ({ name, expanded_u_mean, unit }) => inUnit(expanded_u_mean, unit, name, 2) },
+        { title: "Spread", number: true, cell: ({ name, spread, unit }) => inUnit(spread, unit, name, 3) },
+        { title: "u of a unit", number: true, cell: ({ name, median_u, unit }) => inUnit(median_u, unit, name, 2) },
       ],
       report.coefficients,
       { label: "Coefficients of the type" },

@@ -1,7 +1,7 @@
 // What several recordings say together: repeatability, agreement, each predicted by the others.
 
 import { h } from "../core/elements.js";
-import { idText, number, shownUnit, sizeText } from "../core/format.js";
+import { idText, number, sizeText } from "../core/format.js";
 import { cardWithHeader, chip, notice, table } from "../core/components.js";
 import { shiftFigures } from "./shifts.js";
 
@@ -32,22 +32,10 @@ function repeatability(joint) {
   const rows = Object.entries(joint.repeatability).flatMap(([axis, each]) => each.map((one) => ({ axis, ...one })));
   if (!rows.length) return null;
   /**
-   * One unit for all of a kind, on all axes.
    * @param {typeof rows[number]} row
    * @param {number | null} value
    */
-  const size = ({ term, unit }, value) => {
-    const alike = rows.filter((each) => each.term === term);
-    return sizeText(
-      value,
-      unit,
-      shownUnit(
-        unit,
-        alike.map((each) => each.value),
-        term,
-      ),
-    );
-  };
+  const size = ({ term, unit }, value) => sizeText(value, unit, term);
   return [
     h("h3", {}, "Repeatability"),
     table(

@@ -2,7 +2,7 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { shownUnit } from "../core/format.js";
+import { shownUnit } from "../core/shown_unit.js";
 
 /** @import { Joint } from "../../../types/api.js" */
 /** @import { PlotTrace } from "../../../types/pages.js" */
@@ -22,8 +22,7 @@ export function shiftFigures(joint) {
     { class: "columns", style: "--column-min: 20rem" },
     terms.map((term) => {
       const kinds = all.filter((one) => one.term === term);
-      const values = kinds.flatMap(({ shifts }) => shifts.map(({ value }) => value));
-      const [factor, unit] = shownUnit(kinds[0].unit, values, term);
+      const [factor, unit] = shownUnit(kinds[0].unit, term);
       /** @returns {{ data: PlotTrace[], layout: object }} */
       const draw = () => ({
         data: kinds.map(({ axis, shifts }) => ({

@@ -2,7 +2,8 @@
 
 import { get, post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { count, duration, number, plainNumber, unitText } from "../core/format.js";
+import { count, duration, number, plainNumber } from "../core/format.js";
+import { shownUnit } from "../core/shown_unit.js";
 import { axisColour, figure } from "../core/figure.js";
 import { actButton, card, chip, table } from "../core/components.js";
 import { poseDrawing } from "./pose_drawing.js";
@@ -13,6 +14,9 @@ import { offText, sharesOfLimits, stillText, unusedTexts } from "./texts.js";
 
 const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
 
+/** @param {{ unit: string, name: string }} row */
+const factorOf = ({ unit, name }) => shownUnit(unit, name)[0];
+
 /**
  * The coefficients with U and limit.
  * @param {readonly LiveMoment["coefficients"][number][]} coefficients
@@ -22,14 +26,14 @@ export const coefficientTable = (coefficients) =>
     [
       { title: "Axis", cell: (row) => row.axis },
       { title: "Coefficient", cell: (row) => h("code", {}, row.name) },
-      { title: "Value", number: true, cell: (row) => number(row.value) },
+      { title: "Value", number: true, cell: (row) => number(factorOf(row) * row.value) },
       {
         title: "U, k = 2",
         number: true,
-        cell: (row) => h("span", { "data-u": row.expanded }, number(row.expanded, 2)),
+        cell: (row) => h("span", { "data-u": row.expanded }, number(factorOf(row) * row.expanded, 2)),
       },
-      { title: "Limit", number: true, cell: (row) => (row.limit === null ? "none" : plainNumber(row.limit)) },
-      { title: "Unit", cell: (row) => unitText(row.unit) },
+      { title: "Limit", number: true, cell: (row) => (row.limit === null ? "none" : plainNumber(factorOf(row) * row.limit)) },
+      { title: "Unit", cell: (row) => shownUnit(row.unit, row.name)[1] },
       {
         title: "Goal",
         cell: (row) =>

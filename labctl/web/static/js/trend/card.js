@@ -2,7 +2,7 @@
 
 import { get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { day, number, shownUnit, sizeText, withUncertainty } from "../core/format.js";
+import { day, number, sizeText, withUncertainty } from "../core/format.js";
 import { cardWithHeader, chip, loadInto, table } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
@@ -11,7 +11,6 @@ import { driftFigure, errorFigure } from "./figures.js";
 import { askedTrend } from "./point.js";
 
 /** @import { CalibrationRow, Drift, Trend } from "../../../types/api.js" */
-/** @import { ShownUnit } from "../core/format.js" */
 
 const K = 2;
 /** @type {Record<string, string>} */
@@ -105,15 +104,11 @@ function drifts(trend) {
     return [day(each.expected), each.earliest ? h("div", { class: "muted small" }, `95 %: ${between}`) : null];
   };
   /**
-   * The unit of a row, and the one in which all of its kind are shown.
+   * The unit of what drifts, and its name.
    * @param {Drift} row
-   * @returns {[unit: string, shown: ShownUnit]}
+   * @returns {[unit: string, name: string]}
    */
-  const unitsOf = ({ what, unit }) => {
-    const own = unit.replace("/year", "");
-    const alike = trend.drifts.filter((each) => each.what === what).map((each) => each.per_year);
-    return [own, shownUnit(own, alike, what)];
-  };
+  const quantity = ({ what, unit }) => [unit.replace("/year", ""), what];
   return table(
     [
       { title: "Axis", cell: (row) => row.axis },
@@ -121,18 +116,18 @@ function drifts(trend) {
       {
         title: "Drift per year, k = 2",
         number: true,
-        cell: (row) => withUncertainty(row.per_year, row.u === null ? null : K * row.u, ...unitsOf(row)),
+        cell: (row) => withUncertainty(row.per_year, row.u === null ? null : K * row.u, ...quantity(row)),
       },
       {
         title: "95 %, Student's t",
         number: true,
         cell: (row) =>
-          row.low === null ? "–" : `${sizeText(row.low, ...unitsOf(row))} to ${sizeText(row.high, ...unitsOf(row))}`,
+          row.low === null ? "–" : `${sizeText(row.low, ...quantity(row))} to ${sizeText(row.high, ...quantity(row))}`,
       },
       {
         title: "Repeatability",
         number: true,
-        cell: (row) => sizeText(row.repeatability, ...unitsOf(row)),
+        cell: (row) => sizeText(row.repeatability, ...quantity(row)),
       },
       {
         title: "Significance",

@@ -3,7 +3,7 @@
 import { faded } from "../core/colour_scales.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { pointPlace, selectPoints } from "../core/figure_point.js";
-import { shownUnit } from "../core/format.js";
+import { shownUnit } from "../core/shown_unit.js";
 import { trendPoint } from "./point.js";
 
 /** @import { Drift, Trend, TrendPoint } from "../../../types/api.js" */
@@ -47,11 +47,7 @@ export function driftFigure(serial, trend, what, place) {
   const lines = trend.drifts.filter((drift) => drift.what === what);
   const axes = [...new Set(trend.points.flatMap((point) => Object.keys(point.axes)))].sort();
   const share = what === "scale_factor";
-  const [factor, unit] = shownUnit(
-    share ? "1" : "deg/s",
-    axes.flatMap((axis) => seriesOf(trend.points, axis, what).value),
-    what,
-  );
+  const [factor, unit] = shownUnit(share ? "1" : "deg/s", what);
   /** @returns {Picture} */
   const draw = () => ({
     data: [

@@ -1,7 +1,7 @@
 // What a calibration by hand says beside the gyro's coefficients: the accelerometer, rests and turns.
 
 import { h } from "../core/elements.js";
-import { number, shownOf, withUncertainty } from "../core/format.js";
+import { number, withUncertainty } from "../core/format.js";
 import { table } from "../core/components.js";
 
 /** @import { Version } from "../../../types/api.js" */
@@ -30,7 +30,7 @@ export function byHand({ poses }) {
         {
           title: "Value, k = 2",
           number: true,
-          cell: (row) => withUncertainty(row.value, K * row.u, row.unit, shownOf(rows, row)),
+          cell: (row) => withUncertainty(row.value, K * row.u, row.unit, row.name),
         },
       ],
       rows,

@@ -2,7 +2,8 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { number, resultTexts, idText, shownOf, shownUnit, withUncertainty } from "../core/format.js";
+import { number, resultTexts, idText, withUncertainty } from "../core/format.js";
+import { shownUnit } from "../core/shown_unit.js";
 import { factList, table } from "../core/components.js";
 import { byHand } from "./by_hand.js";
 import { coefficientColumns, isSingle } from "./coefficient_table.js";
@@ -10,7 +11,6 @@ import { heldText } from "./held.js";
 
 /** @import { Coefficient, Version } from "../../../types/api.js" */
 /** @import { CoefficientColumn } from "./coefficient_table.js" */
-/** @import { ShownUnit } from "../core/format.js" */
 
 /** @type {["rms_dps" | "heldout_rms_dps" | "noise_floor_dps", string][]} */
 const ERRORS = [
@@ -97,11 +97,7 @@ function overTemperature(first, second) {
 function columnsFigure(name, columns, front) {
   const { unit } = columns[0];
   const several = columns.some(({ version }) => version !== front);
-  const [factor, shown] = shownUnit(
-    unit,
-    columns.flatMap(({ value }) => value),
-    name,
-  );
+  const [factor, shown] = shownUnit(unit, name);
   /** @param {VersionColumn} column */
   const line = ({ axis, version, temperature_c, value, u }) => {
     const faint = version !== front;
@@ -145,10 +141,10 @@ function columnsFigure(name, columns, front) {
 /**
  * A coefficient with its expanded uncertainty: texts of the same place, and the unit.
  * @param {Coefficient} coefficient
- * @param {ShownUnit} shown that of all coefficients of this kind
+ * @param {string} name
  */
-function shownResult({ value, u, unit }, shown) {
-  const { middle, half, power, suffix } = resultTexts(value, u === null ? null : K * u, unit, shown);
+function shownResult({ value, u, unit }, name) {
+  const { middle, half, power, suffix } = resultTexts(value, u === null ? null : K * u, unit, name);
   return {
     value: power ? `${middle} ${power}` : middle,
     u: half === null ? "–" : power ? `${half} ${power}` : half,
@@ -169,7 +165,7 @@ function list(first, second) {
     }),
   );
   /** @param {typeof rows[number]} row */
-  const texts = (row) => shownResult(row, shownOf(rows, row));
+  const texts = (row) => shownResult(row, row.name);
   return table(
     [
       { title: "Axis", cell: (row) => row.axis },
@@ -187,7 +183,7 @@ function list(first, second) {
                     row.beside.value,
                     row.beside.u === null ? null : K * row.beside.u,
                     row.beside.unit,
-                    shownOf(rows, row),
+                    row.name,
                   )
                 : "–",
           }

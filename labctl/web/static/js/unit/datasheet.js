@@ -3,7 +3,8 @@
 import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { button, cardWithHeader, chip, loadInto, table } from "../core/components.js";
-import { number, unitText } from "../core/format.js";
+import { number } from "../core/format.js";
+import { unitText } from "../core/shown_unit.js";
 
 /** @import { Characteristic, Datasheet } from "../../../types/api.js" */
 

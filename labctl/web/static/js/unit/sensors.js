@@ -49,7 +49,7 @@ function coefficients({ sensor, version, verdict, coefficients: rows }, newest) 
         {
           title: "Value ± U, 95.45 %",
           number: true,
-          cell: (row) => withUncertainty(row.value, row.expanded, row.unit === "1" ? "" : row.unit),
+          cell: (row) => withUncertainty(row.value, row.expanded, row.unit, row.name),
         },
       ],
       [...rows],

@@ -4,6 +4,7 @@
 import { address } from "./address.js";
 import { Problem, Unreachable, isAbort } from "./errors.js";
 import { parseMessage, splitMessages } from "./event_message.js";
+import { withNames } from "../names.js";
 import { tracked } from "./pending.js";
 
 /** @import { AnswerOf, Options, PathOf, PostOptions, Streams } from "../../../../types/api.js" */
@@ -43,6 +44,12 @@ async function request(path, options) {
 }
 
 /**
+ * The answer as JSON; names in it are shown as they are from now on.
+ * @param {Response} response
+ */
+const answerOf = async (response) => withNames(await response.json());
+
+/**
  * Read: `get("/api/units/{serial}", { path: { serial }, query, signal })`.
  * @template {PathOf<"get">} P
  * @param {P} path
@@ -50,7 +57,7 @@ async function request(path, options) {
  * @returns {Promise<AnswerOf<"get", P>>}
  */
 export async function get(path, ...[{ path: parameters, query, signal } = /** @type {any} */ ({})]) {
-  return (await request(address(path, parameters, query), { headers: headers(), signal })).json();
+  return answerOf(await request(address(path, parameters, query), { headers: headers(), signal }));
 }
 
 /**
@@ -62,7 +69,7 @@ export async function get(path, ...[{ path: parameters, query, signal } = /** @t
  */
 export async function getPart(path, { path: parameters, query, signal } = /** @type {any} */ ({})) {
   const response = await request(address(path, parameters, query), { headers: headers(), signal });
-  const rows = await response.json();
+  const rows = await answerOf(response);
   const next = /<[^>?]*\?([^>]*)>; rel="next"/.exec(response.headers.get("Link") ?? "")?.[1];
   return {
     rows,
@@ -85,7 +92,7 @@ export async function post(path, { path: parameters, body, signal }) {
     body: JSON.stringify(body),
     signal,
   };
-  return (await request(address(path, parameters), options)).json();
+  return answerOf(await request(address(path, parameters), options));
 }
 
 /**
@@ -95,7 +102,7 @@ export async function post(path, { path: parameters, body, signal }) {
  * @returns {Promise<AnswerOf<"delete", P>>}
  */
 export async function remove(path, { path: parameters }) {
-  return (await request(address(path, parameters), { method: "DELETE", headers: headers() })).json();
+  return answerOf(await request(address(path, parameters), { method: "DELETE", headers: headers() }));
 }
 
 /**
@@ -108,7 +115,7 @@ export async function remove(path, { path: parameters }) {
 export async function upload(path, files) {
   const form = new FormData();
   for (const file of files) form.append("files", file, file.name);
-  return (await request(path, { method: "POST", headers: headers(), body: form })).json();
+  return answerOf(await request(path, { method: "POST", headers: headers(), body: form }));
 }
 
 /**
@@ -123,7 +130,7 @@ export async function sendFile(path, file, fields) {
   const form = new FormData();
   form.append("file", file, file.name);
   for (const [name, value] of Object.entries(fields)) for (const each of [value].flat()) form.append(name, each);
-  return (await request(path, { method: "POST", headers: headers(), body: form })).json();
+  return answerOf(await request(path, { method: "POST", headers: headers(), body: form }));
 }
 
 /**
@@ -173,7 +180,7 @@ export async function* eventStream(path, { path: parameters, after, query, signa
       if (done) return;
       const { messages, rest } = splitMessages(text + value);
       text = rest;
-      for (const message of messages) yield parseMessage(message);
+      for (const message of messages) yield withNames(parseMessage(message));
     }
   } finally {
     reader.cancel().catch(() => {});
