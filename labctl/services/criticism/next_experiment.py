@@ -45,6 +45,11 @@ LONGER, LONGEST_TO_REPEAT_H = 4, 6.0
 BETWEEN = "between_rates"
 #: Effects named in the sentence that explains a choice; the rest is counted.
 NAMED = 3
+#: Why probabilities can be known while a verdict names no cause alone.
+REQUIRED = (
+    "a verdict requires strong evidence for the cause, and that no other effect reproduces nearly all of the error in "
+    "all recordings together"
+)
 
 
 @dataclass(frozen=True)
@@ -230,8 +235,18 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     rank = f"; {of} experiments that this bench can run are ordered by {order}" if of > 1 else ""
     listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
     pair = f"; if it is {leader}, this distinguishes it from {listed}" if told and foreseen.rank[0] > 0 else ""
-    naming = f"the probability that one cause is then named alone is {probability_text(expected.names_one)}"
-    return f"{first}{rank}{pair}; {naming}."
+    return f"{first}{rank}{pair}; {_naming_text(foreseen, question)}."
+
+
+def _naming_text(foreseen: Foreseen, question: OpenQuestion) -> str:
+    """Return with which probability a cause is named, and why that is small where much is learned all the same."""
+    text = f"the probability that one cause is then named alone is {probability_text(foreseen.forecast.names_one)}"
+    if foreseen.naming >= MIN_NAMING:
+        return text
+    named = zip(question.ids, question.probabilities.tolist(), strict=True)
+    if nothing := [p for name, p in named if name not in question.effects]:
+        text = f"{text}, and that none is missing is {probability_text(nothing[0])} at present"
+    return f"{text}: the information moves the probabilities of the effects, but {REQUIRED}"
 
 
 def _asked(question: OpenQuestion) -> str:
