@@ -44,7 +44,7 @@ export function visibilityReport(rows) {
     h(
       "p",
       { class: "muted small" },
-      "The number beside each effect is the smallest size that the plan can detect, in the unit of the effect. ppm: millionths of the rate, or of the full effect.",
+      "The number beside each effect is the smallest size that the plan can detect, in the unit of the effect. ppm: millionths of the rate; %: of the full effect.",
     ),
     unseen.length
       ? table(

@@ -2,7 +2,7 @@
 
 import { h } from "../core/elements.js";
 import { plainNumber, sizeText, idText } from "../core/format.js";
-import { unitText } from "../core/shown_unit.js";
+import { shownUnit, unitText } from "../core/shown_unit.js";
 import { card, chip, pageHeader, notice, table } from "../core/components.js";
 import { linkButton } from "../bench/actions.js";
 import { signatureFigure } from "./signature_plot.js";
@@ -150,6 +150,13 @@ const AXES_TEXTS = {
 /** @param {Effect} effect */
 const axesParagraph = (effect) => h("p", { class: "muted" }, AXES_TEXTS[effect.rows] ?? "");
 
+/** What a number without a unit is, by the unit in which it is shown. @type {Record<string, string>} */
+const SHARES = {
+  ppm: "Values in ppm are millionths of the rate.",
+  "%": "Values in % are the part of the full effect: of the band, the step, the law or the steps of the table.",
+  mrad: "Values in mrad are angles: the part of the rate about another axis, in thousandths.",
+};
+
 /** @param {Effect} effect */
 function sizeCard(effect) {
   const rows = Object.entries(effect.plausible);
@@ -176,7 +183,7 @@ function sizeCard(effect) {
       "p",
       { class: "muted small" },
       effect.unit === "1"
-        ? "Values in % or ppm (millionths) are ratios: to the rate, or, where the coefficient scales another effect, to that effect."
+        ? SHARES[shownUnit(effect.unit, effect.id)[1]]
         : "Plausible sizes of its first coefficient.",
     ),
   );
