@@ -8,7 +8,7 @@ from labctl.answers.criticism import Advice, Experiment
 from labctl.fitting.criticism import Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
 from labctl.probability_text import probability_text
-from labctl.services.criticism.next_experiment import MIN_NAMING, REQUIRED, naming_probability
+from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
 from labctl.shown_unit import shown_unit
 
 #: From this share of the variance of several axes on, their slow courses are one.
@@ -109,9 +109,8 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
         return [f"To distinguish them: {first['do']}."]
     share = first["information_bit"] / first["open_bit"]
     text = (
-        f"No experiment that this bench can run is expected to name the cause, because {REQUIRED}. Most is learned of "
-        f"the probabilities of the effects by this one, {probability_text(share)} of the missing information: "
-        f"{first['do']}."
+        "No experiment that this bench can run is expected to name one cause alone; this one says most of how probable "
+        f"each effect is, {probability_text(share)} of the missing information: {first['do']}."
     )
     return [text]
 

@@ -136,9 +136,7 @@ function seenText({ visibility }) {
   const all = visibility ?? [];
   const able = all.filter(({ visible }) => visible).sort((a, b) => b.share - a.share);
   const names = able.map(({ effect, smallest_size, unit }) =>
-    smallest_size === null
-      ? idText(effect)
-      : `${idText(effect)} from ${sizeText(smallest_size, unit, effect)}`,
+    smallest_size === null ? idText(effect) : `${idText(effect)} from ${sizeText(smallest_size, unit, effect)}`,
   );
   return `This plan can detect ${able.length} of ${all.length} effects${names.length ? `: ${names.join(", ")}` : ""}.`;
 }

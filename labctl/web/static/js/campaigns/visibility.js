@@ -13,8 +13,7 @@ const ABSORBED_SHARE = 0.02;
 const effectLink = (row) => h("a", { href: `/effects/${row.effect}` }, idText(row.effect));
 
 /** @param {Visibility} row */
-const smallestSize = ({ effect, smallest_size, unit }) =>
-  sizeText(smallest_size, unit, effect);
+const smallestSize = ({ effect, smallest_size, unit }) => sizeText(smallest_size, unit, effect);
 
 /** @param {readonly Visibility[]} rows */
 export function visibilityReport(rows) {

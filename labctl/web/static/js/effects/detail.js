@@ -182,9 +182,7 @@ function sizeCard(effect) {
     h(
       "p",
       { class: "muted small" },
-      effect.unit === "1"
-        ? SHARES[shownUnit(effect.unit, effect.id)[1]]
-        : "Plausible sizes of its first coefficient.",
+      effect.unit === "1" ? SHARES[shownUnit(effect.unit, effect.id)[1]] : "Plausible sizes of its first coefficient.",
     ),
   );
 }

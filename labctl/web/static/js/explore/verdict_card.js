@@ -96,6 +96,7 @@ const chanceText = (p) =>
 export function suspectList(state, effects, { onadd, onlaw, explain }) {
   const { criticism } = state;
   const named = new Set(criticism.named);
+  const [next] = nextEffects(criticism);
   const drawnNow = h("p", { class: "muted small", "aria-live": "polite" }, DRAW);
   /** @param {Suspect} suspect */
   const draw = (suspect) =>
@@ -151,7 +152,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
             h(
               "div",
               { class: "row tight" },
-              button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "primary" : ""}` }),
+              button("Add", () => onadd(s.effect), { kind: `tiny ${s.effect === next ? "primary" : ""}` }),
               draw(s),
               openWhatIf(s),
             ),
@@ -241,9 +242,7 @@ function coefficientText(suspect, axis) {
         { class: "small" },
         h("span", { class: "muted" }, idText(name)),
         " ",
-        unbroken(
-          withUncertainty(value, u === null ? null : 2 * u, unit, name),
-        ),
+        unbroken(withUncertainty(value, u === null ? null : 2 * u, unit, name)),
       ),
     )
     .concat(
@@ -323,6 +322,15 @@ function lawList({ criticism, axis, motion }, onlaw) {
     test ? h("p", {}, `To distinguish the first two, ${test.do}.`) : null,
   );
 }
+
+/**
+ * The effects of which one is to be added next: those whose addition is advised, then those that the verdict names.
+ * @param {Criticism} criticism
+ */
+const nextEffects = ({ advice, named }) => [
+  ...advice.filter((each) => each.add && named.includes(each.effect)).map((each) => each.effect),
+  ...named,
+];
 
 /** @param {Criticism} criticism */
 function experimentList(criticism) {

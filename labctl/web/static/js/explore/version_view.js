@@ -74,7 +74,8 @@ export function versionView(given) {
   asking
     .then(([criticism, catalogue]) => {
       endWait();
-      setChildren(place, finish?.element ?? null, sections(given, criticism, catalogue.effects));
+      const end = finish ? null : toCertify(given, criticism);
+      setChildren(place, finish?.element ?? null, sections(given, criticism, catalogue.effects, end));
       finish?.settle(nextSteps(given, criticism));
       if (query.tour) import("../tour/tour.js").then(({ showTour }) => showTour(place, signal));
       else if (location.hash) document.getElementById(location.hash.slice(1))?.scrollIntoView();
@@ -119,8 +120,9 @@ function countWait(place, signal) {
  * @param {Given} given
  * @param {Criticism} criticism
  * @param {readonly Effect[]} effects
+ * @param {HTMLElement | null} end what is done with a version that nothing is missing from
  */
-function sections({ unit, calibration, versions, chosen, motion, query, signal }, criticism, effects) {
+function sections({ unit, calibration, versions, chosen, motion, query, signal }, criticism, effects, end) {
   const axes = axisNames(criticism);
   const state = new ExploreState({
     serial: unit.serial,
@@ -137,7 +139,7 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   const joint = criticism.joint ? jointCard(criticism.joint) : null;
   if (!axes.length) {
     const alone = chosen.recordings.length < 2 && motion !== "rates";
-    return [verdictCard(state), joint, alone ? errorComparison(state, signal) : null, errorLadder(state, signal)];
+    return [verdictCard(state), end, joint, alone ? errorComparison(state, signal) : null, errorLadder(state, signal)];
   }
   const adding = extendModel(state, effects);
   const parts = [
@@ -154,24 +156,42 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   parts.forEach((part, k) => {
     part.id = SECTIONS[k][0];
   });
-  return [verdictCard(state), joint, pageNavigation(state, axes), ...parts];
+  return [verdictCard(state), end, joint, pageNavigation(state, axes), ...parts];
 }
+
+/**
+ * Put a version in force, on the page of its unit.
+ * @param {Given} given
+ */
+const certify = async ({ unit: { serial }, calibration: { version } }) => {
+  await navigate(`/units/${encodeURIComponent(serial)}?version=${version}`);
+  const { askCertification } = await import("../unit/certification.js"); // no weight of a first visit
+  await askCertification(serial, version);
+};
+
+/**
+ * The step after a version that nothing is missing from; null while something is, and for the version in force.
+ * @param {Given} given
+ * @param {Criticism} criticism
+ */
+const toCertify = (given, criticism) =>
+  criticism.verdict !== "adequate" || given.unit.certified_version === given.calibration.version
+    ? null
+    : h(
+        "div",
+        { class: "row" },
+        actButton("Certify: put in force", () => certify(given), { kind: "primary" }),
+        h("span", { class: "muted" }, "Programs that ask for the calibration of this unit then get this version."),
+      );
 
 /**
  * What the new version has come to, and what can be done next.
  * @param {Given} given
  * @param {Criticism} criticism
  */
-function nextSteps({ unit, calibration }, criticism) {
+function nextSteps(given, criticism) {
   const isEnd = criticism.verdict === "adequate";
   const plan = criticism.experiments.find((each) => each.toml)?.toml;
-  const { serial } = unit;
-  const { version } = calibration;
-  const certify = async () => {
-    await navigate(`/units/${encodeURIComponent(serial)}?version=${version}`);
-    const { askCertification } = await import("../unit/certification.js"); // no weight of a first visit
-    await askCertification(serial, version);
-  };
   return [
     notice(
       isEnd ? "good" : "warn",
@@ -182,12 +202,12 @@ function nextSteps({ unit, calibration }, criticism) {
     h(
       "div",
       { class: "row" },
-      actButton("Certify: put in force", certify, { kind: isEnd ? "primary" : "" }),
+      actButton("Certify: put in force", () => certify(given), { kind: isEnd ? "primary" : "" }),
       h(
         "a",
         {
           class: `button ${isEnd ? "" : "primary"}`,
-          href: plan ? planAddress(plan, serial) : "/campaigns/new",
+          href: plan ? planAddress(plan, given.unit.serial) : "/campaigns/new",
         },
         "Next experiment",
       ),

@@ -136,9 +136,7 @@ export function whatIf({ state, suspect, parameters, others, explained, explain 
 function sizeWords(suspect, state, { share, isFitted }, left) {
   const coefficients = isFitted ? Object.entries(suspect.coefficients[state.axis] ?? {}) : [];
   const sizes = coefficients.map(([name, { value, unit }]) =>
-    coefficients.length > 1
-      ? null
-      : `${idText(name)} ${withUncertainty(share * value, null, unit, name)}`,
+    coefficients.length > 1 ? null : `${idText(name)} ${withUncertainty(share * value, null, unit, name)}`,
   );
   const size = [`${percent(share)} of the fitted size`, ...sizes].filter(Boolean).join(", ");
   const of = shownText(state.criticism) ?? `${left.length} data sets`;

@@ -78,7 +78,11 @@ function coefficientCard(report) {
       [
         { title: "Coefficient", cell: ({ name }) => name },
         { title: "Mean", number: true, cell: ({ name, mean, unit }) => inUnit(mean, unit, name, 4) },
-        { title: "U of the mean", number: true, cell: ({ name, expanded_u_mean, unit }) => inUnit(expanded_u_mean, unit, name, 2) },
+        {
+          title: "U of the mean",
+          number: true,
+          cell: ({ name, expanded_u_mean, unit }) => inUnit(expanded_u_mean, unit, name, 2),
+        },
         { title: "Spread", number: true, cell: ({ name, spread, unit }) => inUnit(spread, unit, name, 3) },
         { title: "u of a unit", number: true, cell: ({ name, median_u, unit }) => inUnit(median_u, unit, name, 2) },
       ],

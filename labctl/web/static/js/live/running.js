@@ -32,7 +32,11 @@ export const coefficientTable = (coefficients) =>
         number: true,
         cell: (row) => h("span", { "data-u": row.expanded }, number(factorOf(row) * row.expanded, 2)),
       },
-      { title: "Limit", number: true, cell: (row) => (row.limit === null ? "none" : plainNumber(factorOf(row) * row.limit)) },
+      {
+        title: "Limit",
+        number: true,
+        cell: (row) => (row.limit === null ? "none" : plainNumber(factorOf(row) * row.limit)),
+      },
       { title: "Unit", cell: (row) => shownUnit(row.unit, row.name)[1] },
       {
         title: "Goal",

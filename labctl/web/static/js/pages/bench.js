@@ -12,6 +12,7 @@ import { checkCard } from "../bench/check_card.js";
 import { otherBenches } from "../bench/driver_text.js";
 import { idleBench, noBenchCard } from "../bench/idle_bench.js";
 import { runningCampaign } from "../bench/running_campaign.js";
+import { enterWall } from "../bench/wall_view.js";
 import { canResume, isRunning } from "../campaigns/states.js";
 
 /** @import { BenchStatus } from "../../../types/api.js" */
@@ -58,7 +59,7 @@ export async function page({ query, signal }) {
           ? h("span", {}, "runs ", h("a", { href: `/campaigns/${now.id}` }, `campaign ${now.id}`), `, ${now.recipe}`)
           : null,
       ),
-      now ? linkButton("Wall view", "/bench?wall=1", "tiny") : null,
+      query.wall === "1" ? null : linkButton("Wall view", "/bench?wall=1", "tiny"),
     ),
   );
   const unsafe = states.filter((each) => each.unconfirmed);
@@ -83,7 +84,10 @@ export async function page({ query, signal }) {
         schedule.find((each) => each.bench === bench.name && each.state === "waiting"),
       ),
     );
-    element.append(checkCard(bench, !bench.unconfirmed, show));
+    if (query.wall === "1") {
+      enterWall(signal); // it stays a wall from one campaign to the next
+      element.append(h("div", { class: "row wall-actions" }, linkButton("Leave this view", "/bench", "tiny")));
+    } else element.append(checkCard(bench, !bench.unconfirmed, show));
     watchForChange(Boolean(bench.unconfirmed), signal);
   }
   if (query.wall !== "1") element.append(...[othersCard(states, bench.name)].filter((each) => each !== null));

@@ -5,6 +5,7 @@ import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { instant } from "../core/format.js";
 import { card, factList, notice, pageHeader } from "../core/components.js";
+import { labelledField } from "../core/fields.js";
 import { Problem } from "../core/http/errors.js";
 import { navigate, query } from "../core/router.js";
 import { stateChip, stateText } from "../unit/certificate_state.js";
@@ -95,8 +96,8 @@ function lookUp(number, calibration) {
   return h(
     "form",
     { class: "stack", onsubmit },
-    h("label", {}, "Number of the certificate", fields.number),
-    h("label", {}, "SHA-256 of the calibration on it, at least 16 digits", fields.calibration),
+    labelledField("Number of the certificate", fields.number),
+    labelledField("SHA-256 of the calibration on it, at least 16 digits", fields.calibration),
     h("div", { class: "row" }, h("button", { class: "button primary", type: "submit" }, "Look up")),
   );
 }

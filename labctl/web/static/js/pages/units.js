@@ -67,9 +67,14 @@ const unitTable = (units) =>
         title: "Serial number",
         cell: (unit) => h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
       },
-      { title: "Model", cell: (unit) => unit.model },
-      { title: "Technology", cell: (unit) => unit.technology?.toUpperCase() ?? "–" },
-      { title: "Batch", cell: (unit) => unit.batch || "–" },
+      {
+        title: "Model",
+        cell: (unit) => [
+          unit.model,
+          unit.technology ? h("div", { class: "muted small" }, unit.technology.toUpperCase()) : null,
+        ],
+      },
+      units.some((unit) => unit.batch) ? { title: "Batch", cell: (unit) => unit.batch || "–" } : null,
       { title: "Recordings", number: true, cell: (unit) => unit.recordings.length },
       { title: "Versions", number: true, cell: (unit) => unit.calibrations.length },
       { title: "Error / noise floor", cell: (unit) => errorSparkline(unit.newest_errors) },

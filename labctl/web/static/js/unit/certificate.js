@@ -1,6 +1,6 @@
 // The certificate of a version: the form that asks for the facts of the order, and the files that were issued.
 
-import { download, post } from "../core/http/api.js";
+import { download, get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { actButton, button, notice } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
@@ -98,14 +98,16 @@ export function certificateFiles(serial, version, issued) {
  */
 async function askCertificate(serial, version, replaced) {
   const why = replaced ? [{ name: "amend", label: `Why certificate ${replaced.number} is replaced` }] : [];
+  const imported = await wasImported(serial, version);
   /** @type {Answers} */
   let given = {};
   let refusal = "";
   for (;;) {
     const fields = [...why, ...FIELDS].map((field) => ({ ...field, value: given[field.name] }));
+    const lacking = imported ? notice("warn", h("p", {}, IMPORTED)) : null;
     const answers = await dialog(`Issue a certificate of version ${version}`, fields, {
       text: "A certificate is a document for a customer; which version is in force does not change. Laboratory and reference standards come from the bench file of the campaign. The certificate is written to the audit trail.",
-      body: refusal ? notice("bad", h("p", {}, refusal)) : null,
+      body: refusal ? notice("bad", h("p", {}, refusal)) : lacking,
       confirm: "Issue certificate",
     });
     if (!answers) return;
@@ -118,6 +120,23 @@ async function askCertificate(serial, version, replaced) {
       [given, refusal] = [answers, error.message];
     }
   }
+}
+
+/** What the certificate of a version needs beyond this form where no campaign measured it. */
+const IMPORTED =
+  "This version was fitted to an imported recording. Its certificate also states the laboratory, the method, the days of the measurement, the reference standards and the repeatability, which this form does not ask for: give them in recording.toml, import it again, and issue the certificate with labctl certificate and a file of the order.";
+
+/**
+ * Whether a recording of a version is from another bench than that of a campaign.
+ * @param {string} serial
+ * @param {number} version
+ */
+async function wasImported(serial, version) {
+  const [rows, { recordings }] = await Promise.all([
+    get("/api/recordings", { query: { unit: serial } }),
+    get("/api/units/{serial}/calibrations/{version}", { path: { serial, version } }),
+  ]);
+  return rows.some((row) => recordings.includes(row.id) && row.origin === "import");
 }
 
 /** @param {Answers} given */
