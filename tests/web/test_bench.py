@@ -11,7 +11,7 @@ import pytest
 from instruments.clock import SystemClock
 from labctl.services.benches import check
 from labctl.services.campaigns import preparation
-from tests.helpers.browser import Faults, Service, number_of
+from tests.helpers.browser import NARROW, WIDE, Faults, Service, number_of
 from tests.helpers.paced_hand import PacedClock, PacedPerson
 from tests.helpers.paths import RECIPES
 
@@ -205,5 +205,47 @@ def test_a_strip_for_each_limit_says_what_the_service_watches(service: Service, 
     expect(page.get_by_role("status").filter(has_text="a question waits for an answer")).to_be_visible()
     page.get_by_role("button", name="Sound is off").click()
     expect(page.get_by_role("button", name="Sound is on")).to_be_visible()
+    page.get_by_role("link", name="Leave this view").click()
+    expect(page.get_by_role("navigation", name="Pages")).to_be_visible()
+
+
+#: How many lines each value takes that is larger than the others.
+LINES = """() => [...document.querySelectorAll(".gauge-value, .limit-value")].map((each) => {
+  const of = document.createRange();
+  of.selectNodeContents(each);
+  return new Set([...of.getClientRects()].map((box) => Math.round(box.top))).size;
+})"""
+#: The boxes of the titles of the vertical axes of a figure, from above.
+TITLES = """plot => [...plot.querySelectorAll(".ytitle, .y2title")]
+  .map((each) => each.getBoundingClientRect()).map(({ top, bottom }) => [top, bottom]).sort((a, b) => a[0] - b[0])"""
+
+
+@pytest.mark.parametrize("size", [WIDE, NARROW], ids=["wide", "narrow"])
+def test_no_value_is_broken_and_no_title_lies_over_another(
+    service: Service, visit: Callable[..., Page], size: dict[str, int]
+) -> None:
+    from playwright.sync_api import expect
+
+    start(service)
+    page = visit("/bench", size=size)
+    plot = page.get_by_role("group", name="Temperatures and rate since this page was opened")
+    plot.scroll_into_view_if_needed()
+    expect(plot.locator(".y2title")).to_be_visible()
+    (_, upper_end), (lower_begin, _) = plot.evaluate(TITLES)
+    assert upper_end <= lower_begin
+    page.goto(f"{service.url}/bench?wall=1")
+    expect(page.get_by_role("region", name="Limits").get_by_role("listitem").first).to_be_visible()
+    lines = page.evaluate(LINES)
+    assert len(lines) >= 5
+    assert set(lines) == {1}
+
+
+def test_a_wall_stays_one_while_no_campaign_runs(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/bench")
+    page.get_by_role("link", name="Wall view").click()
+    expect(page.get_by_role("region", name="No campaign is running")).to_be_visible()
+    expect(page.get_by_role("navigation", name="Pages")).to_be_hidden()
     page.get_by_role("link", name="Leave this view").click()
     expect(page.get_by_role("navigation", name="Pages")).to_be_visible()

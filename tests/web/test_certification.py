@@ -53,6 +53,7 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     expect(in_force).to_contain_text("Certified despite objections")
     page.get_by_role("button", name="Issue certificate").first.click()
     expect(dialog).to_contain_text("a document for a customer; which version is in force does not change")
+    expect(dialog).to_contain_text("This version was fitted to an imported recording.")
     dialog.get_by_role("button", name="Cancel").click()
     acts = page.get_by_role("region", name="Certifications").first
     expect(acts).to_contain_text("overridden")

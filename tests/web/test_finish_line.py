@@ -85,6 +85,8 @@ def test_explore_says_what_its_buttons_do_and_what_an_experiment_can_decide(
     expect(learn).to_contain_text(
         f"the probability that one cause is then named alone is {probability_text(best['power'])}"
     )
+    primary = learn.get_by_role("listitem").filter(has=page.locator(".button.primary"))
+    expect(primary.locator(".suspect-name")).to_have_text(["sine response"])  # whose addition is advised
     sine = learn.get_by_role("listitem").filter(has_text="sine response")
     sine.get_by_role("button", name="What if").click()
     expect(page.get_by_role("heading", name="What if: sine response")).to_be_in_viewport()
@@ -139,6 +141,9 @@ def test_the_error_runs_from_the_one_version_to_the_other_and_ends_green(
     finish.get_by_role("button", name="Certify").click()
     expect(page.get_by_role("dialog")).to_contain_text("Certify version 2: put it in force")
     assert f"/units/{unit}" in page.url
+    page.goto(f"{service.url}/explore?unit={unit}&version=2")  # whoever comes back finds the next step as well
+    page.locator("main").get_by_role("button", name="Certify").click()
+    expect(page.get_by_role("dialog")).to_contain_text("Certify version 2: put it in force")
 
 
 @pytest.mark.slow

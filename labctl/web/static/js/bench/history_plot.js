@@ -41,11 +41,11 @@ export function historyPlot(history) {
         }),
       ],
       layout: {
-        margin: { l: 58, r: 12, t: 34, b: 42 },
+        margin: { l: 76, r: 12, t: 34, b: 42 },
         hovermode: "x unified",
         xaxis: { title: { text: `time of the campaign, ${unit.name}` }, anchor: "y2" },
-        yaxis: { title: { text: "temperature, deg C" }, domain: [0.42, 1] },
-        yaxis2: { title: { text: "table rate, deg/s" }, domain: [0, 0.34], anchor: "x" },
+        yaxis: { title: { text: "temperature,<br>deg C" }, domain: [0.42, 1] },
+        yaxis2: { title: { text: "table rate,<br>deg/s" }, domain: [0, 0.34], anchor: "x" },
       },
     };
   };

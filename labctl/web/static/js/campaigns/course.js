@@ -75,9 +75,9 @@ export function courseCard(course, plan, datasets, moved) {
         ...outputs(plan, datasets, unit.seconds),
       ],
       layout: {
-        margin: { l: 62, r: 12, t: 34, b: 42 },
+        margin: { l: 76, r: 12, t: 34, b: 42 },
         xaxis: { title: { text: `time of the campaign, ${unit.name}` }, anchor: datasets ? "y2" : "y" },
-        yaxis: { title: { text: "temperature, deg C" }, domain: datasets ? [0.42, 1] : [0, 1] },
+        yaxis: { title: { text: "temperature,<br>deg C" }, domain: datasets ? [0.42, 1] : [0, 1] },
         ...(datasets ? { yaxis2: { title: { text: outputTitle(datasets) }, domain: [0, 0.34], anchor: "x" } } : {}),
         shapes: [
           {
@@ -125,7 +125,7 @@ export function courseCard(course, plan, datasets, moved) {
  */
 function outputTitle(datasets) {
   const names = Object.keys(datasets.channels).filter((name) => name.startsWith("gyro_"));
-  return ["output", ...new Set(names.map((name) => channelUnit(name, datasets.output)))].join(", ");
+  return ["output", ...new Set(names.map((name) => channelUnit(name, datasets.output)))].join(",<br>");
 }
 
 /**

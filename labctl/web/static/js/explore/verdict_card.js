@@ -166,8 +166,12 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
           ),
           evidenceItem(
             "Error with it, deg/s",
-            h("span", { class: "number" }, number(s.rms_after_dps)),
-            h("span", { class: "muted small" }, `${number(s.heldout_rms_after_dps)} ${heldOutName(state.motion)}`),
+            s.rms_after_dps === null
+              ? h("span", { class: "muted small" }, "no fit with it was made")
+              : [
+                  h("span", { class: "number" }, number(s.rms_after_dps)),
+                  h("span", { class: "muted small" }, heldOutText(s, state.motion)),
+                ],
           ),
           evidenceItem(
             `Coefficient ± U (95.45 %)${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
@@ -213,6 +217,13 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
  */
 const evidenceItem = (title, ...children) =>
   h("div", { class: "suspect-value" }, h("span", { class: "muted small" }, title), ...children);
+
+/**
+ * @param {Suspect} suspect
+ * @param {ExploreState["motion"]} motion
+ */
+const heldOutText = ({ heldout_rms_after_dps: heldOut }, motion) =>
+  heldOut === null ? "" : `${number(heldOut)} ${heldOutName(motion)}`;
 
 /** @param {number} nats */
 function evidenceMeter(nats) {
