@@ -14,6 +14,7 @@ from labctl.certificates.document import (
     CoefficientResult,
     ConformityResult,
     ResultPoint,
+    SensorCoefficient,
     SensorReference,
     SensorResult,
     StandardUsed,
@@ -81,7 +82,7 @@ def _pages(record: Certificate) -> dict[str, object]:
             _state("As left, after adjustment", record.as_left),
         ],
         "adjustment": record.adjustment,
-        "coefficients": [_coefficient(coefficient, record.coefficients) for coefficient in record.coefficients],
+        "coefficients": [_coefficient(coefficient) for coefficient in record.coefficients],
         "sensors": [_sensor(sensor) for sensor in record.sensors],
         "conformity": _conformity(record),
         "external": record.external,
@@ -282,16 +283,14 @@ def _sensor(result: SensorResult) -> Mapping[str, object]:
             ["SHA-256 of the result", result.hash],
         ],
         "formula": result.formula,
-        "rows": [
-            [
-                coefficient.name,
-                *rounded(coefficient.value, coefficient.expanded),
-                f"{coefficient.k:.2f}",
-                readable(coefficient.unit),
-            ]
-            for coefficient in result.coefficients
-        ],
+        "rows": [_of_sensor(coefficient) for coefficient in result.coefficients],
     }
+
+
+def _of_sensor(coefficient: SensorCoefficient) -> list[str]:
+    factor, unit = shown_unit(coefficient.unit, coefficient.name)
+    value, expanded = rounded(factor * coefficient.value, factor * coefficient.expanded)
+    return [coefficient.name, value, expanded, f"{coefficient.k:.2f}", readable(unit)]
 
 
 def reference_text(reference: SensorReference) -> str:

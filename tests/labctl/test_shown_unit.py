@@ -1,4 +1,4 @@
-"""The units in which quantities are shown: each quantity has one, the same on pages, in commands and on certificates."""
+"""The units in which quantities are shown: each has one, the same on pages, in commands and on certificates."""
 
 from __future__ import annotations
 

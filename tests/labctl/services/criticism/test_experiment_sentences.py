@@ -43,7 +43,9 @@ def test_where_none_is_expected_to_be_named_the_sentence_says_what_a_verdict_req
 ) -> None:
     why = why_of(monkeypatch, Forecast(0.999, 0.01, 0.0, 0.0, ()), ("sine_response", "scale_factor_odd"))
     assert "1.00 of the 1.00 bit that are missing to know which of 2 effects it is" in why
-    assert f"is then named alone is < 1 %: the information moves the probabilities of the effects, but {REQUIRED}." in why
+    assert (
+        f"is then named alone is < 1 %: the information moves the probabilities of the effects, but {REQUIRED}." in why
+    )
 
 
 def test_where_nothing_may_be_missing_the_sentence_says_how_probable_that_is(monkeypatch: pytest.MonkeyPatch) -> None:
