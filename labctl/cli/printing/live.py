@@ -69,10 +69,9 @@ def _progress(state: LiveState) -> str:
     parts = [f"{state.t_s:.0f} s: {state.rests} rests, {len(state.covered)} of {state.wanted} poses"]
     worst = state.worst
     if worst is not None:
-        parts.append(
-            f"largest U: {worst.name} of {worst.axis}, {size_text(worst.expanded, worst.unit, worst.name)} (limit "
-            f"{size_text(worst.limit, worst.unit, worst.name)})"
-        )
+        limit = "" if worst.limit is None else f" (limit {size_text(worst.limit, worst.unit, worst.name)})"
+        shown = size_text(worst.expanded, worst.unit, worst.name)
+        parts.append(f"largest U: {worst.name} of {worst.axis}, {shown}{limit}")
     elif not state.covered and state.t_s > BEGINNING_S:
         parts.append(state.missing[-1])
     if state.turns_left:

@@ -23,7 +23,8 @@ def print_sensor(answer: AccelerometerResponse | MagnetometerResponse) -> None:
     rows = table(name, "coefficient", "unit", "value", "u", "U, 95.45 %", numbers=2)
     for each in coefficients_of(answer):
         factor, unit_symbol = shown_unit(each.unit, each.name)
-        shown = [factor * each.value, factor * each.u, factor * each.expanded]
+        known = (each.value, each.u, each.expanded)
+        shown = [None if value is None else factor * value for value in known]
         rows.add_row(each.name, unit_symbol, *map(format_number, shown, (5, 2, 2)))
     console.print(rows)
     _print_verdict(answer)

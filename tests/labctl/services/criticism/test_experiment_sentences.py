@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
 
-from labctl.fitting.criticism import Forecast, OpenQuestion
+from labctl.fitting.criticism import Forecast
 from labctl.services.criticism import next_experiment as module
-from labctl.services.criticism.next_experiment import REQUIRED, experiments_for, ranked_experiments
+from labctl.services.criticism.next_experiment import REQUIRED, experiments_for
 from labctl.services.planning.loading import load_bench, load_recipe
 from procedures.experiments import Block
+
+if TYPE_CHECKING:
+    from labctl.fitting.criticism import Criticism
+    from labctl.store import Store
 
 
 def why_of(monkeypatch: pytest.MonkeyPatch, forecast: Forecast, ids: tuple[str, ...]) -> str:
@@ -27,10 +31,9 @@ def why_of(monkeypatch: pytest.MonkeyPatch, forecast: Forecast, ids: tuple[str, 
         probabilities=np.full(len(ids), 1 / len(ids)),
     )  # fmt: skip
     monkeypatch.setattr(module, "open_question", lambda _: question)
-    base = load_recipe("quick-triaxial"), load_bench("triaxial-sim"), []
-    monkeypatch.setattr(module, "_recipe_of", lambda *_: base)
-    assert ranked_experiments(cast("OpenQuestion", question), base[0], base[1])
-    return experiments_for(cast("module.Store", None), [], cast("module.Criticism", None))[0]["why"]
+    recipe, bench = load_recipe("quick-triaxial"), load_bench("triaxial-sim")
+    monkeypatch.setattr(module, "_recipe_of", lambda *_: (recipe, bench, []))
+    return experiments_for(cast("Store", None), [], cast("Criticism", None))[0]["why"]
 
 
 def test_where_a_cause_is_expected_to_be_named_no_reason_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
