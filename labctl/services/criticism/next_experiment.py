@@ -239,7 +239,7 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
 
 
 def _naming_text(foreseen: Foreseen, question: OpenQuestion) -> str:
-    """Return with which probability a cause is named, and why that is small where much is learned all the same."""
+    """Return with which probability a cause is named, and why that is small where much is learned nevertheless."""
     text = f"the probability that one cause is then named alone is {probability_text(foreseen.forecast.names_one)}"
     if foreseen.naming >= MIN_NAMING:
         return text
