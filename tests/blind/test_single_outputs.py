@@ -88,6 +88,7 @@ def test_rates_across_that_do_not_fit_are_refused(recording: Any, given: Any, me
         compensator.compensate(np.zeros(3), 20.0, cross_rates_dps=given)
 
 
+@pytest.mark.slow
 def test_no_model_is_adequate_that_leaves_a_large_multiple_of_the_floor(recording: Any) -> None:
     """The verdict of an adequate model, beside a fit that left far more: the words do not contradict the figure."""
     model = fit(recording, "yang2018", ["scale_factor_odd"]).fitted.model

@@ -95,6 +95,7 @@ def test_a_folder_without_a_recording_is_not_sent(client: Client, tmp_path: Path
         client.import_recording(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_campaign_is_started_watched_and_found(client: Client) -> None:
     begun = client.start_campaign(CampaignRequest(recipe="short"))
     assert isinstance(begun, CampaignResponse)

@@ -74,6 +74,7 @@ def calibration() -> Calibration:
     )
 
 
+@pytest.mark.slow
 def test_a_robot_corrects_rates_with_the_core_alone(calibration: Calibration, tmp_path: Path) -> None:
     file = tmp_path / "calibration.json"
     file.write_bytes(calibration.to_bytes())

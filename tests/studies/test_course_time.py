@@ -7,6 +7,7 @@ import pytest
 from studies import course_time
 
 
+@pytest.mark.slow
 def test_errors_of_half_a_reply_are_inside_u_and_far_outside_the_fit_alone() -> None:
     ends = [course_time.found(seed, instant) for seed, instant in ((1, -1.0), (2, 1.0), (3, -1.0))]
     for each, sign in zip(ends, (-1, 1, -1), strict=True):

@@ -25,6 +25,7 @@ def test_a_sine_is_advised_where_it_takes_nine_tenths_of_the_error(first_two_thi
     assert said(found)[2] == ("sine_response",)
 
 
+@pytest.mark.slow
 def test_a_gain_that_scatters_from_part_to_part_is_not_advised(first_two_thirds: Recording) -> None:
     """The sine beside a cubic gains 1 % on parts left out; on the last third it would lose 2 %."""
     base, found = criticised(first_two_thirds, "ojeda2000")

@@ -65,6 +65,7 @@ def test_labctl_and_the_independent_analyses_agree(small: dict[str, list[Row]]) 
         assert all(row.agreement in {"yes", "same", "labctl better"} for row in rows), name
 
 
+@pytest.mark.slow
 def test_the_page_has_the_numbers_of_the_study(small: dict[str, list[Row]]) -> None:
     text = PAGE.read_text(encoding="utf-8")
     for name, rows in small.items():

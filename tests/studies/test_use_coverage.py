@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from studies.use_coverage import CONVENTIONS, MODELS, PLACES, scores
 
 
+@pytest.mark.slow
 def test_a_unit_is_scored_at_every_place_by_every_model_and_by_every_convention_of_the_data_sheet() -> None:
     found = scores(1)
     assert len(found) == (2 * len(MODELS) + len(CONVENTIONS) - 1) * len(PLACES)

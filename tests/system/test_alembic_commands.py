@@ -65,6 +65,7 @@ def test_a_new_revision_has_the_next_number(alembic: Alembic, project: Path) -> 
     assert text.startswith('"""Serial numbers of tables."""\n')
 
 
+@pytest.mark.slow
 def test_a_new_column_is_found(alembic: Alembic, project: Path, database: Path) -> None:
     alembic("upgrade", "head")
     with sqlite3.connect(database) as raw:

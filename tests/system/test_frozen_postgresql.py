@@ -108,6 +108,7 @@ def crowd(service: ServiceProcess) -> Iterator[None]:
             thread.join(WAIT_S)
 
 
+@pytest.mark.slow
 def test_requests_that_wait_for_the_frozen_database_keep_no_stop_from_the_table(
     cluster: Cluster, service: ServiceProcess, simulator: Simulator
 ) -> None:

@@ -24,6 +24,7 @@ def campaign(simulator: Simulator) -> subprocess.Popen[str]:
     return process
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(
     campaign: subprocess.Popen[str], simulator: Simulator, number: signal.Signals
@@ -37,6 +38,7 @@ def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(
     assert end_of(simulator.folder / DATABASE) == ("aborted", "interrupted (Ctrl-C or a signal)")
 
 
+@pytest.mark.slow
 def test_impatience_once_the_table_is_stop_requested_changes_nothing(
     campaign: subprocess.Popen[str], simulator: Simulator
 ) -> None:

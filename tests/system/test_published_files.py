@@ -65,6 +65,7 @@ def test_each_kind_takes_three_commands_at_most_and_no_script() -> None:
         assert [words[:2] for words in commands] == [["labctl", each] for each in ("import", "fit", "calibration")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pan-cooldown", "imucal-annotated", "imucal-session", "mpu9150-0"])
 def test_published_files_are_calibrated(name: str, lab: Lab) -> None:
     found = calibrated(lab, blocks()[name])
@@ -76,6 +77,7 @@ def test_published_files_are_calibrated(name: str, lab: Lab) -> None:
     assert [found[axis]["bias"] for axis in "xyz"] == pytest.approx(bias, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_raw_words_of_a_warm_up_are_calibrated(lab: Lab) -> None:
     """63,792 readings; against the parabolas that their author printed, at 20 deg C."""
     found = calibrated(lab, blocks()["freeimu-warmup"])
@@ -84,6 +86,7 @@ def test_raw_words_of_a_warm_up_are_calibrated(lab: Lab) -> None:
         assert found[axis]["bias"] == pytest.approx(np.polyval(printed, word) / 16.4, abs=0.01)
 
 
+@pytest.mark.slow
 def test_two_files_are_one_recording(lab: Lab) -> None:
     found = calibrated(lab, blocks()["xsens_gyro"])
     assert found["y"]["misalignment_z"] == pytest.approx(0.0530, abs=5e-4)
@@ -96,6 +99,7 @@ def test_means_of_a_rate_table_are_calibrated(lab: Lab) -> None:
     assert error["rms_dps"] == pytest.approx(0.0466, abs=2e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TEXTS)
 def test_the_text_as_published_gives_the_same(name: str, lab: Lab, tmp_path: Path) -> None:
     called, separator, header = TEXTS[name]
@@ -139,6 +143,7 @@ def write_cold_start(path: Path) -> None:
     write_ulog(path, {("sensor_gyro", 0): (("timestamp", "x", "y", "z", "temperature"), rows)})
 
 
+@pytest.mark.slow
 def test_a_table_whose_rate_changes_is_calibrated(lab: Lab, tmp_path: Path) -> None:
     write_sweep(tmp_path / "sweep.csv")
     found = calibrated(lab, blocks()["sweep"])["z"]

@@ -80,6 +80,7 @@ def test_a_campaign_is_aborted_from_the_command_line(service: ServiceProcess) ->
     assert "aborted" in again.stderr
 
 
+@pytest.mark.slow
 def test_a_service_begins_what_was_entered_before_it_ran_and_while_it_runs(tmp_path: Path) -> None:
     database = tmp_path / "lab.sqlite"
     command = labctl(database, "campaign", "start", "short", "--at", "now", "--json", "--bench", "single-axis-sim")

@@ -90,6 +90,7 @@ def test_a_number_that_does_not_belong_to_the_hash_is_unknown(
     expect(page.get_by_role("alert")).to_contain_text(f"Certificate {FIRST} is amended")
 
 
+@pytest.mark.slow
 def test_the_page_of_the_unit_lists_the_states_and_withdraws(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 
@@ -109,6 +110,7 @@ def test_the_page_of_the_unit_lists_the_states_and_withdraws(service: Service, v
     assert (newest["state"], newest["state_by"], newest["state_by_key"]) == ("withdrawn", "Rita", None)
 
 
+@pytest.mark.slow
 def test_a_revocation_names_certificates_and_who_fetched_the_version(
     service: Service, visit: Callable[..., Page]
 ) -> None:

@@ -103,6 +103,7 @@ def test_a_saved_picture_says_what_it_is_of(visit: Callable[..., Page], explored
     assert page.get_by_text(f"unit {serial}, version 1 (").count() == 0, "the figure of the page stays as it was"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "view", ["Error over rate", "Error over temperature", "Surface", "At rest", "Error of a full turn"]
 )

@@ -158,6 +158,7 @@ def test_nothing_moves_where_less_motion_is_wanted(service: Service, visit: Call
     assert len(page.evaluate("window.counted")) == 1
 
 
+@pytest.mark.slow
 def test_the_versions_are_played_again_from_the_ladder(service: Service, visit: Callable[..., Page], unit: str) -> None:
     from playwright.sync_api import expect
 
@@ -175,6 +176,7 @@ def test_the_versions_are_played_again_from_the_ladder(service: Service, visit: 
     expect(played).to_contain_text(f"Version 2: {shown(last['rms_dps'])} deg/s")
 
 
+@pytest.mark.slow
 def test_two_versions_lie_side_by_side_with_one_scale_and_one_camera(
     service: Service, visit: Callable[..., Page], unit: str
 ) -> None:

@@ -48,6 +48,7 @@ def test_a_new_page_begins_at_its_top_and_back_returns_to_where_one_was(visit: C
     page.wait_for_function("Math.abs(window.scrollY - 600) < 2")
 
 
+@pytest.mark.slow
 def test_a_button_that_opens_a_page_opens_it_at_its_top(visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

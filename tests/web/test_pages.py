@@ -99,6 +99,7 @@ def test_an_empty_house_leads_to_a_first_calibration_in_one_press(visit: Callabl
     assert [row["version"] for row in service.get("/api/units/OSU-FOG-2024/calibrations")] == [1]
 
 
+@pytest.mark.slow
 def test_the_picture_of_the_start_page_is_true(visit: Callable[..., Page], service: Service) -> None:
     """The figures that it shows are those of the example, fitted and improved."""
     page = visit("/")

@@ -134,6 +134,7 @@ def test_a_point_of_a_trace_and_of_a_campaign_is_its_readings(service: Service, 
     assert "equal." in card.inner_text()
 
 
+@pytest.mark.slow
 def test_a_point_of_a_trend_is_what_the_version_leaves_of_every_reading(
     service: Service, visit: Callable[..., Page]
 ) -> None:

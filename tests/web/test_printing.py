@@ -66,6 +66,7 @@ def fitted(service: Service) -> Service:
 HEADINGS = """() => [...document.querySelectorAll("main :is(h1, h2, h3)")].map((each) => each.textContent.trim())"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", ["/units/FOG-0001", "/explore?unit=FOG-0001", "/recordings/1", "/campaigns/new"])
 @pytest.mark.usefixtures("fitted")
 def test_no_heading_is_left_alone_at_the_end_of_a_sheet(
@@ -114,6 +115,7 @@ PRINTED = """() => {
 MIN_COLOURS = 50
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("fitted")
 def test_ctrl_p_prints_a_figure_in_three_dimensions_that_was_never_scrolled_to(visit: Callable[..., Page]) -> None:
     page = visit("/explore?unit=FOG-0001&view=surface", alone=True, size={"width": 1280, "height": 300})

@@ -48,6 +48,7 @@ def test_a_page_that_arrives_late_takes_the_place_of_its_frame(service: Service,
 BUSY = {"type": "about:blank", "title": "Busy", "status": 503, "detail": "too many requests at once; ask again"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", ["/units", "/explore?unit=FOG-0001"])
 def test_a_page_that_was_refused_for_a_while_comes_by_itself(
     service: Service, visit: Callable[..., Page], faults: Faults, address: str

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import pytest
+
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
@@ -34,6 +36,7 @@ def test_the_tour_leads_through_the_page_and_can_be_left(visit: Callable[..., Pa
     assert page.locator(".tour-here").count() == 0
 
 
+@pytest.mark.slow
 def test_a_step_of_the_tour_has_an_address_and_ends_with_the_page(visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

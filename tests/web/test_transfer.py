@@ -61,6 +61,7 @@ def test_a_visit_moves_at_most_1500_kb_and_a_later_one_what_has_changed(
     assert set(static.values()) == {0}
 
 
+@pytest.mark.slow
 def test_a_later_visit_gets_what_has_changed_meanwhile(visit: Callable[..., Page], service: Service) -> None:
     from playwright.sync_api import expect
 

@@ -39,6 +39,7 @@ def test_a_reload_in_the_middle_shows_the_same(fog: Service, visit: Callable[...
     expect(page.get_by_role("button", name="At rest", exact=True)).to_have_attribute("aria-pressed", "true")
 
 
+@pytest.mark.slow
 def test_a_service_that_restarts_is_said_and_then_answers_again(
     fog: Service, visit: Callable[..., Page], faults: Faults
 ) -> None:
@@ -113,6 +114,7 @@ def guarded(tmp_path: Path) -> Iterator[tuple[Service, str, str]]:
     service.stop()
 
 
+@pytest.mark.slow
 def test_a_viewer_may_look_and_preview_and_nothing_else(guarded: tuple[Service, str, str], chromium: Browser) -> None:
     from playwright.sync_api import expect
 

@@ -109,6 +109,7 @@ def test_the_figures_of_the_page_are_those_of_the_service(
     assert [row[1] for row in cells(parts)][1:] == ["unknown", *kept, "unknown", "unknown"]
 
 
+@pytest.mark.slow
 def test_the_lines_of_the_budget_and_the_pictures_are_those_of_the_service(
     service: Service, visit: Callable[..., Page], fog: str
 ) -> None:
@@ -157,6 +158,7 @@ PLACES = """plot => {
 }"""
 
 
+@pytest.mark.slow
 def test_titles_and_legend_of_contributions_are_whole_and_apart(visit: Callable[..., Page], fog: str) -> None:
     from playwright.sync_api import expect
 
@@ -194,6 +196,7 @@ def test_published_coefficients_are_unknown_and_never_zero(
     expect(card).to_contain_text("Coefficients: published coefficients come without uncertainties.")
 
 
+@pytest.mark.slow
 def test_a_model_that_asks_for_more_is_unknown_with_its_reason(
     service: Service, visit: Callable[..., Page], faults: Faults, fog: str
 ) -> None:

@@ -126,6 +126,7 @@ UNDER = """plot => {
 }"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [390, 1000, 1280])
 def test_the_title_of_the_map_is_not_under_the_tool_bar(opened: tuple[Page, Locator], width: int) -> None:
     page, panel = opened

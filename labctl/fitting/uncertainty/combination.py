@@ -69,9 +69,11 @@ def coverage_factor(
         if name in _CHARACTERISTIC:
             phi = phi * _CHARACTERISTIC[name](share * t)
 
+    weight = phi / t
+
     def excess(k: float) -> float:
         # (2/pi) times the integral of phi(t) sin(k t) / t, by the trapezoidal rule
-        return 2 / math.pi * float(np.sum(phi * np.sin(k * t) / t) + 0.5 * k) * float(t[0]) - probability
+        return 2 / math.pi * (float(weight @ np.sin(k * t)) + 0.5 * k) * float(t[0]) - probability
 
     from scipy.optimize import brentq
 

@@ -117,8 +117,9 @@ def model_line(
     Its degrees of freedom are taken as infinite: the estimate has a floor that covers its own scatter.
     """
     rate_dps, across = rates_dps.get(axis, 0.0), {name: rate for name, rate in rates_dps.items() if name != axis}
-    u = evidence.model_error.at(rate_dps, temperature_c, across) if evidence else None
-    reason = evidence.model_error.unknown_at(rate_dps, temperature_c, across) if evidence else _lacking(fitted)
+    u, reason = (
+        evidence.model_error.at_or_why(rate_dps, temperature_c, across) if evidence else (None, _lacking(fitted))
+    )
     return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=reason or BY_HELD_OUT)
 
 

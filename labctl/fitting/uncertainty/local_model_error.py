@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -56,8 +57,16 @@ class LocalModelError:
         what the model leaves at each of these rates is added: beside that of the axis itself, for which data sets at
         any rate about the others count, what a rate about another axis leaves beyond that of rest.
         """
-        if self.unknown_at(rate_dps, temperature_c, across_dps) is not None:
-            return None
+        return self.at_or_why(rate_dps, temperature_c, across_dps)[0]
+
+    def at_or_why(
+        self, rate_dps: float, temperature_c: float, across_dps: Mapping[str, float] = NO_RATES
+    ) -> tuple[float | None, str | None]:
+        """Return `at` and `unknown_at`, of which one is None."""
+        reason = self.unknown_at(rate_dps, temperature_c, across_dps)
+        return (None if reason else self._at_known(rate_dps, temperature_c, across_dps)), reason
+
+    def _at_known(self, rate_dps: float, temperature_c: float, across_dps: Mapping[str, float]) -> float:
         variance = self._variance(self._away(rate_dps, temperature_c))
         turning_dps = {axis: rate for axis, rate in across_dps.items() if rate}
         if not turning_dps:
@@ -151,7 +160,7 @@ class LocalModelError:
         beside = [np.where(self._is_tilted, 0.0, each) for each in others]
         return self._distance([_scaled(across[axis], rate_dps), *beside], temperature_c)
 
-    @property
+    @cached_property
     def _is_tilted(self) -> NDArray[np.bool_]:
         """Whether the unit turned about more than one body axis in a data set, (m,)."""
         sizes = np.sort(np.abs([self.rate_dps, *(self.across_dps or {}).values()]), axis=0)

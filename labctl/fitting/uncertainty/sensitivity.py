@@ -48,8 +48,10 @@ class LawFunction:
 
     def temperature_slope(self, fitted: FittedModel, temperature_c: float) -> float:
         """Return its derivative over temperature, per K."""
-        above, below = (self.value(fitted, temperature_c + sign * STEP_K) for sign in (1, -1))
-        return (above - below) / (2 * STEP_K)
+        both = {name: np.tile(rates, 2) for name, rates in self.rates.items()}
+        temperatures_c = np.repeat([temperature_c + STEP_K, temperature_c - STEP_K], len(self.weights))
+        above, below = fitted.error_dps(channels_at(self.axis, both, temperatures_c), self.axis).reshape(2, -1)
+        return float(self.weights @ (above - below)) / self.divisor / (2 * STEP_K)
 
     def gradient(self, fitted: FittedModel, temperature_c: float) -> Array:
         """Return its derivative along the coefficients of the axis, (k*m,), temperature functions running fastest."""
@@ -64,7 +66,7 @@ class LawFunction:
         return np.outer(slopes, basis).ravel() / self.divisor
 
     def _channels(self, temperature_c: float) -> Channels:
-        return channels_at(self.axis, self.rates, len(self.weights), temperature_c)
+        return channels_at(self.axis, self.rates, np.full(len(self.weights), temperature_c))
 
 
 @dataclass(frozen=True)
@@ -93,10 +95,11 @@ def u_of_fit(law: CoefficientFunction, fitted: FittedModel, temperature_c: float
     return math.sqrt(max(float(gradient @ fit.own_covariance @ gradient), 0.0))
 
 
-def channels_at(axis: str, rates: dict[str, Array], n: int, temperature_c: float) -> Channels:
-    """Return n rows at rates about body axes, (n,) deg/s, and one temperature."""
+def channels_at(axis: str, rates: dict[str, Array], temperatures_c: Array) -> Channels:
+    """Return rows at rates about body axes, (n,) deg/s, and temperatures, (n,) deg C."""
+    n = len(temperatures_c)
     columns = {
-        "temperature_c": np.full(n, temperature_c),
+        "temperature_c": temperatures_c,
         "table_rate_dps": rates.get(axis, np.zeros(n)),
         "position": np.full(n, axis),
     }
@@ -110,15 +113,15 @@ def error_at(axis: str, rates_dps: Mapping[str, float]) -> LawFunction:
 
 def response(fitted: FittedModel, rates_dps: Mapping[str, float], temperature_c: float) -> Array:
     """Return the slopes of the n outputs along the rates about x, y and z at a rate vector, (n, 3)."""
-    axes = tuple(fitted.axes)
-    slopes = np.zeros((len(axes), len(BODY_AXES)))
-    for column, body_axis in enumerate(BODY_AXES):
-        at = rates_dps.get(body_axis, 0.0)
-        ends = {name: np.full(2, rate) for name, rate in rates_dps.items()} | {body_axis: np.array([at, at + STEP_DPS])}
-        for row, axis in enumerate(axes):
-            error = fitted.error_dps(channels_at(axis, ends, 2, temperature_c), axis)
-            slopes[row, column] = np.diff(error)[0] / STEP_DPS + (axis == body_axis)
-    return slopes
+    at = np.array([rates_dps.get(axis, 0.0) for axis in BODY_AXES])
+    stepped = np.vstack([at, at + STEP_DPS * np.eye(len(BODY_AXES))])  # the place, then a step along each axis
+    rates, temperatures_c = dict(zip(BODY_AXES, stepped.T, strict=True)), np.full(len(stepped), temperature_c)
+    slopes = [
+        (errors[1:] - errors[0]) / STEP_DPS + np.array([axis == body_axis for body_axis in BODY_AXES])
+        for axis in fitted.axes
+        for errors in [fitted.error_dps(channels_at(axis, rates, temperatures_c), axis)]
+    ]
+    return np.array(slopes)
 
 
 def correction_gain(fitted: FittedModel, response_of_outputs: Array) -> Array:

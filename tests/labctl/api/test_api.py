@@ -57,6 +57,7 @@ def test_health_and_metrics_describe_an_idle_bench(client: TestClient) -> None:
     assert client.get("/openapi.json").json()["info"]["title"] == "labctl"
 
 
+@pytest.mark.slow
 def test_uncertainty_criticism_improve_and_ladder(fog: TestClient) -> None:
     path = "/api/units/OSU-FOG-2024/calibrations/1"
     here = fog.get(f"{path}/uncertainty", params={"rate_dps": 50, "temperature_c": 40}).json()

@@ -135,6 +135,7 @@ def test_a_client_that_never_reads_is_cut_with_a_bounded_buffer(server: BoundedS
     assert server.app.sent < 16 << 20  # most of it in the system's own buffers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loop", ["uvloop", "asyncio"])
 def test_a_client_that_reads_slowly_is_not(loop: str) -> None:
     """It reads for longer than a client may stand still; a busy machine holds it up for less than that."""

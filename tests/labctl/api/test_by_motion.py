@@ -42,6 +42,7 @@ def of_axis(found: dict[str, Any], axis: str) -> dict[str, np.ndarray]:
     return {name: np.array(values)[own] for name, values in rows.items()}
 
 
+@pytest.mark.slow
 def test_at_rest_the_bias_is_that_of_the_readings_and_the_model_that_of_the_file(client: TestClient) -> None:
     recording = at_rest(("z",), lag_s=LAG_S)
     plain, found = by_motion(client, recording, effects=["bias", "bias_temperature:2", "thermal_lag"])

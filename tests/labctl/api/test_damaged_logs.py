@@ -18,6 +18,7 @@ LOGS, PREVIEW = "/api/recordings/logs", "/api/recordings/logs/preview"
 SEED, OF_EACH = 29, 12
 
 
+@pytest.mark.slow
 def test_whole_logs_of_every_kind_are_imported(client: TestClient, tmp_path: Path) -> None:
     whole = whole_logs(tmp_path)
     logs = {kind: sent_as(kind, whole, "", content) for kind, content in whole.items()}

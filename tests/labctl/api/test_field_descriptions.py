@@ -102,6 +102,7 @@ def properties() -> dict[tuple[str, str], dict[str, Any]]:
     }
 
 
+@pytest.mark.slow
 def test_each_property_in_the_description_of_the_api_has_a_description() -> None:
     assert [f"{name}.{key}" for (name, key), value in properties().items() if "description" not in value] == []
 

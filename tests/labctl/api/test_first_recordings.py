@@ -102,6 +102,7 @@ def run(client: TestClient, **body: Any) -> int:
     return int(client.get(f"/api/campaigns/{number}").json()["recordings"]["FOG-0001"])
 
 
+@pytest.mark.slow
 def test_a_simulated_campaign_can_hide_an_effect(client: TestClient) -> None:
     plain, hidden = run(client), run(client, hide=HIDE)
     assert asymmetry(client, hidden) - asymmetry(client, plain) == pytest.approx(0.04, rel=0.1)

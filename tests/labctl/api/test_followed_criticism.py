@@ -38,6 +38,7 @@ def path(client: TestClient) -> str:
     return f"{unit}/1/criticism"
 
 
+@pytest.mark.slow
 def test_the_stages_come_first_and_the_answer_is_that_of_a_plain_get(client: TestClient, path: str) -> None:
     followed = client.get(f"{path}/events")
     assert followed.headers["content-type"].startswith("text/event-stream")

@@ -77,6 +77,7 @@ def test_no_campaign_and_no_unit_is_loaded_for_it(ran: TestClient) -> None:
     assert all("count(" in each.lower() for each in about), about
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["/metrics", "/health"])
 def test_a_key_may_be_sent_and_the_description_says_so(client: TestClient, path: str) -> None:
     document = client.get("/openapi.json").json()

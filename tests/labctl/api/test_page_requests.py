@@ -31,6 +31,7 @@ def fog(client: TestClient, shared_answers: Path) -> TestClient:
     return client
 
 
+@pytest.mark.slow
 def test_a_version_says_whether_it_is_in_force(fog: TestClient) -> None:
     fitted = fog.post(f"{FOG}/calibrations", json={"model": "ojeda2000"}).json()
     version = fog.get(f"{FOG}/calibrations/2").json()
@@ -137,6 +138,7 @@ def test_a_preview_is_what_improve_makes_and_changes_nothing(
     assert client.post(f"{path}/preview", json={"add": ["no_such"]}).json()["type"] == "urn:labctl:problem:bad-input"
 
 
+@pytest.mark.slow
 def test_recordings_and_their_data_sets(fog: TestClient) -> None:
     ran = fog.post("/api/campaigns", json={"recipe": "short"}).json()
     followed = fog.get(f"/api/campaigns/{ran['id']}/events")
@@ -211,6 +213,7 @@ def test_pictures_are_figures_with_how_to_read_them(
     assert found["map"]["figure"]["data"][0]["type"] == "heatmap"
 
 
+@pytest.mark.slow
 def test_the_text_of_the_api_needs_nothing_from_outside(client: TestClient) -> None:
     page = client.get("/api-docs")
     assert page.status_code == 200

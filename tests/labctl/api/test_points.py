@@ -47,6 +47,7 @@ def test_what_a_figure_shows_is_what_its_readings_give(
         assert point["summary"] == f"Recomputed from {len(readings)} raw readings: equal."
 
 
+@pytest.mark.slow
 def test_the_rate_of_a_residual_is_the_mean_rate(unit: tuple[TestClient, Recording, str]) -> None:
     client, _, path = unit
     residuals, compared = (client.get(f"{path}/{name}").json()["columns"] for name in ("residuals", "comparison"))
@@ -75,6 +76,7 @@ def test_a_figure_that_is_not_of_these_readings_is_not_called_equal(
     assert "not equal, the difference is 1e-09 deg/s" in point["summary"]
 
 
+@pytest.mark.slow
 def test_means_without_readings_say_so_and_a_point_that_is_not_there_too(
     unit: tuple[TestClient, Recording, str],
 ) -> None:

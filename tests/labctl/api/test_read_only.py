@@ -98,6 +98,7 @@ def test_every_act_is_refused_with_one_problem_that_says_where_to_act(reader: Te
         assert "`labctl bench status` lists those with a bench" in problem["detail"]
 
 
+@pytest.mark.slow
 def test_what_is_read_equals_what_the_service_that_writes_answers(
     ran: TestClient, reader: TestClient, serial: str
 ) -> None:

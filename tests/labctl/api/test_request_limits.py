@@ -121,6 +121,7 @@ class Opened:
         return opening
 
 
+@pytest.mark.slow
 def test_no_word_in_a_request_becomes_a_path(
     client: TestClient, traps: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

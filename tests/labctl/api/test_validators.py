@@ -64,6 +64,7 @@ def test_an_unchanged_answer_is_sent_once(fitted: TestClient, path: str) -> None
     tag_of(fitted, path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["trace?channel=gyro_z&points=50", "inspection"])
 def test_what_depends_on_a_recording_alone_is_not_computed_for_a_client_that_has_it(
     ran: TestClient, monkeypatch: pytest.MonkeyPatch, path: str
@@ -77,6 +78,7 @@ def test_what_depends_on_a_recording_alone_is_not_computed_for_a_client_that_has
     assert computed == []
 
 
+@pytest.mark.slow
 def test_a_data_set_that_is_marked_changes_what_shows_the_recording(ran: TestClient, tmp_path: Path) -> None:
     paths = [f"/api/recordings/1/{path}" for path in ("trace?channel=gyro_z&points=50", "inspection", "datasets")]
     before = [tag_of(ran, path) for path in paths]
@@ -88,6 +90,7 @@ def test_a_data_set_that_is_marked_changes_what_shows_the_recording(ran: TestCli
     assert {answer.headers["etag"] for answer in after}.isdisjoint(before)
 
 
+@pytest.mark.slow
 def test_each_data_set_of_a_running_campaign_changes_the_answers_that_show_it(client: TestClient) -> None:
     paths = ("/api/campaigns/{}", "/api/campaigns/{}/plan", "/api/recordings/1/datasets", "/api/recordings/1")
     ids = [client.post("/api/campaigns", json={"recipe": "short"}).json()["id"]]

@@ -58,6 +58,7 @@ def test_effects_with_orders_are_a_complete_model(fog: Lab) -> None:
     assert added["version"] == 2
 
 
+@pytest.mark.slow
 def test_from_import_to_a_corrected_file(fog: Lab) -> None:
     fog.run("fit", "OSU-FOG-2024", "--model", "ojeda2000")
     refused = fog.run("calibration", "OSU-FOG-2024", status=1)
@@ -76,6 +77,7 @@ def test_from_import_to_a_corrected_file(fog: Lab) -> None:
     fog.run("compensate", str(file), str(raw), str(out), "--outside", "refuse", status=2)
 
 
+@pytest.mark.slow
 def test_the_table_of_units_says_what_the_answer_says(fog: Lab) -> None:
     serial = "OSU-FOG-2024"
     fog.run("batches", "set", "B-7", serial, "--by", "A")
@@ -224,6 +226,7 @@ FEW = [-90.0, 0.0, 90.0]
 MANY = [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

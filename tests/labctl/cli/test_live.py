@@ -55,6 +55,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lab:
     return Lab(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_stream_of_lines_to_a_version(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(feeds, "feed_of", lambda *_: TurnedFeed(40))
     answer = lab.json("live", "IMU-1", "--lines", "-", "--columns", ",".join(NAMES), "--target", "0.002")

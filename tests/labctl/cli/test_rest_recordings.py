@@ -61,6 +61,7 @@ def test_a_leg_left_out_shows_a_lag_that_leaving_out_temperatures_does_not(lab: 
     assert checked["rms_dps"] == pytest.approx(better["error"]["rms_dps"], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_without_a_thermometer_the_bias_is_fitted_criticised_verified_and_improved(lab: Lab) -> None:
     assert imported(lab, thermometer=False)["suggested_model"] == "bias"
     refused = lab.run("fit", "REST-1", "--model", "bias_temperature", status=2)

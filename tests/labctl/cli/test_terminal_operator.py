@@ -18,6 +18,7 @@ from labctl.store import open_store
 from procedures.contracts.operator import HumanOperator, Prompt
 
 
+@pytest.mark.slow
 def test_answers_and_resumes_at_a_terminal_are_in_the_audit_trail(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -169,6 +169,7 @@ def test_a_migration_that_is_killed_leaves_the_old_database_and_is_done_again(
     assert lab.json("check")["ok"]
 
 
+@pytest.mark.slow
 @from_end_to_end
 def test_the_unfinished_campaign_is_resumed_to_its_end(
     labs: Callable[[Entry], Lab], entry: Entry, tmp_path: Path

@@ -25,6 +25,7 @@ from tests.helpers.exported import exported, stated, whole_range
 Grid = tuple[np.ndarray, np.ndarray]
 
 
+@pytest.mark.slow
 @pytest.mark.needs_cc
 @pytest.mark.parametrize("any_calibration", ["fog", "mems", "plain", "open_loop"], indirect=True)
 def test_the_code_gives_the_stated_numbers_bit_by_bit(any_calibration: Calibration, tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from tests.helpers.calibrations import calibrated, inside
 Grid = tuple[np.ndarray, np.ndarray]
 
 
+@pytest.mark.slow
 @pytest.mark.needs_cc
 @pytest.mark.parametrize(
     ("real", "before", "most"), [("double", "from the calibration in double", 1e-10), ("float", "in single", 2e-3)]

@@ -63,6 +63,7 @@ def corrected(root: ET.Element, axes: tuple[str, ...], raw: np.ndarray, warm: np
     return rate
 
 
+@pytest.mark.slow
 def test_its_tables_correct_within_the_stated_error(any_calibration: Calibration) -> None:
     text = write(any_calibration, {**OPTIONS, "outputs": "15", "temperatures": "9"}).content.decode()
     raw, warm = whole_range(any_calibration, temperatures=37)

@@ -19,6 +19,7 @@ from tests.helpers.exported import exported
 Grid = tuple[np.ndarray, np.ndarray]
 
 
+@pytest.mark.slow
 def test_the_module_alone_computes_the_same(any_calibration: Calibration) -> None:
     text, written = exported(any_calibration, "python")
     imported = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import | ast.ImportFrom)]

@@ -86,6 +86,7 @@ def test_a_unit_turned_on_its_face_shows_its_misalignment_free_of_the_fixture(se
     assert result.error.rms_dps < 1.2 * result.error.noise_floor_dps
 
 
+@pytest.mark.slow
 def test_what_is_left_is_noise_and_no_effect_is_blamed(made: tuple[Recording, Unit, Bench]) -> None:
     data = fit_data_of(made[0])
     result = fit_preset(data, preset_for(None, list(MODEL)))

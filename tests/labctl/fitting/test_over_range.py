@@ -65,6 +65,7 @@ def test_the_lower_bound_is_below_u(means: Recording, sets: int) -> None:
     assert 0 < least.u_dps < found.u_dps
 
 
+@pytest.mark.slow
 def test_a_lower_bound_is_below_u_of_three_axes_too() -> None:
     recording = Triaxial(3).campaign(3)
     data, preset = data_and_preset(recording, "yang2018", [])

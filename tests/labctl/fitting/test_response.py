@@ -86,6 +86,7 @@ def test_a_bandwidth_beyond_the_readings_is_bounded_and_not_named() -> None:
     assert band["value"] > 50.0
 
 
+@pytest.mark.slow
 def test_a_delay_on_a_ramp_that_goes_one_way_is_a_bias() -> None:
     one_way = profile_recording(ramp(60.0, -60.0, 60.0, 100.0)[20:], delay_s=DELAY_S, scale=SCALE)
     bias, u = value_and_u(fit(one_way, None, PLAIN), "bias")
@@ -98,6 +99,7 @@ def test_a_delay_on_a_ramp_that_goes_one_way_is_a_bias() -> None:
     assert u < 1e-4
 
 
+@pytest.mark.slow
 def test_a_delay_on_a_ramp_there_and_back_is_told_from_a_bias_and_its_uncertainty_says_how_well() -> None:
     up = ramp(60.0, -60.0, 60.0, 100.0)
     both = profile_recording(np.concatenate([up, up[::-1]]), delay_s=DELAY_S, scale=SCALE, bias_dps=BIAS_DPS)

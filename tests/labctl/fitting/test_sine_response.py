@@ -80,6 +80,7 @@ def test_a_law_that_bends_the_other_way_is_no_sine() -> None:
     assert found["at_most"] == 0.0
 
 
+@pytest.mark.slow
 def test_nothing_is_missing_beside_it_and_the_suspect_is_the_same_constant() -> None:
     recording = open_loop(0.15, 2e-3)
     samples = Recording(recording.info.model_copy(update={"technology": "fog"}), recording.columns)
@@ -137,6 +138,7 @@ def test_a_calibration_of_version_0_1_keeps_its_law() -> None:
     assert sine_form_of(fitted, ("z",)) is None
 
 
+@pytest.mark.slow
 def test_every_axis_has_its_own_constant(triaxial: Callable[[int], Any]) -> None:
     recording = triaxial(3).campaign(3)
     columns = dict(recording.columns)

@@ -64,6 +64,7 @@ def test_where_a_unit_has_no_thermometer_the_chambers_stands_in(
     assert "temperature" not in expected.environment
 
 
+@pytest.mark.slow
 def test_criticism_and_the_static_record_go_by_the_chamber_too() -> None:
     recording = by_chamber(at_rest(LOOP_S, 5.0, 45.0, datasets=240))
     model, _ = preset_for(None, ["bias"]).build(fit_data_of(recording))

@@ -111,6 +111,7 @@ def test_an_added_lag_has_a_hint_only_where_it_is_not_certain(half_explained: Re
     assert hint_of_added(certain, base, [LAG]) is None
 
 
+@pytest.mark.slow
 def test_the_hint_stands_in_the_criticism_without_advice(half_explained: Recording) -> None:
     found = criticise(half_explained, based(half_explained)[1], points=to_points(half_explained))
     assert found.family is None

@@ -101,6 +101,7 @@ def test_a_campaign_that_fails(tmp_path: Path) -> None:
     assert records.all()[-1]["event"] == "campaign.state"  # nothing is said after why it ended
 
 
+@pytest.mark.slow
 def test_a_campaign_that_is_interrupted_and_resumed(tmp_path: Path) -> None:
     location, control = str(tmp_path / "lab.sqlite"), Control()
 

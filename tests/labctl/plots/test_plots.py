@@ -57,6 +57,7 @@ def trace(picture: Picture, name: str) -> Any:
     return next(t for t in picture.figure.data if t.name == name)
 
 
+@pytest.mark.slow
 def test_every_picture_has_a_title_a_caption_and_something_drawn() -> None:
     found = named(pictures_of(answer(), LADDER))
     assert list(found) == [
@@ -230,6 +231,7 @@ def test_what_is_in_the_numbers_cannot_end_the_script() -> None:
     assert data["data"][0]["x"] == ["1: </script><b>"]
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_report(tmp_path: Path) -> None:
     lab = Lab(tmp_path)
     write_recording(single_axis(1), lab.folder / "in", "parquet")

@@ -102,6 +102,7 @@ def test_verification_and_fitted_parts_cover_a_recording(recording: Recording) -
         fit(only, effects=EFFECTS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file_format", ["csv", "parquet"])
 def test_the_mark_survives_files_and_the_database(recording: Recording, tmp_path: Path, file_format: Any) -> None:
     write_recording(recording, tmp_path / "out", file_format)
@@ -137,6 +138,7 @@ def test_a_wrong_mark_is_named(recording: Recording, tmp_path: Path, change: Any
         read_recording(tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_a_campaign_marks_its_verification_part(tmp_path: Path) -> None:
     bench = resolve(read_bench("servo-sim"))
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
@@ -179,6 +181,7 @@ def test_a_fault_of_the_verification_part_refuses_no_fit_but_the_certification(
     assert objections[0]["do"].endswith("and measure the verification part again")
 
 
+@pytest.mark.slow
 def test_a_fault_of_what_is_fitted_refuses_the_fit(recording: Recording, tmp_path: Path) -> None:
     columns = {name: -values if name == "gyro_x" else values for name, values in recording.columns.items()}
     wrong = replace(recording, columns=columns)

@@ -78,6 +78,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
         yield opened
 
 
+@pytest.mark.slow
 def test_a_declared_act_has_a_route_whose_request_is_validated_and_an_entry_in_the_audit_trail(store: Store) -> None:
     runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
     campaign = runner.start(CampaignRequest(recipe="short")).id

@@ -107,6 +107,7 @@ def test_data_that_are_certainly_wrong_speak_against_their_version(lab: Lab, tmp
     assert "data" in {each["what"] for each in act["objections"]}
 
 
+@pytest.mark.slow
 def test_over_http_the_refusal_is_a_conflict_and_the_assessment_says_it_before(tmp_path: Path) -> None:
     with open_client(tmp_path / "lab.sqlite") as client:
         client.post("/api/recordings/example", json={"name": "osu-fog"})
@@ -152,6 +153,7 @@ def criticism(verdict: str, share_removed: float) -> CriticismResponse:
     })  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("verdict", "share_removed", "refused"),
     [

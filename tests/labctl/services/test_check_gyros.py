@@ -85,6 +85,7 @@ def test_a_change_of_the_scale_factor_is_told_from_one_of_the_bias(store: Store)
     assert states["bias"] != "out"
 
 
+@pytest.mark.slow
 def test_a_new_chart_begins_where_it_is_said_to(store: Store) -> None:
     for week in range(3):
         measure(store, week, 0.0)

@@ -60,6 +60,7 @@ def test_every_command_has_exactly_one_route_with_its_responses() -> None:
                 assert kind.__name__ in str(responses[str(status)])
 
 
+@pytest.mark.slow
 def test_here_in_the_service_and_over_http_a_command_answers_the_same(service: LabService, tmp_path: Path) -> None:
     asked = RecordingFolder(EXAMPLES / "osu-fog")
     request = ToUnit("OSU-FOG-2024", FitRequest(effects=["bias", "scale_factor"]))

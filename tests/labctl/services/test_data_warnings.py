@@ -40,6 +40,7 @@ def brought_in(lab: Lab) -> Callable[[Recording], list[dict[str, object]]]:
     return bring
 
 
+@pytest.mark.slow
 def test_good_data_have_no_warning_anywhere(lab: Lab, brought_in: Callable[[Recording], list[object]]) -> None:
     assert brought_in(single_axis(1)) == []
     assert lab.json("fit", FOG, "--model", "ojeda2000")["warnings"] == []
@@ -73,6 +74,7 @@ def test_certainly_wrong_data_are_refused_in_one_line_unless_accepted(
     lab.run("improve", FOG, "--add", "scale_factor_odd", "--accept-warnings")
 
 
+@pytest.mark.slow
 def test_probably_wrong_data_are_fitted_with_a_loud_warning(
     lab: Lab, brought_in: Callable[[Recording], list[dict[str, object]]]
 ) -> None:
@@ -86,6 +88,7 @@ def test_probably_wrong_data_are_fitted_with_a_loud_warning(
     assert found["text"][0].startswith("Check the data: axis z")
 
 
+@pytest.mark.slow
 def test_a_criticism_that_cannot_be_computed_says_the_data_first(
     lab: Lab, brought_in: Callable[[Recording], list[dict[str, object]]]
 ) -> None:
@@ -158,6 +161,7 @@ def test_a_fit_that_is_worse_than_none_is_certainly_wrong() -> None:
     assert "residual of the model on the data of the fit is 109.4 deg/s RMS" in much.text
 
 
+@pytest.mark.slow
 def test_a_fit_that_is_worse_than_none_is_refused_with_its_figures_and_not_kept(
     lab: Lab, brought_in: Callable[[Recording], list[object]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -178,6 +182,7 @@ def test_a_fit_that_is_worse_than_none_is_refused_with_its_figures_and_not_kept(
     assert [each["what"] for each in accepted["warnings"]] == ["worse"]
 
 
+@pytest.mark.slow
 def test_an_improvement_that_does_not_predict_better_says_so_loudly(
     lab: Lab, brought_in: Callable[[Recording], list[object]]
 ) -> None:

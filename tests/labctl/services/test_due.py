@@ -321,6 +321,7 @@ def client(store: Store, tmp_path: Path) -> Iterator[TestClient]:
         yield opened
 
 
+@pytest.mark.slow
 def test_units_that_are_due_are_found_counted_and_listed(client: TestClient, store: Store) -> None:
     now = service_of(client).clock.utc()
     campaign = client.post("/api/campaigns", json={"recipe": "short"}).json()["id"]

@@ -109,6 +109,7 @@ def test_a_fit_without_the_option_has_no_such_key_in_its_file(lab: Lab) -> None:
     assert "held" not in json.loads(lab.run("calibration", "ONE", "--version", "1").stdout)["model"]
 
 
+@pytest.mark.slow
 def test_a_change_of_the_model_keeps_what_is_held_until_its_effect_is_added_again(lab: Lab) -> None:
     fitted(lab)
     changed = lab.json("improve", "ONE", "--add", "scale_factor_asymmetry")

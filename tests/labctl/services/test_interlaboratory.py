@@ -94,6 +94,7 @@ def test_equal_numbers_of_two_laboratories_are_no_shared_standard(store: Store) 
     assert compared(store, first, second, -4e-3).shared == []
 
 
+@pytest.mark.slow
 def test_what_cannot_be_compared_is_refused(store: Store) -> None:
     standard = clock(100.0, "A-1")
     version = measure(store, date(2026, 1, 5), standard)
@@ -108,6 +109,7 @@ def test_what_cannot_be_compared_is_refused(store: Store) -> None:
         compare(store, (SERIAL, version), (SERIAL, other), 400.0)
 
 
+@pytest.mark.slow
 def test_a_result_that_one_of_them_lacks_is_named(store: Store) -> None:
     version = measure(store, date(2026, 1, 5), clock(100.0, "A-1"))
     measure(store, date(2026, 2, 5), clock(100.0, "B-1"))

@@ -39,6 +39,7 @@ def test_a_version_keeps_all_its_recordings_and_what_they_say_together(lab: Lab)
     assert lab.json("verify", "J-1", "--version", "2", "--recording", "1")["seen"]
 
 
+@pytest.mark.slow
 def test_recordings_of_which_one_has_no_date_have_no_order(lab: Lab, tmp_path: Path) -> None:
     undated = recordings(1, (0.0,))[1]
     head = undated.info.model_copy(update={"date_known": False})
@@ -52,6 +53,7 @@ def test_recordings_of_which_one_has_no_date_have_no_order(lab: Lab, tmp_path: P
     assert not [w for w in dated["warnings"] if w["what"] == "date"]
 
 
+@pytest.mark.slow
 def test_a_later_recording_is_as_expected_of_a_version_of_several(lab: Lab) -> None:
     """What a later day is off by is known from the recordings themselves: each was predicted by the others."""
     lab.run("fit", "J-1", "--recording", "1,2", "--effects", ",".join(EFFECTS))

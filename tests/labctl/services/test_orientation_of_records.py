@@ -144,6 +144,7 @@ def test_a_recording_is_followed_over_http_as_on_the_command_line(
     assert lab.json("orientation", "T-1", *options) == with_stops
 
 
+@pytest.mark.slow
 def test_http_and_the_command_line_take_the_same_options() -> None:
     taken = set(inspect.signature(noise.orientation).parameters)
     assert set(OrientationQuery.model_fields) <= taken

@@ -107,6 +107,7 @@ def test_rests_that_do_not_agree_or_are_too_few_are_named_with_what_to_do(tmp_pa
     assert "8 rests have 7 turns between them; nine coefficients of the gyro need at least 9" in " ".join(found["text"])
 
 
+@pytest.mark.slow
 def test_options_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
     unit = unit_of(10)
     folder = str(write_turned(tmp_path / "first", unit, 24))

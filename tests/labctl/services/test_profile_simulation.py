@@ -69,6 +69,7 @@ def coefficient(recording: Recording, effects: list[str], name: str) -> tuple[fl
     return value, u
 
 
+@pytest.mark.slow
 def test_a_hidden_delay_is_found_and_the_recording_is_a_sound_profile() -> None:
     recording = simulated(time_delay=0.005)
     assert recording.info.motion == "profile"
@@ -89,6 +90,7 @@ def test_a_simulated_profile_states_the_time_of_its_reference() -> None:
     assert {line.source: line.contribution for line in budget.lines}["table_time_common"] == 0.0
 
 
+@pytest.mark.slow
 def test_a_hidden_bandwidth_is_found_beside_a_delay() -> None:
     recording = simulated(time_delay=0.003, bandwidth=0.004)
     value, u = coefficient(recording, [*EFFECTS_FITTED, "bandwidth"], "bandwidth")
@@ -96,6 +98,7 @@ def test_a_hidden_bandwidth_is_found_beside_a_delay() -> None:
     assert u < 1.0
 
 
+@pytest.mark.slow
 def test_a_late_encoder_looks_like_an_early_gyro() -> None:
     """Delays are against the time stamps of the reference: nothing in the data tells whose clock is off."""
     value, u = coefficient(simulated(table={"encoder_late_s": 0.002}, time_delay=0.005), EFFECTS_FITTED, "delay")

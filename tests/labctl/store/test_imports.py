@@ -99,6 +99,7 @@ def test_another_writer_gets_its_turn_during_an_import(store: Store, monkeypatch
     assert max(between) <= 5  # transactions of the import that came before one of the other's
 
 
+@pytest.mark.slow
 def test_parts_are_bounded_in_bytes(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """A data set of 200,000 readings: its blocks are several, and no transaction has many of them."""
     given = one_row_sets(2, per_set=200_000)
@@ -222,6 +223,7 @@ def test_what_is_left_is_discarded_in_short_transactions(location: str, monkeypa
     assert set(rows_of(location).values()) == {0}
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_inside_an_import(location: str) -> None:
     """A real process, ended by SIGKILL between two parts."""
     program = """if True:

@@ -77,6 +77,7 @@ def rows_of(location: str) -> dict[str, list[Any]]:
     return found
 
 
+@pytest.mark.slow
 def test_a_campaign_leaves_the_same_rows_as_in_a_file(url: str, tmp_path: Path) -> None:
     path = str(tmp_path / "lab.sqlite")
     for location in (path, url):
@@ -191,6 +192,7 @@ def test_a_server_that_is_restarted_fails_no_write_and_no_read(cluster: Cluster,
             starting.join()
 
 
+@pytest.mark.slow
 def test_a_campaign_goes_on_while_its_server_is_restarted(
     cluster: Cluster, url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -328,6 +330,7 @@ def test_a_writer_that_hangs_is_told_and_then_ended_by_the_server(url: str, monk
         store.close()
 
 
+@pytest.mark.slow
 def test_the_life_of_a_certificate_is_the_same_on_a_server(url: str) -> None:
     with open_store(url, write=True) as store:
         certificates.add_version(store)
@@ -378,6 +381,7 @@ def test_the_register_of_standards_is_the_same_as_in_a_file(url: str, tmp_path: 
         assert on_server[name] == in_file[name], name
 
 
+@pytest.mark.slow
 def test_the_drift_of_a_type_is_the_same_on_a_server(url: str, tmp_path: Path) -> None:
     found = []
     for place in (url, str(tmp_path / "lab.sqlite")):

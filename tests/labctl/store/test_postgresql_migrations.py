@@ -71,6 +71,7 @@ def rows_of(location: str) -> dict[str, list[Any]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
 def test_every_earlier_schema_is_migrated_on_a_server_as_in_a_file(entry: Entry, url: str, tmp_path: Path) -> None:
     path = entry.unpack(tmp_path)

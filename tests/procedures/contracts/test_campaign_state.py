@@ -50,6 +50,7 @@ def test_the_description_of_the_api_lists_the_states() -> None:
     assert {"ended", "active"} <= set(schemas["CampaignResponse"]["properties"])
 
 
+@pytest.mark.slow
 def test_no_other_module_lists_states_of_campaigns() -> None:
     words = {state.value for state in CampaignState}
     found = []

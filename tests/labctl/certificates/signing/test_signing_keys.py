@@ -205,6 +205,7 @@ print(json.dumps(said))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["EC:prime256v1", "rsa:2048"])
 def test_a_key_in_a_token_signs_pdf_and_dcc(tmp_path: Path, kind: str) -> None:
     uri = _token(tmp_path, kind)

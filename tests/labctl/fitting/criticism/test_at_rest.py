@@ -59,6 +59,7 @@ def test_a_bias_beside_a_ramp_is_that_of_the_middle_of_the_record() -> None:
     assert bias == pytest.approx(means, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_temperature_that_was_not_logged_is_said_and_nothing_is_advised() -> None:
     found = criticised(at_rest())
     assert (found.verdict.form, found.verdict.named) == ("unexplained", ())
@@ -69,6 +70,7 @@ def test_a_temperature_that_was_not_logged_is_said_and_nothing_is_advised() -> N
     assert found.advice == ()
 
 
+@pytest.mark.slow
 def test_a_hysteresis_that_holds_on_parts_left_out_is_advised() -> None:
     found = criticised(at_rest("hysteresis"))
     assert [(each["effect"], each["add"]) for each in found.advice] == [("thermal_hysteresis", True)]
@@ -90,6 +92,7 @@ def test_without_a_technology_the_largest_plausible_size_of_all_counts() -> None
     assert largest_plausible("cross_g_sensitivity", "fog") == 1e-3
 
 
+@pytest.mark.slow
 def test_a_suspect_is_not_listed_with_a_fit_that_is_worse_than_the_model() -> None:
     found = criticised(at_rest("hysteresis"))
     assert found.base is not None

@@ -82,6 +82,7 @@ def test_what_no_effect_describes_is_unexplained() -> None:
     assert found.verdict.named == ()
 
 
+@pytest.mark.slow
 def test_two_at_once_are_both_named() -> None:
     found = held(single_axis(6, scale_factor_asymmetry=3e-4, rate_hysteresis=0.006))
     assert set(found.verdict.named) == {"scale_factor_asymmetry", "rate_hysteresis"}
@@ -97,6 +98,7 @@ def without(recording: Recording, *names: str) -> Recording:
     return replace(recording, columns={k: v for k, v in recording.columns.items() if k not in names})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("channel", "silenced"),
     [
@@ -128,6 +130,7 @@ def test_without_the_chamber_nothing_wrong_is_said() -> None:
     assert held(without(single_axis(2), "chamber_c", "chamber_setpoint_c")).verdict.form == "adequate"
 
 
+@pytest.mark.slow
 def test_order_of_columns_units_and_names_of_axes_do_not_matter() -> None:
     recording = single_axis(1, **HELD)
     turned = replace(recording, columns=dict(reversed(list(recording.columns.items()))))
@@ -231,6 +234,7 @@ def bring(lab: Lab) -> Callable[[Recording], Lab]:
     return taken
 
 
+@pytest.mark.slow
 def test_the_whole_walk(bring: Callable[[Recording], Lab]) -> None:
     """Fit, criticise, improve, ladder, criticise again: as a person types it."""
     lab = bring(single_axis(1, **HELD))
@@ -275,6 +279,7 @@ def test_the_same_input_gives_the_same_bytes(
     assert lab.run("criticise", "FOG-0001", "--json").stdout == first
 
 
+@pytest.mark.slow
 def test_bench_effects_stay_on_the_bench(bring: Callable[[Recording], Lab]) -> None:
     lab = bring(single_axis(8, table_rate_ripple=2e-4))
     lab.run("fit", "FOG-0001", "--model", "ojeda2000")

@@ -42,6 +42,7 @@ class Garbage:
         sum(range(50))
 
 
+@pytest.mark.slow
 def test_fifty_threads_read_formulas_at_once(hasty: None) -> None:
     """Without a lock about one in 200 fails: `AST constructor recursion depth mismatch`."""
     texts = ["a: " + "+".join(f"(table_rate_dps*{n})" for n in range(20)), "a: " + "(" * 90 + "1" + ")" * 90]

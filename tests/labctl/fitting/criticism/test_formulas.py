@@ -83,6 +83,7 @@ def test_in_use_the_tables_rate_is_that_of_the_only_axis() -> None:
     assert np.allclose(found, expected, atol=2e-4)
 
 
+@pytest.mark.slow
 def test_of_three_axes_it_is_refused_by_name() -> None:
     recording = three_axes(1)
     used = in_use(recording, SUPPLY)

@@ -31,6 +31,7 @@ def added(kind: str, recipe: str, model: str, size_dps: float, seed: int = 0) ->
     return held(KINDS[kind].added(plain(recipe, seed), seed, size_dps), model).verdict
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("recipe", "model", "size_dps", "seed"),
     [("gyrostar", "weiss1995", 0.5, 0), ("ojeda2000", "ojeda2000", 0.03, 1), ("ojeda2000", "ojeda2000", 1.0, 0)],

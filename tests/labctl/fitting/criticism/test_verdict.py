@@ -84,6 +84,7 @@ def test_a_sine_response_is_named_for_a_fibre_gyro() -> None:
     assert "sine_response" in held(single_axis(5, sine_response=0.25)).verdict.named
 
 
+@pytest.mark.slow
 def test_a_model_that_leaves_less_than_the_noise_is_adequate_whatever_is_like_the_rest() -> None:
     found = held(read_recording(EXAMPLES / "osu-fog"), full=True)
     assert (found.verdict.form, found.verdict.named) == ("adequate", ())
@@ -119,6 +120,7 @@ def test_the_search_ends_where_the_data_say_nothing_more() -> None:
     assert all(suspect.share_removed < 0.1 for suspect in weak)
 
 
+@pytest.mark.slow
 def test_one_name_that_explains_only_a_part_stays_ambiguous() -> None:
     """An effect that takes off little of the excess is the only one of its group, and still not certain."""
     found = held(read_recording(EXAMPLES / "osu-fog"), "bias_scale", full=True)

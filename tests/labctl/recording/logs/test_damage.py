@@ -99,6 +99,7 @@ def test_damage_anywhere_is_refused_or_said_and_no_reading_is_invented(kind: str
     assert said == PLACES or kind != "ULog"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_file_that_is_cut_off_is_refused_or_says_so(kind: str, tmp_path: Path) -> None:
     path = KINDS[kind](tmp_path)

@@ -102,6 +102,7 @@ def test_a_simulated_bench_asks_nothing(store: Store) -> None:
     assert store.campaigns.events(1)[0].kind == "state"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("real")
 def test_a_scheduled_start_keeps_who_confirmed_it(store: Store) -> None:
     clock, runner = VirtualClock(AT), BenchRunner(store, BENCH, VirtualClock)

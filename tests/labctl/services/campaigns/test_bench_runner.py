@@ -115,6 +115,7 @@ def moves(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return opened
 
 
+@pytest.mark.slow
 def test_a_bench_that_is_not_confirmed_safe_refuses_what_is_due_and_blocks_nothing(lab: Lab, moves: list[str]) -> None:
     lab.enter(at="now")
     lab.tick()
@@ -147,6 +148,7 @@ def test_what_is_due_waits_for_a_bench_that_was_lost(lab: Lab, moves: list[str])
     assert (lab.event(due)[0], lab.states()) == ("started", ["done"])
 
 
+@pytest.mark.slow
 def test_a_campaign_whose_bench_was_lost_is_resumed_before_the_queue_continues(lab: Lab) -> None:
     lab.begin_and_lose(at=200)
     lost = campaign_status(lab.store, 1)
@@ -210,6 +212,7 @@ def test_without_the_lease_nothing_is_resumed_and_nothing_moves(tmp_path: Path, 
     first.lab_service.close()
 
 
+@pytest.mark.slow
 def test_a_command_that_takes_a_campaign_up_needs_the_lease_too(
     tmp_path: Path, moves: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -230,6 +233,7 @@ def test_a_command_that_takes_a_campaign_up_needs_the_lease_too(
     assert resume.resume_here(location, None, None, None, ResumeRequest(by="Ada")).state == "done"
 
 
+@pytest.mark.slow
 def test_a_service_resumes_a_left_campaign_before_its_queue(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     first = Lab(location)
@@ -248,6 +252,7 @@ def test_a_service_resumes_a_left_campaign_before_its_queue(tmp_path: Path) -> N
     second.lab_service.close()
 
 
+@pytest.mark.slow
 def test_what_cannot_be_resumed_waits_for_a_person_and_the_queue_continues(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -54,6 +54,7 @@ def bench(seed: int = 1, mistakes: tuple[str, ...] = (), **hidden: float) -> Ben
     return BenchFile.model_validate(file)
 
 
+@pytest.mark.slow
 def test_a_hidden_scale_error_is_found_within_its_uncertainty(tmp_path: Path) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         made = prepare(store, WHOLE, bench(scale_factor=HIDDEN), VirtualClock(), clip=False)

@@ -119,6 +119,7 @@ def test_a_course_gives_the_rate_of_each_reading_and_the_fit_uses_it(tmp_path: P
     assert np.unique(np.round(columns["table_time_common_u_s"], 6)).tolist() == [0.0, round(REPLY_S / np.sqrt(8), 6)]
 
 
+@pytest.mark.slow
 def test_the_simulation_without_bytes_has_the_same_truth(tmp_path: Path) -> None:
     bench = servo_bench(hidden={"time_delay": 0.02})
     gyro = bench.gyros[0]
@@ -136,6 +137,7 @@ def test_the_simulation_without_bytes_has_the_same_truth(tmp_path: Path) -> None
     assert list(np.unique(walked.columns["dataset"])) == list(np.unique(driven.columns["dataset"]))
 
 
+@pytest.mark.slow
 def test_a_stop_in_the_middle_is_obeyed_within_a_second_and_the_course_is_taken_again(tmp_path: Path) -> None:
     bench = servo_bench()
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:

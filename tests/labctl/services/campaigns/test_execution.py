@@ -44,6 +44,7 @@ def dump(location: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
     dumps = []
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):

@@ -46,6 +46,7 @@ def post(client: TestClient, act: str, **body: Any) -> Any:
     return client.post(f"/api/campaigns/1/{act}", json=body)
 
 
+@pytest.mark.slow
 def test_questions_are_answered_by_id_and_old_ids_are_refused(client: TestClient) -> None:
     client.post("/api/campaigns", json={"recipe": "short"})
     first = until(client, lambda answer: answer["prompt"])
@@ -74,6 +75,7 @@ def test_a_person_declines(client: TestClient) -> None:
     assert "the cube is hot" in answer["reason"]
 
 
+@pytest.mark.slow
 def test_who_answered_is_recorded_and_listeners_that_are_gone_hold_nobody_up(
     client: TestClient, runner: BenchRunner
 ) -> None:

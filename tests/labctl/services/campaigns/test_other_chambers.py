@@ -39,6 +39,7 @@ PYMEASURE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chamber", ["espec", "weiss-simserv", "weiss-ascii2", "thermotron", "binder", "pymeasure"])
 def test_a_campaign(store: Store, chamber: str, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = VirtualClock()

@@ -58,6 +58,7 @@ def test_a_faulty_bench_ends_the_campaign_or_not_but_never_hangs_and_never_lies(
     assert end.well, end
 
 
+@pytest.mark.slow
 def test_the_faults_drawn_are_of_every_kind_in_every_instrument() -> None:
     drawn = [(bench.name, each) for seed in range(500) for bench in [faults.benches()[seed % 4]]
              for each in faults.draw(seed, bench)]  # fmt: skip
@@ -127,6 +128,7 @@ def test_another_bench_is_refused(tmp_path: Path) -> None:
             prepare_resume(store, prepared.id, load_bench("triaxial-sim"), lambda _: VirtualClock(), ResumeRequest())
 
 
+@pytest.mark.slow
 def test_what_is_not_confirmed_safe_stays_until_a_person_clears_it(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     with open_store(location, write=True) as store:
@@ -180,6 +182,7 @@ def test_a_host_that_was_off_means_that_the_units_were() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_unit_that_drops_out_is_written_down_and_its_recording_ends_there(tmp_path: Path) -> None:
     bench = faults.benches()[3]
     database = Database(str(tmp_path / "lab.sqlite"), write=True)

@@ -22,6 +22,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
         yield opened
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("silent_s", [2.0, 9.0, 11.0, 18.0])
 def test_a_table_that_still_turns_is_stopped_before_the_step_is_begun_again(store: Store, silent_s: float) -> None:
     bench, clock = load_bench("single-axis-sim"), VirtualClock()

@@ -29,6 +29,7 @@ def bench_of(folder: Path, format_: str, rate_hz: float, clock_ppm: float) -> st
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("format_", "rate_hz", "clock_ppm"), [("kvh-1750", 25, 0), ("xsens-mti", 20, 2e4), ("vectornav-vnimu", 20, -2e4)]
 )

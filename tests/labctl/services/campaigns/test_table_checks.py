@@ -124,6 +124,7 @@ def test_rates_are_by_all_timed_runs_and_their_scatter_is_in_the_record(tmp_path
         assert abs(abs(rate_dps) / true_dps - 1) * 1e6 < figures["expanded_ppm"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("changed", "state"), [(0.0, "done"), (1e-3, "failed")])
 def test_a_resumed_campaign_compares_its_clock_with_that_before(tmp_path: Path, changed: float, state: str) -> None:
     location = str(tmp_path / "lab.sqlite")

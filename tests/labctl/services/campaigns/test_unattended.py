@@ -334,6 +334,7 @@ def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str
     assert (again["left"], "before it could make the bench safe" in again["unconfirmed"]) == ([], True)
 
 
+@pytest.mark.slow
 def test_a_simulated_bench_only_says_that_a_campaign_was_left(left: str) -> None:
     assert labctl(left, "bench", "status").exit_code == 0
     started = labctl(left, "campaign", "start", "short", "--bench", BENCH.name, "--json")

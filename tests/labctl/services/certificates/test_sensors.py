@@ -97,6 +97,7 @@ def test_the_scale_factors_are_those_of_the_local_gravity_that_is_stated(store: 
     assert "other temperatures" in found.not_stated
 
 
+@pytest.mark.slow
 def test_a_magnetometer_without_a_stated_field_is_relative_and_says_so(store: Store) -> None:
     _, (found,) = sensors_of(store, magnetometer=MAGNETOMETER)
     assert found.reference.u is None
@@ -204,6 +205,7 @@ def test_the_alignment_of_the_gyro_triad_is_stated_with_its_uncertainty(tmp_path
         assert each.expanded == pytest.approx(factor * fitted["u"], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_alignment_of_the_magnetometer_is_in_all_three_forms(tmp_path: Path) -> None:
     unit = unit_of(11)
     folder = write_turned(tmp_path / "turned", unit, 20, serial=SERIAL)

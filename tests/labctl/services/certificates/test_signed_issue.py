@@ -122,6 +122,7 @@ def test_a_service_does_not_start_with_a_key_that_others_can_read(signer: Owner,
         refuse_unusable_keys()
 
 
+@pytest.mark.slow
 def test_without_a_key_no_library_for_signatures_is_loaded(tmp_path: Path) -> None:
     (tmp_path / "certificate.json").write_bytes(issued()[1].document)
     script = """

@@ -59,6 +59,7 @@ def certificate(store: Store, version: int, **order: object) -> Certificate:
     return Certificate.model_validate_json(store.certificates.forms(answer.number).document)
 
 
+@pytest.mark.slow
 def test_the_drift_is_that_of_the_unit_per_year(store: Store) -> None:
     assert str(stability_of(store, SERIAL, add(store, later(0.0, 0.0)))).startswith(NO_HISTORY)
     add(store, later(0.5, 0.010))
@@ -104,6 +105,7 @@ def test_without_a_history_the_certificate_says_that_the_drift_is_not_known(stor
         assert "until 2028-03-01 is not known" in text
 
 
+@pytest.mark.slow
 def test_with_a_history_the_promise_contains_the_drift(store: Store) -> None:
     add(store, later(0.0, 0.0))
     add(store, later(1.0, 0.01))
@@ -120,6 +122,7 @@ def test_with_a_history_the_promise_contains_the_drift(store: Store) -> None:
     assert f"the largest U of the results is {conformity.expanded_dps:.3g} °/s" in " ".join(found.statements)
 
 
+@pytest.mark.slow
 def test_versions_that_share_a_recording_are_no_interval(store: Store) -> None:
     add(store, later(0.0, 0.0))
     store.recordings.add_import(later(1.0, 0.02), AT)

@@ -119,6 +119,7 @@ def test_an_error_that_only_the_verification_shows_fails(recording: Recording, t
     assert min(each.risk for each in found.results if each.output == "y") > 0.99
 
 
+@pytest.mark.slow
 def test_about_its_own_axis_an_output_is_judged_where_it_turned_about_it(store: Store) -> None:
     found = issued(store, about="own axis").conformity
     assert found is not None

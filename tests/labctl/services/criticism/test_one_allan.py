@@ -69,6 +69,7 @@ def test_n_is_that_of_allantools(store: Store, axis: str, seed: int, line_dps: f
     assert n["value"] == pytest.approx(60 * WHITE_DPS / np.sqrt(RATE_HZ), rel=0.03)
 
 
+@pytest.mark.slow
 def test_several_recordings_state_the_longest_record(store: Store) -> None:
     noise = criticise_unit(store, "MEMS-1", None, None, recordings=(1, 2)).noise
     assert noise is not None

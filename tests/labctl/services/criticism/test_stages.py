@@ -40,6 +40,7 @@ def stages_of(store: Store, serial: str) -> list[str]:
     return received
 
 
+@pytest.mark.slow
 def test_stages_are_reported_in_order_and_none_for_a_cached_answer(store: Store) -> None:
     (unit,) = store.units.all()
     received = stages_of(store, unit.serial)
@@ -51,6 +52,7 @@ def test_stages_are_reported_in_order_and_none_for_a_cached_answer(store: Store)
     assert stages_of(store, unit.serial) == []
 
 
+@pytest.mark.slow
 def test_cancelled_at_any_stage_it_leaves_no_file_and_can_be_asked_again(store: Store, cache: Path) -> None:
     (unit,) = store.units.all()
     before = sorted(cache.rglob("*"))

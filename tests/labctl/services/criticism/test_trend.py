@@ -84,6 +84,7 @@ def test_the_line_and_its_interval_go_on_beyond_the_limit(five_years: Lab) -> No
     assert at[-1] > datetime.fromisoformat(leaves["expected"])
 
 
+@pytest.mark.slow
 def test_a_bias_that_is_outside_its_limit_is_said_to_be_outside_already(five_years: Lab, tmp_path: Path) -> None:
     lab = Lab(shutil.copytree(five_years.folder, tmp_path / "lab"))
     found = lab.json("trend", "J-1", "--limit-dps", "0.03")

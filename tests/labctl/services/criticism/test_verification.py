@@ -81,6 +81,7 @@ def test_a_recording_of_another_unit_needs_the_request(two_days: Lab, tmp_path: 
     assert (found["serial"], found["recorded_unit"]) == (FOG, "FOG-9")
 
 
+@pytest.mark.slow
 def test_a_ladder_is_of_one_recording_and_follows_parentage(two_days: Lab) -> None:
     two_days.json("fit", FOG, "--recording", "2", "--model", "bias_scale")
     two_days.json("improve", FOG, "--version", "1", "--recording", "1", "--add", "saturation")

@@ -99,6 +99,7 @@ def test_a_table_over_temperature_is_measured_at_fixed_temperatures_and_a_law_wh
     assert law.chosen.hours < table.chosen.hours
 
 
+@pytest.mark.slow
 def test_without_a_recipe_the_range_is_that_of_bench_and_unit() -> None:
     answer = design_campaign(None, DesignRequest(model="bias_scale", hours=6.0), BENCH)
     (gyro,), table = BENCH.gyros, BENCH.table
@@ -135,6 +136,7 @@ def test_a_request_that_asks_for_nothing_is_refused(asked: dict[str, Any], said:
         DesignRequest.model_validate(SMALL | asked)
 
 
+@pytest.mark.slow
 def test_an_earlier_calibration_states_the_noise(tmp_path: Any) -> None:
     gyro = BENCH.gyros[0].model_copy(update={"sample_rate_hz": 4.0})
     plan = make_plan(load_recipe("ojeda2000-121"), limits_of(BENCH))

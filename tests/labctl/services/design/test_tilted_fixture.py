@@ -90,6 +90,7 @@ def test_its_recipe_runs_and_its_fit_finds_the_unit_whatever_the_fixture_is_off_
         np.testing.assert_allclose(found, scale, atol=4e-5)
 
 
+@pytest.mark.slow
 def test_a_fixture_is_of_no_use_to_one_axis_or_a_table_over_temperature() -> None:
     single = design_campaign(
         None, DesignRequest(like="ojeda2000", model="bias_scale", hours=3.0), load_bench("single-axis-sim")

@@ -108,6 +108,7 @@ def test_a_type_with_too_few_units_or_without_the_model_gives_no_prior(store: St
         prior_of_type(store, "FOG-Q", "bias_scale", [])
 
 
+@pytest.mark.slow
 def test_a_design_with_the_prior_takes_no_longer_and_its_recipe_is_fitted_with_it(
     store: Store, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -64,6 +64,7 @@ def campaigns(location: str) -> list[str]:
         return sorted(row.recipe_name for row in store.campaigns.all())
 
 
+@pytest.mark.slow
 def test_it_goes_on_until_one_cause_is_left(location: str) -> None:
     answer = run(location)
     assert (answer.state, answer.outcome, answer.named) == ("done", "one_cause", ["warm_up"])
@@ -96,6 +97,7 @@ def test_its_campaigns_are_on_the_same_units_on_other_days(location: str) -> Non
     assert len({each["noise_seed"] for each in simulations}) == 3
 
 
+@pytest.mark.slow
 def test_a_ctrl_c_stops_it_and_the_same_command_continues_its_campaign(location: str) -> None:
     answer, _ = begin_here(location, UNIT, DiagnosisRequest(hours=24), None)
 

@@ -80,6 +80,7 @@ def service(location: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]
     opened.lab.close()
 
 
+@pytest.mark.slow
 def test_a_diagnosis_for_the_night_judges_at_once_and_begins_no_experiment_before_its_time(service: Service) -> None:
     path = f"/api/units/{UNIT}/diagnoses"
     past = service.post(path, 400, at="2026-10-31T22:00Z")

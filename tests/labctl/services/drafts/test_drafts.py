@@ -154,6 +154,7 @@ def test_the_version_in_force_is_applied_as_it_is_and_the_drift_has_an_uncertain
     assert version_in_force(store, UNIT) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unjudged")
 def test_another_model_in_force_is_compared_by_its_corrected_rates_alone(store: Store) -> None:
     fit_unit(store, UNIT, FitRequest(effects=["bias"]), NOW)

@@ -40,6 +40,7 @@ def versions(store: Store) -> list[list[int]]:
     return [store.calibrations.versions(f"U{number:05d}") for number in range(UNITS)]
 
 
+@pytest.mark.slow
 def test_each_unit_gets_one_version_that_is_not_in_force_and_a_second_job_has_nothing_to_do(store: Store) -> None:
     first = run_job(store)
     assert (first.state, first.done, first.failed, first.waiting) == ("done", UNITS, 0, 0)
@@ -63,6 +64,7 @@ def test_the_fit_of_a_job_is_that_of_a_single_unit(store: Store) -> None:
     assert kept["axes"] == alone.model_dump(mode="json")["axes"]
 
 
+@pytest.mark.slow
 def test_what_changed_since_is_computed_again(store: Store) -> None:
     run_job(store)
     store.recordings.add_import(unit_points(2), AT)  # a new recording
@@ -73,6 +75,7 @@ def test_what_changed_since_is_computed_again(store: Store) -> None:
     assert run_job(store, effects=["bias"]).done == UNITS  # another model
 
 
+@pytest.mark.slow
 def test_a_criticism_is_written_once_and_its_verdict_kept(store: Store) -> None:
     run_job(store)
     judged = run_job(store, kind="criticise")
@@ -155,6 +158,7 @@ def test_an_engine_that_was_lost_with_all_that_it_had_loses_nothing_and_writes_n
     assert versions(store) == [[1]] * UNITS
 
 
+@pytest.mark.slow
 def test_a_version_that_another_fit_took_is_made_again_with_the_next_number(store: Store) -> None:
     made: list[str] = []
 

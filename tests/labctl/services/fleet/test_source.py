@@ -212,6 +212,7 @@ def test_two_may_publish_at_once_and_what_cannot_be_written_leaves_no_part(
     assert not list((lab / "both").rglob("*.part"))
 
 
+@pytest.mark.slow
 def test_what_is_published_is_a_recording_in_the_interchange_format(lab: Path) -> None:
     with open_store(str(lab / "lab.sqlite"), write=False) as store:
         for number in DATA:
@@ -239,6 +240,7 @@ def test_a_storage_without_recordings_ends_the_job(lab: Path) -> None:
             publish(store, FleetPublishRequest(url="sausage://bucket/lab"))
 
 
+@pytest.mark.slow
 def test_a_storage_that_is_lost_ends_the_job_and_leaves_its_other_units_to_do(lab: Path) -> None:
     begun: list[str] = []
 

@@ -149,6 +149,7 @@ def test_a_wrong_pose_is_said_with_its_angle_and_is_not_the_one_that_was_asked_f
     assert [each.name for each in moment.pose_list if each.covered] == moment.poses
 
 
+@pytest.mark.slow
 def test_a_person_ends_it_early_with_a_version(service: Service) -> None:
     feed = service.feed(PacedFeed())
     feed.turn = service.obey

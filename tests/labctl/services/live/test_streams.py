@@ -153,6 +153,7 @@ def simulated() -> tuple[LiveCalibration, LiveState, np.ndarray]:
     return live, state, truth
 
 
+@pytest.mark.slow
 def test_the_simulated_person_completes_it(simulated: tuple[LiveCalibration, LiveState, np.ndarray]) -> None:
     live, state, _ = simulated
     assert state.done

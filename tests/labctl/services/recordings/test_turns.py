@@ -66,6 +66,7 @@ def test_a_turn_that_came_out_short_is_no_calibration(lab: Lab, tmp_path: Path) 
     assert "repeat the turn, or correct turn_deg" in refused.stderr
 
 
+@pytest.mark.slow
 def test_a_law_of_the_rate_is_not_added_to_turns(lab: Lab, tmp_path: Path) -> None:
     lab.run("import", session(2, tmp_path / "first"))
     lab.run("fit", "HAND", "--model", "turns")

@@ -98,6 +98,7 @@ def test_they_have_a_notice_wherever_they_are_shown(laboratory: Laboratory) -> N
     assert "sheath" not in said  # what the laboratory wrote for itself
 
 
+@pytest.mark.slow
 def test_new_certificates_of_them_are_refused_and_the_others_are_issued(laboratory: Laboratory) -> None:
     store, at = laboratory.store, noon(date(2026, 4, 1))
     with pytest.raises(CertificateRefused, match=REFUSED):

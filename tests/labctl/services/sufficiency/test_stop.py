@@ -128,6 +128,7 @@ def test_the_status_and_the_course_say_how_far_it_is(store: Store) -> None:
     assert reached[-1]
 
 
+@pytest.mark.slow
 def test_another_process_finds_the_same_from_the_database(store: Store) -> None:
     here = InThisThread(store, 1).last()
     other = InOwnProcess(store.location, 1)

@@ -80,6 +80,7 @@ def abort(_campaign: Prepared, control: Control) -> None:
     control.abort("enough")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("act", "state"), [(abort, "aborted"), (break_table, "failed")], ids=["aborted", "failed"])
 def test_a_campaign_that_ends_early_is_sealed_reopened_and_sealed(
     location: str, act: Callable[[Prepared, Control], None], state: str
@@ -114,6 +115,7 @@ def test_a_campaign_that_is_not_over_is_not_sealed_and_said(location: str) -> No
     assert acts(location, "recording") == [("sealed", "aborted")]
 
 
+@pytest.mark.slow
 def test_what_a_journal_writes_after_the_end_is_sealed_again(location: str) -> None:
     with open_store(location, write=True) as store:
         campaign = prepared(store)

@@ -73,6 +73,7 @@ def kept_rests(seed: int, rests: int, wrong_g: float = 0.0) -> np.ndarray:
     return fit_sizes(SizeLaw(readings), 1.0, np.full(rests, 1e-8), MIN_POSES)[2]
 
 
+@pytest.mark.slow
 def test_no_rest_is_left_out_because_few_others_predict_it_badly() -> None:
     assert all(kept_rests(seed, rests).all() for rests in (13, 16, 20) for seed in range(60))
 
