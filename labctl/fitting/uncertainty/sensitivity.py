@@ -115,7 +115,8 @@ def response(fitted: FittedModel, rates_dps: Mapping[str, float], temperature_c:
     """Return the slopes of the n outputs along the rates about x, y and z at a rate vector, (n, 3)."""
     at = np.array([rates_dps.get(axis, 0.0) for axis in BODY_AXES])
     stepped = np.vstack([at, at + STEP_DPS * np.eye(len(BODY_AXES))])  # the place, then a step along each axis
-    rates, temperatures_c = dict(zip(BODY_AXES, stepped.T, strict=True)), np.full(len(stepped), temperature_c)
+    rates: dict[str, Array] = dict(zip(BODY_AXES, stepped.T, strict=True))
+    temperatures_c = np.full(len(stepped), temperature_c)
     slopes = [
         (errors[1:] - errors[0]) / STEP_DPS + np.array([axis == body_axis for body_axis in BODY_AXES])
         for axis in fitted.axes
