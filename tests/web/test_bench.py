@@ -91,6 +91,7 @@ def test_what_cannot_be_done_ends_the_campaign(service: Service, visit: Callable
     expect(last).to_contain_text("simulated time")
 
 
+@pytest.mark.slow
 def test_says_that_simulated_time_is_slower_than_was_asked_for(
     service: Service, visit: Callable[..., Page], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -106,6 +107,7 @@ def test_says_that_simulated_time_is_slower_than_was_asked_for(
     expect(said).not_to_be_visible()
 
 
+@pytest.mark.slow
 def test_says_that_it_is_stale_and_goes_on_where_it_was(
     service: Service, visit: Callable[..., Page], faults: Faults
 ) -> None:

@@ -41,6 +41,7 @@ def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service
     serving.stop()
 
 
+@pytest.mark.slow
 def test_a_turn_is_shown_refused_wanted_again_and_done(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

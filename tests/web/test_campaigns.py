@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 
+@pytest.mark.slow
 def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

@@ -118,6 +118,7 @@ def test_the_dialog_asks_for_every_fact_names_what_is_missing_and_gives_the_cert
     assert download.value.path().read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("laboratory", "recipe"), [("", DRAFTED)])
 def test_a_laboratory_that_the_bench_file_does_not_name_is_asked_for_where_it_belongs(
     service: Service, visit: Callable[..., Page], faults: Faults

@@ -59,6 +59,7 @@ def check_equation(place: Locator, effect: dict[str, Any]) -> None:
         assert f"{source['work']}: {source['place']}" in place.inner_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect_id", ["sine_response", "thermal_hysteresis"])
 def test_the_page_of_an_effect_has_its_equation_and_the_meaning_of_its_shape(
     service: Service, visit: Callable[..., Page], effect_id: str

@@ -30,6 +30,7 @@ def explored(service: Service) -> str:
     return f"/explore?unit={service.get('/api/recordings/1')['serial']}"
 
 
+@pytest.mark.slow
 def test_a_pick_shows_everywhere_and_in_the_address(visit: Callable[..., Page], explored: str) -> None:
     from playwright.sync_api import expect
 

@@ -56,6 +56,7 @@ def ran(cell: str) -> dict[str, Any]:
     return names
 
 
+@pytest.mark.slow
 def test_a_click_on_a_point_shows_its_readings_and_the_same_computed_from_them(
     service: Service, visit: Callable[..., Page], recording: Recording
 ) -> None:

@@ -71,6 +71,7 @@ def expect_stale(page: Page) -> None:
     assert colour(page) == text
 
 
+@pytest.mark.slow
 def test_a_service_that_stands_still_or_is_killed_is_stale_within_5_s(tmp_path: Path, chromium: Browser) -> None:
     from playwright.sync_api import expect
 
@@ -101,6 +102,7 @@ def expect_fresh(page: Page, line: Locator, calm: str) -> None:
     assert colour(page) == calm
 
 
+@pytest.mark.slow
 def test_a_network_that_is_gone_is_stale_within_5_s(idle: Page) -> None:
     from playwright.sync_api import expect
 
@@ -116,6 +118,7 @@ def test_a_bench_process_that_is_not_heard_is_stale_though_the_service_answers(i
     assert "Last answer of the bench 12 s ago" in idle.locator("[data-freshness]").inner_text()
 
 
+@pytest.mark.slow
 def test_a_service_that_answers_but_refuses_what_the_page_shows_is_stale(idle: Page) -> None:
     from playwright.sync_api import expect
 

@@ -36,6 +36,7 @@ def tab_to(page: Page, name: str) -> None:
     pytest.fail(f"{name} is not reached with {MAX_TABS} tabs")
 
 
+@pytest.mark.slow
 def test_a_cell_of_the_map_is_reached_read_and_selected(explored: Page, service: Service) -> None:
     from playwright.sync_api import expect
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import pytest
+
 from tests.helpers.browser import Service
 
 if TYPE_CHECKING:
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
 UNIT = "OSU-FOG-2024"
 
 
+@pytest.mark.slow
 def test_the_page_names_what_was_held_and_its_source(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

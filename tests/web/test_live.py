@@ -66,6 +66,7 @@ def person(service: Service, monkeypatch: pytest.MonkeyPatch) -> Iterator[Person
     made.feed.run_free()
 
 
+@pytest.mark.slow
 def test_begun_followed_and_ended_with_a_version(service: Service, visit: Callable[..., Page], person: Person) -> None:
     from playwright.sync_api import expect
 

@@ -50,6 +50,7 @@ def check(service: Service, card: Locator, **points: list[float]) -> dict[str, A
     return evaluated
 
 
+@pytest.mark.slow
 def test_points_are_moved_by_mouse_and_keys_and_the_last_request_wins(
     service: Service, visit: Callable[..., Page]
 ) -> None:

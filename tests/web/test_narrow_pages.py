@@ -37,6 +37,7 @@ def template(furnish: Callable[..., Path]) -> Path:
     return furnish(fitted)
 
 
+@pytest.mark.slow
 def test_no_page_is_wider_than_a_phone_with_a_long_serial_number(service: Service, visit: Callable[..., Page]) -> None:
     assert len(LONG) == 64
     for path in PAGES:
@@ -47,6 +48,7 @@ def test_no_page_is_wider_than_a_phone_with_a_long_serial_number(service: Servic
         page.close()
 
 
+@pytest.mark.slow
 def test_two_versions_stand_below_each_other_with_one_scale_and_a_card_has_no_empty_line(
     service: Service, visit: Callable[..., Page]
 ) -> None:

@@ -31,6 +31,7 @@ def unit(service: Service) -> str:
     return serial
 
 
+@pytest.mark.slow
 def test_a_new_page_begins_at_its_top_and_back_returns_to_where_one_was(visit: Callable[..., Page], unit: str) -> None:
     from playwright.sync_api import expect
 

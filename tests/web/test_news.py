@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import pytest
+
 from tests.helpers.browser import Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 
+@pytest.mark.slow
 def test_a_campaign_that_is_done_is_a_row_with_a_button(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

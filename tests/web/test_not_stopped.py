@@ -89,6 +89,7 @@ class Failing:
                 pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "ways"), [(WIDE, ("a proxy's page", "a page that says well", "no answer", "refused")), (NARROW, ())]
 )

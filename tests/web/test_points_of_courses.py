@@ -73,6 +73,7 @@ def copied(card: Locator, name: str) -> str:
     return str(page.evaluate("navigator.clipboard.readText()"))
 
 
+@pytest.mark.slow
 def test_a_point_of_an_allan_deviation_is_its_clusters_and_a_link_and_a_cell_give_it(
     service: Service, visit: Callable[..., Page]
 ) -> None:

@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import pytest
+
 from tests.helpers.browser import Faults, Service
 
 if TYPE_CHECKING:
@@ -18,6 +20,7 @@ ACTS = re.compile(
 )
 
 
+@pytest.mark.slow
 def test_pages_say_that_the_service_only_reads_and_show_no_act(
     service: Service, visit: Callable[..., Page], faults: Faults
 ) -> None:

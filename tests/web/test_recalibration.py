@@ -57,6 +57,7 @@ def within(figure: dict[str, Any], truth: float) -> bool:
     return bool(figure["u"] is not None and figure["low"] < truth < figure["high"])
 
 
+@pytest.mark.slow
 def test_a_year_later_the_draft_states_what_was_found_left_and_changed(years: Lab) -> None:
     before, after, last = (years.json("campaign", "status", str(number)) for number in (1, 2, 3))
     assert [each["started_at"][:10] for each in (before, after, last)] == [f"{year}-01-05" for year in YEARS]
@@ -74,6 +75,7 @@ def test_a_year_later_the_draft_states_what_was_found_left_and_changed(years: La
     assert [each["passed"] for each in report["limits"]] == [False]
 
 
+@pytest.mark.slow
 def test_the_trend_covers_the_ageing_on_the_command_line_over_http_and_on_the_page(
     years: Lab, service: Service, visit: Callable[..., Page]
 ) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pytest
 from scipy import stats
 from typer.testing import CliRunner
 
@@ -46,6 +47,7 @@ def rows_of(page: Page, name: str) -> dict[str, tuple[float, float, float, str]]
     return {first: parsed(second) for first, second in cells}
 
 
+@pytest.mark.slow
 def test_the_coefficients_and_the_alignment_of_the_page_are_those_of_the_command(
     service: Service, visit: Callable[[str], Page], tmp_path: Path
 ) -> None:

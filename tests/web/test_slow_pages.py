@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page, Route
 
 
+@pytest.mark.slow
 def test_a_slow_page_shows_its_name_what_it_waits_for_and_can_be_left(visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

@@ -25,6 +25,7 @@ def ratios_of(drawn: Locator) -> list[float]:
     return [100.0 ** ((floor - height) / (floor - 3.0)) for height in heights]
 
 
+@pytest.mark.slow
 def test_a_sparkline_draws_the_error_of_each_version_over_the_floor(
     service: Service, visit: Callable[..., Page]
 ) -> None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import pytest
+
 from tests.helpers.browser import Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 
+@pytest.mark.slow
 def test_a_bad_standard_is_a_notice_on_the_page(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

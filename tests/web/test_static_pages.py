@@ -64,6 +64,7 @@ def boxes(page: Page, selector: str) -> list[list[float]]:
     return found
 
 
+@pytest.mark.slow
 def test_pages_without_a_server_fit_a_phone(phone: Page, tmp_path: Path) -> None:
     for name, content, headings in (("inspection", inspection(), 3), ("contributions", contributions(), 2)):
         file = tmp_path / f"{name}.html"

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 PARTS = ("Verdict", "Where the model fails", "Which effects are missing", "Add it", "Error of the versions")
 
 
+@pytest.mark.slow
 def test_the_tour_leads_through_the_page_and_can_be_left(visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

@@ -33,6 +33,7 @@ def moved_bytes(page: Page) -> dict[str, int]:
     return moved
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path", ["/units/{serial}", "/explore?unit={serial}", "/recordings/{recording}", "/recordings", "/"]
 )

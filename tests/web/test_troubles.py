@@ -28,6 +28,7 @@ def fog(service: Service) -> Service:
     return service
 
 
+@pytest.mark.slow
 def test_a_reload_in_the_middle_shows_the_same(fog: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

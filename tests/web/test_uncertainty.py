@@ -64,6 +64,7 @@ def asked(service: Service, serial: str, rate_dps: float, temperature_c: float, 
     return service.get(f"/api/units/{serial}/calibrations/{version}/uncertainty?{place}")
 
 
+@pytest.mark.slow
 def test_the_figures_of_the_page_are_those_of_the_service(
     service: Service, visit: Callable[..., Page], fog: str
 ) -> None:

@@ -41,6 +41,7 @@ def rms_shown(panel: Locator) -> float:
     return float(found.group(1))
 
 
+@pytest.mark.slow
 def test_the_slider_moves_between_the_fits_without_and_with_the_effect(
     opened: tuple[Page, Locator], service: Service
 ) -> None:
