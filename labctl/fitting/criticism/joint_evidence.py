@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.evidence.design import Design
-from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts
+from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts, reproduced_by_draws
 from labctl.fitting.criticism.evidence.elimination import stack
 from labctl.fitting.criticism.evidence.further_coefficients import further_nats
 from labctl.fitting.criticism.evidence.gains import MIN_REMAINING
@@ -178,6 +178,15 @@ class AxisForecast:
             return 0.0, -fitted.shape.after.directions
         inner = self.gram[best.columns, fitted.shape.columns] @ fitted.coefficients
         return float(best.after.gain(inner)), best.after.directions - fitted.shape.after.directions
+
+    def reproduced_by_draws(self, fitted: Fitted, drawn: str, outcomes: Outcomes, k: int) -> float:
+        """Return the part of a fitted signal, in chi2, that as many draws of a shift reproduce as it has
+        coefficients."""
+        best = outcomes.best(drawn, k)
+        if best is None:
+            return 0.0
+        inner = self.gram[best.columns, fitted.shape.columns] @ fitted.coefficients
+        return reproduced_by_draws(self.gram[best.columns, best.columns], inner, fitted.shape.after.directions)
 
     def further_nats(self, fitted: Fitted, rival: str, outcomes: Outcomes, k: int) -> float:
         """Return the evidence against the coefficients that a rival has beyond a fitted signal, nats."""

@@ -71,3 +71,28 @@ class DrawnShifts:
         spread = 1.0 + self.variances[:, None] * self.known  # (s, w)
         gain = self._amplitudes(products) ** 2 @ (self.variances[:, None] / spread).T  # (..., s)
         return np.asarray(0.5 * gain - 0.5 * np.log(spread).sum(axis=1))
+
+
+def reproduced_by_draws(gram: NDArray[np.float64], inner: Array, number: int) -> float:
+    """Return the part of a signal, in chi2, that so many draws reproduce while all others are equal.
+
+    `gram` (w, w) are the inner products of the columns of the shifts less the first, whitened, base eliminated, and
+    `inner` (w,) those with the signal. The draws are taken one after the other, the one that reproduces most first.
+    """
+    draws = np.concatenate(
+        [np.eye(len(inner)), np.ones((len(inner), 1))], axis=1
+    )  # the last: the first run or mounting
+    left, products = draws.T @ gram @ draws, draws.T @ inner
+    least, part = UNSEEN * float(np.diag(left).max(initial=0.0)), 0.0
+    for _ in range(number):
+        known = np.diag(left)
+        is_seen = known > max(least, 0.0)
+        each = np.where(is_seen, products**2 / np.where(is_seen, known, 1.0), 0.0)
+        best = int(np.argmax(each))
+        if not each[best] > 0:
+            break
+        part += float(each[best])
+        along = left[best] / known[best]
+        products = products - along * products[best]
+        left = left - np.outer(along, left[best])
+    return part

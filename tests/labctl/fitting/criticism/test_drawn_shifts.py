@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts
+from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts, reproduced_by_draws
 
 G = 600.0
 
@@ -81,3 +81,40 @@ def test_shifts_still_to_come_are_drawn_as_large_as_those_that_were_seen() -> No
     np.testing.assert_allclose(seen.mean(axis=0), shifts[1:] - shifts[0], atol=3e-4)
     between = new[:, 0] - new[:, 1]  # two draws, without the first run's
     assert np.std(between) == pytest.approx(np.sqrt(2.0) * true_dps, rel=0.3)
+
+
+def share_by_draws(runs: NDArray[np.int64], signal: NDArray[np.float64], number: int) -> float:
+    columns, signal = indicators(runs), signal - signal.mean()
+    return reproduced_by_draws(columns.T @ columns, columns.T @ signal, number) / float(signal @ signal)
+
+
+def test_gravity_that_one_mounting_alone_turns_up_is_one_draw() -> None:
+    runs = np.repeat([1, 2, 3], [40, 50, 60])
+    for up in (1, 2, 3):
+        assert share_by_draws(runs, 0.3 * (runs == up), 1) == pytest.approx(1.0)
+    assert share_by_draws(runs, np.array([0.0, 1.0, -0.4])[runs - 1], 1) < 0.95
+    assert share_by_draws(runs, np.array([0.0, 1.0, -0.4])[runs - 1], 2) == pytest.approx(1.0)
+
+
+def test_gravity_that_an_inverted_mounting_turns_down_is_two_draws() -> None:
+    """Six mountings with a coefficient each reproduce it, but two of them have to be equal and opposite."""
+    runs = np.repeat(np.arange(1, 7), 20)
+    force_g = np.array([1.0, -1.0, 0.0, 0.0, 0.0, 0.0])[runs - 1]
+    assert share_by_draws(runs, force_g, 1) < 0.7
+    assert share_by_draws(runs, force_g, 2) == pytest.approx(1.0)
+    assert share_by_draws(runs, force_g, 9) == pytest.approx(1.0)
+
+
+def test_draws_are_found_by_definition_beside_a_base_that_takes_a_part_of_them() -> None:
+    """The best single draw is the best of all fits of one column: of a run alone, or of all but the first."""
+    rng = np.random.default_rng(6)
+    runs = np.repeat(np.arange(1, 6), [7, 9, 3, 12, 5])
+    every = np.column_stack([(runs == number).astype(float) for number in range(1, 6)])
+    base = np.linalg.qr(np.column_stack([np.ones(36), rng.normal(size=(36, 2))]))[0]
+    every, signal = (each - base @ (base.T @ each) for each in (every, rng.normal(size=36)))
+    by_hand = max(float((column @ signal) ** 2 / (column @ column)) for column in every.T)
+    assert reproduced_by_draws(every[:, 1:].T @ every[:, 1:], every[:, 1:].T @ signal, 1) == pytest.approx(by_hand)
+
+
+def test_a_shift_that_is_not_seen_reproduces_nothing() -> None:
+    assert reproduced_by_draws(np.zeros((2, 2)), np.zeros(2), 2) == 0.0
