@@ -230,17 +230,7 @@ class _MeasuredPair(Pair):
     @property
     def share_by_draws(self) -> float:
         fixed, drawn = (self.rival, self.leader) if is_drawn(self.leader) else (self.leader, self.rival)
-        part = whole = 0.0
-        for axis, option in fixed.option.items():
-            of_axis = self.comparison.axes[axis]
-            signal, gram = of_axis.slices[option], of_axis.best.gram
-            values, _ = solve_option(of_axis.best, signal)
-            whole += float(values @ gram[signal, signal] @ values)
-            if axis in drawn.option:
-                by = of_axis.slices[drawn.option[axis]]
-                number = int(of_axis.dimensions[option])
-                part += reproduced_by_draws(gram[by, by], gram[by, signal] @ values, number)
-        return part / whole if whole > 0 else 0.0
+        return overlap_by_draws(self.comparison, fixed, drawn)
 
 
 def _pair(comparison: Comparison, leader: Candidate, rival: Candidate) -> Pair:
@@ -309,6 +299,20 @@ def overlap(comparison: Comparison, leader: Candidate, rival: Candidate) -> floa
             else (0.0, reproduced_and_size(eliminated, slices[option], slices[option])[1])
         )
         part, whole = part + shared, whole + size
+    return part / whole if whole > 0 else 0.0
+
+
+def overlap_by_draws(comparison: Comparison, fixed: Candidate, drawn: Candidate) -> float:
+    """Return which share of a fitted signal as many draws of a shift reproduce as it has coefficients, 0 to 1."""
+    part = whole = 0.0
+    for axis, option in fixed.option.items():
+        of_axis = comparison.axes[axis]
+        signal, gram = of_axis.slices[option], of_axis.best.gram
+        values, _ = solve_option(of_axis.best, signal)
+        whole += float(values @ gram[signal, signal] @ values)
+        if axis in drawn.option:
+            by = of_axis.slices[drawn.option[axis]]
+            part += reproduced_by_draws(gram[by, by], gram[by, signal] @ values, int(of_axis.dimensions[option]))
     return part / whole if whole > 0 else 0.0
 
 
