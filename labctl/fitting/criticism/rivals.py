@@ -102,8 +102,9 @@ def cannot_be_distinguished(pair: Pair) -> bool:
 
     A rival that is the leader with more coefficients is judged by what is known of these: it is out where they are
     next to nothing, by the same odds as any other, `LEAD`, unless it has a shape with no more coefficients than the
-    leader that is not far behind. One with a coefficient for each run or mounting stays in as well where noise hardly
-    makes them so large, whatever its evidence: the price of so many coefficients hides small shifts.
+    leader that is not far behind. One with a draw for each run or mounting is judged in the same way, but stays in
+    while its evidence, which is averaged over the size of the draws, is near; and where noise hardly makes the further
+    draws so large, whatever its evidence.
     """
     near = pair.rival_log_bf > pair.leader_log_bf - LEAD or (pair.rival_log_bf > 0 and _is_indistinguishable(pair))
     is_random = is_drawn(pair.rival)
@@ -112,7 +113,8 @@ def cannot_be_distinguished(pair: Pair) -> bool:
     if not (near or is_random) or pair.further_directions <= 0 or not pair.contains_leader:
         return near
     if is_random:
-        return near or by_chance(pair.further_gain, pair.further_directions) < MIN_CHANCE
+        by_odds = pair.rival_log_bf > pair.leader_log_bf - LEAD or (near and pair.further_nats < LEAD)
+        return by_odds or by_chance(pair.further_gain, pair.further_directions) < MIN_CHANCE
     return near and (
         pair.further_nats < LEAD or pair.rival_log_bf > pair.leader_log_bf or pair.has_as_simple_a_shape
     )  # fmt: skip

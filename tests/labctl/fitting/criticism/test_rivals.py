@@ -116,6 +116,9 @@ def test_a_rival_that_is_the_leader_with_more_coefficients_is_judged_by_these(
         ({"further_gain": 1.001 * TWO_DIRECTIONS, "share": 0.5}, False),
         ({"further_gain": 1.001 * TWO_DIRECTIONS, "further_directions": 0}, False),
         ({"rival_log_bf": 17.5, "further_nats": 9.0}, True),  # near, whatever is known of its shifts
+        ({"rival_log_bf": 16.5, "further_nats": 2.99}, True),
+        ({"rival_log_bf": 16.5, "further_nats": 3.0}, False),  # its further shifts are known to be 0
+        ({"rival_log_bf": 8.0, "further_nats": 2.99}, False),
     ],
 )
 def test_a_shift_of_each_run_or_mounting_stays_where_noise_hardly_makes_it(
