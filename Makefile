@@ -19,7 +19,7 @@ test: $(VENV)/.tested
 	@scripts/install-test-dependencies
 	@$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not slow"
 
-# The tests of seconds each: searches, coverage over many draws, campaigns in real time. `.ci/run` runs them after `make test`.
+# The tests that take long: searches, coverage over many draws, campaigns, pages. `.ci/run` runs them after `make test`.
 test-slow: $(VENV)/.tested
 	@scripts/install-test-dependencies
 	@$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder -m slow

@@ -90,6 +90,7 @@ def test_a_refusal_has_the_services_words_and_a_slug_for_programs(client: Client
     assert (uncertified.value.slug, uncertified.value.exit_status) == ("not-certified", 1)
 
 
+@pytest.mark.slow
 def test_a_folder_without_a_recording_is_not_sent(client: Client, tmp_path: Path) -> None:
     with pytest.raises(BadRecording, match="no recording there"):
         client.import_recording(tmp_path)
@@ -116,6 +117,7 @@ def test_a_campaign_is_started_watched_and_found(client: Client) -> None:
     assert later == events[-1:]
 
 
+@pytest.mark.slow
 def test_a_later_start_is_an_entry_of_the_schedule_and_an_abort_names_its_reason(client: Client) -> None:
     later = client.start_campaign(CampaignRequest(recipe="short", cron="30 2 * * MON", time_zone="UTC"))
     assert isinstance(later, ScheduledResponse)

@@ -98,6 +98,7 @@ def test_a_robot_corrects_rates_with_the_core_alone(calibration: Calibration, tm
     np.testing.assert_array_equal(np.load(tmp_path / "rates.npy"), here)
 
 
+@pytest.mark.slow
 def test_a_script_has_a_recording_in_memory_and_the_client(tmp_path: Path) -> None:
     done = in_core(
         "import numpy as np\n"

@@ -190,6 +190,7 @@ def test_a_flight_controller_says_what_it_loses(laws: dict[str, Calibration], na
     assert "thermal lag of the bias" in text
 
 
+@pytest.mark.slow
 def test_a_scale_factor_that_lags_is_named_on_a_turning_table_and_found_with_its_u() -> None:
     recording = turned_unit(3, Turned(scale_lag_s=400.0, loops=1))
     points, data, model = based(recording)

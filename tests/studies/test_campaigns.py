@@ -28,6 +28,7 @@ def test_sizes_are_kept_for_every_protocol(name: str) -> None:
         assert list(map(abs, by_z.values())) == sorted(map(abs, by_z.values()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["scale_factor_asymmetry", "rate_hysteresis"])
 def test_a_kept_size_still_gives_its_z(effect: str) -> None:
     """If this fails the simulator or the model has changed: make the sizes again (`python -m studies.effect_sizes`)."""
@@ -78,6 +79,7 @@ def test_what_was_answered_is_not_asked_again(tmp_path: Path, monkeypatch: pytes
     assert "1 nothing" in criticism.run()
 
 
+@pytest.mark.slow
 def test_one_campaign_is_simulated_and_criticised(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(criticism, "WITH_PEERS", False)
     size = sizes("O")["scale_factor_asymmetry"]["30"]

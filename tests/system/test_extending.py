@@ -96,6 +96,7 @@ def test_the_examples_are_what_the_page_says() -> None:
     assert there == given
 
 
+@pytest.mark.slow
 def test_a_driver_with_its_simulator(outside: Callable[[str], Outside]) -> None:
     user = outside(GYRO)
     refused = user.labctl("labctl bench check acme-gyro/bench.toml", status=2)
@@ -139,6 +140,7 @@ def test_an_effect_on_both_sides(outside: Callable[[str], Outside]) -> None:
     assert improved["error"]["rms_dps"] < 0.5 * improved["before"]["rms_dps"]
 
 
+@pytest.mark.slow
 def test_an_export(outside: Callable[[str], Outside]) -> None:
     user = outside(EXPORT)
     user.follow()
@@ -157,6 +159,7 @@ def test_an_export(outside: Callable[[str], Outside]) -> None:
     assert "of acme-table 0.1.0 in group labctl.exports: cannot write this calibration: KeyError: 'x'" in failed
 
 
+@pytest.mark.slow
 def test_an_importer(outside: Callable[[str], Outside], tmp_path: Path) -> None:
     user = outside(IMPORTER)
     user.follow()

@@ -66,6 +66,7 @@ def recorded_once(service: ServiceProcess, campaign: int, reason: str) -> None:
     assert [row.detail["reason"] for row in rows] == [reason], [(row.id, row.who, row.detail) for row in rows]
 
 
+@pytest.mark.slow
 def test_a_stop_with_a_key_is_carried_out_while_the_database_is_frozen(
     cluster: Cluster, service: ServiceProcess, simulator: Simulator
 ) -> None:

@@ -74,6 +74,7 @@ def test_an_f4t_and_an_adam_on_real_tcp(serve: Callable[[str], tuple[BenchFile, 
         gyro.stop()
 
 
+@pytest.mark.slow
 def test_a_real_port_on_which_nobody_answers_is_silence_too() -> None:
     ours, theirs = os.openpty()
     try:

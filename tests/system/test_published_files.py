@@ -93,6 +93,7 @@ def test_two_files_are_one_recording(lab: Lab) -> None:
     assert found["z"]["misalignment_x"] == pytest.approx(-0.0249, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_means_of_a_rate_table_are_calibrated(lab: Lab) -> None:
     calibrated(lab, blocks()["osu-rate-table"])
     error = lab.json("fit", "OSU-FOG-2024", "--model", "ojeda2000")["error"]

@@ -28,6 +28,7 @@ AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 LAB = "http://lab.example:8420"
 
 
+@pytest.mark.slow
 def test_two_processes_serve_a_replica_and_a_killed_one_is_replaced(cluster: Cluster) -> None:
     url = cluster.new_database()
     with open_store(url, write=True) as store:

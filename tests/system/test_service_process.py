@@ -193,6 +193,7 @@ def test_a_service_that_is_interrupted_twice_ends_its_campaign_first(service: Se
     assert (state, "the service stops" in reason) == ("aborted", True)
 
 
+@pytest.mark.slow
 def test_a_proxy_of_the_laboratory_is_neither_asked_nor_told_a_key(
     lasting_service: ServiceProcess, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

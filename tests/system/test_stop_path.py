@@ -227,6 +227,7 @@ def logged(log: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines() if line.startswith("{")]
 
 
+@pytest.mark.slow
 def test_instruments_that_do_not_answer_a_stop_are_named_until_they_do(simulator: Simulator, tmp_path: Path) -> None:
     log = tmp_path / "service.log"
     with running(tmp_path / "lab.sqlite", "--bench", str(simulator.bench), log=log) as service:

@@ -95,6 +95,7 @@ def test_the_same_data_sets_within_noise(far_bench: Path, tmp_path: Path) -> Non
     assert np.asarray(far["temperature_c"]) == pytest.approx(np.asarray(near["temperature_c"]), abs=1.0)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
     recipe = tmp_path / "two-processes.toml"
     recipe.write_text(RECIPE)

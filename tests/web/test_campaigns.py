@@ -209,6 +209,7 @@ def test_a_start_is_put_on_the_schedule_and_taken_out(service: Service, visit: C
     assert service.get("/api/schedule") == []
 
 
+@pytest.mark.slow
 def test_a_designed_recipe_is_the_services_and_its_plan_is_shown(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

@@ -74,6 +74,7 @@ def test_whoever_has_the_paper_sees_the_state_without_a_key(service: Service, vi
     assert row.number == SECOND
 
 
+@pytest.mark.slow
 def test_a_number_that_does_not_belong_to_the_hash_is_unknown(
     service: Service, visit: Callable[..., Page], faults: Faults
 ) -> None:
@@ -130,6 +131,7 @@ def test_a_revocation_names_certificates_and_who_fetched_the_version(
     expect(said).to_contain_text(f"Withdrawn: {FIRST}, {SECOND}. Notify those who fetched it: anonymous.")
 
 
+@pytest.mark.slow
 def test_a_version_that_waits_is_released_by_the_second_person(
     service: Service, visit: Callable[..., Page], faults: Faults
 ) -> None:

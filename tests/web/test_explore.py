@@ -121,6 +121,7 @@ def test_measured_and_modelled_are_compared_in_every_view(visit: Callable[..., P
     assert len(download.value.path().read_text().splitlines()) > 10
 
 
+@pytest.mark.slow
 def test_a_formula_of_ones_own_is_previewed_and_an_error_said(visit: Callable[..., Page], explored: str) -> None:
     from playwright.sync_api import expect
 

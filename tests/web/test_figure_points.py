@@ -122,6 +122,7 @@ def test_a_link_opens_exactly_that_point_and_a_cell_gives_it(
     )
 
 
+@pytest.mark.slow
 def test_the_cell_of_a_figure_gives_exactly_that_figure(
     service: Service, visit: Callable[..., Page], recording: Recording
 ) -> None:

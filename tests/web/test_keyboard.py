@@ -66,6 +66,7 @@ def test_a_cell_of_the_map_is_reached_read_and_selected(explored: Page, service:
     expect(failing).to_contain_text("No data set is selected")
 
 
+@pytest.mark.slow
 def test_the_points_over_a_channel_are_reached_from_left_to_right(explored: Page) -> None:
     from playwright.sync_api import expect
 

@@ -77,6 +77,7 @@ def test_a_long_list_is_shown_in_parts_and_searched_whole(visit: Callable[..., P
     assert len(set(names)) == ROWS
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("many")
 def test_a_search_is_in_the_address_and_finds_what_was_not_shown(visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
@@ -110,6 +111,7 @@ def test_units_have_the_same_order_in_every_list(service: Service, visit: Callab
     assert choice.input_value() == "A-10"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("many")
 def test_a_choice_is_in_the_address_and_goes_with_a_search(visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
@@ -153,6 +155,7 @@ def test_the_version_in_force_stands_before_the_newest_ones(service: Service, vi
     expect(card.get_by_role("status")).to_have_count(0)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("many")
 @pytest.mark.parametrize(
     ("address", "said"),
@@ -172,6 +175,7 @@ def test_an_address_of_what_is_not_there_says_so(
     faults.clear()  # the browser reports the 404 that the page is about
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("many")
 def test_the_batch_of_a_unit_is_stated_on_its_page_and_filters_the_list(
     visit: Callable[..., Page], service: Service
@@ -194,6 +198,7 @@ def test_the_batch_of_a_unit_is_stated_on_its_page_and_filters_the_list(
     expect(page.get_by_text("3 of 3 units found")).to_be_visible()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("many")
 def test_pages_that_show_a_part_of_a_list_say_so_and_find_the_rest(
     service: Service, visit: Callable[..., Page]

@@ -106,6 +106,7 @@ def test_points_are_moved_by_mouse_and_keys_and_the_last_request_wins(
     expect(page.get_by_label("Recipe as TOML")).to_have_value(re.compile(r"rates_dps = \[\s*-69\.0"))
 
 
+@pytest.mark.slow
 def test_an_answer_that_comes_late_is_not_shown(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

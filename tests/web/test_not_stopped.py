@@ -119,6 +119,7 @@ def test_whatever_answers_in_place_of_the_service_the_page_says_not_stopped_unti
     faults.clear()  # the browser itself logs each answer that fails
 
 
+@pytest.mark.slow
 def test_a_key_that_may_not_stop_is_said_and_another_one_stops(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chromium: Browser
 ) -> None:

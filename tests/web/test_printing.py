@@ -82,6 +82,7 @@ def test_no_heading_is_left_alone_at_the_end_of_a_sheet(
     assert [lines[-1] for lines in sheets if lines and lines[-1] in headings] == []
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("fitted")
 def test_tables_are_printed_as_tables_and_without_their_buttons(visit: Callable[..., Page], tmp_path: Path) -> None:
     page = visit("/units/FOG-0001", alone=True)

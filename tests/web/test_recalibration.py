@@ -99,6 +99,7 @@ def test_the_trend_covers_the_ageing_on_the_command_line_over_http_and_on_the_pa
     expect(page.get_by_text("As left (version 2)").first).to_be_visible()
 
 
+@pytest.mark.slow
 def test_another_year_is_another_noise_and_the_same_year_the_same(years: Lab) -> None:
     first, second = (years.json("trend", UNIT)["points"][number]["as_left"]["rms_dps"] for number in (0, 1))
     assert first != second

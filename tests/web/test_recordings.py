@@ -8,6 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pytest
+
 from tests.helpers.browser import NARROW, Faults, Service
 
 if TYPE_CHECKING:
@@ -85,6 +87,7 @@ settle_s = 2
 """
 
 
+@pytest.mark.slow
 def test_traces_are_looked_at_more_closely_down_to_the_readings(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 

@@ -182,6 +182,7 @@ def test_titles_and_legend_of_contributions_are_whole_and_apart(visit: Callable[
         assert found["panel"][3] - found["panel"][2] > (bottom - top) / 3, found  # the legend leaves room to the lines
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [None, NARROW])
 def test_published_coefficients_are_unknown_and_never_zero(
     visit: Callable[..., Page], published: str, size: dict[str, int] | None

@@ -55,6 +55,7 @@ def test_a_kilohertz_comes_without_a_loss(stand: Make) -> None:
     assert np.allclose(np.diff(times), 1e-3, rtol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("format_", "share"), [("xsens-mti", 0.97), ("kvh-1750", 1.03), ("serial-csv", 1.03)])
 def test_a_clock_three_per_cent_off_loses_nothing(stand: Make, format_: str, share: float) -> None:
     s = stand(

@@ -86,6 +86,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Lab:
     return lab
 
 
+@pytest.mark.slow
 def test_every_key_that_is_kept_with_a_version_is_declared(lab: Lab) -> None:
     with open_store(str(lab.database), write=False) as store:
         first, second = (store.calibrations.get(FOG, version).answer for version in (1, 2))

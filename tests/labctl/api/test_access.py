@@ -95,6 +95,7 @@ def test_wrong_missing_and_revoked_keys_are_refused_on_every_path(guarded: Guard
         assert answer.json()["type"] == "urn:labctl:problem:not-identified", kind
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "path"), operations())
 def test_every_path_asks_for_its_role_and_no_more(guarded: Guarded, method: str, path: str) -> None:
     for role, key in guarded.keys.items():

@@ -82,6 +82,7 @@ def test_uncertainty_criticism_improve_and_ladder(fog: TestClient) -> None:
     assert formula.headers["content-type"] == "application/problem+json"
 
 
+@pytest.mark.slow
 def test_the_uncertainty_over_what_was_calibrated_is_that_of_each_place(fog: TestClient) -> None:
     path = "/api/units/OSU-FOG-2024/calibrations/1"
     place = {"rate_dps": 50, "temperature_c": 40}
@@ -240,6 +241,7 @@ def followed(client: TestClient, number: int, **headers: str) -> tuple[list[Any]
     return events, [json.loads(each["data"]) for each in said if each["event"] == "progress"]
 
 
+@pytest.mark.slow
 def test_a_campaign_runs_and_can_be_followed(client: TestClient) -> None:
     started = client.post("/api/campaigns", json={"recipe": "short"}).json()
     number = started["id"]
@@ -260,6 +262,7 @@ def test_a_campaign_runs_and_can_be_followed(client: TestClient) -> None:
     assert len(shown["columns"]["gyro_z"]) == 5
 
 
+@pytest.mark.slow
 def test_a_service_that_starts_again_says_what_was_left(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     from labctl.services.campaigns.preparation import prepare

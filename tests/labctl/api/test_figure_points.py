@@ -71,6 +71,7 @@ def test_a_point_of_an_allan_deviation_is_that_of_allantools(lab: tuple[TestClie
     assert np.sqrt(squares / twice) == pytest.approx(deviation, rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("points", [100, 19_000])
 def test_a_bin_of_a_trace_is_what_its_readings_give(lab: tuple[TestClient, Recording], points: int) -> None:
     client, recording = lab
@@ -122,6 +123,7 @@ def test_the_mean_of_a_data_set_is_that_of_its_readings(lab: tuple[TestClient, R
     assert "has no mean of 'gyro_q'; choose one of" in refused.json()["detail"]
 
 
+@pytest.mark.slow
 def test_a_point_of_a_trend_is_a_straight_line_through_the_errors_of_its_readings(
     lab: tuple[TestClient, Recording],
 ) -> None:

@@ -146,6 +146,7 @@ def test_a_resumed_campaign_goes_on_with_the_same_units(tmp_path: Path) -> None:
         assert asymmetry(again, 1) - asymmetry(again, run(again)) == pytest.approx(0.04, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_made_a_recording_is_no_matter_of_its_notes(client: TestClient) -> None:
     made = make_recording(SimulateRequest(recipe="short")).recording
     assert made.info.notes.startswith("simulated")

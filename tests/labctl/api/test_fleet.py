@@ -45,6 +45,7 @@ def get(http: TestClient, path: str, **query: Any) -> Any:
     return http.get(path, params=query).raise_for_status().json()
 
 
+@pytest.mark.slow
 def test_a_job_is_begun_at_once_and_carried_out_by_the_service(http: TestClient) -> None:
     begun = http.post("/api/fleet/jobs", json=FIT)
     assert begun.status_code == 201
@@ -68,6 +69,7 @@ def test_a_job_is_begun_at_once_and_carried_out_by_the_service(http: TestClient)
     assert {"fleet fit", "fleet cancel", "fleet end", "fit"} <= set(actions)
 
 
+@pytest.mark.slow
 def test_the_client_has_a_method_for_each_request(http: TestClient) -> None:
     with Client("http://testserver", transport=transport_to(http)) as client:
         begun = client.start_fleet_job(FleetJobRequest.model_validate(FIT))
@@ -101,6 +103,7 @@ def test_an_engine_is_used_only_where_the_service_was_started_with_it(
     assert http.post("/api/fleet/jobs", json={**FIT, "type": "none"}).status_code == 404
 
 
+@pytest.mark.slow
 def test_a_storage_is_read_only_where_the_service_was_started_with_it_and_never_with_a_password(
     http: TestClient, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -121,6 +124,7 @@ def test_a_storage_is_read_only_where_the_service_was_started_with_it_and_never_
     assert "hunter2" not in said
 
 
+@pytest.mark.slow
 def test_types_chart_and_report_are_answered(http: TestClient) -> None:
     http.post("/api/fleet/jobs", json=FIT).raise_for_status()
     carry_out(http)

@@ -51,6 +51,7 @@ def test_the_stages_come_first_and_the_answer_is_that_of_a_plain_get(client: Tes
     assert [kind for kind, _ in events_of(client.get(f"{path}/events").text)] == ["answer"]
 
 
+@pytest.mark.slow
 def test_what_fails_at_once_is_a_problem_document_and_later_an_event(
     client: TestClient, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -94,6 +95,7 @@ class Client:
         self._socket.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["", "/events"])
 def test_leaving_cancels_the_computation_and_leaves_nothing_in_the_cache(
     served: str, end: str, cache: Path, monkeypatch: pytest.MonkeyPatch
@@ -108,6 +110,7 @@ def test_leaving_cancels_the_computation_and_leaves_nothing_in_the_cache(
     assert sorted(cache.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_one_of_two_clients_that_leaves_does_not_cancel_the_others_answer(
     served: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

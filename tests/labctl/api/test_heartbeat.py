@@ -45,6 +45,7 @@ def test_a_plan_says_when_a_start_needs_a_person(client: TestClient, monkeypatch
     assert (entered["needed_at"], entered["warning"]) == (found["needed_at"], found["warning"])
 
 
+@pytest.mark.slow
 def test_the_date_of_a_recording_says_whose_clock_it_is_of(ran: TestClient) -> None:
     ran.post("/api/recordings/example", json={"name": "osu-fog"})
     assert {row["campaign"]: row["simulated_time"] for row in ran.get("/api/recordings").json()} == {

@@ -44,6 +44,7 @@ def test_several_recordings_in_bodies_and_queries(unit: TestClient) -> None:
     assert unit.get(f"{UNIT}/calibrations/1/assessment").json()["verdict_recording"] == 2
 
 
+@pytest.mark.slow
 def test_a_version_is_compared_with_every_data_set_of_several_recordings(unit: TestClient) -> None:
     unit.post(f"{UNIT}/calibrations", json={"recordings": [1, 2], "effects": EFFECTS})
     path = f"{UNIT}/calibrations/1/comparison"

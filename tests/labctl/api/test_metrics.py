@@ -38,6 +38,7 @@ def test_every_metric_has_a_help_and_a_type(client: TestClient) -> None:
     assert found["process_open_fds"].samples[0].value > 0
 
 
+@pytest.mark.slow
 def test_campaigns_are_counted_by_state(ran: TestClient) -> None:
     found = metrics(ran)
     assert value(found["labctl_units"]) == 1
@@ -69,6 +70,7 @@ def statements(store: Store) -> Iterator[list[str]]:
         sa.event.remove(sa.Engine, "before_cursor_execute", note)
 
 
+@pytest.mark.slow
 def test_no_campaign_and_no_unit_is_loaded_for_it(ran: TestClient) -> None:
     with statements(service_of(ran).store) as executed:
         metrics(ran)

@@ -198,6 +198,7 @@ def test_a_law_of_the_output_has_its_error_at_true_rates(fog: TestClient) -> Non
         assert corrected[:, 0] == pytest.approx(rate, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_pictures_are_figures_with_how_to_read_them(
     client: TestClient, make_points: Callable[..., Recording], grid_11_by_11: tuple[np.ndarray, np.ndarray]
 ) -> None:

@@ -69,6 +69,7 @@ def test_what_cannot_be_planned_says_why(client: TestClient, body: dict[str, Any
     assert says in answer.json()["detail"]
 
 
+@pytest.mark.slow
 def test_a_campaigns_steps_tell_what_became_of_them(ran: TestClient) -> None:
     plan = ran.get("/api/campaigns/1/plan").json()
     line = plan["timeline"]

@@ -146,6 +146,7 @@ def test_what_no_request_reaches_is_refused_too(reader: TestClient, serial: str)
     assert len(reader.get(f"/api/units/{serial}/calibrations").json()) == 1
 
 
+@pytest.mark.slow
 def test_a_campaign_that_the_writer_may_run_is_not_called_abandoned(
     ran: TestClient, reader: TestClient, path: Path
 ) -> None:

@@ -16,6 +16,7 @@ from tests.helpers.bounded_server import bounded_server, request, rest_of
 from tests.helpers.log_records import logged
 
 
+@pytest.mark.slow
 def test_an_act_is_one_record_with_the_number_of_its_request(client: TestClient, tmp_path: Path) -> None:
     with logged(tmp_path) as records:
         answer = client.post("/api/campaigns", json={"recipe": "short"}, headers={"X-Request-ID": "mine-1"})

@@ -59,6 +59,7 @@ def test_a_standard_from_its_entry_to_its_finding(client: TestClient) -> None:
     assert client.get("/api/standards/none").status_code == 404
 
 
+@pytest.mark.slow
 def test_the_alarm_of_a_check_gyro_is_a_metric(client: TestClient) -> None:
     store = service_of(client).store
     for month in (1, 2):

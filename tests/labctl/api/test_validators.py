@@ -127,6 +127,7 @@ def test_a_certification_changes_the_answers_that_state_it(fitted: TestClient) -
     assert {tag_of(fitted, path) for path in paths}.isdisjoint(after)
 
 
+@pytest.mark.slow
 def test_a_criticism_of_other_data_or_of_another_version_has_another_tag(fitted: TestClient) -> None:
     first = tag_of(fitted, f"{UNIT}/calibrations/1/criticism")
     other = measured(fitted, bias_dps=0.3)
@@ -152,6 +153,7 @@ def test_head_has_the_tag_of_get(fitted: TestClient) -> None:
     assert fitted.head(path, headers={"If-None-Match": tag}).status_code == 304
 
 
+@pytest.mark.slow
 def test_a_followed_criticism_is_tagged_once_it_is_known(fitted: TestClient) -> None:
     path = f"{UNIT}/calibrations/1/criticism/events"
     computed = fitted.get(path)

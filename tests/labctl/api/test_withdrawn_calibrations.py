@@ -47,6 +47,7 @@ def fetches(inside: TestClient) -> list[Any]:
     return found
 
 
+@pytest.mark.slow
 def test_a_revocation_withdraws_the_certificates_and_names_who_fetched(inside: TestClient) -> None:
     assert fetches(inside) == []
     number = inside.post(f"{ONE}/certificate", json=ISSUE).json()["number"]
@@ -77,6 +78,7 @@ def test_a_revocation_withdraws_the_certificates_and_names_who_fetched(inside: T
     assert [act["fetched_by"] for act in acts] == [[], []]
 
 
+@pytest.mark.slow
 def test_each_key_is_recorded_once_with_its_first_and_last_fetch(database: Path) -> None:
     lab = Lab(database.parent)
     keys = {name: lab.json("key", "create", name, "--role", "viewer")["key"] for name in ("robot 1", "robot 2")}
@@ -134,6 +136,7 @@ def test_the_client_raises_for_a_withdrawn_calibration_and_for_one_that_it_holds
             assert client.calibration(SERIAL, 1, accept_withdrawn=True).state == "revoked"
 
 
+@pytest.mark.slow
 def test_on_the_command_line_every_state_is_said(database: Path, tmp_path: Path) -> None:
     lab = Lab(tmp_path)
     with open_client(database) as client:

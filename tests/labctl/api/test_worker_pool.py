@@ -94,6 +94,7 @@ def test_what_is_quick_never_waits_for_a_worker(service: Service, unit: str, tmp
     assert [answer.status_code for answer in refused] == [429] * len(refused)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "end"), [("verify_unit", "verification"), ("criticise_unit", "criticism/events")])
 def test_a_client_that_leaves_ends_its_worker(
     service: Service, unit: str, name: str, end: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -109,6 +110,7 @@ def test_a_client_that_leaves_ends_its_worker(
     assert service.get("/health")["status"] == "ok"
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_is_a_problem_document(service: Service, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("labctl.api.routers.calibrations.verify_unit", die_in_a_worker)
     answer = httpx.get(f"{service.url}/api/units/{unit}/calibrations/1/verification", timeout=WAIT_S)

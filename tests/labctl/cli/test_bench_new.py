@@ -80,6 +80,7 @@ def test_it_finds_what_is_on_each_port_and_writes_a_file_that_passes_the_check(
     assert lab.run(*command, "--yes", status=2).stderr.startswith(f"labctl: {path} exists already and was not changed")
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_named_and_nothing_is_written(
     lab: Lab, far: tuple[SimulationServer, BenchFile, io.StringIO]
 ) -> None:

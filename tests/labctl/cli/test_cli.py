@@ -110,6 +110,7 @@ def test_a_published_table_becomes_a_calibration(lab: Lab) -> None:
     assert "fit it with --model weiss1995" in lab.run("fit", "WEISS-ENV05S", "--model", "ojeda2000", status=2).stderr
 
 
+@pytest.mark.slow
 def test_export_and_import_again_give_the_same_fit(fog: Lab) -> None:
     fog.run("export", "recording", "1", "--out", str(fog.folder / "out"))
     fog.run("import", str(fog.folder / "out"))
@@ -119,6 +120,7 @@ def test_export_and_import_again_give_the_same_fit(fog: Lab) -> None:
     assert one == two
 
 
+@pytest.mark.slow
 def test_simulate_hides_an_effect(lab: Lab) -> None:
     plain = lab.json("simulate", "short", "--out", str(lab.folder / "a"), "--seed", "4")
     hidden = lab.json("simulate", "short", "--out", str(lab.folder / "b"), "--seed", "4", "--hide", "bias=0.7")
@@ -132,6 +134,7 @@ def test_simulate_hides_an_effect(lab: Lab) -> None:
     assert biases[1] - biases[0] == pytest.approx(0.7, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_campaign_from_plan_to_status(lab: Lab) -> None:
     plan = lab.json("campaign", "plan", "table1-x-table2")
     assert plan["datasets"] == 630

@@ -76,6 +76,7 @@ def test_a_disturbed_field_is_not_exported(tmp_path: Path) -> None:
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.slow
 def test_a_recording_in_poses_gives_the_alignment_too(tmp_path: Path) -> None:
     unit = TrueTriads.drawn(np.random.default_rng(5))
     recording = recording_of(*turned_by_hand(5, unit, 14))

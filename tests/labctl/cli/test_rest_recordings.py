@@ -28,6 +28,7 @@ def imported(lab: Lab, **how: object) -> dict[str, object]:
     return lab.json("import", str(folder))
 
 
+@pytest.mark.slow
 def test_a_ramp_in_one_data_set_is_fitted_in_windows_and_left_out_leg_by_leg(lab: Lab) -> None:
     assert imported(lab)["suggested_model"] == "bias_temperature"
     answer = lab.json("fit", "REST-1", "--model", "bias_temperature")

@@ -99,6 +99,7 @@ def test_the_charts_of_a_check_gyro(lab: Lab) -> None:
     assert (answer["marked"], answer["alarm"], answer["temperature_c"]) == (True, False, 25.0)
 
 
+@pytest.mark.slow
 def test_two_versions_are_compared(lab: Lab) -> None:
     with open_store(str(lab.database), write=True) as store:
         register.measured(store, "FOG-B", date(2025, 7, 7), COUNTER)

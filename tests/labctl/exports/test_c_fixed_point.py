@@ -102,6 +102,7 @@ int main(void) {{
 SAMPLES = 40
 
 
+@pytest.mark.slow
 @pytest.mark.needs_cortex_m
 @pytest.mark.parametrize("which", ["fog", "mems"])
 def test_a_cortex_m4_computes_the_same(request: pytest.FixtureRequest, tmp_path: Path, which: str) -> None:

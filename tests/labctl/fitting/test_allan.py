@@ -64,6 +64,7 @@ def test_flicker_and_random_walk_show_their_sizes() -> None:
         assert figure.u < 0.2 * true, letter
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hours", [1, 8])
 def test_a_warm_up_is_taken_off_and_not_read_as_a_random_walk(hours: int) -> None:
     """What a first hour says of longer times does not contradict what the later hours show."""
@@ -111,6 +112,7 @@ def test_a_deviation_that_follows_no_slope_of_the_standard_has_a_bound_and_no_va
     assert figure.at_most is not None
 
 
+@pytest.mark.slow
 def test_the_interval_holds_the_truth_at_95_percent_of_averaging_times() -> None:
     inside = []
     for seed in range(40):

@@ -68,6 +68,7 @@ def test_it_is_what_allantools_deviations_at_long_averaging_times_give(smooth: F
     assert noise_of(rates).figures["N"].value == pytest.approx(by_theirs, rel=0.03)
 
 
+@pytest.mark.slow
 def test_the_smoothing_of_a_filter_is_the_mean_distance_of_the_instants_it_weighs() -> None:
     assert noise_of(moving_average(20)(white(1, 400_000))).smoothing_s == pytest.approx(20 * PERIOD_S / 3, rel=0.1)
     assert noise_of(first_order(5)(white(1, 400_000))).smoothing_s == pytest.approx(5 * PERIOD_S, rel=0.1)

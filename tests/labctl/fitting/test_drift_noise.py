@@ -62,6 +62,7 @@ def least_over_expected(size: float, seed: int, draws: int = 100) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_a_drift_as_specified_is_not_called_large_and_a_large_one_is() -> None:
     assert least_over_expected(0.0, 5).max() < 0.3
     assert np.mean(least_over_expected(1.0, 6) >= LARGE_DRIFT) <= 0.05

@@ -93,6 +93,7 @@ def test_coverage_of_k_and_b(triaxial: Callable[[int], object]) -> None:
     assert 0.92 < np.mean(z < 2) < 0.98
 
 
+@pytest.mark.slow
 def test_the_noise_floor_is_white_noise_and_drift_together(triaxial: Callable[[int], object]) -> None:
     error = fit(triaxial(3).campaign(3), "yang2018").error  # type: ignore[attr-defined]
     assert error.noise_floor_dps == pytest.approx(np.hypot(0.01 / np.sqrt(60), 0.0015), rel=0.2)

@@ -98,6 +98,7 @@ def test_what_is_left_is_noise_and_no_effect_is_blamed(made: tuple[Recording, Un
     assert criticise(made[0], result.fitted.model, full=False).verdict.named == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 6])
 def test_how_a_unit_is_placed_in_more_mountings_than_needed_is_no_error_of_the_model(seed: int) -> None:
     plan = replace(TURNED.plan, turned=tuple(f"{end}@{angle}" for end in AXES for angle in (90, 180, 270)))

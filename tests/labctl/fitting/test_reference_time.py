@@ -44,6 +44,7 @@ def axis_of(recording: Recording, effects: list[str]) -> AxisFit:
     return fit(recording, None, effects).fitted.axes["z"]
 
 
+@pytest.mark.slow
 def test_a_time_that_all_data_sets_have_in_common_is_in_a_delay_in_full_and_in_nothing_beside_it() -> None:
     alone, found = axis_of(swept(common_s=None), DELAYED), axis_of(swept(), DELAYED)
     assert found.values == pytest.approx(alone.values, abs=1e-12)
@@ -53,6 +54,7 @@ def test_a_time_that_all_data_sets_have_in_common_is_in_a_delay_in_full_and_in_n
         assert found.u_of(name) == pytest.approx(alone.u_of(name), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_times_of_their_own_average_over_the_data_sets() -> None:
     alone, found = axis_of(swept(common_s=None), DELAYED), axis_of(swept(common_s=None, own_s=OWN_S), DELAYED)
     assert found.u_of("delay") == pytest.approx(np.hypot(alone.u_of("delay"), OWN_S / 2), rel=0.02)
@@ -95,6 +97,7 @@ def test_a_recording_that_does_not_state_it_says_so() -> None:
     assert "measure again" in budget.lines[-1].why
 
 
+@pytest.mark.slow
 def test_document_and_answer_have_the_same_budget() -> None:
     recording = swept(own_s=OWN_S)
     made = build_calibration(

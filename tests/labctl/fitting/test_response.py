@@ -68,6 +68,7 @@ def test_windows_of_several_readings_give_the_same(swept: Recording, monkeypatch
         assert u < 1.5 * value_and_u(one, name)[1]
 
 
+@pytest.mark.slow
 def test_a_delay_of_many_periods_is_found() -> None:
     """The grid of beginnings matters: at 10 Hz and 120 ms the first step would go to the wrong period."""
     late = profile_recording(sweep(60.0, 0.5, 10.0, 50.0, 100.0), delay_s=0.12)

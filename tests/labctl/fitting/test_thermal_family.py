@@ -132,6 +132,7 @@ def test_other_effects_stay_beside_the_family() -> None:
     assert found.form == "missing"
 
 
+@pytest.mark.slow
 def test_a_lag_and_a_hysteresis_that_are_there_together_are_both_named() -> None:
     recording = unit_at_rest(2, Hidden(lag_s=600.0, width_k=5.0))  # with dwells: evenly, two lags look like both
     found = criticise(recording, based(recording)[1], points=to_points(recording), full=False)

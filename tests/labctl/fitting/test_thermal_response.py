@@ -41,6 +41,7 @@ def shapes(recording: Recording) -> dict[str, tuple[float, float]]:
     return {name: (entry["value"], float(entry["u"] or 0.0)) for name, entry in found.items()}
 
 
+@pytest.mark.slow
 def test_axes_with_one_time_constant_share_it() -> None:
     found = shapes(flowing(dict.fromkeys("xyz", partial(follow, tau_s=400.0))))
     assert list(found) == ["tau_s"]
@@ -48,6 +49,7 @@ def test_axes_with_one_time_constant_share_it() -> None:
     assert abs(value - 400.0) < 3 * u < 40.0
 
 
+@pytest.mark.slow
 def test_each_axis_gets_its_own_time_constant_where_they_differ() -> None:
     true = {"x": 250.0, "y": 500.0, "z": 900.0}
     found = shapes(flowing({axis: partial(follow, tau_s=tau_s) for axis, tau_s in true.items()}))
@@ -63,6 +65,7 @@ def test_two_flows_are_found_where_one_does_not_predict_the_legs_left_out() -> N
     assert found["second_tau_s"][0] == pytest.approx(1500.0, rel=0.3)
 
 
+@pytest.mark.slow
 def test_axes_of_different_structures_have_one_each() -> None:
     recording = flowing({"x": partial(follow, tau_s=300.0), "y": mixture, "z": partial(follow, tau_s=700.0)})
     found = fit(recording, effects=EFFECTS)

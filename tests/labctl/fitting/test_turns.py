@@ -121,6 +121,7 @@ def test_uncertainty_of_the_turn_is_that_of_the_scale_factor(turned: Recording) 
     assert max(u) < 1.5 / 720
 
 
+@pytest.mark.slow
 def test_a_common_error_of_all_turns_is_not_averaged_out(turned: Recording) -> None:
     """A fixture that turns too far by a share of 2 %: no gain is more certain than that."""
     common = replace(turned, info=turned.info.model_copy(update={"turn_common_u": 0.02}))

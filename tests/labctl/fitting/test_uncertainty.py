@@ -56,6 +56,7 @@ def drawn(fitted: FittedModel, rng: np.random.Generator) -> FittedModel:
     return FittedModel(fitted.model, {name: other(name) for name in fitted.axes})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["bias_scale", "ojeda2000"])
 @pytest.mark.parametrize(("rate", "warm"), [(0.0, 35.0), (90.0, 26.0)])
 def test_it_is_the_spread_of_what_drawn_coefficients_give(

@@ -48,6 +48,7 @@ def steps(records: Records) -> list[tuple[int, str]]:
     return [(record["step"], record["outcome"]) for record in records.named("step.ended")]
 
 
+@pytest.mark.slow
 def test_a_campaign_that_is_done(tmp_path: Path) -> None:
     with logged(tmp_path) as records:
         assert run_with(tmp_path).state == "done"
@@ -153,6 +154,7 @@ def test_a_repeated_step_is_logged_as_repeated(tmp_path: Path) -> None:
     assert [each["level"] for each in records.named("step.ended")] == ["warning", "error", "info"]
 
 
+@pytest.mark.slow
 def test_a_day_of_a_bench_is_less_than_ten_megabytes(tmp_path: Path) -> None:
     """A campaign with soaks of minutes, which logs more in an hour than one with soaks of an hour; scaled to 24 h."""
     with logged(tmp_path) as records:
@@ -162,6 +164,7 @@ def test_a_day_of_a_bench_is_less_than_ten_megabytes(tmp_path: Path) -> None:
     assert records.path.stat().st_size / answer.t_s * DAY_S < MAX_BYTES_A_DAY / 4
 
 
+@pytest.mark.slow
 def test_a_log_that_nobody_reads_does_not_hold_the_engine(tmp_path: Path) -> None:
     """Its pipe is full from the beginning: the campaign has the same readings and ends the same way."""
     reading, writing = os.pipe()

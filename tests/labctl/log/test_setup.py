@@ -246,6 +246,7 @@ def test_a_process_without_standard_error_goes_on_and_writes_into_no_other_file(
     assert (tmp_path / "data").read_text(encoding="utf-8") == "data"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["/dev/full", "broken pipe"])
 def test_a_full_disk_or_a_broken_pipe_ends_nothing(output: str) -> None:
     if output == "broken pipe":
@@ -263,6 +264,7 @@ def test_a_full_disk_or_a_broken_pipe_ends_nothing(output: str) -> None:
     assert (done.returncode, done.stdout) == (0, "went on")
 
 
+@pytest.mark.slow
 def test_an_output_that_takes_nothing_keeps_a_process_from_ending_only_for_a_moment() -> None:
     reading, writing = os.pipe()
     try:

@@ -182,6 +182,7 @@ def test_the_report_is_one_page_that_needs_no_network() -> None:
     assert all(figure["data"] for figure in data)
 
 
+@pytest.mark.slow
 def test_the_verdict_stands_before_the_pictures() -> None:
     page = Page(report_html(answer(), LADDER))
     assert page.order.index("verdict") < page.order.index("table") < page.order.index("numbers-map")

@@ -94,6 +94,7 @@ def test_every_transaction_is_a_method_of_a_repository(store: Store) -> None:
         store.run("Audit.rows", (), {})
 
 
+@pytest.mark.slow
 def test_a_campaign_is_started_followed_and_aborted_from_the_web_process(store: Store, folder: Path) -> None:
     access = RemoteBench(folder, BENCH, str(folder / "lab.sqlite"))
     rings = threading.Semaphore(0)

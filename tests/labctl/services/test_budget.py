@@ -129,6 +129,7 @@ def test_the_command_prints_what_http_gives(client: TestClient, database: Path, 
     assert "name a file that ends in .html" in refused.output
 
 
+@pytest.mark.slow
 def test_a_campaign_says_that_a_standard_is_overdue_and_keeps_it(tmp_path: Path) -> None:
     record = read_bench("single-axis-sim").model_dump()
     late = {"quantity": "clock", "u": 2.0, "name": "counter", "due": "2020-01-31"}

@@ -123,6 +123,7 @@ def test_the_oldest_go(ask: Callable[..., LadderResponse], cache: Path, monkeypa
     assert len(list(cache.rglob("*.json"))) == 3
 
 
+@pytest.mark.slow
 def test_a_recording_that_differs_in_one_reading_is_another(tmp_path: Path) -> None:
     one = single_axis(1)
     other = single_axis(1)

@@ -33,6 +33,7 @@ def lab(tmp_path: Path) -> Lab:
     return lab
 
 
+@pytest.mark.slow
 def test_an_adequate_version_is_certified_with_its_verdict(lab: Lab) -> None:
     lab.run("fit", FOG, "--model", "ojeda2000")
     criticised = lab.json("criticise", FOG)
@@ -96,6 +97,7 @@ def test_a_table_of_coefficients_has_no_verdict_and_a_reason(lab: Lab) -> None:
     assert "verdict: none: recording 2 is a table" in lab.run("certifications", TABLE).stdout
 
 
+@pytest.mark.slow
 def test_data_that_are_certainly_wrong_speak_against_their_version(lab: Lab, tmp_path: Path) -> None:
     write_recording(spoilt(to_points(single_axis(1)), scaled(-1.0, "gyro_z")), tmp_path / "wrong")
     lab.run("import", str(tmp_path / "wrong"))

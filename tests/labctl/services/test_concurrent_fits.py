@@ -80,6 +80,7 @@ def test_a_number_that_another_process_takes_between_look_and_write(
         store.calibrations.add("nobody", AT, 1, calibration(1))
 
 
+@pytest.mark.slow
 def test_two_fits_at_once_are_two_versions(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     commands = local_executor(store, VirtualClock())
     commands.execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))

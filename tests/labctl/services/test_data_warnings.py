@@ -107,6 +107,7 @@ def test_exchanged_axes_are_refused_and_have_no_inverse(
     assert "cannot be inverted" in forced
 
 
+@pytest.mark.slow
 def test_over_http_the_refusal_is_a_problem_document(tmp_path: Path) -> None:
     folder = tmp_path / "wrong"
     write_recording(spoilt(to_points(single_axis(1)), scaled(np.pi / 180, "gyro_z")), folder)

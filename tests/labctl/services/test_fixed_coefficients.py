@@ -64,6 +64,7 @@ def fitted(lab: Lab, *more: str) -> Any:
     return lab.json("fit", "ONE", "--effects", EFFECTS, "--fixed", str(lab.folder / "known.toml"), *more)
 
 
+@pytest.mark.slow
 def test_a_fit_holds_the_values_of_the_file_and_says_so(lab: Lab) -> None:
     answer = fitted(lab)
     assert answer["model"]["held"] == {
@@ -141,6 +142,7 @@ def test_a_criticism_takes_what_is_held_as_known(lab: Lab) -> None:
     assert suspect["rms_after_dps"] == pytest.approx(1e-3, rel=0.3)  # of a fit that estimates it
 
 
+@pytest.mark.slow
 def test_a_calibration_file_holds_all_that_the_new_model_shares_with_it(lab: Lab) -> None:
     first = lab.json("fit", "ONE", "--effects", "bias,scale_factor,bias_temperature:1")
     path = lab.folder / "first.json"
@@ -163,6 +165,7 @@ def test_a_calibration_file_holds_all_that_the_new_model_shares_with_it(lab: Lab
     assert "belong to a law of the rate" in " ".join(refused.split())
 
 
+@pytest.mark.slow
 def test_over_http_a_fit_is_the_same(lab: Lab, tmp_path: Path) -> None:
     here = fitted(lab)
     store = Store(Database(str(tmp_path / "served.sqlite"), write=True))

@@ -57,6 +57,7 @@ def scale_factor(found: LaboratoryComparison) -> ComparedResult:
     return one
 
 
+@pytest.mark.slow
 def test_scores_of_two_laboratories_with_standards_of_their_own(store: Store) -> None:
     found = compared(store, clock(6000.0, "A-1"), clock(9000.0, "B-1"), -0.03)
     one = scale_factor(found)
@@ -73,12 +74,14 @@ def test_scores_of_two_laboratories_with_standards_of_their_own(store: Store) ->
     assert found.text[0].startswith("scale_factor of axis z: En = 1.")
 
 
+@pytest.mark.slow
 def test_laboratories_that_agree(store: Store) -> None:
     found = compared(store, clock(6000.0, "A-1"), clock(9000.0, "B-1"), -0.01)
     assert found.satisfactory
     assert found.text == ["All 2 results agree within their expanded uncertainties (|En| <= 1)."]
 
 
+@pytest.mark.slow
 def test_a_shared_standard_is_said_and_its_part_subtracted(store: Store) -> None:
     same = clock(9000.0, "A-1")
     found = compared(store, same, same, -1.4e-2)
@@ -89,6 +92,7 @@ def test_a_shared_standard_is_said_and_its_part_subtracted(store: Store) -> None
     assert any("correlated by it" in text for text in found.text)
 
 
+@pytest.mark.slow
 def test_equal_numbers_of_two_laboratories_are_no_shared_standard(store: Store) -> None:
     first, second = (clock(9000.0, "1").model_copy(update={"issued_by": name}) for name in ("PTB", "NPL"))
     assert compared(store, first, second, -4e-3).shared == []

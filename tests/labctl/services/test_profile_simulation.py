@@ -80,6 +80,7 @@ def test_a_hidden_delay_is_found_and_the_recording_is_a_sound_profile() -> None:
     assert u < 1e-5
 
 
+@pytest.mark.slow
 def test_a_simulated_profile_states_the_time_of_its_reference() -> None:
     """Without wires it is known: the budget of a delay has a line of 0, and none of unknown size."""
     recording = simulated(time_delay=0.005)

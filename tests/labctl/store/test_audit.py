@@ -151,6 +151,7 @@ def test_rows_of_before_the_head_get_one(location: str) -> None:
         assert (head.length, head.hash) == (1, first)
 
 
+@pytest.mark.slow
 def test_a_campaign_is_recorded_in_the_audit_trail(location: str) -> None:
     with open_store(location, write=True) as store:
         with acting(Actor("A. Person", "key")):

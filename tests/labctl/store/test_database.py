@@ -62,6 +62,7 @@ def samples(seed: int = 1) -> Recording:
     return Recording(info, columns, environment)
 
 
+@pytest.mark.slow
 def test_migrations_make_todays_tables(location: str) -> None:
     with open_store(location, write=True):
         pass

@@ -81,6 +81,7 @@ def test_the_server_counts_on_from_the_highest_number(source: str, url: str) -> 
     assert run_here(url, StartRequest(recipe="short", bench="single-axis-sim")).id == 2
 
 
+@pytest.mark.slow
 def test_an_interrupted_move_goes_on_and_nothing_opens_its_target(
     source: str, url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

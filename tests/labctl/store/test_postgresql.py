@@ -113,6 +113,7 @@ def test_units_are_found_by_an_index_of_any_part_of_their_texts(url: str) -> Non
     assert postgresql_server.SEARCH_INDEX in plan
 
 
+@pytest.mark.slow
 def test_a_server_without_the_extension_is_searched_without_the_index(
     url: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -354,6 +355,7 @@ def test_the_life_of_a_certificate_is_the_same_on_a_server(url: str) -> None:
     assert check(url).findings == ()
 
 
+@pytest.mark.slow
 def test_the_register_of_standards_is_the_same_as_in_a_file(url: str, tmp_path: Path) -> None:
     path = str(tmp_path / "lab.sqlite")
     for location in (path, url):

@@ -112,6 +112,7 @@ def test_what_changes_while_it_is_read_is_not_believed(at_rest: Path) -> None:
         os.utime(at_rest, ns=(0, 0))
 
 
+@pytest.mark.slow
 def test_the_server_refuses_what_labctl_would_not(url: str) -> None:
     with pytest.raises(StoreError, match="has no tables of labctl"):
         Database(url, write=False, read_only=True)
@@ -138,6 +139,7 @@ def replicated(cluster: Cluster, url: str) -> Iterator[tuple[str, Store]]:
         yield url, store
 
 
+@pytest.mark.slow
 def test_a_replica_says_how_old_its_data_are(replicated: tuple[str, Store], cluster: Cluster) -> None:
     url, reader = replicated
     with open_store(url, write=True) as writer:

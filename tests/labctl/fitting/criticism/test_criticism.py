@@ -35,6 +35,7 @@ def test_three_axes_with_nothing_hidden() -> None:
     assert held(three_axes(4), "yang2018").verdict.form == "adequate"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "size"),
     [
@@ -75,6 +76,7 @@ def test_gravity_in_yangs_three_positions_is_an_alias_group() -> None:
     assert {"g_sensitivity", "run_shift", "mounting_shift"} <= set(found.verdict.named)
 
 
+@pytest.mark.slow
 def test_what_no_effect_describes_is_unexplained() -> None:
     found = held(single_axis(5, outside_etalon=0.03))
     assert found.verdict.form == "unexplained"
@@ -88,6 +90,7 @@ def test_two_at_once_are_both_named() -> None:
     assert set(found.verdict.named) == {"scale_factor_asymmetry", "rate_hysteresis"}
 
 
+@pytest.mark.slow
 def test_a_small_one_is_named_where_a_large_one_does_nothing() -> None:
     """Waves within data sets, however large, leave no drift between them: that is a second cause, no wrong shape."""
     found = held(single_axis(6, magnetic_sensitivity=0.003, supply_sensitivity=0.06))
@@ -116,6 +119,7 @@ def test_a_channel_that_was_not_kept_silences_its_effects(channel: str, silenced
     assert not silenced & set(found.verdict.named)
 
 
+@pytest.mark.slow
 def test_what_is_suspected_is_not_called_beyond_what_the_recording_can_say(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(visibility, "MIN_VISIBLE", 1.1)  # as if the schedule hid everything
     found = held(single_axis(1, **HELD), full=True)
@@ -289,6 +293,7 @@ def test_bench_effects_stay_on_the_bench(bring: Callable[[Recording], Lab]) -> N
     assert [term["effect"] for term in document["model"]["terms"]] == ["rate_temperature_surface"]
 
 
+@pytest.mark.slow
 def test_a_formula_leaves_with_the_calibration(bring: Callable[[Recording], Lab]) -> None:
     lab = bring(single_axis(8, supply_sensitivity=0.2))
     lab.run("fit", "FOG-0001", "--model", "ojeda2000")

@@ -87,6 +87,7 @@ def test_a_forecast_is_the_same_again() -> None:
     assert forecast(_question(), _planned("top_rates")) == forecast(_question(), _planned("top_rates"))
 
 
+@pytest.mark.slow
 def test_whether_a_weak_effect_is_missing_is_a_question_beside_an_adequate_model() -> None:
     recording = single_axis(61002, supply_sensitivity=0.0233)
     model, _ = preset_for("ojeda2000", []).build(fit_data_of(recording))

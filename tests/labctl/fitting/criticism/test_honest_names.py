@@ -85,11 +85,13 @@ def test_a_saturation_that_bends_softly_is_still_named(z: int) -> None:
     assert held(campaign("O", 20_013, hidden)).verdict.named[:1] == ("saturation",)
 
 
+@pytest.mark.slow
 def test_a_step_of_the_scale_factor_within_a_data_set_is_time() -> None:
     verdict = added("time_step_scale", "ojeda2000", "ojeda2000", 1.0)
     assert (verdict.form, verdict.named, verdict.depends_on[0]) == ("unexplained", (), "t_s")
 
 
+@pytest.mark.slow
 def test_the_place_of_a_step_is_found_and_nothing_where_there_is_none() -> None:
     recording = KINDS["time_step_bias"].added(plain("ojeda2000", 0), 0, 1.0)
     model, _ = preset_for("ojeda2000", []).build(fit_data_of(recording))

@@ -49,6 +49,7 @@ def test_what_is_hidden_in_a_sweep_is_named_with_its_size(
     assert found == pytest.approx(parameters, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_model_that_has_them_is_adequate_and_its_floor_is_that_of_a_piece() -> None:
     recording = profile_recording(SWEEP, delay_s=0.005, bandwidth_hz=40.0, scale=0.024)
     found = criticised(recording, [*PLAIN, "time_delay", "bandwidth"], full=True)
@@ -58,6 +59,7 @@ def test_a_model_that_has_them_is_adequate_and_its_floor_is_that_of_a_piece() ->
     assert float(left.floor_dps.mean()) < 0.02 / 4  # a piece has some twenty windows
 
 
+@pytest.mark.slow
 def test_slow_ramps_cannot_tell_a_delay_from_a_bandwidth_and_say_which_experiment_would() -> None:
     up = ramp(30.0, -60.0, 60.0, 100.0)
     found = criticised(profile_recording(np.concatenate([up, up[::-1]]), delay_s=0.005), PLAIN)

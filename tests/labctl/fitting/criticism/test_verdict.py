@@ -45,12 +45,14 @@ def test_what_a_base_leaves_a_hundredth_of_is_not_named(seed: int) -> None:
     assert held(made("gyrostar", seed), "weiss1995").verdict.named == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["saturation", "vibration_rectification"])
 def test_the_remainder_of_a_large_effect_gets_no_second_name(effect: str) -> None:
     found = held(made("ojeda2000", 1, effect))
     assert found.verdict.groups == ((effect,),)
 
 
+@pytest.mark.slow
 def test_what_remains_is_said_with_its_channel() -> None:
     found = held(made("ojeda2000", 1, "saturation"))
     left = found.verdict.remainder
@@ -60,6 +62,7 @@ def test_what_remains_is_said_with_its_channel() -> None:
     assert any(line.startswith("saturation explains 99") for line in sentences(found))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "channel"), [("supply_scale", "supply_v"), ("humidity_scale", "humidity_pct"), ("time_step_scale", "t_s")]
 )

@@ -89,6 +89,7 @@ def test_a_field_that_changes_from_rest_to_rest_is_refused_with_what_to_do(sessi
         align_field(replace(readings), solved, moved, magnetometer)
 
 
+@pytest.mark.slow
 def test_a_rest_whose_error_makes_the_field_steeper_has_no_more_weight() -> None:
     """The dip is that of the plain mean over the rests, within half its u; it was 3 u larger."""
     unit = TrueTriads.drawn(np.random.default_rng(10**6 + 80004))

@@ -29,6 +29,7 @@ def test_a_nudge_is_a_motion_and_no_second_device(index: int, tmp_path: Path) ->
     assert outcome("nudged", *said_of("nudged", index, 97, tmp_path)) in ("named", "refused")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["plain", "rate_steps", "long_soak", "coarse", "jitter", "through_zero", "hot"])
 def test_awkward_but_clean_files_get_no_finding(kind: str, tmp_path: Path) -> None:
     for index in range(2):

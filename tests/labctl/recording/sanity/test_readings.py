@@ -22,6 +22,7 @@ SEEDS = (301, 302)
 STARTED = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FAULTS)
 def test_each_kind_of_fault_is_found(kind: str) -> None:
     for seed in SEEDS:

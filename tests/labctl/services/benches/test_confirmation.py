@@ -192,6 +192,7 @@ def test_what_cannot_be_written_or_read_keeps_no_bench_from_being_tried(
     assert not bench(store).is_unconfirmed
 
 
+@pytest.mark.slow
 def test_nothing_is_tried_while_a_campaign_runs_or_without_the_lease(store: Store, real: RealBench) -> None:
     store.benches.clear(BENCH.name, "Ada", "looked", AT)
     wall = VirtualClock(AT)
@@ -277,6 +278,7 @@ def test_a_service_says_whether_it_leaves_its_bench_unconfirmed(
     assert ("labctl confirmed the safe state at" in looked.stdout) == healed
 
 
+@pytest.mark.slow
 def test_a_campaign_in_the_foreground_that_leaves_its_bench_unconfirmed_ends_with_a_failure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -84,6 +84,7 @@ def test_a_start_over_http_that_nobody_confirmed_is_refused_and_nothing_is_writt
         assert list(client.get("/api/benches").json()[0]["start_questions"]) == list(BENCH_CHECKS)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("real")
 def test_who_confirmed_is_the_first_event_and_in_the_audit_trail(store: Store) -> None:
     runner = BenchRunner(store, BENCH, VirtualClock)
@@ -94,6 +95,7 @@ def test_who_confirmed_is_the_first_event_and_in_the_audit_trail(store: Store) -
     assert recorded(store) == (f"operator.bench_clear: {TEXT}", TEXT)
 
 
+@pytest.mark.slow
 def test_a_simulated_bench_asks_nothing(store: Store) -> None:
     runner = BenchRunner(store, BENCH, VirtualClock)
     runner.start(CampaignRequest(recipe="short"))

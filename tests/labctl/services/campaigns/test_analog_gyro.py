@@ -15,6 +15,7 @@ from labctl.services.campaigns.preparation import prepare
 from labctl.store import open_store
 
 
+@pytest.mark.slow
 def test_a_campaign(tmp_path: Path) -> None:
     record = read_bench("gyrostar-sim").model_dump()
     gyro = record["gyros"][0] | {

@@ -138,6 +138,7 @@ def test_a_bench_that_is_not_confirmed_safe_refuses_what_is_due_and_blocks_nothi
     assert lab.states() == ["done", "done"]
 
 
+@pytest.mark.slow
 def test_what_is_due_waits_for_a_bench_that_was_lost(lab: Lab, moves: list[str]) -> None:
     due = lab.enter(at="now")
     lab.lose()
@@ -195,6 +196,7 @@ def test_a_campaign_that_waits_keeps_its_bench_and_lets_it_go_when_it_is_lost(
     assert lab.states() == ["interrupted"]
 
 
+@pytest.mark.slow
 def test_without_the_lease_nothing_is_resumed_and_nothing_moves(tmp_path: Path, moves: list[str]) -> None:
     location = str(tmp_path / "lab.sqlite")
     first = Lab(location)
@@ -273,6 +275,7 @@ def test_what_cannot_be_resumed_waits_for_a_person_and_the_queue_continues(
     assert lab.event(due)[0] == "started"
 
 
+@pytest.mark.slow
 def test_entries_and_what_became_of_them_are_in_the_audit_trail(lab: Lab) -> None:
     with acting(Actor("Ada", "key")):
         lab.enter(at="now")

@@ -76,6 +76,7 @@ def test_a_hidden_scale_error_is_found_within_its_uncertainty(tmp_path: Path) ->
         assert abs(values["scale_factor"] - expected) < 2.0 * u["scale_factor"] < 0.1 * HIDDEN
 
 
+@pytest.mark.slow
 def test_what_was_refused_is_in_the_events_and_not_in_the_recording(tmp_path: Path) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         made = prepare(store, ONE, bench(mistakes=("short", "axis")), VirtualClock(), clip=False)

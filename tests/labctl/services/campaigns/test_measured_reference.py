@@ -93,6 +93,7 @@ def campaign(
     return Outcome(samples, points, version, document["provenance"], 1 + value - true, u, text, events, location)
 
 
+@pytest.mark.slow
 def test_with_the_encoder_the_scale_factor_is_right(tmp_path: Path) -> None:
     found = campaign(tmp_path, **FAST)
     assert abs(found.scale) < 3 * found.u < 3e-5
@@ -120,6 +121,7 @@ def test_with_the_encoder_the_scale_factor_is_right(tmp_path: Path) -> None:
     assert read_recording(tmp_path / "out").info.rate_reference == "measured"
 
 
+@pytest.mark.slow
 def test_without_it_the_error_is_in_the_scale_factor_and_is_named_table_rate_ratio(tmp_path: Path) -> None:
     found = campaign(tmp_path, {"reference": "demanded"}, **FAST)
     assert found.scale == pytest.approx(2e-4, abs=1e-5)
@@ -148,6 +150,7 @@ def test_an_error_in_one_direction_is_found_by_direction(tmp_path: Path) -> None
     assert "scale_factor_asymmetry" in found.text
 
 
+@pytest.mark.slow
 def test_a_table_that_turns_as_commanded_gives_no_warning(tmp_path: Path) -> None:
     found = campaign(tmp_path, {"reference": "demanded"}, criticised=False)
     assert found.events == []

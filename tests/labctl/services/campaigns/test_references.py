@@ -44,6 +44,7 @@ def campaign(store: Store, bench: BenchFile, silent: tuple[float, float] | None 
     return run(store, prepared)
 
 
+@pytest.mark.slow
 def test_the_reference_is_the_temperature_of_the_fit_and_its_values_are_columns(store: Store) -> None:
     bench = bench_of(is_temperature=True, certificate="NMI 4711", u_c=0.02, corrections={"reference_c": 0.5})
     ended = campaign(store, bench)
@@ -65,6 +66,7 @@ def test_the_reference_is_the_temperature_of_the_fit_and_its_values_are_columns(
     assert len(store.recordings.samples(ended.recordings["FOG-0001"]).columns["reference_c"]) > 1000
 
 
+@pytest.mark.slow
 def test_a_unit_without_a_thermometer_is_fitted_by_the_reference(store: Store) -> None:
     unit = {"driver": "kvh-dsp3000", "port": "sim://kvh-dsp3000/fog", "sample_rate_hz": 100}
     ended = campaign(store, bench_of(unit, is_temperature=True))
@@ -76,6 +78,7 @@ def test_a_unit_without_a_thermometer_is_fitted_by_the_reference(store: Store) -
     assert fit(recording, "bias_scale").temperature_c == pytest.approx((24, 28), abs=0.3)
 
 
+@pytest.mark.slow
 def test_a_reference_that_is_not_chosen_is_kept_beside_the_units_own_thermometer(store: Store) -> None:
     ended = campaign(store, bench_of())
     columns = store.recordings.points(ended.recordings["FOG-0001"]).columns
@@ -83,6 +86,7 @@ def test_a_reference_that_is_not_chosen_is_kept_beside_the_units_own_thermometer
     assert np.abs(np.asarray(columns["reference_c"]) - np.asarray(columns["temperature_c"])).max() > 0.1
 
 
+@pytest.mark.slow
 def test_a_short_silence_is_survived_and_said(store: Store) -> None:
     ended = campaign(store, bench_of(), silent=(700.0, 730.0))
     assert ended.state == "done", ended.reason

@@ -80,6 +80,7 @@ def stopped(store: Store, after: str, **changes: Any) -> Any:
     return prepared, run(store, prepared, control, seen)
 
 
+@pytest.mark.slow
 def test_after_a_fault_a_person_takes_it_up_and_it_cannot_be_finished_twice(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     with open_store(location, write=True) as store:
@@ -109,6 +110,7 @@ def test_after_a_fault_a_person_takes_it_up_and_it_cannot_be_finished_twice(tmp_
                 prepare_resume(store, prepared.id, bench, lambda _: VirtualClock(), request)
 
 
+@pytest.mark.slow
 def test_a_resumed_campaign_here_is_the_newest_that_was_interrupted(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     with open_store(location, write=True) as store:
@@ -214,6 +216,7 @@ def test_the_same_seed_gives_the_same_campaign_after_an_interruption(tmp_path: P
     assert np.array_equal(found[0], found[1])
 
 
+@pytest.mark.slow
 def test_run_here_leaves_an_uninterrupted_campaign_as_it_was(tmp_path: Path) -> None:
     answer = run_here(str(tmp_path / "lab.sqlite"), StartRequest(recipe="short"))
     assert (answer.state, answer.reason, answer.wish, answer.prompt) == ("done", "all steps done", None, None)

@@ -62,6 +62,7 @@ def resume(runner: BenchRunner) -> object:
     return runner.resume(1, ResumeRequest(by="Bob"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("campaign", [None, 1])  # 1 has ended: its page still shows the button
 @pytest.mark.parametrize("move", [start, resume])
 def test_what_was_asked_before_a_stop_does_not_take_it_back(
@@ -81,6 +82,7 @@ def test_what_was_asked_before_a_stop_does_not_take_it_back(
     assert runner.stop_latch.state.held == ()
 
 
+@pytest.mark.slow
 def test_a_campaign_that_a_person_has_started_is_not_taken_for_one_that_was_left(
     runner: BenchRunner, store: Store
 ) -> None:
@@ -103,6 +105,7 @@ def test_a_campaign_that_a_person_has_started_is_not_taken_for_one_that_was_left
     assert (store.campaigns.get(1).state, store.campaigns.get(1).reason) == ("done", "all steps done")
 
 
+@pytest.mark.slow
 def test_a_stop_of_one_campaign_is_not_said_to_have_stopped_another(runner: BenchRunner) -> None:
     answers: list[tuple[bool, str]] = []
 

@@ -27,6 +27,7 @@ def bench_of(folder: Path, clock_ppm: float) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [97.0, 103.0])
 def test_a_campaign_loses_nothing_and_its_times_are_those_of_the_device(tmp_path: Path, rate_hz: float) -> None:
     database = str(tmp_path / "lab.sqlite")

@@ -75,6 +75,7 @@ def scale_of(location: str, ratio: float) -> float:
     return 1 + float(dict(zip(found.names, found.values[:, 0], strict=True))["scale_factor"])
 
 
+@pytest.mark.slow
 def test_with_a_slow_step_clock_the_reference_and_the_fit_are_right(tmp_path: Path) -> None:
     """Steps 9.1 % slow: without the measurement the table does 81.8 deg/s where 90 are recorded."""
     exact, slow = str(tmp_path / "exact.sqlite"), str(tmp_path / "slow.sqlite")
@@ -202,6 +203,7 @@ def test_runs_that_disagree_are_refused_before_the_first_data_set(tmp_path: Path
     assert rows(location, "select count(*) from timed_runs") == [(12,)]
 
 
+@pytest.mark.slow
 def test_missed_steps_end_the_campaign_and_the_data_sets_since_the_last_check(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     with open_store(location, write=True) as store:
@@ -249,6 +251,7 @@ def test_a_check_for_missed_steps_that_sees_little_says_how_much(tmp_path: Path)
     assert "end other work on this computer" in said
 
 
+@pytest.mark.slow
 def test_a_unit_that_sends_angles_instead_of_rates_is_found_and_nothing_that_it_sent_counts(tmp_path: Path) -> None:
     """Like a DSP-3000 in incremental mode that hears no command: 1 deg/s where the table turns at 10."""
     location, recipe = str(tmp_path / "lab.sqlite"), RECIPE.replace("[24, 26]", "[25]")

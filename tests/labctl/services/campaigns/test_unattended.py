@@ -117,6 +117,7 @@ def test_what_is_not_safe_is_on_the_bench_before_the_campaign_ends(store: Store)
     assert store.benches.unconfirmed(BENCH.name) == "table to rest: no answer"
 
 
+@pytest.mark.slow
 def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: Store) -> None:
     left_running(store)
     with pytest.raises(NotEnoughData, match="no complete data set yet"):
@@ -129,6 +130,7 @@ def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: S
         newest_row(store, "FOG-0001", 3)
 
 
+@pytest.mark.slow
 def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say_so(store: Store) -> None:
     older, newer = left_running(store), left_running(store)
     runner = BenchRunner(store, BENCH, VirtualClock)
@@ -386,6 +388,7 @@ def test_a_service_that_starts_says_what_it_finds(left: str, monkeypatch: pytest
     assert (other["unconfirmed"], other["cut_short"]) == ("", "")
 
 
+@pytest.mark.slow
 def test_another_terminal_is_told_where_a_campaign_runs(tmp_path: Path) -> None:
     location, said = str(tmp_path / "lab.sqlite"), []
 

@@ -26,6 +26,7 @@ def lab(tmp_path: Path) -> Lab:
     return lab
 
 
+@pytest.mark.slow
 def test_the_command_names_what_is_missing_then_writes_the_three_forms(lab: Lab, tmp_path: Path) -> None:
     out = tmp_path / "c.pdf"
     said = lab.run("certificate", SERIAL, "--out", str(out), "--by", "I. Issuer", status=2).stderr
@@ -51,6 +52,7 @@ def test_the_command_names_what_is_missing_then_writes_the_three_forms(lab: Lab,
     assert answer["number"] in lab.run("certificates", SERIAL).stdout
 
 
+@pytest.mark.slow
 def test_over_http_it_is_issued_fetched_and_listed(lab: Lab) -> None:
     with open_client(lab.database) as client:
         assert client.get(PATH).status_code == 404

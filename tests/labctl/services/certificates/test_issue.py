@@ -86,6 +86,7 @@ def test_each_part_of_the_order_is_needed(store: Store, part: str) -> None:
     assert rows_of(store) == 0
 
 
+@pytest.mark.slow
 def test_a_standard_past_its_due_date_is_refused_by_name(empty: Store) -> None:
     day = simulated().info.started_at.date()
     good = Standard(quantity="clock", u=1.0, certificate="C-1", issued_by="PTB", calibrated=day, due=date(2099, 1, 1))
@@ -101,6 +102,7 @@ def test_a_standard_past_its_due_date_is_refused_by_name(empty: Store) -> None:
     assert rows_of(empty) == 0
 
 
+@pytest.mark.slow
 def test_standards_without_certificate_or_traceability_are_missing(empty: Store) -> None:
     bare = Standard(quantity="clock", u=1.0)
     version = add_version(empty, with_standards(bare))
@@ -189,6 +191,7 @@ def test_the_issue_is_in_the_audit_trail(store: Store) -> None:
     assert row.detail["hash"] == answer.hash
 
 
+@pytest.mark.slow
 def test_as_found_is_by_the_version_in_force_before(store: Store) -> None:
     first = json.loads(_document(store, 1))
     assert first["as_found"]["basis"] == "the output converted with its nominal scale factor, without correction"

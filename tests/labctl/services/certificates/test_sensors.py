@@ -134,6 +134,7 @@ def test_all_three_forms_state_both(store: Store) -> None:
             if each.role != "information"] == []  # fmt: skip
 
 
+@pytest.mark.slow
 def test_coefficients_of_temperature_are_stated_with_their_range(store: Store, tmp_path: Path) -> None:
     unit = TrueUnit.drawn(np.random.default_rng(5))
     path = tmp_path / "warm.csv"
@@ -180,6 +181,7 @@ def test_a_field_that_was_not_constant_is_no_calibration(store: Store, tmp_path:
         issue(store, SERIAL, add_version(store), request(magnetometer=MAGNETOMETER | {"version": newest}), AT)
 
 
+@pytest.mark.slow
 def test_the_alignment_of_the_gyro_triad_is_stated_with_its_uncertainty(tmp_path: Path) -> None:
     folder = tmp_path / "turned"
     recording, truth = simulate_session(3, Session(rests=22, latitude_deg=48.0))

@@ -283,6 +283,7 @@ def test_an_unsigned_file_is_by_no_expected_signer(store: Store, tmp_path: Path)
     assert (said.ok, said.signed_by, said.in_register) == (False, None, "same")
 
 
+@pytest.mark.slow
 def test_a_withdrawn_certificate_is_not_to_be_relied_on(
     store: Store, tmp_path: Path, signer: Owner, authority: Owner
 ) -> None:
@@ -317,6 +318,7 @@ def test_other_files_are_refused(store: Store, tmp_path: Path, content: bytes, s
         verify_file(store, tmp_path / "none", None)
 
 
+@pytest.mark.slow
 def test_the_commands(
     with_version: Path, tmp_path: Path, signer: Owner, authority: Owner, monkeypatch: pytest.MonkeyPatch
 ) -> None:

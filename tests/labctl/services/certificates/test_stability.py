@@ -77,6 +77,7 @@ def test_the_drift_is_that_of_the_unit_per_year(store: Store) -> None:
     assert years_until(measured, BEGUN) == 0.0
 
 
+@pytest.mark.slow
 def test_it_is_that_of_the_worst_place(store: Store) -> None:
     add(store, later(0.0, 0.0))
     found = stability_of(store, SERIAL, add(store, later(1.0, 0.0, scale=1e-4)))
@@ -84,6 +85,7 @@ def test_it_is_that_of_the_worst_place(store: Store) -> None:
     assert found.worst[0] == pytest.approx(1e-4 * 100.0, rel=0.02)  # of 100 deg/s
 
 
+@pytest.mark.slow
 def test_two_versions_of_one_day_are_no_interval(store: Store) -> None:
     add(store, later(0.0, 0.0))
     assert str(stability_of(store, SERIAL, add(store, later(0.01, 0.05)))).startswith(NO_HISTORY)
@@ -132,6 +134,7 @@ def test_versions_that_share_a_recording_are_no_interval(store: Store) -> None:
     assert str(stability_of(store, SERIAL, version)).startswith(NO_HISTORY)
 
 
+@pytest.mark.slow
 def test_a_place_that_an_earlier_version_does_not_cover_is_not_known(store: Store) -> None:
     narrow = later(0.0, 0.0)
     cool = np.asarray(narrow.columns["temperature_c"]) < 35.0

@@ -127,6 +127,7 @@ def test_a_single_interval_goes_first_where_the_unit_changed_more_than_its_type(
     assert found.worst == pytest.approx((0.5, 1))
 
 
+@pytest.mark.slow
 def test_the_certificate_says_which_units_the_drift_is_of(store: Store) -> None:
     add_type(store)
     due = BEGUN + timedelta(days=365.25 * 2)
@@ -161,6 +162,7 @@ def certified(store: Store, due: datetime) -> int:
     return version
 
 
+@pytest.mark.slow
 def test_the_work_does_not_grow_with_the_fleet(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(type_drift, "MAX_UNITS", 5)
     add_type(store)

@@ -80,6 +80,7 @@ def test_cancelled_at_any_stage_it_leaves_no_file_and_can_be_asked_again(store: 
     assert sorted(cache.rglob("*")) != before
 
 
+@pytest.mark.slow
 def test_a_cached_answer_loads_no_fit() -> None:
     code = """
 import sys, labctl.cli, labctl.services.commands.open, labctl.services.criticism.criticise

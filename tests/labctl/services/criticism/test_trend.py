@@ -96,6 +96,7 @@ def test_a_bias_that_is_outside_its_limit_is_said_to_be_outside_already(five_yea
     assert limit == pytest.approx(2 * expected)  # what `verify` accepts of a version of several recordings
 
 
+@pytest.mark.slow
 def test_two_recordings_have_a_drift_without_an_uncertainty_and_say_so(tmp_path: Path) -> None:
     found = lab_over_years(tmp_path, 2).json("trend", "J-1")
     assert all(each["u"] is None and each["low"] is None for each in found["drifts"])

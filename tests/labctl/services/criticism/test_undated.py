@@ -63,6 +63,7 @@ def test_a_clock_that_was_never_set_gives_no_date(tmp_path: Path) -> None:
     assert second["started_at"] == "2025-06-15T15:06:40Z"
 
 
+@pytest.mark.slow
 def test_the_trend_leaves_out_what_has_no_date_and_says_what_to_do(tmp_path: Path) -> None:
     lab = Lab(tmp_path)
     for seed in (1, 2, 3):
@@ -87,6 +88,7 @@ def test_recordings_that_earlier_versions_dated_by_their_file_have_no_date() -> 
     assert RecordingInfo(**head, date_known=False).measured_at is None  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("apart_days", [0.0, 10 / 86400, 0.02])
 def test_recordings_that_overlap_or_are_close_are_no_trend(tmp_path: Path, apart_days: float) -> None:
     rng, lab = np.random.default_rng(9), Lab(tmp_path)

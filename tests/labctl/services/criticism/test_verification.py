@@ -70,6 +70,7 @@ def test_criticism_says_first_what_the_version_itself_leaves(two_days: Lab) -> N
     assert lines[1] == "Refitted to recording 2:"
 
 
+@pytest.mark.slow
 def test_a_recording_of_another_unit_needs_the_request(two_days: Lab, tmp_path: Path) -> None:
     other = single_axis(3)
     other = type(other)(other.info.model_copy(update={"serial": "FOG-9"}), other.columns, other.environment)

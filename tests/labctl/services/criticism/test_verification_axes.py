@@ -99,6 +99,7 @@ def test_nothing_is_off_in_recordings_of_a_unit_that_did_not_change(lab: Lab) ->
         assert found["axes_off"] == [], seed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("groups", [1, 2, 3, 8])
 @pytest.mark.parametrize("freedom", [6, 40])
 @pytest.mark.parametrize("axes", ["x", "xy", "xyz"])

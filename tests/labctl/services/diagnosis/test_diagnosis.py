@@ -89,6 +89,7 @@ def test_one_for_later_is_left_to_a_service(location: str) -> None:
     assert campaigns(location) == before
 
 
+@pytest.mark.slow
 def test_its_campaigns_are_on_the_same_units_on_other_days(location: str) -> None:
     run(location)
     with open_store(location, write=False) as store:
@@ -208,6 +209,7 @@ def test_the_hours_end_it(location: str) -> None:
     assert "0.5 h of 0.5 h are left" in ended.why
 
 
+@pytest.mark.slow
 def test_a_recording_that_cannot_be_judged_with_the_others_is_left_out(location: str) -> None:
     def script(recordings: list[int]) -> CriticismResponse:
         if 2 in recordings:

@@ -263,6 +263,7 @@ def test_a_campaign_in_a_terminal_makes_its_draft_after_the_bench_is_closed(loca
     assert [each.state for each in control._with_drafts(answer).drafts] == ["made"]
 
 
+@pytest.mark.slow
 def test_a_campaign_without_fit_ends_in_its_recordings(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     run_here(location, StartRequest(recipe=RECIPE, bench="single-axis-sim", fit=False))

@@ -88,6 +88,7 @@ def test_a_criticism_is_written_once_and_its_verdict_kept(store: Store) -> None:
         run_job(store, kind="criticise", model="ojeda2000")
 
 
+@pytest.mark.slow
 def test_a_unit_that_cannot_be_fitted_has_its_reason_and_the_others_go_on(store: Store) -> None:
     store.recordings.add_import(one_row_sets(1, "A-1"), AT)
     job = run_job(store)
@@ -98,6 +99,7 @@ def test_a_unit_that_cannot_be_fitted_has_its_reason_and_the_others_go_on(store:
     assert failed.version is None
 
 
+@pytest.mark.slow
 def test_a_job_that_is_cancelled_keeps_what_was_written_and_the_next_one_goes_on_there(store: Store) -> None:
     def cancel(answer: jobs.FleetJobResponse) -> None:
         if answer.done == 2:
@@ -113,6 +115,7 @@ def test_a_job_that_is_cancelled_keeps_what_was_written_and_the_next_one_goes_on
     assert versions(store) == [[1]] * UNITS
 
 
+@pytest.mark.slow
 def test_an_interrupt_ends_a_job_as_a_cancel_does(store: Store) -> None:
     def interrupt(task: FleetTask) -> None:
         if task.serial == "U00002":
@@ -124,6 +127,7 @@ def test_an_interrupt_ends_a_job_as_a_cancel_does(store: Store) -> None:
     assert (row.state, store.fleet.counts(row.id).done) == ("cancelled", 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [ComputationEnded("killed"), BrokenProcessPool("died")])
 def test_a_unit_whose_worker_died_is_tried_again_last_and_given_up_after_some_times(
     store: Store, error: Exception
@@ -143,6 +147,7 @@ def test_a_unit_whose_worker_died_is_tried_again_last_and_given_up_after_some_ti
     assert f"{TRIES} times" in failed.reason
 
 
+@pytest.mark.slow
 def test_an_engine_that_was_lost_with_all_that_it_had_loses_nothing_and_writes_nothing_twice(store: Store) -> None:
     begun: list[str] = []
 
@@ -175,6 +180,7 @@ def test_a_version_that_another_fit_took_is_made_again_with_the_next_number(stor
     assert versions(store) == [[1, 2], [1], [1], [1]]
 
 
+@pytest.mark.slow
 def test_a_job_is_carried_out_by_one_process_and_taken_up_when_that_one_is_gone(store: Store) -> None:
     clock = VirtualClock(AT)
     request = FleetJobRequest(kind="fit", effects=["bias"])
@@ -191,6 +197,7 @@ def test_a_job_is_carried_out_by_one_process_and_taken_up_when_that_one_is_gone(
     assert versions(store) == [[1]] * UNITS
 
 
+@pytest.mark.slow
 def test_a_job_is_not_left_for_good_where_the_clock_was_set_back(store: Store) -> None:
     job = jobs.begin(store, FleetJobRequest(kind="fit", effects=["bias"]), AT, "another process")
     for back, done in ((LEFT_AFTER / 2, 0), (timedelta(days=1), UNITS)):

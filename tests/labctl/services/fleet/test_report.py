@@ -154,6 +154,7 @@ def test_all_figures_of_a_report_are_of_the_error_model(tmp_path: Path) -> None:
                 fleet_report(store, request, NOW)
 
 
+@pytest.mark.slow
 def test_versions_come_newest_recording_first(tmp_path: Path) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         for number in range(3):

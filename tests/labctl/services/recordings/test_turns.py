@@ -33,6 +33,7 @@ def lab(tmp_path: Path) -> Lab:
     return Lab(tmp_path)
 
 
+@pytest.mark.slow
 def test_the_published_turns_take_two_commands(lab: Lab) -> None:
     taken = lab.json("import", str(EXAMPLES / "imucal-turns"))
     assert (taken["datasets"], taken["suggested_model"], taken["warnings"]) == (9, "turns", [])

@@ -175,6 +175,7 @@ def test_a_user_follows_the_same_drift_on_the_command_line(lab: Lab, weiss: Any)
     assert "deg/min" in lab.run(*asked).stdout
 
 
+@pytest.mark.slow
 def test_a_units_own_recording_is_held_against_the_paper(lab: Lab) -> None:
     lab.run("import", str(EXAMPLES / "osu-fog"))
     answer = lab.json("reproduce", "ojeda2000", "OSU-FOG-2024", "--out", str(lab.folder / "own"))

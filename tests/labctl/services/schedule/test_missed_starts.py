@@ -74,6 +74,7 @@ def test_waiting_behind_another_campaign_counts_as_late(lab: Lab) -> None:
     assert (lab.outcomes(strict), lab.begun) == (["missed"], [])
 
 
+@pytest.mark.slow
 def test_a_cron_line_that_may_not_be_late_goes_on_the_next_day(lab: Lab) -> None:
     daily = lab.enter(cron="0 2 * * *", time_zone="UTC", late_limit_s=0)
     lab.clock.sleep(86400)
@@ -143,6 +144,7 @@ def under_way(real: Lab) -> StoreJournal:
     return journal
 
 
+@pytest.mark.slow
 def test_a_restart_does_not_make_a_start_late_that_queues_behind_a_campaign(real: Lab) -> None:
     journal = under_way(real)
     waits = real.enter(at="2026-01-05T10:00Z")
@@ -226,6 +228,7 @@ def test_a_missed_start_stays_in_the_list_until_a_person_removes_it(real: Lab) -
         cancel_start(real.store, once, real.clock.utc())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("simulated", [True, False])
 def test_only_a_real_bench_of_a_service_has_the_default(
     tmp_path: Path, store: Store, monkeypatch: pytest.MonkeyPatch, simulated: bool

@@ -229,6 +229,7 @@ class Served:
             job.thread.join()
 
 
+@pytest.mark.slow
 def test_a_scheduled_campaign_runs_and_a_restart_begins_it_no_second_time(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     first = Served(location)

@@ -124,6 +124,7 @@ def test_the_drift_and_the_known_error_of_the_day_are_recorded(store: Store) -> 
     assert used.uncorrected == used.value
 
 
+@pytest.mark.slow
 def test_a_campaign_records_what_the_register_predicts(store: Store) -> None:
     register.certificate(store, "T-1", date(2024, 1, 5), 0.010, due="2026-06-30")
     register.certificate(store, "T-2", date(2025, 1, 5), 0.030, due="2026-06-30")

@@ -170,6 +170,7 @@ def test_a_certificate_that_is_changed_by_hand_is_found(tmp_path: Path) -> None:
     assert any(text.startswith("finding 1 on a standard: act changed") for text in found)
 
 
+@pytest.mark.slow
 def test_a_finding_that_was_wrong_is_withdrawn_and_stays_readable(tmp_path: Path) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         register.add(store)
@@ -185,6 +186,7 @@ def test_a_finding_that_was_wrong_is_withdrawn_and_stays_readable(tmp_path: Path
         assert issue(store, "FOG-B", 1, request(), noon(FOUND)).number
 
 
+@pytest.mark.slow
 def test_a_standard_that_is_found_bad_while_a_certificate_is_written_refuses_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -127,6 +127,7 @@ def test_what_a_journal_writes_after_the_end_is_sealed_again(location: str) -> N
     assert acts(location, "recording")[1:] == [("sealed", "written after the end")] * 2
 
 
+@pytest.mark.slow
 def test_a_draft_is_an_event_after_the_end(location: str) -> None:
     with open_store(location, write=True) as store:
         campaign = prepared(store)
@@ -140,6 +141,7 @@ def test_a_draft_is_an_event_after_the_end(location: str) -> None:
     assert acts(location, "campaign") == [("sealed", "done"), ("sealed", "draft")]
 
 
+@pytest.mark.slow
 def test_calibrations_certifications_certificates_and_keys_are_sealed(location: str) -> None:
     with open_store(location, write=True) as store:
         version = certificates.add_version(store)

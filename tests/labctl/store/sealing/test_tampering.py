@@ -90,6 +90,7 @@ def test_an_edit_is_found_and_named(location: str, key: PublicKey, name: str, wi
     assert says(found, part, words), found.findings
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["key", "anchor file", "given anchor"])
 @pytest.mark.parametrize("name", EDITS)
 def test_an_edit_whose_author_made_all_fit_again_is_found(location: str, key: PublicKey, name: str, how: str) -> None:

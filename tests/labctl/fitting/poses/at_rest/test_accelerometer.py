@@ -27,6 +27,7 @@ def test_gravity_is_that_of_the_tables_of_wgs_84(latitude_deg: float | None, gra
     assert local_gravity_g(info) * STANDARD_GRAVITY == pytest.approx(gravity, abs=2e-6)
 
 
+@pytest.mark.slow
 def test_nine_parameters_cover_the_truth() -> None:
     scores = []
     for seed in range(12):

@@ -112,6 +112,7 @@ def later_or_refused(known: Known, directions: np.ndarray, seed: int) -> tuple[B
     return fewer, true, ""
 
 
+@pytest.mark.slow
 def test_scatter_between_rests_is_known_from_the_earlier_session_too() -> None:
     """With 0.3 mg from rest to rest and six faces, U holds the truth, and the unit is not said to have changed."""
     scatter_g, inside, agree = 3e-4, [], []
