@@ -22,6 +22,11 @@ class ShownUnit(NamedTuple):
     factor: float
     unit: str
 
+    def number(self, value: float, digits: int = 2) -> str:
+        """Write a stored value with `digits` significant digits, without the unit: 2000 and not 2e+03 ppm."""
+        text = f"{self.factor * value:.{digits}g}"
+        return f"{float(text):.0f}" if "e+" in text and self.factor != 1 else text
+
 
 def _begins_with(stems: tuple[str, ...]) -> re.Pattern[str]:
     """Return what a name matches that begins with one of `stems`, behind an axis or not: x.misalignment_y."""
@@ -52,5 +57,5 @@ def shown_unit(unit: str, name: str) -> ShownUnit:
 
 def size_text(value: float, unit: str, name: str, digits: int = 2) -> str:
     """Write a quantity with `digits` significant digits in the unit in which it is shown: 0.31 mrad."""
-    factor, shown = shown_unit(unit, name)
-    return f"{factor * value:.{digits}g} {shown}"
+    shown = shown_unit(unit, name)
+    return f"{shown.number(value, digits)} {shown.unit}"

@@ -37,3 +37,9 @@ def test_the_cases_contain_every_plain_number_of_the_catalogue() -> None:
 
 def test_an_angle_is_the_same_number_as_a_coefficient_and_as_a_change_between_mountings() -> None:
     assert size_text(0.00031, "1", "misalignment_y") == size_text(0.00031, "rad", "alignment") == "0.31 mrad"
+
+
+def test_a_large_size_is_written_without_an_exponent() -> None:
+    assert size_text(2.04e-3, "1", "scale_factor") == "2000 ppm"
+    assert size_text(2.04e-7, "1", "scale_factor") == "0.2 ppm"
+    assert size_text(12345.0, "deg/s", "bias") == "1.2e+04 deg/s"

@@ -63,7 +63,7 @@ def test_the_coefficients_and_the_alignment_of_the_page_are_those_of_the_command
     force, field = rows_of(page, "Accelerometer, version 1"), rows_of(page, "Magnetometer, version 1")
     expected = {
         **{f"bias {a}": (force, given["accelerometer"]["bias_g"][a], "g") for a in "xyz"},
-        "misalignment yz": (force, given["accelerometer"]["misalignment"]["yz"], ""),
+        "misalignment yz": (force, given["accelerometer"]["misalignment"]["yz"], "mrad"),
         **{f"hard iron {a}": (field, given["magnetometer"]["hard_iron_ut"][a], "uT") for a in "xyz"},
         "soft iron xz": (field, given["magnetometer"]["soft_iron"]["xz"], ""),
         **{f"gyro triad about {a}": (force, given["accelerometer"]["alignment"]["axes"][a], "deg") for a in "xyz"},
@@ -74,6 +74,8 @@ def test_the_coefficients_and_the_alignment_of_the_page_are_those_of_the_command
     for name, (shown, true, unit) in expected.items():
         value, expanded, half, unit_shown = shown[name]
         assert unit_shown.replace("µ", "u").replace("°", "deg") == unit, name
+        if unit == "mrad":
+            value, expanded, half = (1e-3 * figure for figure in (value, expanded, half))
         assert abs(value - true["value"]) <= 1.001 * half, name
         of_command = true.get("expanded", stats.t.ppf(0.97725, true.get("degrees_of_freedom") or 1e9) * true["u"])
         assert abs(expanded - of_command) <= 1.001 * half, name

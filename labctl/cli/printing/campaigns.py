@@ -10,7 +10,7 @@ from rich.text import Text
 
 from labctl.cli.output import console, format_number, print_heading, print_json, table
 from labctl.cli.turn_text import turn_text
-from labctl.shown_unit import shown_unit
+from labctl.shown_unit import shown_unit, size_text
 from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 
 if TYPE_CHECKING:
@@ -204,12 +204,12 @@ def print_start(answer: ScheduledResponse) -> None:
 
 def _print_mountings(angles: MisalignmentOutlook) -> None:
     """Print how well a misalignment can be known, and what further mountings are worth."""
-    factor, unit = shown_unit("1", "misalignment")
-    at_best = f"{factor * angles.expanded:.2g} {unit}"
+    at_best = size_text(angles.expanded, "1", "misalignment")
     console.print(f"  misalignment: U {at_best} at best, by fixture and table", soft_wrap=True)
     for more in angles.further:
+        u = size_text(more.expanded, "1", "misalignment")
         console.print(
-            f"    {factor * more.expanded:.2g} {unit} with {more.turned}: mountings: {more.mountings} more, time: "
+            f"    {u} with {more.turned}: mountings: {more.mountings} more, time: "
             f"{hours(more.more_s)} more; the recipe then has",
             soft_wrap=True,
         )  # fmt: skip

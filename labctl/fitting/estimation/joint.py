@@ -237,15 +237,19 @@ def _of_shifts(repeatability: Mapping[str, list[RepeatabilityJson]]) -> Iterator
         for line in lines:
             if not line["freedom"]:
                 continue
-            factor, unit_symbol = shown_unit(line["unit"], line["term"])
-            low, high = factor * line["low"], factor * line["high"]
+            shown = shown_unit(line["unit"], line["term"])
             if not line["seen"]:
-                yield f"Axis {axis}: no {line['term']}, beyond the noise; at most {high:.2g} {unit_symbol}."
+                most = f"{shown.number(line['high'])} {shown.unit}"
+                yield f"Axis {axis}: no {line['term']}, beyond the noise; at most {most}."
                 continue
-            values = [factor * shift["value"] for shift in line["shifts"]]
-            size = f"{factor * line['value']:.2g} {unit_symbol} (95 %: {low:.2g} to {high:.2g})"
+            values = [shift["value"] for shift in line["shifts"]]
+            widest = shown.number(max(values) - min(values))
+            size = (
+                f"{shown.number(line['value'])} {shown.unit} (95 %: {shown.number(line['low'])} to "
+                f"{shown.number(line['high'])})"
+            )
             yield (
-                f"Axis {axis}: shifts of up to {max(values) - min(values):.2g} {unit_symbol} between the recordings "
+                f"Axis {axis}: shifts of up to {widest} {shown.unit} between the recordings "
                 f"({_probability(line['p_value'])}) are {line['term']}: standard deviation {size}. These shifts are "
                 "neither a drift nor part of the calibration."
             )

@@ -85,9 +85,11 @@ def _doubt(name: str, suspect: Suspect | None, criticism: Criticism, technology:
         return f"{name} would have a size that is not physical for {technology}"
     values = next(iter(next(iter(suspect.coefficients.values())).values()))
     usual = CATALOGUE[name].ranges.get(technology) if name in CATALOGUE else None
-    factor, unit = shown_unit(values["unit"], name)
-    size = f"its size would be {factor * values['value']:.2g} {unit}"
-    limit = f", where {factor * usual[0]:g} to {factor * usual[1]:g} is usual for {technology}" if usual else ""
+    shown = shown_unit(values["unit"], name)
+    size = f"its size would be {shown.number(values['value'])} {shown.unit}"
+    limit = (
+        f", where {shown.number(usual[0], 6)} to {shown.number(usual[1], 6)} is usual for {technology}" if usual else ""
+    )
     before = criticism.base.error.rms_dps if criticism.base is not None else None
     after = suspect.after.error.rms_dps if suspect.after is not None else None
     change = ""

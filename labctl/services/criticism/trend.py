@@ -288,15 +288,14 @@ def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
         yield f"{points} {word} in time: a drift needs two recordings, and its uncertainty three."
     for drift in drifts:
         text = f"Axis {drift.axis}, {drift.what}" if drift.axis != "all" else "RMS error over all axes"
-        factor, unit_symbol = shown_unit(drift.unit.removesuffix("/year"), drift.what)
-        per_year = f"{factor * drift.per_year:.2g} {unit_symbol}/year"
+        shown = shown_unit(drift.unit.removesuffix("/year"), drift.what)
+        per_year = f"{shown.number(drift.per_year)} {shown.unit}/year"
         if drift.u is None or drift.low is None or drift.high is None:
             figure = f"{text}: {per_year}"
             yield f"{figure} from two recordings; its uncertainty needs {MIN_POINTS} recordings."
         else:
             is_drift = "drifts by" if drift.significant else "no drift beyond repeatability:"
-            low, high = factor * drift.low, factor * drift.high
-            yield f"{text}: {is_drift} {per_year} (95 %: {low:.2g} to {high:.2g})."
+            yield f"{text}: {is_drift} {per_year} (95 %: {shown.number(drift.low)} to {shown.number(drift.high)})."
 
 
 def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[str]:

@@ -91,8 +91,8 @@ def population_in(units: Sequence[UnitCoefficients]) -> Compared:
 
 def _group(effect: GroupEffect) -> FleetGroup:
     named, per = ", ".join(effect.coefficients), " per year" if effect.factor == DATE else ""
-    factor, unit_symbol = shown_unit(effect.unit, next(iter(effect.coefficients), ""))
-    shift, u = f"{factor * effect.shift:.3g} {unit_symbol}{per}", f"{factor * effect.u:.2g}"
+    shown = shown_unit(effect.unit, next(iter(effect.coefficients), ""))
+    shift, u = f"{shown.number(effect.shift, 3)} {shown.unit}{per}", shown.number(effect.u)
     by = f"{shift} (u = {u}, {effect.units} units, p = {effect.p_value:.1g})"
     if effect.factor == DATE:
         text = f"{named} changes with the date of the measurement by {by}."
