@@ -117,7 +117,6 @@ def test_what_is_not_safe_is_on_the_bench_before_the_campaign_ends(store: Store)
     assert store.benches.unconfirmed(BENCH.name) == "table to rest: no answer"
 
 
-@pytest.mark.slow
 def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: Store) -> None:
     left_running(store)
     with pytest.raises(NotEnoughData, match="no complete data set yet"):
@@ -130,7 +129,6 @@ def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: S
         newest_row(store, "FOG-0001", 3)
 
 
-@pytest.mark.slow
 def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say_so(store: Store) -> None:
     older, newer = left_running(store), left_running(store)
     runner = BenchRunner(store, BENCH, VirtualClock)
