@@ -335,11 +335,14 @@ function lawList({ criticism, axis, motion }, onlaw) {
 }
 
 /**
- * The effects of which one is to be added next: those whose addition is advised, then those that the verdict names.
+ * The effects of which one is to be added next, of those that the verdict names: first those whose addition is advised,
+ * then those that were fitted. `print_criticism` of the command does the same.
  * @param {Criticism} criticism
  */
-const nextEffects = ({ advice, named }) => [
-  ...advice.filter((each) => each.add && named.includes(each.effect)).map((each) => each.effect),
+const nextEffects = ({ advice, named, suspects }) => [
+  ...[...advice.filter(({ add }) => add), ...suspects.filter((each) => each.rms_after_dps !== null)]
+    .map(({ effect }) => effect)
+    .filter((effect) => named.includes(effect)),
   ...named,
 ];
 
