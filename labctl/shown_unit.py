@@ -22,6 +22,10 @@ class ShownUnit(NamedTuple):
     factor: float
     unit: str
 
+    def scaled(self, value: float | None) -> float | None:
+        """Return a stored value as it is shown; None where it is not known."""
+        return None if value is None else self.factor * value
+
     def number(self, value: float, digits: int = 2) -> str:
         """Write a stored value with `digits` significant digits, without the unit: 2000 and not 2e+03 ppm."""
         text = f"{self.factor * value:.{digits}g}"

@@ -51,9 +51,9 @@ def print_plan(answer: PlanResponse) -> None:
     rows = table("\neffects that this plan could detect", "effect", "visible share", "from size", "unit", numbers=3)
     for line in answer.visibility:
         if line.visible:
-            factor, unit_symbol = shown_unit(line.unit, line.effect)
-            smallest = None if line.smallest_size is None else factor * line.smallest_size
-            rows.add_row(line.effect, format_number(line.share, 2), format_number(smallest, 2), unit_symbol)
+            shown = shown_unit(line.unit, line.effect)
+            smallest = format_number(shown.scaled(line.smallest_size), 2)
+            rows.add_row(line.effect, format_number(line.share, 2), smallest, shown.unit)
     console.print(rows)
     hidden = table("\nand what not", "effect", "because of", "experiment that would detect it")
     for line in answer.visibility:

@@ -129,15 +129,9 @@ def print_report(answer: FleetReportResponse) -> None:
     if answer.coefficients:
         rows = table("", "coefficient", "unit", "mean", "U", "spread", "u of a unit", numbers=4)
         for each in answer.coefficients:
-            factor, unit_symbol = shown_unit(each.unit, each.name)
-            mean, u_mean, spread, of_one = (
-                None if figure is None else factor * figure
-                for figure in (each.mean, each.expanded_u_mean, each.spread, each.median_u)
-            )
-            rows.add_row(
-                each.name, unit_symbol, format_number(mean), format_number(u_mean, 2), format_number(spread, 3),
-                format_number(of_one, 2),
-            )  # fmt: skip
+            shown = shown_unit(each.unit, each.name)
+            figures = map(shown.scaled, (each.mean, each.expanded_u_mean, each.spread, each.median_u))
+            rows.add_row(each.name, shown.unit, *map(format_number, figures, (4, 2, 3, 2)))
         console.print(rows)
     for outlier in answer.outliers[:MAX_OUTLIERS]:
         console.print(f"{outlier.serial}: {outlier.text}", soft_wrap=True)

@@ -115,13 +115,10 @@ def _print_coefficients(answer: UncertaintyResponse) -> None:
             parts = [line["contribution"] for line in one["lines"] if line["source"] not in EVALUATED]
             known = [part for part in parts if part is not None]
             standards = sum(part**2 for part in known) ** 0.5 if known else None
-            factor, unit_symbol = shown_unit(one["unit"], name)
-            value, combined, expanded, of_standards = (
-                None if each is None else factor * each
-                for each in (one["value"], one["combined"], one["expanded"], standards)
-            )
+            shown = shown_unit(one["unit"], name)
             rows.add_row(
-                f"{axis} {name}", unit_symbol, format_number(value), format_number(combined, 2),
-                format_number(one["k"], 3), format_number(expanded, 2), format_number(of_standards, 2),
+                f"{axis} {name}", shown.unit, format_number(shown.scaled(one["value"])),
+                format_number(shown.scaled(one["combined"]), 2), format_number(one["k"], 3),
+                format_number(shown.scaled(one["expanded"]), 2), format_number(shown.scaled(standards), 2),
             )  # fmt: skip
     console.print(rows)
