@@ -117,11 +117,10 @@ def response(fitted: FittedModel, rates_dps: Mapping[str, float], temperature_c:
     stepped = np.vstack([at, at + STEP_DPS * np.eye(len(BODY_AXES))])  # the place, then a step along each axis
     rates: dict[str, Array] = dict(zip(BODY_AXES, stepped.T, strict=True))
     temperatures_c = np.full(len(stepped), temperature_c)
-    slopes = [
-        (errors[1:] - errors[0]) / STEP_DPS + np.array([axis == body_axis for body_axis in BODY_AXES])
-        for axis in fitted.axes
-        for errors in [fitted.error_dps(channels_at(axis, rates, temperatures_c), axis)]
-    ]
+    slopes = []
+    for axis in fitted.axes:
+        error = fitted.error_dps(channels_at(axis, rates, temperatures_c), axis)
+        slopes.append((error[1:] - error[0]) / STEP_DPS + np.array([axis == body_axis for body_axis in BODY_AXES]))
     return np.array(slopes)
 
 
