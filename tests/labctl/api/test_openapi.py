@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 from typing import Any
@@ -83,16 +83,7 @@ def schema_of(document: dict[str, Any]) -> Any:
     return schema
 
 
-def asking(examples: int) -> Callable[..., None]:
-    """Return what asks so many examples."""
-
-    @settings(max_examples=examples, suppress_health_check=list(HealthCheck))
-    def asked(case: Any, application: Any, statuses: set[int]) -> None:
-        ask(case, application, statuses)
-
-    return asked
-
-
+@settings(max_examples=REQUESTS, suppress_health_check=list(HealthCheck))
 def ask(case: Any, application: Any, statuses: set[int]) -> None:
     for name, there in THERE.items():  # half of what is asked is asked of what is there
         dear = 16 if name == "version" and case.path.endswith(COSTLY) else 2
@@ -116,7 +107,7 @@ def test_nothing_that_is_sent_is_a_server_error(method: str, path: str, applicat
     """
     schema = schema_of(openapi_document() | {"paths": {path: {method: openapi_document()["paths"][path][method]}}})
     asked = build_operation_test(
-        config=schema.config, operation=schema[path][method.upper()], test_func=asking(REQUESTS), given_kwargs={},
+        config=schema.config, operation=schema[path][method.upper()], test_func=ask, given_kwargs={},
         feedback=FeedbackSources(constants_value_source=make_constants_value_source(schema)),
     )  # fmt: skip
     statuses: set[int] = set()
