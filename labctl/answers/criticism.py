@@ -347,6 +347,11 @@ class CriticismResponse(ResponseModel):
         default_factory=list,
         description="For each effect that the verdict is based on: whether to add it, by what would be exported.",
     )
+    next_effect: str | None = Field(
+        default=None,
+        description="Of the effects that the verdict is based on, the one to add next: one whose addition is advised, "
+        "else one that was fitted to these data; null: the verdict names none.",
+    )
     not_testable: list[NotTestable] = Field(description="Effects that this recording cannot show, and why.")
     experiments: list[Experiment] = Field(
         description="Measurements that would distinguish the effects in question, or show effects that cannot be "

@@ -81,11 +81,8 @@ def print_criticism(answer: CriticismResponse) -> None:
         )
     for sentence in _not_testable(answer):
         console.print(sentence, style="dim", soft_wrap=prints_all)
-    if answer.named:
-        advised = [each["effect"] for each in answer.advice if each["add"]]
-        fitted = [each["effect"] for each in answer.suspects if each["rms_after_dps"] is not None]
-        first = next((name for name in (*advised, *fitted) if name in answer.named), answer.named[0])
-        console.print(f"next: labctl improve {answer.serial} --add {first}", style="dim")
+    if answer.next_effect is not None:
+        console.print(f"next: labctl improve {answer.serial} --add {answer.next_effect}", style="dim")
     _print_laws(answer)
 
 

@@ -104,6 +104,14 @@ class Criticism:
         """The noise of the recording, whatever the model: the same as that of a fit to it."""
         return self.fit_data.noise_floor
 
+    @property
+    def next_effect(self) -> str | None:
+        """The effect to add next, of those named: one whose addition is advised, else one that was fitted."""
+        named = self.verdict.named
+        advised = [each["effect"] for each in self.advice if each["add"]]
+        fitted = [suspect.candidate.id for suspect in self.suspects if suspect.after is not None]
+        return next((effect for effect in (*advised, *fitted, *named) if effect in named), None)
+
     @cached_property
     def beside_missing(self) -> Comparison | None:
         """The comparison with the noise that remains beside all that was found missing."""

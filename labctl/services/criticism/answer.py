@@ -98,6 +98,7 @@ def answer_of(
         slow_process=criticism.slow,
         output_steps=dict(criticism.data.steps),
         advice=list(criticism.advice),
+        next_effect=criticism.next_effect,
     )
 
 

@@ -6485,6 +6485,11 @@ export interface components {
              */
             advice: components["schemas"]["Advice"][];
             /**
+             * Next Effect
+             * @description Of the effects that the verdict is based on, the one to add next: one whose addition is advised, else one that was fitted to these data; null: the verdict names none.
+             */
+            next_effect: string | null;
+            /**
              * Not Testable
              * @description Effects that this recording cannot show, and why.
              */

@@ -96,7 +96,6 @@ const chanceText = (p) =>
 export function suspectList(state, effects, { onadd, onlaw, explain }) {
   const { criticism } = state;
   const named = new Set(criticism.named);
-  const [next] = nextEffects(criticism);
   const drawnNow = h("p", { class: "muted small", "aria-live": "polite" }, DRAW);
   /** @param {Suspect} suspect */
   const draw = (suspect) =>
@@ -152,7 +151,9 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
             h(
               "div",
               { class: "row tight" },
-              button("Add", () => onadd(s.effect), { kind: `tiny ${s.effect === next ? "primary" : ""}` }),
+              button("Add", () => onadd(s.effect), {
+                kind: `tiny ${s.effect === criticism.next_effect ? "primary" : ""}`,
+              }),
               draw(s),
               openWhatIf(s),
             ),
@@ -333,18 +334,6 @@ function lawList({ criticism, axis, motion }, onlaw) {
     test ? h("p", {}, `To distinguish the first two, ${test.do}.`) : null,
   );
 }
-
-/**
- * The effects of which one is to be added next, of those that the verdict names: first those whose addition is advised,
- * then those that were fitted. `print_criticism` of the command does the same.
- * @param {Criticism} criticism
- */
-const nextEffects = ({ advice, named, suspects }) => [
-  ...[...advice.filter(({ add }) => add), ...suspects.filter((each) => each.rms_after_dps !== null)]
-    .map(({ effect }) => effect)
-    .filter((effect) => named.includes(effect)),
-  ...named,
-];
 
 /** @param {Criticism} criticism */
 function experimentList(criticism) {
