@@ -128,49 +128,32 @@ export function startForm(bench, order) {
       actButton(`Start on ${there.name}`, () => now(there), { kind: "primary large" }),
     ),
   ];
+  /** @param {Child} time the field of when it begins */
+  const scheduled = (time) => [
+    h(
+      "div",
+      { class: "row", style: "align-items: start" },
+      time,
+      labelledField("Time zone", zone),
+      labelledField(
+        "Priority",
+        priority,
+        "When several starts are due, the one with the highest priority begins first.",
+      ),
+      labelledField(
+        "May be late by, h",
+        late,
+        "If the campaign cannot begin within this time, the start is skipped. Empty: no limit; after any number of missed starts, one campaign begins as soon as it can.",
+      ),
+      zones,
+    ),
+    h("div", { class: "row" }, actButton("Add to the schedule", later, { kind: "primary large" })),
+  ];
   /** @type {Record<When, () => Child>} */
   const FORMS = {
     now: () => (bench ? startNow(bench) : null),
-    at: () => [
-      h(
-        "div",
-        { class: "row", style: "align-items: start" },
-        labelledField("Begin at", at),
-        labelledField("Time zone", zone),
-        labelledField(
-          "Priority",
-          priority,
-          "When several starts are due, the one with the highest priority begins first.",
-        ),
-        labelledField(
-          "May be late by, h",
-          late,
-          "If the campaign cannot begin within this time, the start is skipped. Empty: no limit; after any number of missed starts, one campaign begins as soon as it can.",
-        ),
-        zones,
-      ),
-      h("div", { class: "row" }, actButton("Add to the schedule", later, { kind: "primary large" })),
-    ],
-    cron: () => [
-      h(
-        "div",
-        { class: "row", style: "align-items: start" },
-        labelledField("Cron line", cron, "minute hour day month weekday"),
-        labelledField("Time zone", zone),
-        labelledField(
-          "Priority",
-          priority,
-          "When several starts are due, the one with the highest priority begins first.",
-        ),
-        labelledField(
-          "May be late by, h",
-          late,
-          "If the campaign cannot begin within this time, the start is skipped. Empty: no limit; after any number of missed starts, one campaign begins as soon as it can.",
-        ),
-        zones,
-      ),
-      h("div", { class: "row" }, actButton("Add to the schedule", later, { kind: "primary large" })),
-    ],
+    at: () => scheduled(labelledField("Begin at", at)),
+    cron: () => scheduled(labelledField("Cron line", cron, "minute hour day month weekday")),
     simulation: () => [
       h(
         "p",
