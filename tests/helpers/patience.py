@@ -3,4 +3,4 @@
 from __future__ import annotations
 
 #: For an answer, an event, the end of a process: longer only where none will come.
-WAIT_S = 120.0
+WAIT_S = 240.0
