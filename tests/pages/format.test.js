@@ -8,6 +8,7 @@ import * as format from "../../labctl/web/static/js/core/format.js";
 import { roundedToUncertainty } from "../../labctl/web/static/js/core/rounding.js";
 import { shownUnit, unitText } from "../../labctl/web/static/js/core/shown_unit.js";
 import { timeUnit } from "../../labctl/web/static/js/core/time_unit.js";
+import { typeset } from "../../labctl/web/static/js/core/typeset.js";
 
 /** @type {(act: (...given: any[]) => unknown, cases: [given: unknown[], text: string][]) => void} */
 const holds = (act, cases) => {
@@ -153,7 +154,11 @@ test("a time axis is in hours, minutes or seconds", () => {
   assert.deepEqual(timeUnit(599, 7200), { name: "s", seconds: 1 });
 });
 
+/** @type {[nats: number, text: string][]} */
+const odds = JSON.parse(readFileSync("tests/pages/odds.json", "utf8"));
+
 test("evidence is said as odds", () => {
+  for (const [nats, text] of odds) assert.equal(format.oddsText(nats), typeset(text));
   holds(format.oddsText, [
     [[0], "1 to 1"],
     [[Math.log(20)], "20 to 1"],
