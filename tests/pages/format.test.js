@@ -182,6 +182,13 @@ test("only a result with its expanded uncertainty has the sign ±", () => {
     .filter((name) => name.endsWith(".js") && /[`"'][^`"']*±/.test(readFileSync(`${folder}/${name}`, "utf8")))
     .sort();
   // the text itself; what the service writes as +-; the heading of a column of such texts; where a line may break in one
-  assert.deepEqual(signed, ["core/format.js", "core/typeset.js", "explore/verdict_card.js", "unit/sensors.js"]);
+  assert.deepEqual(signed, [
+    "core/format.js",
+    "core/typeset.js",
+    "explore/suspect_notes.js",
+    "explore/verdict_card.js",
+    "fleet/report_card.js",
+    "unit/sensors.js",
+  ]);
   assert.equal(format.scatterText(0.01234), "s = 0.012");
 });

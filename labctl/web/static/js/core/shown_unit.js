@@ -21,14 +21,26 @@ export const unitText = (unit) =>
 
 /**
  * The unit in which a quantity is shown, whatever its value. Of plain numbers angles are in mrad, parts of a whole in %,
- * ratios as they are, and all others, which are relative to the rate, in ppm; an angle in rad is in mrad.
+ * ratios as they are, and all others, which are relative to the rate, in ppm, and their changes with temperature in
+ * ppm K⁻¹; an angle in rad is in mrad.
  * @param {string | null | undefined} unit
  * @param {string} name of the coefficient or effect
  * @returns {ShownUnit}
  */
 export function shownUnit(unit, name) {
   if (unit === "rad") return [1e3, "mrad"];
-  if (unit !== "1" || RATIOS.test(name)) return [1, unitText(unit)];
+  const [plain, ...per] = (unit ?? "").split(" ");
+  if (plain !== "1") return [1, unitText(unit)];
+  const [factor, shown] = plainUnit(name);
+  return [factor, [shown, unitText(per.join(" "))].filter(Boolean).join(" ")];
+}
+
+/**
+ * @param {string} name
+ * @returns {ShownUnit}
+ */
+function plainUnit(name) {
+  if (RATIOS.test(name)) return [1, ""];
   if (ANGLES.test(name)) return [1e3, "mrad"];
   return PARTS.test(name) ? [100, "%"] : [1e6, "ppm"];
 }
