@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from labctl.answers.criticism import Advice, Experiment
-from labctl.fitting.criticism import Criticism, Suspect
-from labctl.fitting.criticism.suspects import MIN_CAUSE
+from labctl.fitting.criticism import MIN_CAUSE, Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
 from labctl.probability_text import odds_text, probability_text
 from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability

@@ -13413,6 +13413,12 @@ export interface components {
              * @default false
              */
             simulated_time: boolean;
+            /**
+             * Unfinished
+             * @description Whether its campaign has not ended, so that more data sets may be measured.
+             * @default false
+             */
+            unfinished: boolean;
         };
         /**
          * RecordingWithPoints
