@@ -1,4 +1,4 @@
-"""Probabilities and shares: one rounding on pages, in commands and sentences, and one of risks on certificates."""
+"""Probabilities, odds and shares: one rounding on pages, in commands and sentences; risks on certificates."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 
 #: Probabilities beyond these are written as bounds: what was computed is neither impossible nor certain.
 MIN_STATED, MAX_STATED = 0.005, 0.995
+#: Odds from so many decades on are written as a power of ten.
+MAX_DECADES = 6.0
 #: A risk of a wrong decision beyond these is written as a bound.
 MIN_RISK, MAX_RISK = 1e-4, 0.99
 
@@ -18,6 +20,16 @@ def probability_text(probability: float) -> str:
     if probability < MIN_STATED:
         return "< 1 %"
     return f"{math.floor(100.0 * probability + 0.5)} %" if probability < MAX_STATED else "> 99 %"
+
+
+def odds_text(nats: float) -> str:
+    """Write the odds for an effect as people say them: 1300 to 1; `nats` is the natural logarithm of the Bayes factor.
+
+    `oddsText` in `core/format.js` of the pages does the same, with raised digits; `tests/pages/odds.json` holds both.
+    """
+    decades = abs(nats) / math.log(10.0)
+    odds = f"{float(f'{10.0**decades:.2g}'):.7g}" if decades < MAX_DECADES else f"10^{math.floor(decades + 0.5)}"
+    return f"{odds} to 1" if nats >= 0.0 else f"1 to {odds}"
 
 
 def risk_text(risk: float) -> str:

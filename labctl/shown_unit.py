@@ -44,19 +44,24 @@ _KINDS = (
 )
 
 
+#: A plain number, and one for each of something: 1, 1/K, 1 K^-2.
+_PLAIN = re.compile(r"1(?![^ /])")
+
+
 def shown_unit(unit: str, name: str) -> ShownUnit:
     """Return the unit in which a quantity is shown, whatever its value: the same on every page and in every print.
 
     `name` is that of the coefficient or effect. Of plain numbers (`unit` "1") angles (`ANGLES`) are in mrad, parts of
-    a whole (`PARTS`) in %, `RATIOS` as they are, and all others, which are relative to the rate, in ppm. An angle in
-    rad is in mrad. `shownUnit` in `core/shown_unit.js` of the pages does the same; `tests/pages/shown_units.json`
-    holds both.
+    a whole (`PARTS`) in %, `RATIOS` as they are, and all others, which are relative to the rate, in ppm; their changes
+    with temperature likewise (`unit` "1/K": ppm/K). An angle in rad is in mrad. `shownUnit` in
+    `core/shown_unit.js` of the pages does the same; `tests/pages/shown_units.json` holds both.
     """
     if unit == "rad":
         return ShownUnit(1e3, "mrad")
-    if unit != "1":
+    if not _PLAIN.match(unit):
         return ShownUnit(1.0, unit)
-    return next((shown for pattern, shown in _KINDS if pattern.match(name)), ShownUnit(1e6, "ppm"))
+    factor, shown = next((shown for pattern, shown in _KINDS if pattern.match(name)), ShownUnit(1e6, "ppm"))
+    return ShownUnit(factor, shown + unit[1:])
 
 
 def size_text(value: float, unit: str, name: str, digits: int = 2) -> str:

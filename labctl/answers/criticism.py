@@ -318,6 +318,11 @@ class CriticismResponse(ResponseModel):
         default_factory=list,
         description="Effects that could be tried although the model is adequate; equivalent effects are in one group.",
     )
+    why_not_named: str = Field(
+        default="",
+        description="Why the effects of `further` are not named, with the odds for each, and by how much the error "
+        "falls at best; also in `text`. Empty: there are none.",
+    )
     undistinguished: list[Undistinguished] = Field(
         default_factory=list,
         description="Effects of an adequate model that these data could not tell from others when they were added: the "

@@ -118,6 +118,9 @@ class RecordingResponse(ResponseModel):
     simulated_time: bool = Field(
         default=False, description="Whether `created_at` is by the clock of a simulated bench."
     )
+    unfinished: bool = Field(
+        default=False, description="Whether its campaign has not ended, so that more data sets may be measured."
+    )
 
 
 class RecordingFacts(ResponseModel):

@@ -20,12 +20,14 @@ from labctl.certificates.document import (
     StandardUsed,
     StateOfItem,
 )
-from labctl.certificates.units import readable
+from labctl.certificates.units import raised, readable
 from labctl.probability_text import risk_text
 from labctl.shown_unit import shown_unit
 
 #: Digits of an uncertainty (GUM 7.2.6), and of a number without one.
 U_DIGITS, DIGITS = 2, 4
+#: Coefficients below ten to this power are written with a power of ten.
+MIN_POWER = -4
 PLACES = {
     "laboratory": "at the laboratory",
     "customer": "at the customer",
@@ -69,7 +71,7 @@ def _pages(record: Certificate) -> dict[str, object]:
             [
                 each.source.replace("_", " "),
                 each.type,
-                f"{Decimal(f'{each.contribution_dps:.2g}'):f}",
+                f"{Decimal(f'{each.contribution_dps:#.2g}'):f}",
                 _freedom(each.freedom),
             ]
             for each in record.uncertainty.budget
@@ -136,6 +138,17 @@ def rounded(value: float, expanded: float) -> tuple[str, str]:
     u = math.ceil(expanded * 10.0**place * (1 - 1e-9)) / 10.0**place
     decimals = max(place, 0)
     return _signed(f"{round(value, place):.{decimals}f}"), f"{u:.{decimals}f}"
+
+
+def _with_power(value: float, u: float) -> tuple[str, str]:
+    """Return the same as `rounded`, small numbers with a power of ten that both have: 7.660 × 10⁻⁶, 0.056 × 10⁻⁶."""
+    largest = max(abs(value), u)
+    exponent = math.floor(math.log10(largest)) if largest > 0.0 else 0
+    if exponent >= MIN_POWER:
+        return rounded(value, u)
+    shown, shown_u = rounded(value / 10.0**exponent, u / 10.0**exponent)
+    power = raised(f" × 10^{exponent}")
+    return shown + power, shown_u if shown_u == "–" else shown_u + power
 
 
 def _number(value: float) -> str:
@@ -261,7 +274,7 @@ def _any_axis_text(certificate: Certificate) -> str:
 
 def _coefficient(coefficient: CoefficientResult) -> list[str]:
     factor, unit = shown_unit(coefficient.unit, coefficient.name)
-    value, u = rounded(factor * coefficient.value, factor * (coefficient.u or 0.0))
+    value, u = _with_power(factor * coefficient.value, factor * (coefficient.u or 0.0))
     temperature_text = "" if coefficient.temperature_c is None else _number(coefficient.temperature_c)
     of_fit = "" if coefficient.has_standards or u == "–" else FIT_ALONE
     return [coefficient.axis, coefficient.name_text, temperature_text, value, u + of_fit, readable(unit)]

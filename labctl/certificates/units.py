@@ -12,12 +12,18 @@ SYMBOLS = {
     "°C": r"\degreecelsius", "deg C": r"\degreecelsius", "V": r"\volt", "%": r"\percent", "ppm": r"\ppm", "1": r"\one",
     "hPa": r"\hecto\pascal", "m": r"\metre", "uT": r"\micro\tesla",
 }  # fmt: skip
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _POWER = re.compile(r"([^\^]+)(?:\^(\d+))?")
 
 
 def readable(unit: str) -> str:
-    """Return a unit as a person reads it: deg as the sign of degrees."""
-    return READ.get(unit, unit.replace("deg C", "°C").replace("deg", "°"))
+    """Return a unit as a person reads it: deg as the sign of degrees, powers raised."""
+    return READ.get(unit, raised(unit.replace("deg C", "°C").replace("deg", "°")))
+
+
+def raised(text: str) -> str:
+    """Return a text with its powers raised: K^-1 as K⁻¹."""
+    return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), text)
 
 
 def dsi(unit: str) -> str | None:

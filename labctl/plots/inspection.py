@@ -19,7 +19,7 @@ ROW_PX, GAP_PX, LINE_PX = 170, 45, 17
 #: Left of the panels, where their headings begin too: on a phone there is no room for one in the middle.
 LEFT_PX = 60
 #: A dot where stretches of readings take less than this share of the time.
-MARKER_PX, SPARSE = 3, 0.1
+MARKER_PX, SPARSE = 4, 0.3
 #: Units of the axis of time: name, seconds, and the shortest span that is drawn in it, s.
 TIME_UNITS = (("h", 3600.0, 10_800.0), ("min", 60.0, 600.0), ("s", 1.0, 0.0))
 #: Colours of the kinds of findings, in the order in which they appear.

@@ -24,6 +24,11 @@ from procedures.contracts.steps import (
 )
 
 
+def _signed(value: float) -> str:
+    """Write a value with its sign; rest has none."""
+    return f"{value:+g}" if value else "0"
+
+
 def describe_step(step: Step, datasets: int) -> str:
     """Return what a step does, with its values; `datasets` is the number of data sets of the plan."""
     text = _TEXTS[type(step)](step)
@@ -32,7 +37,7 @@ def describe_step(step: Step, datasets: int) -> str:
 
 _TEXTS: Mapping[type[Step], Callable[[Any], str]] = {
     Acquire: lambda step: (
-        f"{step.course.text if step.course else f'{step.rate_dps:+g} deg/s'} at {step.temperature_c:g} deg C, "
+        f"{step.course.text if step.course else f'{_signed(step.rate_dps)} deg/s'} at {step.temperature_c:g} deg C, "
         f"{step.position} up"
     ),
     Turn: lambda step: f"{step.turn_deg:+g} deg by hand, {step.position} up",

@@ -9,12 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from labctl.probability_text import probability_text, risk_text, share_text
+from labctl.probability_text import odds_text, probability_text, risk_text, share_text
 
 #: The pages' `probabilityText` is tested with the same cases.
 CASES = json.loads(Path("tests/pages/probabilities.json").read_text(encoding="utf-8"))
 #: The pages' `percent` is tested with the same cases.
 SHARES = json.loads(Path("tests/pages/shares.json").read_text(encoding="utf-8"))
+#: The pages' `oddsText` is tested with the same cases.
+ODDS = json.loads(Path("tests/pages/odds.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(("nats", "text"), ODDS)
+def test_odds_are_written_as_on_the_pages(nats: float, text: str) -> None:
+    assert odds_text(nats) == text
 
 
 @pytest.mark.parametrize(("probability", "text"), CASES)

@@ -25,8 +25,13 @@ test("a suspect that is not listed has no probability, and none is impossible or
   const line = lineOfRound(ROUND, ["thermal_lag", "warm_up", "run_shift"]);
   assert.deepEqual(line.probabilities, ["–", "61 %", "< 1 %"]);
   assert.deepEqual(lineOfRound({ ...ROUND, suspects: { warm_up: 0.9999 } }, ["warm_up"]).probabilities, ["> 99 %"]);
-  assert.deepEqual([line.hours, line.verdict], ["2.1", "ambiguous: thermal_lag, warm_up"]);
-  assert.equal(lineOfRound({ ...ROUND, came_text: "measured" }, []).experiment, `${ROUND.why}. measured`);
+  assert.deepEqual([line.hours, line.verdict], ["2.1", "ambiguous: thermal lag, warm up"]);
+  assert.deepEqual([line.experiment, line.result], [`${ROUND.why}.`, ""]);
+});
+
+test("a choice and its result are two sentences, each with one full stop", () => {
+  const line = lineOfRound({ ...ROUND, why: "the probability is > 99 %.", came_text: "expected: one cause" }, []);
+  assert.deepEqual([line.experiment, line.result], ["The probability is > 99 %.", "Expected: one cause."]);
 });
 
 test("what waits for a person is marked, and so is an end without a cause", () => {

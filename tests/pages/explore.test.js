@@ -18,6 +18,7 @@ import {
   scaled,
   toRanges,
 } from "../../labctl/web/static/js/explore/dataset_rows.js";
+import { usualRecording } from "../../labctl/web/static/js/explore/chosen_recordings.js";
 import { cellsText, colourLimit, mapCells } from "../../labctl/web/static/js/explore/residual_cells.js";
 
 test("a selection is written as ranges and read again", () => {
@@ -107,4 +108,16 @@ test("rows of columns are picked together", () => {
   assert.deepEqual(pickRows({ a: [1, 2, 3], b: ["x", "y", "z"] }, [2, 0]), { a: [3, 1], b: ["z", "x"] });
   assert.equal(rms([3, 4, 0, 0]), 2.5);
   assert.equal(rms([]), 0);
+});
+
+test("the recording of a campaign that has not ended is not compared while there is another one", () => {
+  const row = (/** @type {number} */ id, /** @type {number} */ datasets, unfinished = false) => ({
+    id,
+    datasets,
+    unfinished,
+  });
+  assert.equal(usualRecording([row(7, 84), row(45, 42, true)]), 7);
+  assert.equal(usualRecording([row(7, 84), row(45, 42)]), 45);
+  assert.equal(usualRecording([row(4, 121), row(5, 23)]), 4);
+  assert.equal(usualRecording([row(45, 3, true)]), 45);
 });

@@ -28,7 +28,7 @@ test("a brush lists the groups inside with the mean of their units there, the fa
       ["B2", 6, "1.400000"],
     ],
   );
-  assert.equal(found[0].off.toFixed(3), (3 - (2 + 2.4 + 8.4) / 10).toFixed(3));
+  assert.equal(found[0].off?.toFixed(3), (3 - (2 + 2.4 + 8.4) / 10).toFixed(3));
 });
 
 test("without limits all groups are listed, each once", () => {
@@ -43,4 +43,11 @@ test("without limits all groups are listed, each once", () => {
     ],
   );
   assert.deepEqual(brushed(POINTS, "2027-01-01", ""), []);
+});
+
+test("a group without others beside it differs from nothing, and not by 0", () => {
+  assert.deepEqual(
+    brushed(POINTS.slice(0, 1), "", "").map(({ level, off }) => [level, off]),
+    [["B1", null]],
+  );
 });

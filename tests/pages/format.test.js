@@ -8,6 +8,7 @@ import * as format from "../../labctl/web/static/js/core/format.js";
 import { roundedToUncertainty } from "../../labctl/web/static/js/core/rounding.js";
 import { shownUnit, unitText } from "../../labctl/web/static/js/core/shown_unit.js";
 import { timeUnit } from "../../labctl/web/static/js/core/time_unit.js";
+import { typeset } from "../../labctl/web/static/js/core/typeset.js";
 
 /** @type {(act: (...given: any[]) => unknown, cases: [given: unknown[], text: string][]) => void} */
 const holds = (act, cases) => {
@@ -153,7 +154,11 @@ test("a time axis is in hours, minutes or seconds", () => {
   assert.deepEqual(timeUnit(599, 7200), { name: "s", seconds: 1 });
 });
 
+/** @type {[nats: number, text: string][]} */
+const odds = JSON.parse(readFileSync("tests/pages/odds.json", "utf8"));
+
 test("evidence is said as odds", () => {
+  for (const [nats, text] of odds) assert.equal(format.oddsText(nats), typeset(text));
   holds(format.oddsText, [
     [[0], "1 to 1"],
     [[Math.log(20)], "20 to 1"],
@@ -177,6 +182,13 @@ test("only a result with its expanded uncertainty has the sign ±", () => {
     .filter((name) => name.endsWith(".js") && /[`"'][^`"']*±/.test(readFileSync(`${folder}/${name}`, "utf8")))
     .sort();
   // the text itself; what the service writes as +-; the heading of a column of such texts; where a line may break in one
-  assert.deepEqual(signed, ["core/format.js", "core/typeset.js", "explore/verdict_card.js", "unit/sensors.js"]);
+  assert.deepEqual(signed, [
+    "core/format.js",
+    "core/typeset.js",
+    "explore/suspect_notes.js",
+    "explore/verdict_card.js",
+    "fleet/report_card.js",
+    "unit/sensors.js",
+  ]);
   assert.equal(format.scatterText(0.01234), "s = 0.012");
 });

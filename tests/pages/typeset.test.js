@@ -16,6 +16,9 @@ test("numbers have the minus sign, plus or minus is one sign, and powers are of 
     ["noise 5e-05 deg/s", "noise 5 × 10⁻⁵ deg/s"],
     ["bias -1.25e-06.", "bias −1.25 × 10⁻⁶."],
     ["2e+06 readings", "2 × 10⁶ readings"],
+    ["k_squared -0.0003 (rad/(rad/s))^2", "k_squared −0.0003 (rad/(rad/s))²"],
+    ["0.0012 (deg/s)^-1 K^-1", "0.0012 (deg/s)⁻¹ K⁻¹"],
+    ["the Bayes factor is e^254", "the Bayes factor is e²⁵⁴"],
   ];
   for (const [text, shown] of cases) assert.equal(typeset(text), shown);
 });

@@ -90,8 +90,9 @@ def test_explore_says_what_its_buttons_do_and_what_an_experiment_can_decide(
     sine = learn.get_by_role("listitem").filter(has_text="sine response")
     sine.get_by_role("button", name="What if").click()
     expect(page.get_by_role("heading", name="What if: sine response")).to_be_in_viewport()
-    sine.get_by_role("button", name="Add").click()
     adding = page.get_by_role("region", name="Add it")
+    assert not adding.locator(".button.primary").all()  # there is nothing to preview yet
+    sine.get_by_role("button", name="Add").click()
     expect(adding).to_contain_text("nothing is stored yet")
     expect(adding).to_contain_text("(usual: 0 (rad/(rad/s))² to 2.3 (rad/(rad/s))²)")
     assert [row["version"] for row in service.get(f"/api/units/{unit}/calibrations")] == [1]
@@ -144,6 +145,45 @@ def test_the_error_runs_from_the_one_version_to_the_other_and_ends_green(
     page.goto(f"{service.url}/explore?unit={unit}&version=2")  # the next step is there after a reload as well
     page.locator("main").get_by_role("button", name="Certify").click()
     expect(page.get_by_role("dialog")).to_contain_text("Certify version 2: put it in force")
+
+
+@pytest.mark.slow
+def test_suspects_beside_an_adequate_model_say_why_none_is_named_and_what_the_noises_are(
+    service: Service, visit: Callable[..., Page], unit: str
+) -> None:
+    from playwright.sync_api import expect
+
+    service.post(f"/api/units/{unit}/calibrations/1/improve", {"add": ["sine_response"]})
+    answer = residual_of(service, unit, 2)
+    assert answer["verdict"] == "adequate"
+    assert answer["why_not_named"] in answer["text"]
+    page = visit(f"/explore?unit={unit}&version=2")
+    settled(page)
+    suspects = page.get_by_role("region", name="Suspected effects: none is named")
+    expect(suspects).to_contain_text(answer["why_not_named"])
+    expect(suspects).not_to_contain_text("distinguished from noise")
+    verdict = page.get_by_role("region", name="Verdict")
+    expect(verdict).not_to_contain_text(answer["why_not_named"])  # stands beside the odds, once
+    expect(verdict).not_to_contain_text("nothing is missing")
+    expect(verdict).to_contain_text("by data sets that repeat each other")
+    expect(verdict).to_contain_text("The noise floor is that of the recording, the same for every model.")
+
+
+@pytest.mark.slow
+def test_a_unit_shows_the_coefficients_of_the_version_in_force(
+    service: Service, visit: Callable[..., Page], unit: str
+) -> None:
+    from playwright.sync_api import expect
+
+    service.post(f"/api/units/{unit}/calibrations/1/improve", {"add": ["sine_response"]})
+    page = visit(f"/units/{unit}")
+    expect(page.get_by_role("region", name="Coefficients").get_by_label("of")).to_have_value("2")
+    body = {"by": "A. Person", "reason": "to compare with what was in use before", "override": True}
+    service.post(f"/api/units/{unit}/calibrations/1/certify", body)
+    page.reload()
+    card = page.get_by_role("region", name="Coefficients")
+    expect(card.get_by_label("of")).to_have_value("1")
+    expect(card).to_contain_text("The uncertainties are those of the fit alone.")
 
 
 @pytest.mark.slow

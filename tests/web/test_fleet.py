@@ -81,7 +81,9 @@ def test_types_are_small_multiples_and_a_type_has_its_chart_and_report(
     )
     expect(card.get_by_role("list", name="Verdict").get_by_role("listitem")).to_have_count(2)
     expect(card.get_by_role("list", name="Due").get_by_role("listitem")).to_have_text(["none in force40"])
-    expect(page.get_by_role("region", name="MEMS-B: 1 unit")).to_be_visible()
+    expect(page.get_by_role("region", name="MEMS-B: 1 unit")).to_contain_text(
+        "Next: labctl fleet fit --model NAME --type 'MEMS-B'"
+    )
     card.get_by_role("link", name="Open FOG-A").click()
     groups = page.get_by_role("group", name="Groups in the chosen time")
     expect(groups.get_by_role("row")).to_have_count(3)

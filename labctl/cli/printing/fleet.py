@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Self
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from labctl.cli.output import console, format_number, stderr, table
+from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 from labctl.shown_unit import shown_unit
 from labctl.texts import counted
 
@@ -130,8 +131,11 @@ def print_report(answer: FleetReportResponse) -> None:
         rows = table("", "coefficient", "unit", "mean", "U", "spread", "u of a unit", numbers=4)
         for each in answer.coefficients:
             shown = shown_unit(each.unit, each.name)
-            figures = map(shown.scaled, (each.mean, each.expanded_u_mean, each.spread, each.median_u))
-            rows.add_row(each.name, shown.unit, *map(format_number, figures, (4, 2, 3, 2)))
+            mean = rounded_to_uncertainty(shown.factor * each.mean, shown.factor * each.expanded_u_mean)
+            rows.add_row(
+                each.name, shown.unit, mean.value + mean.power, mean.u + mean.power if mean.u else "–",
+                shown.number(each.spread, 3), shown.number(each.median_u),
+            )  # fmt: skip
         console.print(rows)
     for outlier in answer.outliers[:MAX_OUTLIERS]:
         console.print(f"{outlier.serial}: {outlier.text}", soft_wrap=True)

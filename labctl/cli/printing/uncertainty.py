@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from labctl.cli.output import console, format_number, stderr, table
+from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 from labctl.shown_unit import shown_unit
 
 if TYPE_CHECKING:
@@ -116,9 +117,12 @@ def _print_coefficients(answer: UncertaintyResponse) -> None:
             known = [part for part in parts if part is not None]
             standards = sum(part**2 for part in known) ** 0.5 if known else None
             shown = shown_unit(one["unit"], name)
+            figures = [
+                "–" if each is None else shown.number(each) for each in (one["combined"], one["expanded"], standards)
+            ]
+            value = rounded_to_uncertainty(shown.factor * (one["value"] or 0.0), shown.scaled(one["expanded"]))
             rows.add_row(
-                f"{axis} {name}", shown.unit, format_number(shown.scaled(one["value"])),
-                format_number(shown.scaled(one["combined"]), 2), format_number(one["k"], 3),
-                format_number(shown.scaled(one["expanded"]), 2), format_number(shown.scaled(standards), 2),
+                f"{axis} {name}", shown.unit, "–" if one["value"] is None else value.value + value.power,
+                figures[0], format_number(one["k"], 3), figures[1], figures[2],
             )  # fmt: skip
     console.print(rows)

@@ -41,7 +41,7 @@ from labctl.fitting.criticism.residuals import (
     where_it_fails as where_it_fails,
     worst_data_sets as worst_data_sets,
 )
-from labctl.fitting.criticism.suspects import Suspect as Suspect
+from labctl.fitting.criticism.suspects import MIN_CAUSE as MIN_CAUSE, Suspect as Suspect
 from labctl.fitting.criticism.thermal_family import ThermalFamily as ThermalFamily, hint_of_added as hint_of_added
 from labctl.fitting.criticism.verdict import Verdict as Verdict
 from labctl.fitting.criticism.visibility import (

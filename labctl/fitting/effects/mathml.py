@@ -15,6 +15,8 @@ GREEK: Mapping[str, str] = {
 #: How strongly what an operator joins holds together; atoms hold most strongly.
 SUM, PRODUCT, SIGN, POWER, ATOM = range(5)
 APPLY, TIMES = "<mo>&#x2061;</mo>", "<mo>&#x2062;</mo>"
+#: Between a factor and a function that is written as a word.
+SPACE = '<mspace width="0.17em"/>'
 COMPARISONS: Mapping[type, str] = {ast.Gt: "&gt;", ast.Lt: "&lt;", ast.GtE: "≥", ast.LtE: "≤", ast.Eq: "="}
 #: What stands on both sides of the argument of a function.
 FENCES: Mapping[str, tuple[str, str]] = {"abs": ("|", "|"), "floor": ("⌊", "⌋")}
@@ -74,6 +76,11 @@ def _function(node: ast.AST) -> str:
     return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
 
 
+def _is_word(node: ast.AST) -> bool:
+    """Return whether a node begins with a function that is written as a word: sign, log."""
+    return len(_function(node)) > 1 and _function(node) not in {"sum", "exp", "sqrt", *FENCES}
+
+
 def _is_derivative(node: ast.expr) -> bool:
     return isinstance(node, ast.BinOp) and {_function(node.left), _function(node.right)} == {"d"}
 
@@ -113,7 +120,8 @@ def _binary(node: ast.BinOp) -> str:
         return f"<msup>{_row(_drawn(node.left, ATOM))}{_row(_drawn(node.right))}</msup>"
     if isinstance(node.op, ast.Mult):
         times = "<mo>·</mo>" if isinstance(node.right, ast.Constant) else TIMES
-        return _row(f"{_drawn(node.left, PRODUCT)}{times}{_drawn(node.right, PRODUCT)}")
+        gap = SPACE if _is_word(node.right) else ""
+        return _row(f"{_drawn(node.left, PRODUCT)}{times}{gap}{_drawn(node.right, PRODUCT)}")
     sign = "+" if isinstance(node.op, ast.Add) else "−"
     return _row(f"{_drawn(node.left)}<mo>{sign}</mo>{_drawn(node.right, PRODUCT)}")
 

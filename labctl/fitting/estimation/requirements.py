@@ -11,6 +11,7 @@ from labctl.fitting.data.tilted_mountings import undetermined
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.linearity import is_linear_in_rate
+from labctl.texts import counted
 
 #: A polynomial of order q in temperature needs at least q times this span.
 SPAN_PER_ORDER_C = 1.0
@@ -85,7 +86,7 @@ def _require_rates(data: FitData, model: ErrorModel) -> None:
             if rates < least:
                 raise NotEnoughData(
                     f"{data.info.serial}, axis {axis}: {term.effect} needs at least {least} different rates; "
-                    f"the recording has {rates}; measure at {least - rates} more rates"
+                    f"the recording has {rates}; measure at {counted(least - rates, 'more rate')}"
                 )
 
 
@@ -97,7 +98,7 @@ def _require_temperatures(data: FitData, model: ErrorModel) -> None:
         if temperatures < least:
             raise NotEnoughData(
                 f"{serial}: {term.effect} needs at least {least} different temperatures; the recording has "
-                f"{temperatures}; measure at {least - temperatures} more temperatures"
+                f"{temperatures}; measure at {counted(least - temperatures, 'more temperature')}"
             )
         if span < SPAN_PER_ORDER_C * (least - 1):
             raise NotEnoughData(

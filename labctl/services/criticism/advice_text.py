@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from labctl.answers.criticism import Advice, Experiment
-from labctl.fitting.criticism import Criticism, Suspect
+from labctl.fitting.criticism import MIN_CAUSE, Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
-from labctl.probability_text import probability_text
+from labctl.probability_text import odds_text, probability_text
 from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
 from labctl.shown_unit import shown_unit
 
@@ -127,3 +127,35 @@ def _advised(advice: Advice) -> str:
         f"Adding {advice['effect']} is advised: on the parts left out of the fit, the exported calibration then "
         f"leaves an error of {advice['after_dps']:.3g} deg/s, now {advice['before_dps']:.3g} deg/s."
     )
+
+
+def why_not_named(criticism: Criticism) -> str:
+    """Return why an adequate model has suspects that are not named, and what they would be worth; "" without any."""
+    names = {name for group in criticism.verdict.further for name in group}
+    if not names or criticism.base is None:
+        return ""
+    suspects = sorted(
+        (suspect for suspect in criticism.suspects if suspect.candidate.id in names),
+        key=lambda suspect: -suspect.candidate.log_bf,
+    )
+    odds = {suspect.candidate.id: f" ({odds_text(suspect.candidate.log_bf)})" for suspect in suspects}
+    listed = ", ".join(f"{name}{odds.get(name, '')}" for name in (*odds, *sorted(names - set(odds))))
+    reasons = ["these odds hold only where the noise is exactly as it was estimated"] if odds else []
+    chance = criticism.lack_of_fit[1]
+    if chance is not None:
+        reasons.append(f"noise alone leaves a residual as large as this one in {probability_text(chance)} of cases")
+    if suspects and all(suspect.share_removed < MIN_CAUSE for suspect in suspects):
+        each = "each takes off" if len(suspects) > 1 else "it takes off"
+        reasons.append(f"{each} less than {probability_text(MIN_CAUSE)} of the error above the noise floor")
+    because = f": {'; '.join(reasons)}" if reasons else ""
+    return f"Suspected and not named: {listed}{because}.{_worth(criticism, suspects)}"
+
+
+def _worth(criticism: Criticism, suspects: Sequence[Suspect]) -> str:
+    """Return how far the error falls at best with one of the suspects, after a space; "" where it does not."""
+    before = criticism.base.error.rms_dps if criticism.base is not None else None
+    fits = (suspect.after.error.rms_dps for suspect in suspects if suspect.after is not None)
+    least = min((rms_dps for rms_dps in fits if rms_dps is not None), default=None)
+    if before is None or least is None or least >= before:
+        return ""
+    return f" At best the error falls from {before:.4g} to {least:.4g} deg/s."

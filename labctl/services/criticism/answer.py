@@ -29,6 +29,7 @@ from labctl.services.criticism.advice_text import (
     not_logged,
     to_distinguish,
     what_to_log,
+    why_not_named,
 )
 
 #: How a warning begins that stands before a verdict.
@@ -88,6 +89,7 @@ def answer_of(
         not_physical=list(verdict.not_physical),
         named_axes={name: list(axes) for name, axes in verdict.axes.items()},
         further=[list(group) for group in verdict.further],
+        why_not_named=why_not_named(criticism),
         not_testable=list(criticism.not_testable),
         experiments=experiments,
         worst=worst_data_sets(criticism.data, criticism.residuals) if criticism.comparison else [],
@@ -181,7 +183,7 @@ def sentences(criticism: Criticism, experiments: Sequence[Experiment] = ()) -> l
         answer_text.append(
             f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}."
         )
-    answer_text += _further(criticism)
+    answer_text += [text for text in (why_not_named(criticism),) if text]
     if criticism.data.info.rate_reference == "demanded":
         answer_text.append(UNMEASURED)
     if verdict.form == "adequate" and criticism.has_large_drift:
@@ -204,19 +206,6 @@ def _remainder(verdict: Verdict) -> str:
         f"{probability_text(1.0 - share)} of the excess over the noise floor; the remaining residual is "
         f"{float(left['over_floor']):.1f} times the noise floor{follows}."
     )
-
-
-def _further(criticism: Criticism) -> list[str]:
-    """Return what else could be tried beside an adequate model, and what it would be worth."""
-    names = {name for group in criticism.verdict.further for name in group}
-    fits = [suspect.after for suspect in criticism.suspects if suspect.candidate.id in names]
-    after = [fit.error.rms_dps for fit in fits if fit is not None and fit.error.rms_dps is not None]
-    if not names or criticism.base is None:
-        return []
-    worth = (
-        f": at best the error falls from {criticism.base.error.rms_dps:.4g} to {min(after):.4g} deg/s" if after else ""
-    )
-    return [f"Further suspected effects, too small to be distinguished from noise{worth}: {_list(sorted(names))}."]
 
 
 def _leg(criticism: Criticism) -> bool:

@@ -31,7 +31,10 @@ def page_of_recordings(
     page = store.recordings.page(request, serial, kind)
     simulated = _of_simulated_time(store, page.rows)
     origins = _origins(store, page.rows)
-    lines = [_line(row, row.campaign in simulated, origins[row.id]) for row in page.rows]
+    unfinished = store.campaigns.not_ended(_campaigns_of(page.rows))
+    lines = [
+        _line(row, row.campaign in simulated, origins[row.id], row.campaign in unfinished) for row in page.rows
+    ]  # fmt: skip
     return Page(lines, page.total, page.next_after)
 
 
@@ -46,15 +49,20 @@ def _origins(store: Store, rows: Sequence[RecordingRow]) -> dict[int, RecordingO
 
 def _of_simulated_time(store: Store, rows: Sequence[RecordingRow]) -> set[int | None]:
     """Return the campaigns of these recordings that ran on a simulated clock."""
-    campaigns = sorted({row.campaign for row in rows if row.campaign is not None})
-    return {number for number, bench in store.campaigns.benches(campaigns).items() if has_simulated_time(bench)}
+    benches = store.campaigns.benches(_campaigns_of(rows))
+    return {number for number, bench in benches.items() if has_simulated_time(bench)}
 
 
-def _line(row: RecordingRow, simulated_time: bool, origin: RecordingOrigin) -> RecordingResponse:
+def _campaigns_of(rows: Sequence[RecordingRow]) -> list[int]:
+    return sorted({row.campaign for row in rows if row.campaign is not None})
+
+
+def _line(row: RecordingRow, simulated_time: bool, origin: RecordingOrigin, unfinished: bool) -> RecordingResponse:
     return RecordingResponse(
         id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
         readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
         motion=row.recording_info.motion, simulated_time=simulated_time, origin=origin,
+        unfinished=unfinished,
     )  # fmt: skip
 
 

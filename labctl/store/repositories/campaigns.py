@@ -193,6 +193,13 @@ class Campaigns:
             rows = connection.execute(sa.select(c.id, c.bench).where(c.id.in_(campaigns)))
             return {row.id: row.bench for row in rows}
 
+    def not_ended(self, campaigns: Sequence[int]) -> set[int]:
+        """Return which of some campaigns have not ended: more may come of them."""
+        c = tables.campaigns.c
+        with self._database.reading() as connection:
+            rows = connection.execute(sa.select(c.id).where(c.id.in_(campaigns), c.state.in_(UNFINISHED)))
+            return {row.id for row in rows}
+
     def _rows(self, condition: sa.ColumnElement[bool]) -> list[CampaignRow]:
         c, r = tables.campaigns.c, tables.recordings.c
         query = sa.select(

@@ -6454,6 +6454,12 @@ export interface components {
              */
             further: string[][];
             /**
+             * Why Not Named
+             * @description Why the effects of `further` are not named, with the odds for each, and by how much the error falls at best; also in `text`. Empty: there are none.
+             * @default
+             */
+            why_not_named: string;
+            /**
              * Undistinguished
              * @description Effects of an adequate model that these data could not tell from others when they were added: the error is corrected, the cause is not known.
              */
@@ -13407,6 +13413,12 @@ export interface components {
              * @default false
              */
             simulated_time: boolean;
+            /**
+             * Unfinished
+             * @description Whether its campaign has not ended, so that more data sets may be measured.
+             * @default false
+             */
+            unfinished: boolean;
         };
         /**
          * RecordingWithPoints

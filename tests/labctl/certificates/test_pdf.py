@@ -127,3 +127,17 @@ def test_pages_say_what_the_json_says() -> None:
     assert pages["hash"] == document["calibration"]["hash"]
     assert len(pages["results"][0]["rows"]) == len(document["results"])
     assert pages["conformity"]["statement"] == document["conformity"]["statement"]
+
+
+def test_small_coefficients_have_a_power_of_ten_and_units_raised_powers() -> None:
+    given = certificate()
+    cubic = given.coefficients[0].model_copy(
+        update={"name": "c_r3_t1", "unit": "(deg/s)^-2 K^-1", "value": -2.97e-9, "u": 9.2e-11}
+    )
+    tiny = json.loads(readable_certificate(given.model_copy(update={"coefficients": (cubic,)})))["coefficients"][0]
+    assert tiny[3].removesuffix(" *") == "−2.970 × 10⁻⁹"
+    assert tiny[4].removesuffix(" *") == "0.092 × 10⁻⁹"
+    assert tiny[5] == "(°/s)⁻² K⁻¹"
+    contributions = [row[2] for row in json.loads(readable_certificate(given))["budget"]]
+    assert contributions
+    assert all(len(text.replace(".", "").lstrip("0")) == 2 for text in contributions if float(text))

@@ -166,7 +166,7 @@ def test_the_first_interval_uses_the_first_three_nodes() -> None:
             [],
             [-50, 0, 50],
             [25, 30, 35],
-            r"needs at least 4 different rates; the recording has 3; measure at 1 more",
+            r"needs at least 4 different rates; the recording has 3; measure at 1 more rate$",
         ),
         ("ojeda2000", [], [-50, -20, 0, 20, 50], [25, 35], r"needs at least 3 different temperatures.* has 2"),
         (None, ["bias_temperature:3"], [0, 10], [25, 26.4, 26.9, 27.6], r"span 2.60 deg C, too little for order 3"),

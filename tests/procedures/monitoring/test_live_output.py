@@ -57,3 +57,5 @@ def test_outputs_are_there_while_a_data_set_is_taken_and_gone_while_the_units_ar
         ("imu", "gyro_z", "deg/s")
     }
     assert during["switch the units on, session 2"][0] == ()
+    rates = {text.split(": ")[1].split(" deg/s")[0] for text in during if text.startswith("data set")}
+    assert rates == {"0", "+20"}

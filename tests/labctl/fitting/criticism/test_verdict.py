@@ -16,8 +16,9 @@ from labctl.fitting.criticism.search.held_out import held_out_rises
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Term
 from labctl.fitting.models.presets import changed, preset_for
+from labctl.probability_text import odds_text, probability_text
 from labctl.recording import Recording, read_recording
-from labctl.services.criticism.answer import sentences
+from labctl.services.criticism.answer import answer_of, sentences
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from studies.outside_catalogue import KINDS
 from tests.helpers.criticism import held
@@ -92,10 +93,7 @@ def test_a_model_that_leaves_less_than_the_noise_is_adequate_whatever_is_like_th
     found = held(read_recording(EXAMPLES / "osu-fog"), full=True)
     assert (found.verdict.form, found.verdict.named) == ("adequate", ())
     assert found.verdict.further
-    assert any(
-        line.startswith("Further suspected effects, too small to be distinguished from noise: at best")
-        for line in sentences(found)
-    )
+    assert sum(line.startswith("Suspected and not named: ") for line in sentences(found)) == 1
     assert all(suspect.share_removed < 1 for suspect in found.suspects)
 
 
@@ -121,6 +119,11 @@ def test_the_search_ends_where_the_data_say_nothing_more() -> None:
     weak = [suspect for suspect in ended.suspects if suspect.candidate.id in further]
     assert weak
     assert all(suspect.share_removed < 0.1 for suspect in weak)
+    why = answer_of("OSU", 2, [1], ended, []).why_not_named
+    assert why in sentences(ended)
+    assert all(f"{each.candidate.id} ({odds_text(each.candidate.log_bf)})" in why for each in weak)
+    assert f"noise alone leaves a residual as large as this one in {probability_text(chance)} of cases" in why
+    assert "takes off less than 10 % of the error above the noise floor" in why
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import sqlalchemy as sa
 from typer.testing import CliRunner
 
 from instruments.bench_config import BenchFile
@@ -30,9 +31,11 @@ from labctl.services.commands.requests import ToCampaign
 from labctl.services.commands.service_control import ServiceControl
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
+from labctl.services.recordings.catalogue import page_of_recordings
 from labctl.services.recordings.loading import newest_row
 from labctl.store import Store, open_store
 from labctl.store.paging import PageRequest
+from labctl.store.schema import tables
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import NOT_SAFE, Event
 from tests.helpers.commands import local_executor
@@ -276,3 +279,12 @@ def test_another_terminal_is_told_where_a_campaign_runs(tmp_path: Path) -> None:
     for result in said:
         assert result.exit_code == 2
         assert f"campaign 1 runs in process {os.getpid()}'s terminal: Ctrl-C there ends it safely" in result.stderr
+
+
+@pytest.mark.usefixtures("real")
+def test_a_recording_is_unfinished_until_its_campaign_has_ended(store: Store) -> None:
+    left_running(store)
+    assert [line.unfinished for line in page_of_recordings(store, PageRequest()).rows] == [True]
+    with store.campaigns._database.writing() as connection:
+        connection.execute(sa.update(tables.campaigns).values(state="done"))
+    assert [line.unfinished for line in page_of_recordings(store, PageRequest()).rows] == [False]

@@ -28,12 +28,10 @@ function gauge(title, unit, low, high, digits) {
   const wanted = svg("path", { class: "gauge-setpoint" });
   const scale = svg(
     "svg",
-    { viewBox: "-4 0 208 26", class: "gauge-scale", "aria-hidden": "true" },
+    { viewBox: "-4 0 208 16", class: "gauge-scale", "aria-hidden": "true" },
     svg("rect", { x: 0, y: 5, width: 200, height: 6, rx: 3, class: "gauge-track" }),
     bar,
     wanted,
-    svg("text", { x: 0, y: 24 }, plainNumber(low)),
-    svg("text", { x: 200, y: 24, "text-anchor": "end" }, plainNumber(high)),
   );
   const element = h(
     "div",
@@ -41,6 +39,7 @@ function gauge(title, unit, low, high, digits) {
     h("span", { class: "gauge-title" }, title),
     h("span", {}, figure, h("span", { class: "gauge-unit" }, unit)),
     scale,
+    h("span", { class: "gauge-ends" }, h("span", {}, plainNumber(low)), h("span", {}, plainNumber(high))),
     beside,
   );
   /**

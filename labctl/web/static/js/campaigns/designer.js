@@ -107,7 +107,7 @@ function form(all, taken, signal) {
       numberField("u_dps", "U of a corrected rate, deg/s", "k = 2, everywhere in the range; empty: the smallest."),
       numberField("hours", "Hours at most", "Empty: no limit."),
     ),
-    h("div", { class: "row" }, button("Design", design, { kind: "primary" })),
+    h("div", { class: "row" }, button("Design", design)),
     answer,
   ];
 }
@@ -142,7 +142,7 @@ function shown(found, taken) {
       h(
         "div",
         { class: "row" },
-        button("Take this recipe", () => taken(found.recipe_toml), { kind: "primary tiny" }),
+        button("Take this recipe", () => taken(found.recipe_toml), { kind: "tiny" }),
       ),
     ),
     h(

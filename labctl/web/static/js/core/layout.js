@@ -74,13 +74,13 @@ export function buildLayout() {
     if (asking) return null;
     asking = true;
     const given = await dialog(
-      "This service requires a key",
+      why ? "This service requires a key" : "Use a key",
       [
         {
           name: "key",
           label: "Key",
           type: "password",
-          hint: "`labctl key create` makes a key. The key is kept in this tab until the tab is closed.",
+          hint: "The command labctl key create makes a key. The key is kept in this tab until the tab is closed.",
         },
       ],
       { text: why, confirm: "Use it" },

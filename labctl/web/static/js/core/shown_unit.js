@@ -10,6 +10,9 @@ const PARTS =
 /** Plain numbers near 1, or elements of a matrix with ones on its diagonal: they stay as they are. */
 const RATIOS = /^(?:[xyz][. ])?soft iron(?![a-z])/;
 
+/** A plain number, and one for each of something: 1, 1/K, 1 K^-2. */
+const PLAIN = /^1(?![^ /])/;
+
 /** @typedef {readonly [factor: number, unit: string]} ShownUnit a shown number is the stored one times the factor */
 
 /**
@@ -21,14 +24,25 @@ export const unitText = (unit) =>
 
 /**
  * The unit in which a quantity is shown, whatever its value. Of plain numbers angles are in mrad, parts of a whole in %,
- * ratios as they are, and all others, which are relative to the rate, in ppm; an angle in rad is in mrad.
+ * ratios as they are, and all others, which are relative to the rate, in ppm, and their changes with temperature in
+ * ppm/K; an angle in rad is in mrad.
  * @param {string | null | undefined} unit
  * @param {string} name of the coefficient or effect
  * @returns {ShownUnit}
  */
 export function shownUnit(unit, name) {
   if (unit === "rad") return [1e3, "mrad"];
-  if (unit !== "1" || RATIOS.test(name)) return [1, unitText(unit)];
+  if (!unit || !PLAIN.test(unit)) return [1, unitText(unit)];
+  const [factor, shown] = plainUnit(name);
+  return [factor, unit === "1" ? shown : `${shown || "1"}${unitText(unit.slice(1))}`];
+}
+
+/**
+ * @param {string} name
+ * @returns {ShownUnit}
+ */
+function plainUnit(name) {
+  if (RATIOS.test(name)) return [1, ""];
   if (ANGLES.test(name)) return [1e3, "mrad"];
   return PARTS.test(name) ? [100, "%"] : [1e6, "ppm"];
 }

@@ -10,16 +10,18 @@ export const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPT
 
 /** A number as programs write it: 5e-05. A part of a name or of a hash is none. */
 const POWER = /(?<![\w.-])(-?\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?![\w.]*\w)/g;
+/** A power as programs write it: (deg/s)^-1, e^254. */
+const RAISED = /\^(-?\d+)/g;
 /** A plus or minus before a number, and the sign of a negative number; not the hyphen of a word, a range or a date. */
 const [PLUS_MINUS, NEGATIVE] = [/\+-(?=\s*\d)/g, /(?<![\w-])-(?=\d)/g];
 
 /**
- * A text with the minus sign, ± and powers of ten: "+-90 deg/s, -5e-05" is "±90 deg/s, −5 × 10⁻⁵". Names that people
+ * A text with the minus sign, ± and powers: "+-90 deg/s, -5e-05 K^-1" is "±90 deg/s, −5 × 10⁻⁵ K⁻¹". Names that people
  * have given stay as they are.
  * @param {string} text
  */
 export function typeset(text) {
-  if (!text.includes("-") && !text.includes("e+")) return text;
+  if (!/-|e\+|\^/.test(text)) return text;
   return splitAtNames(text)
     .map((part, k) => (k % 2 ? part : withSigns(part)))
     .join("");
@@ -29,6 +31,7 @@ export function typeset(text) {
 function withSigns(text) {
   return text
     .replace(POWER, (_, factor, sign, power) => `${factor} × 10${superscript(sign + power)}`)
+    .replace(RAISED, (_, power) => superscript(power))
     .replace(PLUS_MINUS, "±")
     .replace(NEGATIVE, MINUS);
 }

@@ -60,7 +60,7 @@ export function effectDetail(effect, all) {
           ? h(
               "p",
               { class: "small" },
-              h("strong", {}, "Look for it in "),
+              h("strong", {}, "Where it shows: "),
               commaSeparated(effect.draws.map((view) => VIEWS[view] ?? idText(view))),
               ".",
             )

@@ -26,13 +26,13 @@ export const VIEWS = {
   frequency: "the periodic errors over time",
   time_in_set: "the mean course of a data set",
   legs: "heating compared with cooling",
-  previous_rate: "against the rate before",
+  previous_rate: "the residual against the rate before",
   repeats: "points measured again",
   worst: "the worst data sets",
-  table_rate_dps: "against the table rate",
-  temperature_c: "against the gyro's temperature",
-  power_s: "against the time since power-on",
-  supply_v: "against the supply voltage",
+  table_rate_dps: "the residual against the table rate",
+  temperature_c: "the residual against the gyro's temperature",
+  power_s: "the residual against the time since power-on",
+  supply_v: "the residual against the supply voltage",
 };
 
 /** @type {Record<string, string>} */

@@ -1,5 +1,7 @@
 // Which recordings are compared: one, or several as one; in the address, in a query and in words.
 
+/** @import { RecordingRow } from "../../../types/api.js" */
+
 /** @typedef {{ recording: number, recordings: readonly number[] }} Chosen `recording` is the newest of them */
 
 /**
@@ -34,4 +36,16 @@ export const inAddress = ({ recording, recordings }) =>
 export function recordingsText({ recording, recordings }) {
   if (recordings.length < 2) return `recording ${recording}`;
   return `recordings ${recordings.slice(0, -1).join(", ")} and ${recordings.at(-1)}`;
+}
+
+/**
+ * The newest recording with at least half as many data sets as the largest: an experiment has few. That of a campaign
+ * that has not ended is taken only where the unit has no other.
+ * @param {readonly Pick<RecordingRow, "id" | "datasets" | "unfinished">[]} own
+ */
+export function usualRecording(own) {
+  const ended = own.filter((row) => !row.unfinished);
+  const rows = ended.length ? ended : own;
+  const most = Math.max(...rows.map((row) => row.datasets));
+  return Math.max(...rows.filter((row) => 2 * row.datasets >= most).map((row) => row.id));
 }

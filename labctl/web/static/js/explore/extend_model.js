@@ -106,7 +106,7 @@ export function extendModel(state, effects) {
   });
   const isEmpty = () => !change.add.size && !change.remove.size && !change.formula;
   const stale = () => {
-    previewing.classList.add("primary");
+    previewing.classList.toggle("primary", !isEmpty()); // nothing to preview, no next step
     setChildren(
       result,
       isEmpty()
@@ -134,7 +134,7 @@ export function extendModel(state, effects) {
     setChildren(result, shown(previewed));
     previewing.classList.remove("primary"); // now the next step is to make the version
   }
-  const previewing = button("Preview", preview, { kind: "primary" });
+  const previewing = button("Preview", preview);
 
   /** @param {Preview} found */
   function shown(found) {

@@ -2,12 +2,12 @@
 
 import { scrollTo, setChildren, h } from "../core/elements.js";
 import { withUncertainty, number, oddsText, probabilityText, idText } from "../core/format.js";
-import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
-import { planAddress } from "../core/routes.js";
+import { button, chip, factList, fitWarnings, cardWithHeader } from "../core/components.js";
 import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { heldOutName } from "./first_models.js";
+import { aliasNotice, experimentList, lawList, unbroken, untestableEffects, whyNoneIsNamed } from "./suspect_notes.js";
 
 /** @import { Criticism, Effect, Suspect } from "../../../types/api.js" */
 /** @import { Child } from "../../../types/pages.js" */
@@ -21,10 +21,28 @@ const VERDICTS = {
   unexplained: ["Unexplained", "warn"],
   insufficient_data: ["Too little data", "bad"],
 };
+/**
+ * An adequate model beside suspects.
+ * @type {[title: string, kind: string]}
+ */
+const NONE_NAMED = ["Adequate: no effect is named", "good"];
 /** Evidence at which the meter is full, nats; its length is the logarithm, so that 70 and 20 000 differ. */
 const FULL_NATS = 1e5;
-/** A smaller probability that an experiment names a wrong cause is not worth a word. */
-const MIN_WRONG = 0.005;
+
+/**
+ * What the noise floor of a recording is computed from, by the name of its source in the answer.
+ * @type {Record<string, string>}
+ */
+const FLOORS = {
+  "within and between data sets": "by the scatter within and between data sets",
+  "within data sets, and by the data sheet": "by the scatter within data sets, and the drift of the data sheet",
+  "within data sets": "by the scatter within data sets",
+  repeats: "by data sets that repeat each other, at nearly equal rate and temperature",
+  "scatter about a smooth surface": "by the scatter about a smooth surface",
+};
+
+const TWO_NOISES =
+  "The noise floor is that of the recording, the same for every model. The variance is compared with noise and drift as they are estimated beside this model, each data set by its own: slow changes that no model follows count as drift there.";
 
 const DRAW =
   "“Draw” shows the part of the residual that an effect would explain. “Add” previews a model with the effect; nothing is stored before you make a version.";
@@ -32,8 +50,9 @@ const DRAW =
 /** @param {ExploreState} state */
 export function verdictCard(state) {
   const { criticism } = state;
-  const [title, kind] = VERDICTS[criticism.verdict];
+  const [title, kind] = criticism.further.length ? NONE_NAMED : VERDICTS[criticism.verdict];
   const of = new Set(criticism.joint?.text); // stands in the card of the recordings together
+  of.add(criticism.why_not_named); // stands beside the suspects
   const [first, ...others] = criticism.text.filter((line) => !of.has(line));
   const { error, noise } = criticism;
   const ratio = (error.rms_dps ?? NaN) / (error.noise_floor_dps ?? NaN);
@@ -59,7 +78,7 @@ export function verdictCard(state) {
       error.heldout_rms_dps === null
         ? null
         : [`RMS ${heldOutName(state.motion)} of the fit`, number(error.heldout_rms_dps), "deg/s"],
-      ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s"],
+      ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s", FLOORS[error.noise_floor_source] ?? null],
       noise.drift_dps === null
         ? null
         : [
@@ -77,6 +96,9 @@ export function verdictCard(state) {
             chanceText(criticism.lack_of_fit.p_value),
           ],
     ]),
+    Number.isFinite(ratio) && criticism.lack_of_fit.statistic !== null
+      ? h("p", { class: "muted small" }, TWO_NOISES)
+      : null,
   );
 }
 
@@ -189,15 +211,13 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
   });
   const isAdequate = criticism.verdict === "adequate";
   return cardWithHeader(
-    isAdequate ? "Missing effects: weak hints only" : "Which effects are missing",
+    isAdequate
+      ? speaking.length
+        ? "Suspected effects: none is named"
+        : "Suspected effects"
+      : "Which effects are missing",
     null,
-    isAdequate && speaking.length
-      ? h(
-          "p",
-          { class: "muted" },
-          "The odds are those of each effect added alone. How many effects were tried is not counted in them; counted, none of these is distinguished from noise.",
-        )
-      : null,
+    isAdequate && speaking.length ? h("p", { class: "muted" }, whyNoneIsNamed(criticism)) : null,
     speaking.length
       ? [drawnNow, list, open]
       : h(
@@ -266,129 +286,4 @@ function coefficientText(suspect, axis) {
           : "of a fit with this effect",
       ),
     );
-}
-
-/**
- * A value with no line break before its uncertainty, nor within its power of ten.
- * @param {string} text
- */
-const unbroken = (text) =>
-  text.replaceAll(/ (%|± )|([<>]) /g, (gap) => gap.replaceAll(" ", "\u00a0")).replaceAll("× ", "×\u00a0");
-
-/** @param {Criticism} criticism */
-function aliasNotice(criticism) {
-  const group = criticism.suspects.find(
-    (s) => s.alias_group.length > 1 && criticism.named.includes(s.effect),
-  )?.alias_group;
-  if (!group || criticism.verdict !== "ambiguous") return null;
-  return notice(
-    "warn",
-    h("p", {}, h("strong", {}, "This recording cannot distinguish these effects: "), group.map(idText).join(", "), "."),
-    h(
-      "p",
-      {},
-      "Adding any one of these effects lowers the error; only another experiment shows which of them is real.",
-    ),
-  );
-}
-
-/**
- * Formulas that describe what no effect explains; each can be tried as a change of the model.
- * @param {ExploreState} state
- * @param {(formulas: string[]) => unknown} onlaw
- */
-function lawList({ criticism, axis, motion }, onlaw) {
-  const { laws, law_test: test } = criticism;
-  if (!laws.length) return null;
-  return h(
-    "section",
-    { class: "stack", "aria-label": "Laws that describe it" },
-    h("h3", {}, "Laws that describe it"),
-    h(
-      "p",
-      { class: "muted" },
-      "No effect of the catalogue explains this residual. A law says what it follows and names no cause.",
-    ),
-    laws.map((law) =>
-      h(
-        "div",
-        { class: "notice stack" },
-        h("p", {}, h("code", {}, law.equations[axis] ?? Object.values(law.equations)[0]), " deg/s"),
-        h(
-          "p",
-          { class: "muted small" },
-          `${probabilityText(law.probability)} among these laws. RMS with it ${number(law.rms_after_dps)} deg/s, ${heldOutName(motion)} ${number(law.heldout_rms_after_dps)} deg/s.`,
-        ),
-        h(
-          "ul",
-          { class: "small" },
-          law.follows.map((line) => h("li", {}, line)),
-        ),
-        h(
-          "div",
-          { class: "row" },
-          button("Try this law", () => onlaw(law.formulas), { kind: "tiny" }),
-        ),
-      ),
-    ),
-    test ? h("p", {}, `To distinguish the first two, ${test.do}.`) : null,
-  );
-}
-
-/** @param {Criticism} criticism */
-function experimentList(criticism) {
-  if (!criticism.experiments.length) return null;
-  return h(
-    "div",
-    { class: "stack" },
-    h("h3", {}, "Experiments that show most of which effect is real"),
-    criticism.experiments
-      .slice(0, 3)
-      .map((each) =>
-        h(
-          "div",
-          { class: "notice" },
-          h(
-            "p",
-            {},
-            each.do,
-            each.hours ? ` (${number(each.hours, 2)} h)` : "",
-            each.names_wrong < MIN_WRONG
-              ? ""
-              : `; a wrong cause is then named with a probability of ${unbroken(probabilityText(each.names_wrong))}`,
-          ),
-          h("p", { class: "muted small" }, each.why),
-          each.toml
-            ? h("a", { class: "button tiny", href: planAddress(each.toml, criticism.serial) }, "Plan it")
-            : null,
-        ),
-      ),
-  );
-}
-
-/** @param {Criticism} criticism */
-function untestableEffects(criticism) {
-  if (!criticism.not_testable.length) return null;
-  /** @param {Criticism["not_testable"][number]} line */
-  const why = (line) =>
-    line.why === "channel"
-      ? `not recorded: ${line.needs.map(idText).join(", ")}`
-      : "this schedule cannot detect the effect";
-  return h(
-    "details",
-    {},
-    h("summary", {}, `Effects that this recording cannot test (${criticism.not_testable.length})`),
-    h(
-      "ul",
-      { class: "two-columns" },
-      criticism.not_testable.map((line) =>
-        h(
-          "li",
-          {},
-          h("a", { href: `/effects/${line.effect}` }, idText(line.effect)),
-          h("span", { class: "muted small" }, ` ${why(line)}`),
-        ),
-      ),
-    ),
-  );
 }

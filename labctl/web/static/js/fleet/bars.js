@@ -29,7 +29,7 @@ export function bars(title, bars, nothing) {
               h(
                 "span",
                 { class: "bar-space", "aria-hidden": "true" },
-                h("span", { class: `bar-length ${kind}`, style: `width: ${(100 * units) / most}%` }),
+                units ? h("span", { class: `bar-length ${kind}`, style: `width: ${(100 * units) / most}%` }) : null,
               ),
               h("span", { class: "bar-count" }, count(units)),
             ),

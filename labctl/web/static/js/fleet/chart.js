@@ -130,7 +130,11 @@ function groupTable(chart, groups) {
       { title: chart.factor, cell: ({ level }) => level || "not stated" },
       { title: "Units", number: true, cell: ({ units }) => count(units) },
       { title: "Mean", number: true, cell: ({ mean }) => withUnit(factor * mean, unit, 4) },
-      { title: "Beside all others", number: true, cell: ({ off }) => withUnit(factor * off, unit, 2) },
+      {
+        title: "Beside all others",
+        number: true,
+        cell: ({ off }) => withUnit(off === null ? null : factor * off, unit, 2),
+      },
     ],
     groups.slice(0, 50),
     { label: "Groups in the chosen time" },

@@ -2,7 +2,7 @@
 
 import { card, cardWithHeader, table, chip } from "../core/components.js";
 import { h } from "../core/elements.js";
-import { count, idText, withUnit } from "../core/format.js";
+import { count, idText, withUncertainty, withUnit } from "../core/format.js";
 import { shownUnit } from "../core/shown_unit.js";
 import { bars } from "./bars.js";
 
@@ -39,7 +39,7 @@ function missingCard(report) {
                   {},
                   each.effects.flatMap((id, k) => (k ? [" or ", effectLink(id)] : [effectLink(id)])),
                   " ",
-                  chip(each.of_bench === null ? "all units" : `bench ${each.of_bench}`, each.of_bench ? "warn" : "bad"),
+                  chip(whose(each), "warn"),
                   h("p", { class: "muted" }, each.text),
                 ),
               ),
@@ -49,6 +49,10 @@ function missingCard(report) {
     ),
   );
 }
+
+/** @param {FleetReport["missing"][number]} missing */
+const whose = ({ of_bench: bench, common }) =>
+  bench !== null ? `bench ${bench}` : common ? "one size in all units" : "of another size in each unit";
 
 /** @param {FleetReport} report */
 const saidCard = (report) =>
@@ -77,11 +81,10 @@ function coefficientCard(report) {
     table(
       [
         { title: "Coefficient", cell: ({ name }) => name },
-        { title: "Mean", number: true, cell: ({ name, mean, unit }) => inUnit(mean, unit, name, 4) },
         {
-          title: "U of the mean",
+          title: "Mean ± U (95.45 %)",
           number: true,
-          cell: ({ name, expanded_u_mean, unit }) => inUnit(expanded_u_mean, unit, name, 2),
+          cell: ({ name, mean, expanded_u_mean, unit }) => withUncertainty(mean, expanded_u_mean, unit, name),
         },
         { title: "Spread", number: true, cell: ({ name, spread, unit }) => inUnit(spread, unit, name, 3) },
         { title: "u of a unit", number: true, cell: ({ name, median_u, unit }) => inUnit(median_u, unit, name, 2) },

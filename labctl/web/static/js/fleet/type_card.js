@@ -57,6 +57,16 @@ export function dueBars({ due }) {
 }
 
 /**
+ * The command that makes what a type lacks; units are criticised once they are fitted.
+ * @param {string} type
+ * @param {boolean} toFit
+ */
+export const nextCommand = (type, toFit) =>
+  ["labctl fleet", toFit ? "fit --model NAME" : "criticise", type ? `--type '${type.replaceAll("'", "'\\''")}'` : ""]
+    .filter(Boolean)
+    .join(" ");
+
+/**
  * @param {FleetType} figures
  * @param {boolean} linked whether the name leads to the page of the type
  */
@@ -73,7 +83,14 @@ export function typeCard(figures, linked) {
       verdicts.length ? bars("Verdict", verdicts, "") : null,
       bars("Due", dueBars(figures), "No unit."),
     ),
-    missing ? h("p", { class: "muted small" }, `No fleet job has ${missing} any of these units.`) : null,
+    missing
+      ? h(
+          "p",
+          { class: "muted small" },
+          `No fleet job has ${missing} any of these units. Next: `,
+          h("code", {}, nextCommand(figures.type, !errors.length)),
+        )
+      : null,
     linked
       ? h("p", {}, h("a", { class: "button", href: `/fleet?type=${encodeURIComponent(figures.type)}` }, `Open ${name}`))
       : null,

@@ -129,7 +129,7 @@ export async function page({ query, signal }) {
             bench.simulated ? chip("simulated", "accent") : null,
           )
         : "Computed for the simulated bench that suits this recipe best.",
-      h("a", { class: "button primary", href: "#begin" }, "Begin …"),
+      h("a", { class: "button", href: "#begin" }, "Begin …"),
     ),
     absentNotice(query.unit, bench),
     query.recipe && named.name !== query.recipe && !query.toml

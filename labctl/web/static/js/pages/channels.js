@@ -259,8 +259,8 @@ function picture(shown, height) {
       },
     };
   };
-  const caption =
-    "Temperatures as they were logged, the rate of each step, means of the data sets (points; click one to see its readings); “now” is since this page was opened.";
+  const live = shown().series.some(({ id }) => id.startsWith("now.")) ? "; “now” is since this page was opened" : "";
+  const caption = `Temperatures as they were logged, the rate of each step, means of the data sets (points; click one to see its readings)${live}.`;
   return figure("Channels of the campaign", caption, draw, {
     height: `${Math.max(18, PANEL_REM * height)}rem`,
     csv: () => [

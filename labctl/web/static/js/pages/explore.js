@@ -7,7 +7,7 @@ import { card, emptyState, pageHeader, notice } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { navigate, query } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
-import { inAddress, numbersIn, recordingsText } from "../explore/chosen_recordings.js";
+import { inAddress, numbersIn, recordingsText, usualRecording } from "../explore/chosen_recordings.js";
 import { fitForm } from "../explore/fit_form.js";
 import { posesView } from "../explore/poses_view.js";
 import { recordingChoice } from "../explore/recording_choice.js";
@@ -102,17 +102,8 @@ function chosenRecordings(asked, own, calibration) {
   if (several.length) return { recording: several[several.length - 1], recordings: several };
   const fitted = calibration?.recordings ?? [];
   if (!asked.recording && fitted.length > 1) return { recording: fitted[fitted.length - 1], recordings: fitted };
-  const recording = Number(asked.recording) || defaultRecording(own);
+  const recording = Number(asked.recording) || usualRecording(own);
   return { recording, recordings: [recording] };
-}
-
-/**
- * The newest recording with at least half as many data sets as the largest: a running campaign has few so far.
- * @param {readonly RecordingRow[]} own
- */
-function defaultRecording(own) {
-  const most = Math.max(...own.map((each) => each.datasets));
-  return Math.max(...own.filter((each) => 2 * each.datasets >= most).map((each) => each.id));
 }
 
 /**

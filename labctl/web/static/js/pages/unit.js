@@ -56,7 +56,7 @@ export async function page({ params, signal }) {
           ladder(unit.serial, signal),
           diagnosisCard(unit.serial, diagnoses, signal),
           unit.recordings.length > 1 ? trendCard(unit.serial, rows, signal) : null,
-          ...versionCards(unit.serial, rows, signal),
+          ...versionCards(unit.serial, rows, unit.certified_version, signal),
         ]
       : emptyState(
           h("p", {}, "No calibration yet."),
@@ -97,15 +97,17 @@ function ladder(serial, signal) {
 }
 
 /**
- * Coefficients of one version, or of two side by side, and the uncertainty in use of the first.
+ * Coefficients of one version, or of two side by side, and the uncertainty in use of the first: of the version in force
+ * unless another one is chosen, or of the newest where none is.
  * @param {string} serial
  * @param {readonly CalibrationRow[]} rows
+ * @param {number | null} inForce
  * @param {AbortSignal} signal
  */
-function versionCards(serial, rows, signal) {
-  const newest = rows[0].version;
+function versionCards(serial, rows, inForce, signal) {
+  const usual = inForce ?? rows[0].version;
   /** @type {number} */
-  let one = Number(query().version) || newest;
+  let one = Number(query().version) || usual;
   /** @type {number | null} */
   let other = Number(query().beside) || null;
   const place = h("div");
@@ -142,7 +144,7 @@ function versionCards(serial, rows, signal) {
   const read = (version) => get("/api/units/{serial}/calibrations/{version}", { path: { serial, version }, signal });
   const draw = () => {
     const shown = one;
-    updateQuery({ version: one === newest ? null : one, beside: other });
+    updateQuery({ version: one === usual ? null : one, beside: other });
     for (const { select } of ofOne) select.value = String(one);
     const asked = Promise.all([read(one), other ? read(other) : null]);
     loadInto(place, "Reading the coefficients", async () => {

@@ -74,7 +74,9 @@ const unitTable = (units) =>
           unit.technology ? h("div", { class: "muted small" }, unit.technology.toUpperCase()) : null,
         ],
       },
-      units.some((unit) => unit.batch) ? { title: "Batch", cell: (unit) => unit.batch || "–" } : null,
+      units.some((unit) => unit.batch)
+        ? { title: "Batch", cell: (unit) => h("span", { class: "nowrap" }, unit.batch || "–") }
+        : null,
       { title: "Recordings", number: true, cell: (unit) => unit.recordings.length },
       { title: "Versions", number: true, cell: (unit) => unit.calibrations.length },
       { title: "Error / noise floor", cell: (unit) => errorSparkline(unit.newest_errors) },

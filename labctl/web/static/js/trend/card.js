@@ -22,7 +22,7 @@ const NAMES = { bias: "bias", scale_factor: "scale factor", error: "RMS error" }
  * @param {AbortSignal} signal
  */
 export function trendCard(serial, rows, signal) {
-  const place = h("div", { class: "stack", style: "min-height: 20rem" });
+  const place = h("div", { class: "stack" });
   const versions = rows.map((row) => row.version).sort((a, b) => a - b);
   let version = versions.find((each) => each === Number(query().trend)) ?? versions[0];
   let limit = Number(query().limit) > 0 ? Number(query().limit) : null;

@@ -1,5 +1,7 @@
 // Coefficients of a version that are columns over temperature.
 
+import { idText } from "../core/format.js";
+
 /** @import { Coefficient, CoefficientAxis, CoefficientTable, Version } from "../../../types/api.js" */
 /**
  * @typedef {object} CoefficientColumn a coefficient of an axis over temperature
@@ -37,6 +39,41 @@ const isTable = (found) => !Array.isArray(found) && Array.isArray(found.value);
  * @returns {found is Coefficient}
  */
 export const isSingle = (found) => found !== undefined && !Array.isArray(found) && !Array.isArray(found.value);
+
+/**
+ * The coefficients of a version beside the columns of another one: its own columns, and each single value as one that is
+ * the same at all temperatures of the other's column.
+ * @param {Pick<Version, "axes">} version
+ * @param {readonly CoefficientColumn[]} others
+ * @returns {CoefficientColumn[]}
+ */
+export function columnsBeside(version, others) {
+  const own = coefficientColumns(version);
+  const constant = others.flatMap(({ axis, name, temperature_c }) => {
+    const found = version.axes[axis]?.coefficients[name];
+    if (!isSingle(found)) return [];
+    const { value, u, unit } = found;
+    return [{ axis, name, temperature_c, value: temperature_c.map(() => value), u: temperature_c.map(() => u), unit }];
+  });
+  return [...own, ...constant];
+}
+
+/**
+ * What two versions have in common and not, in words.
+ * @param {{ version: number, effects: readonly string[], columns: boolean }} first
+ * @param {{ version: number, effects: readonly string[], columns: boolean }} second
+ */
+export function differenceText(first, second) {
+  const more = first.effects.filter((id) => !second.effects.includes(id)).map(idText);
+  const less = second.effects.filter((id) => !first.effects.includes(id)).map(idText);
+  const parts = [more.length ? `has ${more.join(", ")} more` : "", less.length ? `lacks ${less.join(", ")}` : ""];
+  const effects = parts.some(Boolean)
+    ? `Version ${first.version} ${parts.filter(Boolean).join(" and ")} than version ${second.version}.`
+    : `Versions ${first.version} and ${second.version} have the same effects.`;
+  if (first.columns === second.columns) return effects;
+  const [table, single] = first.columns ? [first, second] : [second, first];
+  return `${effects} The coefficients of version ${table.version} change with temperature, those of version ${single.version} are one value each.`;
+}
 
 /** @param {Pick<Version, "axes">} version */
 export const coefficientColumns = (version) =>

@@ -6,7 +6,7 @@ import { number, resultTexts, idText, withUncertainty } from "../core/format.js"
 import { shownUnit } from "../core/shown_unit.js";
 import { factList, table } from "../core/components.js";
 import { byHand } from "./by_hand.js";
-import { coefficientColumns, isSingle } from "./coefficient_table.js";
+import { coefficientColumns, columnsBeside, differenceText, isSingle } from "./coefficient_table.js";
 import { heldText } from "./held.js";
 
 /** @import { Coefficient, Version } from "../../../types/api.js" */
@@ -18,6 +18,8 @@ const ERRORS = [
   ["heldout_rms_dps", "at temperatures left out of the fit"],
   ["noise_floor_dps", "noise floor"],
 ];
+const FIT_ALONE =
+  "The uncertainties are those of the fit alone. What the model leaves and the reference standards of the bench count in the uncertainty in use below; the command labctl uncertainty states it for each coefficient.";
 /** Coverage factor of the bars: expanded uncertainty. */
 const K = 2;
 
@@ -27,9 +29,11 @@ const K = 2;
  * @param {Version} second
  */
 export function comparison(first, second) {
-  const [own, other] = [first, second].map((version) => new Set(version.model.effects));
-  const more = [...own].filter((id) => !other.has(id));
-  const less = [...other].filter((id) => !own.has(id));
+  const [own, other] = [first, second].map((each) => ({
+    version: each.version,
+    effects: each.model.effects,
+    columns: coefficientColumns(each).length > 0,
+  }));
   return h(
     "div",
     { class: "stack" },
@@ -41,14 +45,7 @@ export function comparison(first, second) {
         `version ${second.version}: ${number(second.error[key])}`,
       ]),
     ),
-    h(
-      "p",
-      {},
-      `Version ${first.version} `,
-      more.length ? `has ${more.map(idText).join(", ")} more` : "has no further effect",
-      less.length ? ` and lacks ${less.map(idText).join(", ")}` : "",
-      ` than version ${second.version}.`,
-    ),
+    h("p", {}, differenceText(own, other)),
   );
 }
 
@@ -60,8 +57,12 @@ export function coefficients(first, second) {
   const held = [first, second]
     .flatMap((version) => (version && heldText(version)) ?? [])
     .map((text) => h("p", {}, text));
-  if (coefficientColumns(first).length) return h("div", { class: "stack" }, held, overTemperature(first, second));
-  return h("div", { class: "stack" }, held, list(first, second), byHand(first));
+  const columns = coefficientColumns(first);
+  const isKnown =
+    columns.some(({ u }) => u.some((each) => each !== null)) || singles(first).some(({ u }) => u !== null);
+  const note = isKnown ? h("p", { class: "muted small" }, FIT_ALONE) : null;
+  if (columns.length) return h("div", { class: "stack" }, held, overTemperature(first, second), note);
+  return h("div", { class: "stack" }, held, list(first, second), note, byHand(first));
 }
 
 /**
@@ -70,9 +71,9 @@ export function coefficients(first, second) {
  * @param {Version | null} second
  */
 function overTemperature(first, second) {
-  const columns = [first, second]
-    .filter((version) => version !== null)
-    .flatMap((version) => coefficientColumns(version).map((column) => ({ ...column, version: version.version })));
+  const own = coefficientColumns(first).map((column) => ({ ...column, version: first.version }));
+  const other = second ? columnsBeside(second, own).map((column) => ({ ...column, version: second.version })) : [];
+  const columns = [...own, ...other];
   const names = new Set(columns.filter(({ version }) => version === first.version).map(({ name }) => name));
   return h(
     "div",
@@ -134,7 +135,10 @@ function columnsFigure(name, columns, front) {
     "div",
     {},
     h("h3", {}, idText(name)),
-    figure(`Coefficient ${idText(name)}`, "Bars: expanded uncertainty, k = 2.", draw, { height: "17rem", csv }),
+    figure(`Coefficient ${idText(name)}`, "Bars: expanded uncertainty of the fit, k = 2.", draw, {
+      height: "17rem",
+      csv,
+    }),
   );
 }
 
@@ -161,7 +165,15 @@ function list(first, second) {
     Object.entries(own).flatMap(([name, found]) => {
       const other = second?.axes[axis]?.coefficients[name];
       if (!isSingle(found)) return [];
-      return [{ axis, name, ...found, beside: isSingle(other) ? other : null }];
+      return [
+        {
+          axis,
+          name,
+          ...found,
+          beside: isSingle(other) ? other : null,
+          missing: other ? "changes with temperature" : "–",
+        },
+      ];
     }),
   );
   /** @param {typeof rows[number]} row */
@@ -171,7 +183,7 @@ function list(first, second) {
       { title: "Axis", cell: (row) => row.axis },
       { title: "Coefficient", cell: (row) => h("code", {}, row.name) },
       { title: "Value", number: true, cell: (row) => texts(row).value },
-      { title: "Expanded uncertainty, k = 2", number: true, cell: (row) => texts(row).u },
+      { title: "Expanded uncertainty of the fit, k = 2", number: true, cell: (row) => texts(row).u },
       { title: "Unit", cell: (row) => texts(row).unit },
       second
         ? {
@@ -185,7 +197,7 @@ function list(first, second) {
                     row.beside.unit,
                     row.name,
                   )
-                : "–",
+                : row.missing,
           }
         : null,
       second
@@ -203,3 +215,7 @@ function list(first, second) {
     { dense: true, label: "Coefficients" },
   );
 }
+
+/** @param {Version} version */
+const singles = ({ axes }) =>
+  Object.values(axes).flatMap(({ coefficients: own }) => Object.values(own).filter(isSingle));

@@ -2,6 +2,7 @@
 
 import { get, post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
+import { idText } from "../core/format.js";
 import { actButton, cardWithHeader, chip, table } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { askBenchClear, askingButton } from "../bench/actions.js";
@@ -47,7 +48,7 @@ function rounds(diagnosis) {
   const lines = diagnosis.rounds.map((round) => lineOfRound(round, columns));
   return h(
     "div",
-    {},
+    { class: "stack" },
     h(
       "p",
       {},
@@ -61,7 +62,7 @@ function rounds(diagnosis) {
             { title: "Bench h", number: true, cell: (line) => line.hours },
             { title: "Verdict", cell: (line) => line.verdict },
             ...columns.map((effect, place) => ({
-              title: effect,
+              title: idText(effect),
               number: true,
               cell: (/** @type {typeof lines[number]} */ line) => line.probabilities[place] ?? "",
             })),
@@ -73,9 +74,24 @@ function rounds(diagnosis) {
     h(
       "ul",
       { class: "plain small" },
-      lines.map((line, place) => h("li", {}, `Round ${place + 1}: ${line.experiment}`)),
+      lines.map(({ experiment, result }, place) =>
+        h(
+          "li",
+          {},
+          h("strong", {}, `Round ${place + 1}. `),
+          experiment,
+          result ? h("p", { class: "muted" }, result) : null,
+        ),
+      ),
     ),
-    diagnosis.next ? h("p", { class: "small muted" }, diagnosis.next.replaceAll("`", "")) : null,
+    diagnosis.next
+      ? h(
+          "p",
+          { class: "small" },
+          "Next: ",
+          diagnosis.next.split("`").map((part, k) => (k % 2 ? h("code", {}, part) : part)),
+        )
+      : null,
   );
 }
 

@@ -1,6 +1,6 @@
 // What is shown of the rounds of a diagnosis; no DOM here.
 
-import { instant, probabilityText } from "../core/format.js";
+import { capitalised, idText, instant, probabilityText } from "../core/format.js";
 
 /** @import { Diagnosis, DiagnosisRound } from "../../../types/api.js" */
 
@@ -68,11 +68,18 @@ export function suspectColumns(rounds) {
 export function lineOfRound(round, columns) {
   return {
     hours: round.spent_hours.toFixed(1),
-    verdict: round.named.length ? `${round.verdict}: ${round.named.join(", ")}` : round.verdict,
+    verdict: round.named.length ? `${round.verdict}: ${round.named.map(idText).join(", ")}` : round.verdict,
     probabilities: columns.map((effect) => {
       const probability = round.suspects[effect];
       return probability === undefined ? "–" : probabilityText(probability);
     }),
-    experiment: round.came_text ? `${round.why}. ${round.came_text}` : round.why,
+    experiment: sentence(round.why),
+    result: sentence(round.came_text),
   };
 }
+
+/**
+ * A text with a capital letter and one full stop; nothing stays nothing.
+ * @param {string} text
+ */
+const sentence = (text) => (text ? `${capitalised(text).replace(/\.+$/, "")}.` : "");

@@ -3,7 +3,7 @@
 import { get } from "../core/http/api.js";
 import { isAbort, messageOf } from "../core/http/errors.js";
 import { h, setChildren } from "../core/elements.js";
-import { fixed, number, plainNumber } from "../core/format.js";
+import { fixed, plainNumber } from "../core/format.js";
 import { busyIndicator, notice, table } from "../core/components.js";
 import { labelledField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
@@ -87,14 +87,14 @@ function over({ grid, coverage_factor }) {
     h(
       "p",
       { class: "muted small" },
-      `Expanded uncertainty of a corrected rate about the axis of each output, the others at rest, on a later day, after another power-on, in deg/s (k = ${coverage_factor}, about 95 %). The noise of a single reading is not included.`,
+      `Expanded uncertainty of a corrected rate about the axis of each output, the others at rest, on a later day, after another power-on, in deg/s (k = ${coverage_factor}, about 95\u00a0%). The noise of a single reading is not included.`,
     ),
     table(
       [
         several ? { title: "Axis", cell: (row) => row.axis } : null,
         { title: "Temperature, deg C", number: true, cell: (row) => fixed(row.warm, 1) },
         ...grid.rate_dps.map((rate, k) => ({
-          title: `${number(rate, 3)} deg/s`,
+          title: `${plainNumber(rate, 3)} deg/s`,
           number: true,
           /** @param {{ cells: readonly AxisUncertainty[] }} row */
           cell: (row) => cell(row.cells[k], coverage_factor),

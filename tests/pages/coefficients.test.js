@@ -1,0 +1,43 @@
+// Coefficients of two versions beside each other, where one has them over temperature and the other one value each.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { columnsBeside, differenceText } from "../../labctl/web/static/js/unit/coefficient_table.js";
+
+/** @param {Record<string, unknown>} coefficients */
+const version = (coefficients) => /** @type {any} */ ({ axes: { x: { coefficients } } });
+const OTHERS = [
+  { axis: "x", name: "bias", temperature_c: [0, 40], value: [0.1, 0.2], u: [0.01, 0.01], unit: "deg/s" },
+  { axis: "y", name: "bias", temperature_c: [0, 40], value: [0.3, 0.4], u: [0.01, 0.01], unit: "deg/s" },
+];
+
+test("a single value stands beside a column as the same value at all its temperatures", () => {
+  const found = columnsBeside(version({ bias: { value: 0.15, u: 0.02, unit: "deg/s" } }), OTHERS);
+  assert.deepEqual(found, [
+    { axis: "x", name: "bias", temperature_c: [0, 40], value: [0.15, 0.15], u: [0.02, 0.02], unit: "deg/s" },
+  ]);
+});
+
+test("columns of another version stand beside each other as they are", () => {
+  const own = { temperature_c: [5, 45], bias: { value: [0.1, 0.3], u: [0.02, 0.03], unit: "deg/s" } };
+  assert.deepEqual(
+    columnsBeside(version(own), OTHERS).map(({ axis, value }) => [axis, value]),
+    [["x", [0.1, 0.3]]],
+  );
+});
+
+test("versions that differ only in how their coefficients follow the temperature are not called the same", () => {
+  const table = { version: 1, effects: ["bias"], columns: true };
+  const single = { version: 2, effects: ["bias"], columns: false };
+  const text =
+    "Versions 2 and 1 have the same effects. The coefficients of version 1 change with temperature, those of version 2 are one value each.";
+  assert.equal(differenceText(single, table), text);
+  assert.equal(
+    differenceText(
+      { ...single, effects: ["bias", "warm_up"] },
+      { ...single, version: 3, effects: ["bias", "dead_band"] },
+    ),
+    "Version 2 has warm up more and lacks dead band than version 3.",
+  );
+});
