@@ -62,10 +62,39 @@ class Pair(ABC):
     def has_as_simple_a_shape(self) -> bool:
         """Whether a shape of the rival with no more coefficients than the leader is not far behind it."""
 
+    @property
+    @abstractmethod
+    def share_by_draws(self) -> float:
+        """The share of the signal of the one that is not drawn that as few draws of the other reproduce, 0 to 1.
+
+        As few: as many as the one has coefficients on each axis; only asked where one of the two is drawn.
+        """
+
     @cached_property
     def contains_leader(self) -> bool:
         """Whether the rival reproduces the leader's signal up to what noise hides."""
         return (1.0 - self.share) * self.leader_gain < INDISTINGUISHABLE_CHI2
+
+
+def is_drawn(candidate: Candidate) -> bool:
+    """Return whether each coefficient of a candidate is a draw, for a powered run or a mounting of its own."""
+    kind = None if candidate.smooth else CATALOGUE.get(candidate.id)
+    return kind is not None and kind.is_random
+
+
+def are_aliases_by_draws(pair: Pair) -> bool:
+    """Return whether one of a pair is drawn, and no more draws than the other has coefficients are its signal.
+
+    One mounting that differs from all others is gravity along an axis that only this mounting turns up, in every
+    reading. Beside that, the evidence weighs no data, but how a coefficient and draws are distributed: the pair cannot
+    be distinguished whatever the odds, as long as the other draws are not larger than noise makes them.
+    """
+    drawn = is_drawn(pair.leader), is_drawn(pair.rival)
+    if drawn[0] == drawn[1] or pair.share_by_draws <= ALIKE:
+        return False
+    if drawn[1] or pair.further_directions >= 0:
+        return True
+    return by_chance(-pair.further_gain, -pair.further_directions) >= MIN_CHANCE
 
 
 def cannot_be_distinguished(pair: Pair) -> bool:
@@ -77,8 +106,9 @@ def cannot_be_distinguished(pair: Pair) -> bool:
     makes them so large, whatever its evidence: the price of so many coefficients hides small shifts.
     """
     near = pair.rival_log_bf > pair.leader_log_bf - LEAD or (pair.rival_log_bf > 0 and _is_indistinguishable(pair))
-    kind = CATALOGUE.get(pair.rival.id)
-    is_random = kind is not None and kind.is_random
+    is_random = is_drawn(pair.rival)
+    if are_aliases_by_draws(pair):
+        return True
     if not (near or is_random) or pair.further_directions <= 0 or not pair.contains_leader:
         return near
     if is_random:
