@@ -10,7 +10,7 @@ for one shape, so an outcome is a draw of the inner products of the shapes with 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,7 +25,7 @@ from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
 from labctl.fitting.criticism.planned_addition import may_be_joined, with_planned
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.criticism.rivals import LEAD, Pair, cannot_be_distinguished
+from labctl.fitting.criticism.rivals import LEAD, Pair, cannot_be_distinguished, is_drawn
 from labctl.fitting.criticism.verdict import ENOUGH, has_as_simple_a_shape, refines_base
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.numeric.arrays import Array
@@ -280,22 +280,31 @@ class _ForeseenPair(Pair):
 
     @property
     def share_by_draws(self) -> float:
+        fixed, drawn = (self.rival, self.leader) if is_drawn(self.leader) else (self.leader, self.rival)
+        signal = self._fitted(fixed.id)
         parts = (
-            self.axes[axis].reproduced_by_draws(each, self.rival.id, self.outcomes[axis], self.k)
-            for axis, each in self.signal.items()
+            self.axes[axis].reproduced_by_draws(each, drawn.id, self.outcomes[axis], self.k)
+            for axis, each in signal.items()
         )
-        return sum(parts) / self.leader_gain
+        return _share(parts, signal)
 
     @property
     def share_of_rival(self) -> float:
-        of_axes = {axis: each.fitted(self.rival.id, self.k) for axis, each in self.outcomes.items()}
-        signal = {axis: each for axis, each in of_axes.items() if each is not None}
-        whole = sum(each.size for each in signal.values())
+        signal = self._fitted(self.rival.id)
         parts = (
             self.axes[axis].reproduced(each, self.leader.id, self.outcomes[axis], self.k)[0]
             for axis, each in signal.items()
         )
-        return sum(parts) / whole if whole > 0 else 0.0
+        return _share(parts, signal)
+
+    def _fitted(self, effect: str) -> dict[str, Fitted]:
+        of_axes = {axis: each.fitted(effect, self.k) for axis, each in self.outcomes.items()}
+        return {axis: each for axis, each in of_axes.items() if each is not None}
+
+
+def _share(parts: Iterable[float], signal: Mapping[str, Fitted]) -> float:
+    whole = sum(each.size for each in signal.values())
+    return sum(parts) / whole if whole > 0 else 0.0
 
 
 def _named_alone(

@@ -65,9 +65,9 @@ class Pair(ABC):
     @property
     @abstractmethod
     def share_by_draws(self) -> float:
-        """The share of the leader's signal that as few draws of the rival reproduce, 0 to 1.
+        """The share of the signal of the one that is not drawn that as few draws of the other reproduce, 0 to 1.
 
-        As few: as many as the leader has coefficients on each axis; only asked where the rival alone is drawn.
+        As few: as many as the one has coefficients on each axis; only asked where one of the two is drawn.
         """
 
     @property
@@ -92,15 +92,16 @@ def are_aliases_by_draws(pair: Pair) -> bool:
 
     One mounting that differs from all others is gravity along an axis that only this mounting turns up. Beside that,
     the evidence weighs no data, but how a coefficient and draws are distributed: such a pair cannot be distinguished
-    whatever the odds. A drawn rival has to be the leader with no more draws than that has coefficients. A drawn leader
-    follows the signal of many a rival, by all its draws; it is another cause only where noise hardly makes what the
-    rival leaves of them.
+    whatever the odds, if no more draws than the other has coefficients are its signal. A drawn leader follows the
+    signal of many a rival by all its draws: one that has evidence stays as well. In both cases the leader is another
+    cause where noise hardly makes what the rival leaves of its draws.
     """
     if is_drawn(pair.leader) == is_drawn(pair.rival):
         return False
+    are_few = pair.share_by_draws > ALIKE
     if is_drawn(pair.rival):
-        return pair.share_by_draws > ALIKE
-    if pair.share_of_rival <= ALIKE:
+        return are_few
+    if not are_few and (pair.rival_log_bf <= 0 or pair.share_of_rival <= ALIKE):
         return False
     more = -pair.further_directions
     return more <= 0 or by_chance(-pair.further_gain, more) >= MIN_CHANCE

@@ -152,8 +152,9 @@ def test_a_shift_whose_few_draws_are_the_signal_stays_whatever_its_odds(
         ({"further_gain": -1.001 * TWO_DIRECTIONS}, False),  # the draws beyond the effect are larger than noise
         ({"further_gain": -1.001 * TWO_DIRECTIONS, "further_directions": 0}, True),  # there are none beyond it
         ({"further_gain": -1.001 * TWO_DIRECTIONS, "further_directions": 1}, True),
-        ({"share_of_rival": 0.995}, False),  # a part of the effect is no shift
-        ({"share_by_draws": 0.0}, True),  # as gravity in the mountings of two recordings, draws of their own
+        ({"share_by_draws": 0.995}, False),  # nothing speaks for it
+        ({"share_by_draws": 0.995, "rival_log_bf": 0.1}, True),  # gravity in two recordings, each with draws of its own
+        ({"share_by_draws": 0.995, "rival_log_bf": 0.1, "share_of_rival": 0.995}, False),  # a part of it is no shift
         ({"rival": candidate("run_shift")}, False),  # both are drawn
     ],
 )
