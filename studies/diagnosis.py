@@ -7,7 +7,7 @@ experiments; the standard campaign again. Named alone: one cause, exact aliases 
 
 Beside an adequate model it goes on where an effect has some evidence. `LABCTL_STUDY_SEED` is the first seed,
 `LABCTL_STUDY_UNITS` units a cell, `LABCTL_STUDY_PROTOCOLS`, `LABCTL_STUDY_Z`, `LABCTL_STUDY_POLICIES` (names with
-commas) choose a part of it.
+commas) choose a part of it, `LABCTL_STUDY_EFFECTS` some of the effects.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ UNITS = int(os.environ.get("LABCTL_STUDY_UNITS", "100"))
 PROTOCOLS = os.environ.get("LABCTL_STUDY_PROTOCOLS", "O,Y").split(",")
 Z_LEVELS = tuple(os.environ.get("LABCTL_STUDY_Z", "5,10,30,100,0").split(","))
 FIRST_SEED = int(os.environ.get("LABCTL_STUDY_SEED", "60000"))
+EFFECTS = frozenset(filter(None, os.environ.get("LABCTL_STUDY_EFFECTS", "").split(",")))
 CHOSEN = os.environ.get("LABCTL_STUDY_POLICIES", "information,random,again").split(",")
 #: Hours beyond the standard campaign.
 MAX_HOURS = 24.0
@@ -147,7 +148,7 @@ class Outcome:
 def units(name: str, z: str) -> Iterator[Unit]:
     """Yield the units of a cell, the effects drawn evenly from those that the protocol can show; z = 0: nothing."""
     p, sized = protocol(name), sizes(name)
-    effects = sorted(set(sized) - set(OUTSIDE))
+    effects = sorted(each for each in set(sized) - set(OUTSIDE) if not EFFECTS or each in EFFECTS)
     order = np.random.default_rng(60_000).permutation(len(effects))
     for k in range(UNITS):
         effect = effects[int(order[k % len(effects)])]

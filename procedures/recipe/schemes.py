@@ -136,12 +136,16 @@ def scheme_text(scheme: Scheme) -> str:
 
 
 def recipe_of(
-    scheme: Scheme, base: Recipe, span: Span, *, name: str, fit: FitRules, ramp_c_per_min: float
+    scheme: Scheme, base: Recipe, span: Span, *, name: str, fit: FitRules, ramp_c_per_min: float,
+    further: Mapping[str, object] | None = None,
 ) -> Recipe:  # fmt: skip
-    """Return the recipe of a scheme over a span; what a scheme says nothing of is as in `base`."""
+    """Return the recipe of a scheme over a span; what a scheme says nothing of is as in `base`.
+
+    `further` are sections of the recipe that are measured besides, whatever the scheme.
+    """
     changes = scheme.changes(base, span, ramp_c_per_min) if isinstance(scheme, Cycle) else scheme.changes(base, span)
     head = {"name": name, "description": f"Designed: {scheme_text(scheme)}", "fit": fit.model_dump()}
-    return Recipe.model_validate({**base.model_dump(), **NOT_TAKEN, **changes, **head})
+    return Recipe.model_validate({**base.model_dump(), **NOT_TAKEN, **changes, **(further or {}), **head})
 
 
 def handling_c(base: Recipe, span: Span) -> float:

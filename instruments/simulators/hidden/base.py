@@ -34,6 +34,7 @@ class State:
     air_c: Array
     run: int
     mounting: int
+    session: int  #: another one measures the same units on another day
     full_scale_dps: float
     north_deg: float
     supply_wander_v: Array

@@ -17,8 +17,12 @@ class BiasDrift(HiddenEffect):
         return (self.size * 200.0 * np.log1p(hours / 200.0))[:, None]
 
 
+#: How far apart in the series of draws two sessions begin: the runs of one are not those of another.
+PER_SESSION = 1031
+
+
 class RunShift(HiddenEffect):
-    """Another bias after every switching-on; size is the standard deviation."""
+    """Another bias after every switching-on, of another day too; size is the standard deviation."""
 
     id, unit, default = "run_shift", "deg/s", 0.01
 
@@ -31,7 +35,8 @@ class RunShift(HiddenEffect):
         return state.run
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
-        shift = self.size * self._shifts[self.number(state) % len(self._shifts)]
+        place = self.number(state) + PER_SESSION * state.session
+        shift = self.size * self._shifts[place % len(self._shifts)]
         return np.full((len(state.t_s), 1), shift)
 
 

@@ -349,6 +349,7 @@ class SimulatedGyro:
             sensor_k_min=6.0 * (sensor - world.heat.sensor_c(self.settings.name, np.maximum(t_s - 10.0, 0.0))),
             run=world.run,
             mounting=world.mounting,
+            session=world.settings.noise_seed,
             full_scale_dps=self.settings.max_rate_dps,
             north_deg=world.north_deg,
             supply_wander_v=world.supply_v(t_s) - (0.0 if world.supply is None else world.supply.nominal_v),

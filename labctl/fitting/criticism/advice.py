@@ -10,11 +10,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from labctl.answers.criticism import Advice
 from labctl.errors import LabctlError
+from labctl.fitting.criticism.held_out_recordings import PARTS, Mask, held_out_recordings
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.joined import recordings_in
 from labctl.fitting.effects import Term, kind_of
@@ -28,10 +28,7 @@ from labctl.fitting.models.presets import Preset, changed
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.least_squares import Solution
 from labctl.progress import report_stage
-from labctl.recording.columns import RECORDING
 
-#: A record at rest is left out in this many parts of time, one after the other.
-PARTS = 4
 #: A part is tested within the temperatures that the others were fitted at, and so far beyond, K.
 BEYOND_K = 1.0
 #: What is exported has to become better by this share: less is chance. A record at rest has few independent errors: a
@@ -39,7 +36,6 @@ BEYOND_K = 1.0
 MIN_GAIN, MIN_GAIN_AT_REST = 0.01, 0.15
 #: From so many parts on the gain also has to exceed what their scatter explains, at this probability (Student's t).
 PARTS_THAT_SCATTER, CERTAIN = 3, 0.95
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -116,7 +112,8 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
 
     The terms `beside` are in both.
 
-    Left out are whole recordings of several, parts of the time of a record at rest, else temperatures.
+    Left out are whole recordings of several (`held_out_recordings`), parts of the time of a record at rest, else
+    temperatures.
     """
     presets = (changed(model, beside), changed(model, (*beside, term)))
     try:
@@ -124,7 +121,7 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
     except LabctlError:
         return Exported(None, None)
     errors: tuple[list[dict[str, Array]], list[dict[str, Array]]] = ([], [])
-    for data_used, left_out in parts_of(data, inner_only=presets[0].inner_only):
+    for data_used, left_out in parts_of(data, term, inner_only=presets[0].inner_only):
         try:
             axis_rms = [
                 _left(data_used, left_out, p, axis_errors) for p, axis_errors in zip(presets, whole, strict=True)
@@ -176,11 +173,11 @@ def _left(
     return dict(residuals(fitted, left_out, solutions.nuisance))
 
 
-def parts_of(data: FitData, *, inner_only: bool) -> Iterator[tuple[FitData, FitData]]:
+def parts_of(data: FitData, term: Term, *, inner_only: bool) -> Iterator[tuple[FitData, FitData]]:
     """Yield (the others, the part left out) of data sets; a part within the temperatures of the others."""
+    masks: list[Mask]
     if len(recordings_in(data.channels.columns)) > 1:
-        of = np.asarray(data.channels[RECORDING])
-        masks: list[Mask] = [of == number for number in np.unique(of)]
+        masks = held_out_recordings(data, term)
     elif "t_s" in data.channels and not np.any(data.channels.table_rate_dps()):
         order = np.argsort(np.asarray(data.channels["t_s"], dtype=np.float64), kind="stable")
         masks = [np.isin(np.arange(len(data)), part) for part in np.array_split(order, PARTS)]

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.effects import Term
+from labctl.fitting.effects import Term, kind_of
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,11 @@ class CandidateShape:
     def smooth(self) -> bool:
         """Whether this is a smooth function of a channel."""
         return self.term is None
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether each coefficient is a draw, for a powered run or a mounting of its own."""
+        return self.term is not None and kind_of(self.term).is_random
 
 
 def slices_of(options: Sequence[CandidateShape]) -> list[slice]:

@@ -31,8 +31,6 @@ from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
 
-#: Effects whose columns are the same at one distance from the table's axis, and not at two.
-OF_RADIUS = frozenset({"scale_factor_even", "centripetal_acceleration"})
 #: Suspects that are less likely than this are left out, unless the verdict names them.
 MIN_PROBABILITY = 0.01
 #: Hypotheses at most, the likeliest.
@@ -164,9 +162,8 @@ def _question(comparison: Comparison, chosen: Sequence[Candidate], odds: Mapping
 def _nodes(ids: Sequence[str], data: ReducedRecording) -> NDArray[np.int64]:
     """Return the number of the cause of each effect, (h,); another radius distinguishes effects by the one it is at."""
     numbers: list[int] = []
-    by_radius = bool(np.any(np.isfinite(data.nodes.radius_m())))
     for i, name in enumerate(ids):
-        aliases = CATALOGUE[name].aliases if name in CATALOGUE and not (by_radius and name in OF_RADIUS) else ()
+        aliases = CATALOGUE[name].aliases_in(data.nodes) if name in CATALOGUE else ()
         same = (numbers[k] for k in range(i) if ids[k] in aliases)
         numbers.append(next(same, i))
     return np.unique(numbers, return_inverse=True)[1].astype(np.int64)
@@ -280,6 +277,25 @@ class _ForeseenPair(Pair):
     @property
     def has_as_simple_a_shape(self) -> bool:
         return (self.leader.id, self.rival.id) in self.question.simple
+
+    @property
+    def share_by_draws(self) -> float:
+        parts = (
+            self.axes[axis].reproduced_by_draws(each, self.rival.id, self.outcomes[axis], self.k)
+            for axis, each in self.signal.items()
+        )
+        return sum(parts) / self.leader_gain
+
+    @property
+    def share_of_rival(self) -> float:
+        of_axes = {axis: each.fitted(self.rival.id, self.k) for axis, each in self.outcomes.items()}
+        signal = {axis: each for axis, each in of_axes.items() if each is not None}
+        whole = sum(each.size for each in signal.values())
+        parts = (
+            self.axes[axis].reproduced(each, self.leader.id, self.outcomes[axis], self.k)[0]
+            for axis, each in signal.items()
+        )
+        return sum(parts) / whole if whole > 0 else 0.0
 
 
 def _named_alone(

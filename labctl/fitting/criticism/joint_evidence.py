@@ -17,6 +17,7 @@ from scipy.special import logsumexp
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts, reproduced_by_draws
 from labctl.fitting.criticism.evidence.elimination import stack
 from labctl.fitting.criticism.evidence.further_coefficients import further_nats
 from labctl.fitting.criticism.evidence.gains import MIN_REMAINING
@@ -32,20 +33,48 @@ UNSEEN = 1e-10
 
 
 @dataclass(frozen=True)
+class Known:
+    """What recordings say of one shape: it maps products of its columns with the data to coefficients and evidence."""
+
+    factor: NDArray[np.float64]  #: (w, r): |factor.T b|^2 is the gain in chi2, `factor @ factor.T` the covariance
+    g: float  #: number of data sets
+    drawn: DrawnShifts | None  #: where each coefficient is a draw
+
+    @property
+    def directions(self) -> int:
+        """The number of directions that are seen."""
+        return self.factor.shape[1]
+
+    def gain(self, products: NDArray[np.float64]) -> Array:
+        """Return the chi2 (...) that the shape removes, by its products (..., w) with the data."""
+        return np.asarray(((products @ self.factor) ** 2).sum(axis=-1))
+
+    def log_bf(self, products: NDArray[np.float64]) -> Array:
+        """Return the log Bayes factor (...) by products (..., w) with the data, with the priors of `evidence`."""
+        if self.drawn is not None:
+            return self.drawn.log_bf(products)
+        shrunk = self.g / (1 + self.g)
+        return np.asarray(0.5 * self.gain(products) * shrunk - 0.5 * self.directions * np.log1p(self.g))
+
+    def draw(self, products: Array, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return n draws, (n, w), of the coefficients as products (w,) with the data leave them."""
+        if self.drawn is not None:
+            return self.drawn.draw(products, n, rng)
+        shrunk = self.g / (1 + self.g)
+        mean = shrunk * self.factor @ (self.factor.T @ products)
+        return np.asarray(mean + rng.standard_normal((n, self.directions)) @ (np.sqrt(shrunk) * self.factor.T))
+
+
+@dataclass(frozen=True)
 class Shape:
-    """One shape: its columns, and what maps their products with the data to a gain in chi2 and to coefficients."""
+    """One shape: its columns, and what recordings say of it."""
 
     effect: str
     columns: slice
-    #: (w, r): |now.T b|^2 is the gain in chi2 by the first recording, and `now @ now.T` the coefficients' covariance
-    now: NDArray[np.float64]
-    before: NDArray[np.float64]  #: the same beside the base of both recordings, in which each run's bias is free
-    after: NDArray[np.float64]  #: the same by both recordings
+    now: Known  #: by the first recording
+    before: Known  #: the same beside the base of both recordings, in which each recording's bias is free
+    after: Known  #: by both recordings
     new: NDArray[np.bool_]  #: (w,) columns that the first recording does not show, as another mounting
-
-    def log_bf(self, gain: Array, factor: NDArray[np.float64], g: float) -> Array:
-        """Return the log Bayes factor of gains in chi2 with the unit-information prior, as `evidence` has it."""
-        return np.asarray(0.5 * gain * g / (1 + g) - 0.5 * factor.shape[1] * np.log1p(g))
 
 
 @dataclass(frozen=True)
@@ -75,15 +104,15 @@ class AxisForecast:
         inner = both[: len(base)].T @ columns
         remaining = columns - both[: len(base)] @ inner
         self.gram = remaining.T @ columns
-        gram_now = remaining_now.T @ columns[first]
+        gram_now, gram_before = remaining_now.T @ columns[first], left_now.T @ columns[first]
         norms_now, norms = (columns[first] ** 2).sum(axis=0), (columns**2).sum(axis=0)
         self.shapes = [
             Shape(
                 option.candidate,
                 place,
-                _factor(gram_now, norms_now, place),
-                _factor(left_now.T @ columns[first], norms_now, place),
-                _factor(self.gram, norms, place),
+                _known(option, gram_now[place, place], norms_now[place], self.g[0]),
+                _known(option, gram_before[place, place], norms_now[place], self.g[0]),
+                _known(option, self.gram[place, place], norms[place], self.g[1]),
                 _new_columns(option, np.diag(gram_now)[place], norms[place]),
             )
             for option, place in zip(design.options, slices_of(design.options), strict=True)
@@ -103,14 +132,11 @@ class AxisForecast:
 
     def shapes_of(self, effect: str) -> list[Shape]:
         """Return the shapes of an effect that the first recording shows; none where it does not touch the axis."""
-        return [shape for shape in self._of.get(effect, []) if shape.now.shape[1]]
+        return [shape for shape in self._of.get(effect, []) if shape.now.directions]
 
     def _now(self, effect: str) -> Array:
         """Return the log Bayes factor of each shape of an effect by the first recording, (s,) nats."""
-        gains = [float(np.sum((s.now.T @ self._b_now[s.columns]) ** 2)) for s in self.shapes_of(effect)]
-        each = [
-            s.log_bf(np.array(gain), s.now, self.g[0]) for s, gain in zip(self.shapes_of(effect), gains, strict=True)
-        ]
+        each = [s.now.log_bf(self._b_now[s.columns]) for s in self.shapes_of(effect)]
         return np.array(each, dtype=np.float64)
 
     def evidence_before(self, effect: str) -> float | None:
@@ -118,9 +144,7 @@ class AxisForecast:
 
         It is averaged over the shapes. What is shifts between runs there cannot count for an effect.
         """
-        shapes = self.shapes_of(effect)
-        gains = [np.array(np.sum((s.before.T @ self._b_before[s.columns]) ** 2)) for s in shapes]
-        each = [s.log_bf(gain, s.before, self.g[0]) for s, gain in zip(shapes, gains, strict=True)]
+        each = [s.before.log_bf(self._b_before[s.columns]) for s in self.shapes_of(effect)]
         return float(logsumexp(each) - np.log(len(each))) if each else None
 
     def draw(self, effect: str, n: int, rng: np.random.Generator) -> Outcomes:
@@ -130,33 +154,44 @@ class AxisForecast:
         shapes, now = self.shapes_of(effect), self._now(effect)
         if shapes:
             chosen = rng.choice(len(shapes), n, p=np.exp(now - logsumexp(now)))
-            shrunk = self.g[0] / (1 + self.g[0])
             for i, shape in enumerate(shapes):
                 rows = np.flatnonzero(chosen == i)
-                mean = shrunk * shape.now @ (shape.now.T @ self._b_now[shape.columns])
-                free = rng.standard_normal((len(rows), shape.now.shape[1])) @ (np.sqrt(shrunk) * shape.now.T)
-                coefficients = mean + free
-                if np.any(shape.new) and not np.all(shape.new):  # the next mounting is another draw of the same kind
-                    size = np.sqrt(np.mean(coefficients[:, ~shape.new] ** 2, axis=1, keepdims=True))
-                    coefficients[:, shape.new] = size * rng.standard_normal((len(rows), int(shape.new.sum())))
-                products[rows] += coefficients @ self._response[:, shape.columns].T
+                coefficients = shape.now.draw(self._b_now[shape.columns], len(rows), rng)
+                products[rows] += self._with_new(shape, coefficients, rng) @ self._response[:, shape.columns].T
         return Outcomes(self, products)
+
+    @staticmethod
+    def _with_new(shape: Shape, coefficients: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return coefficients (n, w), those of mountings still to come drawn with the size of those that were seen."""
+        if shape.now.drawn is None and np.any(shape.new) and not np.all(shape.new):
+            size = np.sqrt(np.mean(coefficients[:, ~shape.new] ** 2, axis=1, keepdims=True))
+            coefficients[:, shape.new] = size * rng.standard_normal((len(coefficients), int(shape.new.sum())))
+        return coefficients
 
     def reproduced(self, fitted: Fitted, rival: str, outcomes: Outcomes, k: int) -> tuple[float, int]:
         """Return the part of a fitted signal, in chi2, that a rival's best shape reproduces, and how many more
         directions the rival has."""
         best = outcomes.best(rival, k)
         if best is None:
-            return 0.0, -fitted.shape.after.shape[1]
+            return 0.0, -fitted.shape.after.directions
         inner = self.gram[best.columns, fitted.shape.columns] @ fitted.coefficients
-        return float(np.sum((best.after.T @ inner) ** 2)), best.after.shape[1] - fitted.shape.after.shape[1]
+        return float(best.after.gain(inner)), best.after.directions - fitted.shape.after.directions
+
+    def reproduced_by_draws(self, fitted: Fitted, drawn: str, outcomes: Outcomes, k: int) -> float:
+        """Return the part of a fitted signal, in chi2, that as many draws of a shift reproduce as it has
+        coefficients."""
+        best = outcomes.best(drawn, k)
+        if best is None:
+            return 0.0
+        inner = self.gram[best.columns, fitted.shape.columns] @ fitted.coefficients
+        return reproduced_by_draws(self.gram[best.columns, best.columns], inner, fitted.shape.after.directions)
 
     def further_nats(self, fitted: Fitted, rival: str, outcomes: Outcomes, k: int) -> float:
         """Return the evidence against the coefficients that a rival has beyond a fitted signal, nats."""
         best = outcomes.best(rival, k)
         if best is None:
             return 0.0
-        covariance = best.after @ best.after.T
+        covariance = best.after.factor @ best.after.factor.T
         through = covariance @ self.gram[best.columns, fitted.shape.columns]
         values = outcomes.coefficients(best, k)
         return further_nats(values, covariance, through, fitted.coefficients, self._size[best.columns])
@@ -173,7 +208,7 @@ class Outcomes:
         """Return the log Bayes factor of each shape of an effect by both recordings, (s, n) nats."""
         if effect not in self._known:
             self._known[effect] = np.array([
-                s.log_bf(((self._products[:, s.columns] @ s.after) ** 2).sum(axis=1), s.after, self._axis.g[1])
+                s.after.log_bf(self._products[:, s.columns])
                 for s in self._axis.shapes_of(effect)
             ])  # fmt: skip
         return self._known[effect]
@@ -193,12 +228,13 @@ class Outcomes:
         best = self.best(effect, k)
         if best is None:
             return None
-        inner = best.after.T @ self._products[k, best.columns]
-        return Fitted(best, best.after @ inner, float(inner @ inner))
+        inner = best.after.factor.T @ self._products[k, best.columns]
+        return Fitted(best, best.after.factor @ inner, float(inner @ inner))
 
     def coefficients(self, shape: Shape, k: int) -> Array:
         """Return the coefficients, (w,), with which a shape is fitted in outcome `k`."""
-        return np.asarray(shape.after @ (shape.after.T @ self._products[k, shape.columns]))
+        factor = shape.after.factor
+        return np.asarray(factor @ (factor.T @ self._products[k, shape.columns]))
 
 
 @dataclass(frozen=True)
@@ -307,12 +343,16 @@ def _orthonormal(base: NDArray[np.float64], prior: Array) -> tuple[NDArray[np.fl
     return root, whole @ root
 
 
-def _factor(gram: NDArray[np.float64], squared_norms: Array, place: slice) -> NDArray[np.float64]:
-    """Return the factor (w, r) of the inverse of a shape's part of a Gram matrix, in the directions that are seen."""
-    size = np.sqrt(np.maximum(squared_norms[place], 1e-300))
-    values, vectors = np.linalg.eigh(gram[place, place] / np.outer(size, size))
+def _known(option: CandidateShape, gram: NDArray[np.float64], squared_norms: Array, g: float) -> Known:
+    """Return what a shape's Gram matrix (w, w), base eliminated, says of it, in the directions that are seen.
+
+    `squared_norms` (w,) are those of its columns before, and `g` is the number of data sets.
+    """
+    size = np.sqrt(np.maximum(squared_norms, 1e-300))
+    values, vectors = np.linalg.eigh(gram / np.outer(size, size))
     kept = values > MIN_REMAINING
-    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / size[:, None])
+    factor = np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / size[:, None])
+    return Known(factor, g, DrawnShifts.of(gram, g) if option.is_drawn else None)
 
 
 def _new_columns(option: CandidateShape, seen_now: Array, norms: Array) -> NDArray[np.bool_]:

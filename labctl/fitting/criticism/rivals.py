@@ -62,10 +62,48 @@ class Pair(ABC):
     def has_as_simple_a_shape(self) -> bool:
         """Whether a shape of the rival with no more coefficients than the leader is not far behind it."""
 
+    @property
+    @abstractmethod
+    def share_by_draws(self) -> float:
+        """The share of the leader's signal that as few draws of the rival reproduce, 0 to 1.
+
+        As few: as many as the leader has coefficients on each axis; only asked where the rival alone is drawn.
+        """
+
+    @property
+    @abstractmethod
+    def share_of_rival(self) -> float:
+        """The share of the rival's signal that the leader reproduces, 0 to 1; only asked where the leader is drawn."""
+
     @cached_property
     def contains_leader(self) -> bool:
         """Whether the rival reproduces the leader's signal up to what noise hides."""
         return (1.0 - self.share) * self.leader_gain < INDISTINGUISHABLE_CHI2
+
+
+def is_drawn(candidate: Candidate) -> bool:
+    """Return whether each coefficient of a candidate is a draw, for a powered run or a mounting of its own."""
+    kind = None if candidate.smooth else CATALOGUE.get(candidate.id)
+    return kind is not None and kind.is_random
+
+
+def are_aliases_by_draws(pair: Pair) -> bool:
+    """Return whether one of a pair is drawn, and its draws are the signal of the other in every reading.
+
+    One mounting that differs from all others is gravity along an axis that only this mounting turns up. Beside that,
+    the evidence weighs no data, but how a coefficient and draws are distributed: such a pair cannot be distinguished
+    whatever the odds. A drawn rival has to be the leader with no more draws than that has coefficients. A drawn leader
+    follows the signal of many a rival, by all its draws; it is another cause only where noise hardly makes what the
+    rival leaves of them.
+    """
+    if is_drawn(pair.leader) == is_drawn(pair.rival):
+        return False
+    if is_drawn(pair.rival):
+        return pair.share_by_draws > ALIKE
+    if pair.share_of_rival <= ALIKE:
+        return False
+    more = -pair.further_directions
+    return more <= 0 or by_chance(-pair.further_gain, more) >= MIN_CHANCE
 
 
 def cannot_be_distinguished(pair: Pair) -> bool:
@@ -77,8 +115,9 @@ def cannot_be_distinguished(pair: Pair) -> bool:
     makes them so large, whatever its evidence: the price of so many coefficients hides small shifts.
     """
     near = pair.rival_log_bf > pair.leader_log_bf - LEAD or (pair.rival_log_bf > 0 and _is_indistinguishable(pair))
-    kind = CATALOGUE.get(pair.rival.id)
-    is_random = kind is not None and kind.is_random
+    is_random = is_drawn(pair.rival)
+    if are_aliases_by_draws(pair):
+        return True
     if not (near or is_random) or pair.further_directions <= 0 or not pair.contains_leader:
         return near
     if is_random:

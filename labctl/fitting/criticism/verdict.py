@@ -15,11 +15,18 @@ import numpy as np
 from labctl.answers.criticism import Remainder
 from labctl.answers.fitted_model import Coefficient
 from labctl.fitting.criticism.channel_functions import TIMES
+from labctl.fitting.criticism.evidence.drawn_shifts import reproduced_by_draws
 from labctl.fitting.criticism.evidence.further_coefficients import further_nats
 from labctl.fitting.criticism.evidence.gains import reproduced_and_size, solve_option
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate
-from labctl.fitting.criticism.rivals import FAR, LEAD, Pair, cannot_be_distinguished
+from labctl.fitting.criticism.rivals import (
+    FAR,
+    LEAD,
+    Pair,
+    are_aliases_by_draws,
+    cannot_be_distinguished,
+)
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.derived import with_derived
 
@@ -164,14 +171,15 @@ def is_at_end(comparison: Comparison, effect: Candidate, *, shortest: bool = Fal
 def alias_group(comparison: Comparison, leader: Candidate) -> tuple[str, ...]:
     """Return the leader and the effects that the data cannot distinguish from it, best first.
 
-    At most `MOST`, and beyond them those whose columns are the same as the leader's or as the last one's.
+    At most `MOST`, and beyond them those whose columns are the same as the leader's or as the last one's, or as those
+    of so few draws.
     """
     near = _alike(comparison, leader, physical=True)
     exact = [r for r in near if abs(r.log_bf - leader.log_bf) < SAME]
     others = [r for r in near if r not in exact]
     if len(others) >= MOST:
         last = others[MOST - 2].log_bf
-        others = [r for r in others if r.log_bf > last - SAME]
+        others = [r for r in others if r.log_bf > last - SAME or are_aliases_by_draws(_pair(comparison, leader, r))]
     return (leader.id, *(r.id for r in exact), *(r.id for r in others))
 
 
@@ -217,6 +225,14 @@ class _MeasuredPair(Pair):
     @property
     def has_as_simple_a_shape(self) -> bool:
         return has_as_simple_a_shape(self.comparison, self.leader, self.rival)
+
+    @property
+    def share_by_draws(self) -> float:
+        return overlap_by_draws(self.comparison, self.leader, self.rival)
+
+    @property
+    def share_of_rival(self) -> float:
+        return overlap(self.comparison, self.rival, self.leader)
 
 
 def _pair(comparison: Comparison, leader: Candidate, rival: Candidate) -> Pair:
@@ -285,6 +301,20 @@ def overlap(comparison: Comparison, leader: Candidate, rival: Candidate) -> floa
             else (0.0, reproduced_and_size(eliminated, slices[option], slices[option])[1])
         )
         part, whole = part + shared, whole + size
+    return part / whole if whole > 0 else 0.0
+
+
+def overlap_by_draws(comparison: Comparison, fixed: Candidate, drawn: Candidate) -> float:
+    """Return which share of a fitted signal as many draws of a shift reproduce as it has coefficients, 0 to 1."""
+    part = whole = 0.0
+    for axis, option in fixed.option.items():
+        of_axis = comparison.axes[axis]
+        signal, gram = of_axis.slices[option], of_axis.best.gram
+        values, _ = solve_option(of_axis.best, signal)
+        whole += float(values @ gram[signal, signal] @ values)
+        if axis in drawn.option:
+            by = of_axis.slices[drawn.option[axis]]
+            part += reproduced_by_draws(gram[by, by], gram[by, signal] @ values, int(of_axis.dimensions[option]))
     return part / whole if whole > 0 else 0.0
 
 

@@ -60,8 +60,11 @@ class Shift:
 
 def shifts_of(channels: Channels, axis: str) -> list[Shift]:
     """Return the shifts of one output axis that the rows (n,) show; none for a single recording."""
-    if len(recordings_in(channels.columns)) < 2:
-        return []
+    return shown_shifts(channels, axis) if len(recordings_in(channels.columns)) > 1 else []
+
+
+def shown_shifts(channels: Channels, axis: str) -> list[Shift]:
+    """Return the shifts that rows (n,) of several recordings show, also where these are all of one recording."""
     return [shift for shift in _every(channels, axis) if np.any(shift.values)]
 
 
@@ -75,11 +78,18 @@ def shift_contrasts(channels: Channels, axis: str, placed_rad: float = 0.0) -> t
     """Return contrasts between the shifts of one axis, (n, k), and the largest standard deviation of each, (k,).
 
     What all recordings have in common is no shift: an error of the bias that they share can still be found. So it is
-    with the angles of mountings.
+    with the angles of mountings. The bias of a recording is one: what differs between its powered runs, or mountings,
+    is what effects of gravity, of the runs and of the mountings compete for, as in a single recording.
     """
+    of_recording: dict[int, Array] = {}
     kinds: dict[tuple[ShiftKind, str], list[Array]] = {}
     for shift in shifts_of(channels, axis):
-        kinds.setdefault((shift.kind, shift.along), []).append(shift.values)
+        if shift.kind == "turn_on":
+            of_recording[shift.recording] = of_recording.get(shift.recording, np.zeros(len(channels))) + shift.values
+        else:
+            kinds.setdefault((shift.kind, shift.along), []).append(shift.values)
+    if of_recording:
+        kinds = {("turn_on", ""): list(of_recording.values()), **kinds}
     angles = angle_columns(channels, axis, placed_rad)
     columns, largest = [angles.values], angles.size.tolist()
     for (kind, _), values in kinds.items():

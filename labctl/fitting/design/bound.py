@@ -27,6 +27,8 @@ from labctl.fitting.numeric.blas_threads import single_threaded
 #: Rates, as shares of the largest, and temperatures between which the time is shared.
 SHARES = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
 LEVELS = 7
+#: The same of a supply voltage, as shares of the nominal one: as far as steps of the supply go.
+SUPPLY_SHARES = (0.95, 1.0, 1.05)
 #: Steps of the algorithm; the criterion then changes by less than a thousandth.
 STEPS = 200
 HOUR_S = 3600.0
@@ -80,18 +82,20 @@ def _least_trace(parts: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def _every_point(positions: Sequence[str], use: RangeOfUse) -> PlannedSets:
-    """Return a data set at each rate and temperature in each position."""
+    """Return a data set at each rate, temperature and voltage of a supply that the bench sets, in each position."""
     low_c, high_c = use.temperature_c
     levels = np.linspace(low_c, high_c, LEVELS)
-    grid = [(p, s * use.rate_dps, t) for t in levels.tolist() for p in positions for s in SHARES]
+    volts = [0.0] if use.supply_v is None else [share * use.supply_v for share in SUPPLY_SHARES]
+    grid = [(p, s * use.rate_dps, t, v) for t in levels.tolist() for p in positions for s in SHARES for v in volts]
     n = len(grid)
     begin_s: Array = EACH_S * np.arange(n, dtype=np.float64)
     lasts_s = np.full(n, EACH_S - 2.0 * STEP_S)
-    temperatures_c: Array = np.array([t for _, _, t in grid])
+    temperatures_c: Array = np.array([t for _, _, t, _ in grid])
     return PlannedSets(
-        begin_s, lasts_s, np.array([rate for _, rate, _ in grid]), np.array([p for p, _, _ in grid]),
+        begin_s, lasts_s, np.array([rate for _, rate, _, _ in grid]), np.array([p for p, *_ in grid]),
         np.ones(n, dtype=np.int64), np.ones(n, dtype=np.int64), begin_s,
         HeatCourse.constant_in_steps(temperatures_c, EACH_S),
+        None if use.supply_v is None else np.array([v for *_, v in grid]),
     )  # fmt: skip
 
 

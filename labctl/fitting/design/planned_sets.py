@@ -36,6 +36,7 @@ class PlannedSets:
     mounting: NDArray[np.int64]  #: (m,)
     on_s: Array  #: (m,) since the units were switched on
     heat: HeatCourse
+    supply_v: Array | None = None  #: (m,) voltage of the units' supply, where the bench sets it
 
     def __len__(self) -> int:
         return len(self.rate_dps)
@@ -65,6 +66,7 @@ def planned_data(sets: PlannedSets, axes: Sequence[str], noise: NoiseFigures) ->
         "position": sets.position, "table_rate_dps": sets.rate_dps, "temperature_c": temperatures_c,
         "power_s": sets.on_s, "duration_s": sets.duration_s, "n": np.full(len(sets), READINGS),
     }  # fmt: skip
+    columns |= {} if sets.supply_v is None else {"supply_v": sets.supply_v}
     for axis in axes:
         white = np.sqrt(noise.of(axis).white_var(sets.duration_s))
         columns |= {f"gyro_{axis}": rates[axis], f"gyro_{axis}_std": np.sqrt(READINGS) * white}

@@ -93,7 +93,10 @@ def derivative_at_points(model: ErrorModel, use: RangeOfUse, design: AxisDesign,
     A unit in use has settled: what follows its temperature with a delay, and what is not exported, counts nothing.
     """
     points, _ = use.points
-    terms = tuple(t for t in model.terms if is_exported(t) and not kind_of(t).remembers and not kind_of(t).needs)
+    terms = tuple(
+        term for term in model.terms
+        if is_exported(term) and not kind_of(term).remembers and not points.missing(kind_of(term).needs)
+    )  # fmt: skip
     values = {
         (owner, column.name): column.values for owner, column in model.with_terms(terms).columns(points, axis)
     }  # fmt: skip

@@ -25,6 +25,7 @@ class RangeOfUse:
     axes: tuple[str, ...]  #: body axes about which the unit turns in use
     rate_dps: float  #: largest size of the rate vector
     temperature_c: tuple[float, float]
+    supply_v: float | None = None  #: in use, where the bench sets it in the calibration
 
     @cached_property
     def temperatures_c(self) -> Array:
@@ -70,5 +71,6 @@ class RangeOfUse:
             "temperature_c": warm, "table_rate_dps": np.linalg.norm(whole, axis=1),
             "position": np.full(len(warm), self.axes[0]),
         }  # fmt: skip
+        columns |= {} if self.supply_v is None else {"supply_v": np.full(len(warm), self.supply_v)}
         every = (trapezoid[:, None] * weights[None, :]).ravel()
         return Channels(columns, rates), np.asarray(every / every.sum())

@@ -166,6 +166,7 @@ class CentripetalAcceleration(_Acceleration):
     shows_at_rest = False
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
     aliases = ("scale_factor_even",)
+    alike_at_one_radius = True
     parameters = (
         Parameter(
             "by_position",

@@ -142,6 +142,7 @@ class Effect(ABC):
     ranges: ClassVar[Mapping[str, tuple[float, float]]] = {}  #: technology -> plausible size of the first coefficient
     one_sign: ClassVar[bool] = False  #: whether the first coefficient has the sign of its range; else of either sign
     aliases: ClassVar[tuple[str, ...]] = ()  #: ids of the same columns, in one of the shapes, whatever the schedule
+    alike_at_one_radius: ClassVar[bool] = False  #: whether it is its aliases at one distance from the table's axis only
     experiment: ClassVar[str] = ""  #: what would distinguish it from similar effects
     equation: ClassVar[Equation | None] = None
     sources: ClassVar[tuple[Source, ...]] = ()  #: of the equation, or of the definition of the effect
@@ -196,6 +197,13 @@ class Effect(ABC):
         For an effect whose cause has to change by more than it does unintended: a drift of the cause is no experiment.
         """
         return ""
+
+    def aliases_in(self, channels: Channels) -> tuple[str, ...]:
+        """Return the ids of effects that no further data sets beside rows of these channels tell from this one.
+
+        Where the distance from the table's axis is known, data sets at another one do.
+        """
+        return () if self.alike_at_one_radius and np.any(np.isfinite(channels.radius_m())) else self.aliases
 
     def options(self, span: Span) -> list[Term]:
         """Return the shapes in which this effect competes for a recording: orders, and a grid of its parameters."""

@@ -141,6 +141,7 @@ class ScaleFactorEven(_Power):
     max_order = 4
     ranges: ClassVar = {"fog": (0.0, 1e-6), "mems": (1e-7, 2e-6), "piezo": (0.0, 1e-5)}
     aliases = ("centripetal_acceleration",)
+    alike_at_one_radius = True
     experiment = "repeat at another radius, or with the unit turned by 180 deg on the table"
     draws = ("table_rate_dps", "map")
     equation: ClassVar = Equation(

@@ -13,7 +13,7 @@ from labctl.fitting.data.earth_rate import turning_columns, turning_size_dps, wi
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.mounting_angles import leaning_rates
 from labctl.fitting.data.response import TIME_CONSTANT
-from labctl.fitting.data.shifts import KINDS, shifts_of
+from labctl.fitting.data.shifts import KINDS, shown_shifts
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.common_radius_error import with_radius_error
 from labctl.fitting.estimation.common_turn_error import with_common_error
@@ -63,7 +63,7 @@ class Nuisance:
             columns = turning_columns(data.info, data.channels, axis)
             if columns.shape[1] == len(self.turning):
                 error += columns @ self.turning
-        for shift in shifts_of(data.channels, axis) if self.shifts else ():
+        for shift in shown_shifts(data.channels, axis) if self.shifts else ():
             error += self.shifts.get(shift.name, 0.0) * shift.values
         return error
 

@@ -38,9 +38,9 @@ MIN_NAMING = 0.05
 SET_UP_H = 0.25
 #: Below this there is nothing to learn, bit.
 MIN_OPEN_BIT = 0.01
-#: An experiment is also planned with its rates run so many times as often, where it is shorter than this, h: the soaks
-#: and mountings are the same, and a weak effect needs the readings.
-LONGER, LONGEST_TO_REPEAT_H = 4, 6.0
+#: An experiment is also planned with its rates run so many times as often, while it is shorter than this, h: the soaks
+#: and mountings are the same, a weak effect needs the readings, and drift needs the time.
+LONGER, LONGEST_TO_REPEAT_H = (4, 16), 6.0
 #: The block that tests laws: where between the rates they differ.
 BETWEEN = "between_rates"
 #: Effects named in the sentence that explains a choice; the rest is counted.
@@ -188,9 +188,12 @@ def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
             if changed.profiles and not plan.recipe.profiles:
                 continue
             yield Planned(block, plan, block.text)
-            if plan.expected_s < 3600 * LONGEST_TO_REPEAT_H:
-                longer = plan.recipe.model_copy(update={"repeats": LONGER * plan.recipe.repeats})
-                yield Planned(block, make_plan(longer, limits), f"{block.text}; rates {LONGER} times as often")
+            short = plan.recipe
+            for times in LONGER:
+                if plan.expected_s >= 3600 * LONGEST_TO_REPEAT_H:
+                    break
+                plan = make_plan(short.model_copy(update={"repeats": times * short.repeats}), limits)
+                yield Planned(block, plan, f"{block.text}; rates {times} times as often")
         except (LabctlError, ProcedureError) as error:
             log.debug("experiment.left_out", block=block.id, reason=str(error))
 

@@ -25,6 +25,7 @@ from labctl.fitting.design.heat_course import HeatFlow
 from labctl.fitting.design.range_of_use import RangeOfUse
 from labctl.fitting.models.presets import POSES, preset_for
 from labctl.services.cache import UNNAMED, compute
+from labctl.services.design.further_sections import further_sections
 from labctl.services.design.known import Known, known_noise
 from labctl.services.design.problem import NOT_POSSIBLE, Candidate, Goal, Problem
 from labctl.services.design.search import chosen, next_best, search
@@ -113,10 +114,14 @@ def pose(store: Store | None, request: DesignRequest, bench: BenchFile | None) -
     known = known_noise(store, on, axes, request.prior, span)
     flow = HeatFlow(limits.ramp_c_per_min, USUAL_AIR_TAU_S if on.air_tau_s is None else on.air_tau_s)
     used = tuple(each for each in BODY_AXES if each in {Position.of(position).axis for position in base.positions})
-    use = RangeOfUse(used, span.rate_dps, (span.low_c, span.high_c))
+    supply_v = None if on.supply is None else on.supply.nominal_v
+    use = RangeOfUse(used, span.rate_dps, (span.low_c, span.high_c), supply_v)
     name = f"{base.name}-designed"
     useful = tuple(each for each in on.tilted_positions if is_useful(base.positions, axes, each))
-    problem = Problem(base, span, model, effects, axes, limits, flow, known.noise, use, name, useful)
+    problem = Problem(
+        base, span, model, effects, axes, limits, flow, known.noise, use, name, useful,
+        further=further_sections(effects, base, span, on),
+    )  # fmt: skip
     of_type = _prior(store, request, model, effects, axes)
     problem = problem if of_type is None else replace(problem, prior=of_type.prior)
     return Posed(problem, on, known, like, of_type)

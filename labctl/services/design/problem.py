@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -85,6 +86,7 @@ class Problem:
     name: str
     tilted: tuple[str, ...] = ()  #: directions that a tilted fixture brings up, of which one may be chosen
     prior: CoefficientPrior | None = None  #: what the type says of the coefficients; the recipe is fitted with it
+    further: Mapping[str, object] = field(default_factory=dict)  #: sections of every recipe (`further_sections`)
     evaluated: dict[Scheme, Candidate | None] = field(default_factory=dict)  #: those that cannot be run are None
 
     def with_fixture(self, position: str) -> Problem:
@@ -112,14 +114,15 @@ class Problem:
         recipe = recipe_of(
             scheme, self.base, self.span, name=self.name,
             fit=FitRules(model=self.model, effects=effects, type_prior=self.prior is not None),
-            ramp_c_per_min=self.limits.ramp_c_per_min,
+            ramp_c_per_min=self.limits.ramp_c_per_min, further=self.further,
         )  # fmt: skip
         return self.of_recipe(recipe, scheme, effects)
 
     def of_recipe(self, recipe: Recipe, scheme: Scheme | None, effects: tuple[str, ...]) -> Candidate:
         """Return what a recipe costs and gives. Raises PlanRefused, NotEnoughData."""
         plan = make_plan(recipe, self.limits)
-        sets = foreseen_sets(plan, self.flow, self.limits.max_acceleration_dps2)
+        nominal_v = None if self.limits.supply is None else self.limits.supply.nominal_v
+        sets = foreseen_sets(plan, self.flow, self.limits.max_acceleration_dps2, nominal_v)
         preset = preset_for(self.model, list(effects))
         predicted = predicted_uncertainty(sets, self.axes, preset, self.noise, self.use, self.prior)
         low_c, high_c = float(sets.temperature_c.min()), float(sets.temperature_c.max())

@@ -93,7 +93,9 @@ def _experiment(progress: Progress, criticism: CriticismResponse) -> Measure | E
     if not offered:
         return End("indistinguishable", sentences.none_offered(named))
     came = _results(progress.done)
-    possible = [each for each in offered if came.get(experiment_key(each["toml"])) != "cannot_be_done"]
+    # what cannot be done at all, such as a mounting, cannot be done with more repeats either
+    impossible = {_whatever_repeats(each.toml) for each in progress.done if each.came == "cannot_be_done"}
+    possible = [each for each in offered if _whatever_repeats(each["toml"]) not in impossible]
     if not possible:
         return End("cannot_be_done", sentences.none_can_be_done(named, len(offered)))
     # what an experiment has not distinguished it does not distinguish
@@ -115,7 +117,16 @@ def _results(done: Sequence[DoneExperiment]) -> Mapping[str, ExperimentResult]:
 
 def experiment_key(toml: str) -> str:
     """Return what two recipes of the same experiment have in common: the hash of all but the name."""
-    document = {key: value for key, value in tomllib.loads(toml).items() if key != "name"}
+    return _key(toml, frozenset({"name"}))
+
+
+def _whatever_repeats(toml: str) -> str:
+    """Return what recipes of the same experiment have in common, however often their rates are run."""
+    return _key(toml, frozenset({"name", "repeats"}))
+
+
+def _key(toml: str, left_out: frozenset[str]) -> str:
+    document = {key: value for key, value in tomllib.loads(toml).items() if key not in left_out}
     return hashlib.sha256(canonical(document)).hexdigest()
 
 

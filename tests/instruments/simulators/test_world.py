@@ -111,6 +111,34 @@ def test_the_same_seed_is_the_same_world_and_another_is_another(stand: Make) -> 
     assert not np.array_equal(one, three)
 
 
+@pytest.mark.parametrize("effect", ["run_shift", "mounting_shift"])
+def test_shifts_of_another_day_are_others_of_the_same_size(stand: Make, effect: str) -> None:
+    def shifts(noise_seed: int) -> list[float]:
+        """Return what the effect adds in ten mountings, each a powered session, deg/s."""
+        means = []
+        for size in (0.0, 1.0):
+            hidden = {"seed": 5, "noise_seed": noise_seed, "hidden": {effect: size}}
+            s = stand("triaxial-sim", simulation=hidden)
+            means.append(np.array([_session(s, k) for k in range(10)]))
+        return (means[1] - means[0]).tolist()
+
+    days = np.array([shifts(day) for day in (0, 0, 1, 2)])
+    assert np.array_equal(days[0], days[1])
+    assert not np.any(np.isclose(days[0], days[2], atol=1e-3))
+    assert not np.any(np.isclose(days[2], days[3], atol=1e-3))
+    assert 0.5 < np.std(days) < 1.5
+
+
+def _session(s: Any, number: int) -> float:
+    """Return the mean output of the first axis in a mounting and powered session of its own."""
+    at = 100.0 * number
+    s.world.mount(at, "z")
+    s.world.power(at, True)
+    rate = s.world.gyro("mems").sample(at + np.arange(1, 3) / 10.0).rate_dps[:, 0].mean()
+    s.world.power(at + 50.0, False)
+    return float(rate)
+
+
 def story(s: Any) -> np.ndarray:
     """A walk in which every channel moves: warm-up, a warming chamber, turns both ways, two mountings, two runs."""
     unit = s.world.gyro(s.file.gyros[0].name)

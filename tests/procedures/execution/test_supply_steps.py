@@ -220,6 +220,27 @@ def test_a_campaign_that_was_killed_among_the_voltages_goes_on_at_the_right_one(
     assert supplied.trace.index("supply.safe") < supplied.trace.index(f"supply.set {voltage.voltage_v:g}")
 
 
+@pytest.mark.parametrize("at", [0, 2, 5])
+def test_a_campaign_that_is_killed_while_a_voltage_is_set_sets_it_when_it_goes_on(supplied: Rig, at: int) -> None:
+    plan = planned(supplied)
+    index = [n for n, step in enumerate(plan.steps) if isinstance(step, SetSupply)][at]
+    wanted: Any = plan.steps[index]
+
+    def kill(what: str, step: Any) -> None:
+        if (what, step) == ("step_started", index):
+            raise KeyboardInterrupt
+
+    supplied.journal.hooks.append(kill)
+    with pytest.raises(KeyboardInterrupt):
+        supplied.make(plan.recipe).run()
+    again = Rig()
+    again.supply = supplied.supply  # whatever it was left at
+    again.supply.rig = again
+    outcome = again.make(plan.recipe).run(index, Restart(gap_s=60.0))
+    assert outcome.state is CampaignState.DONE, outcome
+    assert set(again.journal.blocks[0][2].raw["supply_v"].tolist()) == {round(wanted.voltage_v * 1e4)}
+
+
 def test_the_power_of_the_units_is_switched_with_the_output(supplied: Rig) -> None:
     recipe = supplied.recipe(positions=["z"], power_cycle={"count": 1, "off_s": 30.0, "rates_dps": [0.0]})
     assert supplied.run(recipe).state is CampaignState.DONE

@@ -1,6 +1,7 @@
 """Bayes factors of the options on one axis against the base, averaged over the noise.
 
-The evidence has a unit-information g-prior on the coefficients (g = number of data sets).
+The evidence has a unit-information g-prior on the coefficients (g = number of data sets); where these are draws, one
+for each powered run or mounting, it is averaged over the standard deviation of the draws.
 """
 
 from __future__ import annotations
@@ -69,11 +70,11 @@ def evidence(
     slices, noises = means.slices, means.noises
     everything = _with_data(design, y)
     others = ScaledBase(design, scale).products(everything)
-    log_p, gain, k = gains_by_noise(means, others)
-    g = float(len(design.t_s))
-    log_bf = 0.5 * gain * g / (1 + g) - 0.5 * k * np.log1p(g)
+    drawn = [i for i, option in enumerate(design.options) if option.is_drawn]
+    found = gains_by_noise(means, others, float(len(design.t_s)), drawn)
+    log_p = found.log_p
     log_all = float(np.logaddexp.reduce(log_p))
-    total = np.logaddexp.reduce(log_p[:, None] + log_bf, axis=0) - log_all
+    total = np.logaddexp.reduce(log_p[:, None] + found.log_bf, axis=0) - log_all
     best = int(np.argmax(log_p))
     eliminated = WhitenedBase(design, means.white_var, noises[best]).eliminate_from(everything[0], others)
     competes = [
@@ -81,9 +82,9 @@ def evidence(
         for option, option_rows in zip(design.options, slices, strict=True)
     ]
     return AxisEvidence(
-        np.where((k[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
+        np.where((found.dimensions[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
         eliminated,
-        gain[best], k[best], slices, np.exp(log_p - log_all), noises, rows,
+        found.gain[best], found.dimensions[best], slices, np.exp(log_p - log_all), noises, rows,
         int((design.precision == 0).sum()),
         float(log_all + 0.5 * np.log(design.precision[design.precision > 0]).sum()),
     )  # fmt: skip

@@ -6,12 +6,14 @@ costs a small eigenproblem.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
+from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts
 from labctl.fitting.criticism.evidence.gains import OptionPairs
 from labctl.fitting.criticism.evidence.noise_grid import DriftModes, Noise, factors, whiten
 from labctl.fitting.numeric.arrays import Array
@@ -96,19 +98,30 @@ class MeansByNoise:
         return MeansByNoise(white_var, noises, slices, options, [products[noise] for noise in noises])
 
 
-def gains_by_noise(means: MeansByNoise, other_products: NonMeanProducts) -> tuple[
-    Array, NDArray[np.float64], NDArray[np.int64]
-]:  # fmt: skip
-    """Return the log likelihood of the base at each noise, and the gains of the options.
+@dataclass(frozen=True)
+class GainsByNoise:
+    """What options remove at each noise."""
 
-    The log likelihood is (noises,); the chi2 that each option removes and the number of its directions are (noises,
-    options). The same as from `WhitenedBase`, without the inner products between options, which are most of the work.
+    log_p: Array  #: (noises,) log likelihood of the base
+    gain: NDArray[np.float64]  #: (noises, options) chi2 that each removes
+    dimensions: NDArray[np.int64]  #: (noises, options) directions of each
+    log_bf: NDArray[np.float64]  #: (noises, options) log Bayes factor against the base
+
+
+def gains_by_noise(
+    means: MeansByNoise, other_products: NonMeanProducts, g: float, drawn: Sequence[int] = ()
+) -> GainsByNoise:
+    """Return what the options remove at each noise, and their evidence with a unit-information prior of `g` data sets.
+
+    `drawn` are the numbers of the options whose coefficients are draws. The same as from `WhitenedBase`, without the
+    inner products between options, which are most of the work.
     """
     left, right = means.options.left, means.options.right
     own_pairs, own_with_data = other_products.of_rows[left, right], other_products.of_rows[:, -1]
     single = means.options.single
     log_p, gain = np.empty(len(means.noises)), np.empty((len(means.noises), len(means.slices)))
     dimensions = np.empty(gain.shape, dtype=np.int64)
+    of_draws = np.empty((len(means.noises), len(drawn)))
     for i, at in enumerate(means.products):
         crossed, log_det = _projected(at.of_base + other_products.of_base, at.crossed + other_products.crossed)
         data_products = at.with_data + own_with_data - crossed.T @ crossed[:, -1]
@@ -116,7 +129,12 @@ def gains_by_noise(means: MeansByNoise, other_products: NonMeanProducts) -> tupl
         before = at.pairs + own_pairs
         after = before - np.einsum("kp,kp->p", crossed[:, left], crossed[:, right])
         gain[i], dimensions[i] = means.options.gains(after, before[single], data_products)
-    return log_p, gain, dimensions
+        for j, option in enumerate(drawn):
+            place = means.slices[option]
+            of_draws[i, j] = DrawnShifts.of(means.options.block(after, place), g).log_bf(data_products[place])
+    log_bf = 0.5 * gain * g / (1 + g) - 0.5 * dimensions * np.log1p(g)
+    log_bf[:, list(drawn)] = of_draws
+    return GainsByNoise(log_p, gain, dimensions, log_bf)
 
 
 def _projected(of_base: NDArray[np.float64], crossed: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:

@@ -60,6 +60,14 @@ class OptionPairs:
         none = np.zeros(0, dtype=np.int64)
         return OptionPairs(tuple(groups), np.concatenate([none, *left]), np.concatenate([none, *right]), len(slices))
 
+    def block(self, products: Array, columns: slice) -> NDArray[np.float64]:
+        """Return the inner products (w, w) of one option, whose columns stand at `columns`, of those of all pairs."""
+        own = np.flatnonzero((self.left >= columns.start) & (self.left < columns.stop))
+        gram = np.zeros((columns.stop - columns.start,) * 2)
+        gram[self.left[own] - columns.start, self.right[own] - columns.start] = products[own]
+        gram[self.right[own] - columns.start, self.left[own] - columns.start] = products[own]
+        return gram
+
     def gains(self, products: Array, squared_norms: Array, data_products: Array) -> tuple[Array, NDArray[np.int64]]:
         """Return gain in chi2 and number of directions, (options,) each.
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts
 from labctl.fitting.criticism.evidence.elimination import MeansByNoise, ScaledBase, WhitenedBase, gains_by_noise
 from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.evidence.noise_grid import DriftModes, correlation, noise_grid
@@ -25,13 +26,17 @@ def test_gains_at_every_noise_are_those_at_each_by_itself() -> None:
     noises = noise_grid("mems", 0.003, 1e-3)
     others = ScaledBase(design, scale).products(columns)
     means = MeansByNoise.of(design, columns[0], slices, white, noises)
-    log_p, gain, dimensions = gains_by_noise(means, others)
+    found = gains_by_noise(means, others, g=60.0, drawn=[2])
     for i, noise in enumerate(noises):
         left = WhitenedBase(design, white, noise).eliminate_from(columns[0], others)
         expected, number = gains_of(left, slices)
-        assert log_p[i] == pytest.approx(left.log_p, rel=1e-10)
-        np.testing.assert_allclose(gain[i], expected, rtol=1e-9)
-        assert dimensions[i].tolist() == number.tolist()
+        assert found.log_p[i] == pytest.approx(left.log_p, rel=1e-10)
+        np.testing.assert_allclose(found.gain[i], expected, rtol=1e-9)
+        assert found.dimensions[i].tolist() == number.tolist()
+        unit_information = 0.5 * expected * 60 / 61 - 0.5 * number * np.log(61)
+        np.testing.assert_allclose(found.log_bf[i, :2], unit_information[:2], rtol=1e-9)
+        of_draws = DrawnShifts.of(left.gram[3:5, 3:5], 60.0).log_bf(left.data_products[3:5])
+        assert found.log_bf[i, 2] == pytest.approx(float(of_draws), rel=1e-9)
 
 
 @pytest.mark.parametrize("tau_s", [0.0, 120.0, 4000.0])

@@ -38,10 +38,13 @@ class GivenPair(Pair):
     further_gain: float = 0.0
     further_nats: float = 0.0
     has_as_simple_a_shape: bool = False
+    share_by_draws: float = 0.0
+    share_of_rival: float = 0.0
 
 
 def test_every_pair_has_to_state_what_the_rules_ask_for() -> None:
     computed = {"share", "further_directions", "further_gain", "further_nats", "has_as_simple_a_shape"}
+    computed |= {"share_by_draws", "share_of_rival"}
     assert Pair.__abstractmethods__ == computed
     assert all(isinstance(vars(Pair)[name], property) for name in computed)
     given = [field.name for field in fields(Pair)]
@@ -120,6 +123,48 @@ def test_a_shift_of_each_run_or_mounting_stays_where_noise_hardly_makes_it(
     changed: dict[str, object], stays: bool
 ) -> None:
     pair = GivenPair(rival=candidate("mounting_shift"), rival_log_bf=-5.0, share=0.99, further_directions=2)
+    assert cannot_be_distinguished(replace(pair, **changed)) is stays
+
+
+@pytest.mark.parametrize(
+    ("changed", "stays"),
+    [
+        ({}, True),
+        ({"share_by_draws": 0.995}, False),  # as one mounting of gravity up, another down
+        ({"rival": SELF_HEATING}, False),  # its coefficients are no draws
+        ({"leader": candidate("run_shift")}, False),  # both are
+    ],
+)
+def test_a_shift_whose_few_draws_are_the_signal_stays_whatever_its_odds(
+    changed: dict[str, object], stays: bool
+) -> None:
+    pair = GivenPair(
+        leader=candidate("g_sensitivity"), rival=candidate("mounting_shift"), leader_log_bf=500.0, rival_log_bf=-5.0,
+        leader_gain=1e4, share=1.0, share_by_draws=0.9951, further_directions=3,
+    )  # fmt: skip
+    assert cannot_be_distinguished(replace(pair, **changed)) is stays
+
+
+@pytest.mark.parametrize(
+    ("changed", "stays"),
+    [
+        ({}, True),
+        ({"further_gain": -1.001 * TWO_DIRECTIONS}, False),  # the draws beyond the effect are larger than noise
+        ({"further_gain": -1.001 * TWO_DIRECTIONS, "further_directions": 0}, True),  # there are none beyond it
+        ({"further_gain": -1.001 * TWO_DIRECTIONS, "further_directions": 1}, True),
+        ({"share_of_rival": 0.995}, False),  # a part of the effect is no shift
+        ({"share_by_draws": 0.0}, True),  # as gravity in the mountings of two recordings, draws of their own
+        ({"rival": candidate("run_shift")}, False),  # both are drawn
+    ],
+)
+def test_an_effect_that_a_shift_follows_stays_while_what_it_leaves_of_the_draws_may_be_noise(
+    changed: dict[str, object], stays: bool
+) -> None:
+    pair = GivenPair(
+        leader=candidate("mounting_shift"), rival=candidate("g_sensitivity"), leader_log_bf=500.0, rival_log_bf=-5.0,
+        leader_gain=1e4, share=0.99, share_by_draws=1.0, share_of_rival=0.9951, further_directions=-2,
+        further_gain=-0.999 * TWO_DIRECTIONS,
+    )  # fmt: skip
     assert cannot_be_distinguished(replace(pair, **changed)) is stays
 
 

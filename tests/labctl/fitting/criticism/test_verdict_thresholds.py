@@ -60,9 +60,10 @@ def compared(*candidates: Candidate, dimensions: tuple[int, ...] = (1, 2, 3), **
 
 @pytest.fixture(autouse=True)
 def overlaps(monkeypatch: pytest.MonkeyPatch) -> Overlaps:
-    """Say which share of one candidate's signal another reproduces; none where nothing is said."""
+    """Say which share of one candidate's signal another reproduces; none where nothing is said, or by few draws."""
     shares: dict[tuple[str, str], float] = {}
     monkeypatch.setattr(module, "overlap", lambda _comparison, of, by: shares.get((of.id, by.id), 0.0))
+    monkeypatch.setattr(module, "overlap_by_draws", lambda *_: 0.0)
     monkeypatch.setattr(module, "_further_nats", lambda *_: 0.0)
     return shares.update
 

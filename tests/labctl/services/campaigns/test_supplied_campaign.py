@@ -42,21 +42,39 @@ def bench_of(**settings: Any) -> BenchFile:
     return with_drivers(with_supply(read_bench("single-axis-sim"), **settings))
 
 
-def killed_in(store: Store, recipe: str, bench: BenchFile, data_set: str) -> int:
-    """Run a campaign whose table falls silent in a data set; returns its number."""
+def killed_in(store: Store, recipe: str, bench: BenchFile, step: str, silent: str = "table") -> int:
+    """Run a campaign whose table or supply falls silent in a step; returns its number."""
     prepared = prepare(store, recipe, bench, VirtualClock(), clip=False)
 
     def silence(progress: Any) -> None:
-        if data_set in progress.step_text and progress.state == "running":
+        if step in progress.step_text and progress.state == "running":
 
             def fail(*_: Any) -> None:
-                raise NoReply("table", "no answer")
+                raise NoReply(silent, "no answer")
 
-            table: Any = prepared.bench.table
-            table.spin = fail
+            table, supply = (getattr(prepared.bench, name) for name in ("table", "supply"))
+            if silent == "table":
+                table.spin = fail
+            else:
+                supply.set_voltage_v = fail
 
     assert run(store, prepared, Control(), silence).state == "failed"
     return prepared.id
+
+
+@pytest.mark.parametrize("voltage", ["4.75 V", "5.25 V", "5 V"])
+def test_killed_in_a_step_of_the_supply_it_sets_that_voltage_again(tmp_path: Path, voltage: str) -> None:
+    bench = bench_of()
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        number = killed_in(store, recipe_in(tmp_path), bench, f"supply of the units to {voltage}", "supply")
+        request = ResumeRequest(by="Ada", power="kept")
+        prepared = prepare_resume(store, number, bench, lambda point: VirtualClock(point.last_at), request)
+        answer = run(store, prepared, Control(), lambda _: None)
+        assert answer.state == "done"
+        points = store.recordings.points(answer.recordings["FOG-0001"])
+        assert np.asarray(points.columns["supply_v"], dtype=np.float64) == pytest.approx(VOLTAGES_V, abs=0.01)
+        supply: Any = prepared.bench.supply
+        assert supply.limits.nominal_v == 5.0
 
 
 @pytest.mark.parametrize("safe_state", ["nominal", "off"])

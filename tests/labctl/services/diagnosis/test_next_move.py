@@ -66,6 +66,21 @@ def test_one_that_cannot_be_done_is_not_proposed_again() -> None:
     assert both.outcome == "cannot_be_done"
 
 
+def test_another_radius_that_cannot_be_done_is_not_proposed_with_more_repeats() -> None:
+    other = {"temperatures_c": [25.0], "rates_dps": [0.0, 20.0]}
+    once, often = (
+        experiment(f"each position also at another distance, {times} times", another_radius=other, repeats=times)
+        for times in (1, 4)
+    )
+    offered = ambiguous(once, often, LONG)
+    declined = next_move(progress(done(once, "cannot_be_done")), offered)
+    assert isinstance(declined, Measure)
+    assert declined.experiment.do == LONG["do"]
+    measured = next_move(progress(done(once)), offered)  # what was measured once may still be measured longer
+    assert isinstance(measured, Measure)
+    assert measured.experiment.do == often["do"]
+
+
 def test_what_was_measured_distinguishes_no_more() -> None:
     assert isinstance(next_move(progress(), ambiguous(RANDOM)), Measure)
     move = next_move(progress(done(RANDOM)), ambiguous(RANDOM))
