@@ -25,7 +25,7 @@ from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
 from labctl.fitting.criticism.planned_addition import may_be_joined, with_planned
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.criticism.rivals import LEAD, Pair, cannot_be_distinguished
+from labctl.fitting.criticism.rivals import LEAD, Pair, cannot_be_distinguished, is_drawn
 from labctl.fitting.criticism.verdict import ENOUGH, has_as_simple_a_shape, refines_base
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.numeric.arrays import Array
@@ -280,19 +280,12 @@ class _ForeseenPair(Pair):
 
     @property
     def share_by_draws(self) -> float:
-        parts = (
-            self.axes[axis].reproduced_by_draws(each, self.rival.id, self.outcomes[axis], self.k)
-            for axis, each in self.signal.items()
-        )
-        return sum(parts) / self.leader_gain
-
-    @property
-    def share_of_rival(self) -> float:
-        of_axes = {axis: each.fitted(self.rival.id, self.k) for axis, each in self.outcomes.items()}
+        fixed, drawn = (self.rival, self.leader) if is_drawn(self.leader) else (self.leader, self.rival)
+        of_axes = {axis: each.fitted(fixed.id, self.k) for axis, each in self.outcomes.items()}
         signal = {axis: each for axis, each in of_axes.items() if each is not None}
         whole = sum(each.size for each in signal.values())
         parts = (
-            self.axes[axis].reproduced(each, self.leader.id, self.outcomes[axis], self.k)[0]
+            self.axes[axis].reproduced_by_draws(each, drawn.id, self.outcomes[axis], self.k)
             for axis, each in signal.items()
         )
         return sum(parts) / whole if whole > 0 else 0.0

@@ -65,15 +65,10 @@ class Pair(ABC):
     @property
     @abstractmethod
     def share_by_draws(self) -> float:
-        """The share of the leader's signal that as few draws of the rival reproduce, 0 to 1.
+        """The share of the signal of the one that is not drawn that as few draws of the other reproduce, 0 to 1.
 
-        As few: as many as the leader has coefficients on each axis; only asked where the rival alone is drawn.
+        As few: as many as the one has coefficients on each axis; only asked where one of the two is drawn.
         """
-
-    @property
-    @abstractmethod
-    def share_of_rival(self) -> float:
-        """The share of the rival's signal that the leader reproduces, 0 to 1; only asked where the leader is drawn."""
 
     @cached_property
     def contains_leader(self) -> bool:
@@ -88,22 +83,18 @@ def is_drawn(candidate: Candidate) -> bool:
 
 
 def are_aliases_by_draws(pair: Pair) -> bool:
-    """Return whether one of a pair is drawn, and its draws are the signal of the other in every reading.
+    """Return whether one of a pair is drawn, and no more draws than the other has coefficients are its signal.
 
-    One mounting that differs from all others is gravity along an axis that only this mounting turns up. Beside that,
-    the evidence weighs no data, but how a coefficient and draws are distributed: such a pair cannot be distinguished
-    whatever the odds. A drawn rival has to be the leader with no more draws than that has coefficients. A drawn leader
-    follows the signal of many a rival, by all its draws; it is another cause only where noise hardly makes what the
-    rival leaves of them.
+    One mounting that differs from all others is gravity along an axis that only this mounting turns up, in every
+    reading. Beside that, the evidence weighs no data, but how a coefficient and draws are distributed: the pair cannot
+    be distinguished whatever the odds, as long as the other draws are not larger than noise makes them.
     """
-    if is_drawn(pair.leader) == is_drawn(pair.rival):
+    drawn = is_drawn(pair.leader), is_drawn(pair.rival)
+    if drawn[0] == drawn[1] or pair.share_by_draws <= ALIKE:
         return False
-    if is_drawn(pair.rival):
-        return pair.share_by_draws > ALIKE
-    if pair.share_of_rival <= ALIKE:
-        return False
-    more = -pair.further_directions
-    return more <= 0 or by_chance(-pair.further_gain, more) >= MIN_CHANCE
+    if drawn[1] or pair.further_directions >= 0:
+        return True
+    return by_chance(-pair.further_gain, -pair.further_directions) >= MIN_CHANCE
 
 
 def cannot_be_distinguished(pair: Pair) -> bool:

@@ -26,6 +26,7 @@ from labctl.fitting.criticism.rivals import (
     Pair,
     are_aliases_by_draws,
     cannot_be_distinguished,
+    is_drawn,
 )
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.derived import with_derived
@@ -228,11 +229,8 @@ class _MeasuredPair(Pair):
 
     @property
     def share_by_draws(self) -> float:
-        return overlap_by_draws(self.comparison, self.leader, self.rival)
-
-    @property
-    def share_of_rival(self) -> float:
-        return overlap(self.comparison, self.rival, self.leader)
+        fixed, drawn = (self.rival, self.leader) if is_drawn(self.leader) else (self.leader, self.rival)
+        return overlap_by_draws(self.comparison, fixed, drawn)
 
 
 def _pair(comparison: Comparison, leader: Candidate, rival: Candidate) -> Pair:

@@ -39,12 +39,11 @@ class GivenPair(Pair):
     further_nats: float = 0.0
     has_as_simple_a_shape: bool = False
     share_by_draws: float = 0.0
-    share_of_rival: float = 0.0
 
 
 def test_every_pair_has_to_state_what_the_rules_ask_for() -> None:
     computed = {"share", "further_directions", "further_gain", "further_nats", "has_as_simple_a_shape"}
-    computed |= {"share_by_draws", "share_of_rival"}
+    computed |= {"share_by_draws"}
     assert Pair.__abstractmethods__ == computed
     assert all(isinstance(vars(Pair)[name], property) for name in computed)
     given = [field.name for field in fields(Pair)]
@@ -151,19 +150,16 @@ def test_a_shift_whose_few_draws_are_the_signal_stays_whatever_its_odds(
         ({}, True),
         ({"further_gain": -1.001 * TWO_DIRECTIONS}, False),  # the draws beyond the effect are larger than noise
         ({"further_gain": -1.001 * TWO_DIRECTIONS, "further_directions": 0}, True),  # there are none beyond it
-        ({"further_gain": -1.001 * TWO_DIRECTIONS, "further_directions": 1}, True),
-        ({"share_of_rival": 0.995}, False),  # a part of the effect is no shift
-        ({"share_by_draws": 0.0}, True),  # as gravity in the mountings of two recordings, draws of their own
-        ({"rival": candidate("run_shift")}, False),  # both are drawn
+        ({"share_by_draws": 0.995}, False),
+        ({"rival": SELF_HEATING, "share_by_draws": 0.0}, False),
     ],
 )
-def test_an_effect_that_a_shift_follows_stays_while_what_it_leaves_of_the_draws_may_be_noise(
+def test_an_effect_that_is_few_draws_of_a_shift_stays_while_the_other_draws_may_be_noise(
     changed: dict[str, object], stays: bool
 ) -> None:
     pair = GivenPair(
         leader=candidate("mounting_shift"), rival=candidate("g_sensitivity"), leader_log_bf=500.0, rival_log_bf=-5.0,
-        leader_gain=1e4, share=0.99, share_by_draws=1.0, share_of_rival=0.9951, further_directions=-2,
-        further_gain=-0.999 * TWO_DIRECTIONS,
+        leader_gain=1e4, share=0.99, share_by_draws=1.0, further_directions=-2, further_gain=-0.999 * TWO_DIRECTIONS,
     )  # fmt: skip
     assert cannot_be_distinguished(replace(pair, **changed)) is stays
 
