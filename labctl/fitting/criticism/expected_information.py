@@ -306,8 +306,20 @@ def _named_alone(
     if gain <= 0:
         return None
     rivals = (
-        _ForeseenPair(leader, rival, float(log_bf[h]), float(log_bf[j]), gain, question, axes, outcomes, k, signal)
+        _ForeseenPair(
+            leader, rival, _beside(outcomes, leader, rival, float(log_bf[h]), k),
+            _beside(outcomes, rival, leader, float(log_bf[j]), k), gain, question, axes, outcomes, k, signal,
+        )
         for j, rival in enumerate(question.candidates)
         if question.nodes[j] != question.nodes[h] and rival.id != NOTHING
-    )
+    )  # fmt: skip
     return None if any(map(cannot_be_distinguished, rivals)) else int(question.nodes[h])
+
+
+def _beside(outcomes: Mapping[str, Outcomes], candidate: Candidate, other: Candidate, log_bf: float, k: int) -> float:
+    """Return the evidence for a candidate in outcome `k` with the same prior of its size as another one has, nats."""
+    if is_drawn(candidate) == is_drawn(other):
+        return log_bf
+    of_axes = (each.evidence_of_sizes(candidate.id, k) for each in outcomes.values())
+    present = [[nats] for nats in of_axes if nats is not None]
+    return float(_over_axes(np.array(present))[0]) if present else log_bf

@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.evidence.design import Design
-from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts, reproduced_by_draws
+from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts, reproduced_by_draws, size_average_nats
 from labctl.fitting.criticism.evidence.elimination import stack
 from labctl.fitting.criticism.evidence.further_coefficients import further_nats
 from labctl.fitting.criticism.evidence.gains import MIN_REMAINING
@@ -55,6 +55,13 @@ class Known:
             return self.drawn.log_bf(products)
         shrunk = self.g / (1 + self.g)
         return np.asarray(0.5 * self.gain(products) * shrunk - 0.5 * self.directions * np.log1p(self.g))
+
+    def size_nats(self, products: NDArray[np.float64]) -> Array:
+        """Return what the log Bayes factor (...) gains where the size is averaged over as that of draws is, nats."""
+        gain = self.gain(products)
+        if self.drawn is not None:
+            return np.zeros_like(gain)
+        return size_average_nats(gain, np.full(gain.shape, self.directions), self.g)
 
     def draw(self, products: Array, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return n draws, (n, w), of the coefficients as products (w,) with the data leave them."""
@@ -217,6 +224,15 @@ class Outcomes:
         """Return the log evidence for an effect by both recordings, (n,) nats; None where it is not on the axis."""
         each = self._shapes(effect)
         return np.asarray(logsumexp(each, axis=0) - np.log(len(each))) if len(each) else None
+
+    def evidence_of_sizes(self, effect: str, k: int) -> float | None:
+        """Return the same in outcome `k` where the size is averaged over as that of draws is."""
+        shapes = self._axis.shapes_of(effect)
+        of_sizes = [
+            log_bf + s.after.size_nats(self._products[k, s.columns])
+            for s, log_bf in zip(shapes, self._shapes(effect)[:, k] if shapes else (), strict=True)
+        ]
+        return float(logsumexp(of_sizes) - np.log(len(shapes))) if shapes else None
 
     def best(self, effect: str, k: int) -> Shape | None:
         """Return the shape of an effect with the most evidence in outcome `k`."""

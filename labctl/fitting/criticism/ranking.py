@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +85,7 @@ class Candidate:
     term: Term | None  #: the shape that fits all axes together best
     gain: float  #: chi2 that it removes, over all axes
     physical: bool = True  #: whether the size that it is fitted with is one that the unit's technology can have
+    size_nats: float = 0.0  #: what `log_bf` gains where its size is averaged over as that of draws is
 
 
 def are_exact(*candidates: Candidate) -> bool:
@@ -141,6 +142,7 @@ def _candidate(
     is not physical are left out; without `priors` of the sizes they count, and the candidate is marked.
     """
     per_axis: list[float] = []
+    of_sizes: list[float] = []
     best: dict[str, int] = {}
     terms: dict[tuple[object, ...], tuple[Term | None, float]] = {}
     gain = 0.0
@@ -152,6 +154,7 @@ def _candidate(
         if not np.any(np.isfinite(values)):
             continue
         per_axis.append(float(np.logaddexp.reduce(values) - np.log(tried)))
+        of_sizes.append(float(np.logaddexp.reduce(values + axes[axis].size_nats[places]) - np.log(tried)))
         best[axis] = places[int(np.argmax(values))]
         gain += float(axes[axis].gain[best[axis]])
         for i, value in zip(places, values.tolist(), strict=True):
@@ -159,11 +162,16 @@ def _candidate(
             terms[shape] = (options[i].term, terms.get(shape, (None, 0.0))[1] + value)
     if not per_axis:
         return None
-    n = len(per_axis)
-    joint = sum(per_axis)
-    alternatives = [joint - np.log(2.0), *(value - np.log(2.0 * n) for value in per_axis)] if n > 1 else [joint]
     term = max(terms.values(), key=lambda pair: pair[1])[0]
-    return Candidate(*key, float(np.logaddexp.reduce(alternatives)), best, term, gain, priors is not None)
+    log_bf = _over_axes(per_axis)
+    return Candidate(*key, log_bf, best, term, gain, priors is not None, _over_axes(of_sizes) - log_bf)
+
+
+def _over_axes(per_axis: Sequence[float]) -> float:
+    """Return the log Bayes factor of a candidate by those of its axes, nats: on all of them, or on one."""
+    n, joint = len(per_axis), sum(per_axis)
+    alternatives = [joint - np.log(2.0), *(value - np.log(2.0 * n) for value in per_axis)] if n > 1 else [joint]
+    return float(np.logaddexp.reduce(alternatives))
 
 
 def _shape_of(option: CandidateShape) -> tuple[object, ...]:

@@ -33,7 +33,7 @@ class Pair(ABC):
 
     leader: Candidate
     rival: Candidate
-    leader_log_bf: float  #: nats
+    leader_log_bf: float  #: nats, with the same prior of the size as for the rival: `log_bf_beside`
     rival_log_bf: float  #: nats
     leader_gain: float  #: chi2 that the leader removes
 
@@ -80,6 +80,15 @@ def is_drawn(candidate: Candidate) -> bool:
     """Return whether each coefficient of a candidate is a draw, for a powered run or a mounting of its own."""
     kind = None if candidate.smooth else CATALOGUE.get(candidate.id)
     return kind is not None and kind.is_random
+
+
+def log_bf_beside(candidate: Candidate, other: Candidate) -> float:
+    """Return the log Bayes factor of a candidate with the same prior of its size as another one has, nats.
+
+    Where one of the two is drawn, the size of both is averaged over: odds between a single size and an average over
+    sizes would come from these priors, and not from the data.
+    """
+    return candidate.log_bf + (candidate.size_nats if is_drawn(candidate) != is_drawn(other) else 0.0)
 
 
 def are_aliases_by_draws(pair: Pair) -> bool:

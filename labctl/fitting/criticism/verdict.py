@@ -27,6 +27,7 @@ from labctl.fitting.criticism.rivals import (
     are_aliases_by_draws,
     cannot_be_distinguished,
     is_drawn,
+    log_bf_beside,
 )
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.derived import with_derived
@@ -234,7 +235,8 @@ class _MeasuredPair(Pair):
 
 
 def _pair(comparison: Comparison, leader: Candidate, rival: Candidate) -> Pair:
-    return _MeasuredPair(leader, rival, leader.log_bf, rival.log_bf, leader.gain, comparison)
+    log_bf = log_bf_beside(leader, rival), log_bf_beside(rival, leader)
+    return _MeasuredPair(leader, rival, *log_bf, leader.gain, comparison)
 
 
 def has_as_simple_a_shape(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:

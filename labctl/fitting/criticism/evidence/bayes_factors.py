@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
+from labctl.fitting.criticism.evidence.drawn_shifts import size_average_nats
 from labctl.fitting.criticism.evidence.elimination import MeansByNoise, ScaledBase, WhitenedBase, gains_by_noise
 from labctl.fitting.criticism.evidence.gains import visible_share
 from labctl.fitting.criticism.evidence.noise_grid import Noise
@@ -30,6 +31,7 @@ class AxisEvidence:
     """Evidence for the options on one axis."""
 
     log_bf: Array  #: (options,) log Bayes factor against the base, averaged over the noise
+    size_nats: Array  #: (options,) what that gains where the size is averaged over as that of draws is
     best: EliminatedBase  #: at the noise that the base finds likeliest
     gain: Array  #: (options,) chi2 that each option removes, at that noise
     dimensions: NDArray[np.int64]  #: (options,) directions that each has beside the base
@@ -71,7 +73,8 @@ def evidence(
     everything = _with_data(design, y)
     others = ScaledBase(design, scale).products(everything)
     drawn = [i for i, option in enumerate(design.options) if option.is_drawn]
-    found = gains_by_noise(means, others, float(len(design.t_s)), drawn)
+    g = float(len(design.t_s))
+    found = gains_by_noise(means, others, g, drawn)
     log_p = found.log_p
     log_all = float(np.logaddexp.reduce(log_p))
     total = np.logaddexp.reduce(log_p[:, None] + found.log_bf, axis=0) - log_all
@@ -81,8 +84,10 @@ def evidence(
         _is_of_base(option) or visible_share(eliminated, option_rows) >= MIN_COMPETING
         for option, option_rows in zip(design.options, slices, strict=True)
     ]
+    size_nats = size_average_nats(found.gain[best], found.dimensions[best], g)
+    size_nats[drawn] = 0.0
     return AxisEvidence(
-        np.where((found.dimensions[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
+        np.where((found.dimensions[best] > 0) & np.array(competes, dtype=bool), total, -np.inf), size_nats,
         eliminated,
         found.gain[best], found.dimensions[best], slices, np.exp(log_p - log_all), noises, rows,
         int((design.precision == 0).sum()),

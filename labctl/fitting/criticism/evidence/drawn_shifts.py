@@ -73,6 +73,18 @@ class DrawnShifts:
         return np.asarray(0.5 * gain - 0.5 * np.log(spread).sum(axis=1))
 
 
+def size_average_nats(gain: Array, directions: NDArray[np.int64], g: float) -> Array:
+    """Return what the evidence for fixed coefficients gains if their size is averaged over as that of draws is, nats.
+
+    `gain` (...) in chi2 is what they remove in `directions` (...), and `g` the number of data sets. Their
+    unit-information prior is the largest size of `DrawnShifts.of`: with it alone, odds against draws would come from
+    the priors (Liang et al. 2008 on a fixed g).
+    """
+    by_g = np.geomspace(1.0, max(g, 1.0), SIZES)
+    log_bf = 0.5 * np.multiply.outer(gain, by_g / (1 + by_g)) - 0.5 * np.multiply.outer(directions, np.log1p(by_g))
+    return np.asarray(logsumexp(log_bf, axis=-1) - np.log(SIZES) - log_bf[..., -1])
+
+
 def reproduced_by_draws(gram: NDArray[np.float64], inner: Array, number: int) -> float:
     """Return the part of a signal, in chi2, that so many draws reproduce while all others are equal.
 

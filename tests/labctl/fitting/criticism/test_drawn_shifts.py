@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts, reproduced_by_draws
+from labctl.fitting.criticism.evidence.drawn_shifts import DrawnShifts, reproduced_by_draws, size_average_nats
 
 G = 600.0
 
@@ -58,6 +58,29 @@ def test_runs_without_shifts_count_against_them() -> None:
 
 def test_what_the_base_has_taken_says_nothing() -> None:
     assert float(DrawnShifts.of(np.zeros((2, 2)), G).log_bf(np.zeros(2))) == pytest.approx(0.0)
+
+
+def test_an_effect_whose_size_is_averaged_over_has_the_evidence_of_a_draw() -> None:
+    """One coefficient, beside one draw with the same column: with one prior of the size the data cannot choose."""
+    column, rng = np.repeat([0.0, 1.0], 300), np.random.default_rng(8)
+    column -= column.mean()
+    gram = np.array([[column @ column / 2.0]])  # a shift less the first one, whose variance is twice that of a draw
+    for size in (0.05, 0.3, 2.0):
+        product = float(column @ (size * column + rng.normal(size=600)))
+        gain = product**2 / float(column @ column)
+        by_draws = float(DrawnShifts.of(gram, G).log_bf(np.array([product / np.sqrt(2.0)])))
+        unit_information = 0.5 * gain * G / (1 + G) - 0.5 * np.log1p(G)
+        averaged = unit_information + size_average_nats(np.array(gain), np.array(1), G)
+        assert float(averaged) == pytest.approx(by_draws, abs=1e-9)
+
+
+def test_the_average_over_sizes_of_many_small_coefficients_is_far_above_one_large_size() -> None:
+    small, large = size_average_nats(np.array([37.8, 6000.0]), np.array([6, 6]), G)
+    assert small > 8.0  # of chi2 37.8 in six directions a unit-information prior says that there is nothing
+    assert abs(large) < 2.5  # each coefficient as large as the prior has it: one of twelve sizes is right
+    assert size_average_nats(np.array(5.0), np.array(0), G) == pytest.approx(
+        float(logsumexp(0.5 * 5.0 * (g := np.geomspace(1, G, 12)) / (1 + g)) - np.log(12) - 2.5 * G / (1 + G))
+    )
 
 
 def test_it_takes_many_products_at_once() -> None:

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from labctl.fitting.criticism.ranking import Candidate
-from labctl.fitting.criticism.rivals import Pair, by_chance, cannot_be_distinguished
+from labctl.fitting.criticism.rivals import Pair, by_chance, cannot_be_distinguished, log_bf_beside
 from labctl.fitting.criticism.verdict import has_as_simple_a_shape as measured_as_simple_a_shape
 
 #: Twice: what noise exceeds with a probability of 0.001 in two directions is 13.8 (chi2).
@@ -162,6 +162,14 @@ def test_an_effect_that_is_few_draws_of_a_shift_stays_while_the_other_draws_may_
         leader_gain=1e4, share=0.99, share_by_draws=1.0, further_directions=-2, further_gain=-0.999 * TWO_DIRECTIONS,
     )  # fmt: skip
     assert cannot_be_distinguished(replace(pair, **changed)) is stays
+
+
+def test_beside_draws_the_size_of_an_effect_is_averaged_over_as_theirs_is() -> None:
+    gravity = replace(candidate("g_sensitivity"), log_bf=4.0, size_nats=7.5)
+    assert log_bf_beside(gravity, candidate("mounting_shift")) == 11.5
+    assert log_bf_beside(gravity, WARM_UP) == 4.0
+    assert log_bf_beside(candidate("mounting_shift"), gravity) == 0.0
+    assert log_bf_beside(replace(candidate("mounting_shift"), size_nats=1.0), candidate("run_shift")) == 0.0
 
 
 def test_a_formula_is_a_rival_like_others() -> None:
