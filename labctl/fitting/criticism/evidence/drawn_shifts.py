@@ -78,7 +78,7 @@ def size_average_nats(gain: Array, directions: NDArray[np.int64], g: float) -> A
 
     `gain` (...) in chi2 is what they remove in `directions` (...), and `g` the number of data sets. Their
     unit-information prior is the largest size of `DrawnShifts.of`: with it alone, odds against draws would come from
-    the priors (Liang et al. 2008 on a fixed g).
+    the priors (Liang et al., J. Am. Stat. Assoc. 103, 410, 2008, on a fixed g).
     """
     by_g = np.geomspace(1.0, max(g, 1.0), SIZES)
     log_bf = 0.5 * np.multiply.outer(gain, by_g / (1 + by_g)) - 0.5 * np.multiply.outer(directions, np.log1p(by_g))

@@ -17,6 +17,7 @@ from labctl.fitting.criticism import (
     open_question,
     reduce_recording,
 )
+from labctl.fitting.criticism.evidence.drawn_shifts import size_average_nats
 from labctl.fitting.criticism.planned_addition import with_planned
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.joined import joined_recording
@@ -150,3 +151,16 @@ def test_a_ramp_is_not_joined_beside_a_table_over_the_temperature() -> None:
     assert len(with_planned(measured, _planned("ramp_at_rest"), surface)) > len(measured)
     with pytest.raises(BadInput, match="plan them at these temperatures"):
         with_planned(measured, _planned("ramp_at_rest"), table)
+
+
+def test_the_evidence_of_a_size_that_is_averaged_over_is_of_the_gain_of_each_effect() -> None:
+    comparison = _found().comparison
+    assert comparison is not None
+    (axis,) = comparison.designs
+    options, evidence = [o.candidate for o in comparison.designs[axis].options], comparison.axes[axis]
+    by_one_shape = [c for c in comparison.candidates if options.count(c.id) == 1]
+    assert len(by_one_shape) > 3
+    for candidate in by_one_shape:
+        i = candidate.option[axis]
+        averaged = size_average_nats(evidence.gain[i], evidence.dimensions[i], float(len(comparison.data)))
+        assert candidate.size_nats == pytest.approx(float(averaged), abs=1e-9), candidate.id
