@@ -166,6 +166,7 @@ export interface ProblemDocument {
   detail?: string;
   warnings?: Warning[];
   problems?: string[];
+  missing?: { fact: string; where: string }[];
 }
 
 /* Requests: path, parameters, body and answer of each operation */
