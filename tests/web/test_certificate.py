@@ -145,8 +145,9 @@ def test_a_laboratory_that_the_bench_file_does_not_name_is_asked_for(
     expect(dialog.get_by_label("Customer", exact=True)).to_have_value("Vehicle Works")  # nothing is typed twice
     for label, name in LABORATORY_FIELDS.items():
         dialog.get_by_label(label, exact=True).fill(LABORATORY[name])
+    dialog.get_by_label("The item turns about the axis of one output at a time").check()
     dialog.get_by_role("button", name="Issue").click()
-    files = page.get_by_role("group", name="Certificate")
+    files = page.get_by_role("group", name="Certificate 20")
     expect(files).to_be_visible()
     with page.expect_download() as download:
         files.get_by_role("button", name="JSON").click()

@@ -45,6 +45,7 @@ const FIELDS = [
     name: "own_axis",
     label: "The item turns about the axis of one output at a time",
     type: "checkbox",
+    hint: "Needed where U is known about the axis of each output alone (“own axis”).",
     required: false,
   },
   {
@@ -117,9 +118,9 @@ async function askCertificate(serial, version, replaced) {
   /** @type {Answers} */
   let given = {};
   let refusal = "";
-  let lacksLaboratory = false;
+  let [lacksLaboratory, asksLaboratory] = [false, false];
   for (;;) {
-    const asked = [...why, ...(lacksLaboratory ? LABORATORY_FIELDS : []), ...FIELDS];
+    const asked = [...why, ...(asksLaboratory ? LABORATORY_FIELDS : []), ...FIELDS];
     const fields = asked.map((field) => ({ ...field, value: given[field.name] }));
     const lacking = imported ? notice("warn", h("p", {}, IMPORTED)) : null;
     const answers = await dialog(`Issue a certificate of version ${version}`, fields, {
@@ -135,7 +136,8 @@ async function askCertificate(serial, version, replaced) {
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
       [given, refusal] = [answers, error.message];
-      lacksLaboratory ||= error.missing.some(({ fact }) => fact.startsWith("laboratory's"));
+      lacksLaboratory = error.missing.some(({ fact }) => fact.startsWith("laboratory's"));
+      asksLaboratory ||= lacksLaboratory;
     }
   }
 }
