@@ -24,6 +24,12 @@ BULLETS = """() => [...document.querySelectorAll("main ul")].filter((list) => {
   const inner = around.getBoundingClientRect().left + parseFloat(getComputedStyle(around).paddingLeft);
   return list.querySelector("li").getBoundingClientRect().left - inner;
 })"""
+#: Put a list as pages have it into a card.
+LIST = """() => {
+  const list = document.createElement("ul");
+  list.append(Object.assign(document.createElement("li"), { textContent: "one" }));
+  document.querySelector("main .card").append(list);
+}"""
 #: A bullet and the space after it, px.
 BULLET_PX = 16
 
@@ -66,6 +72,7 @@ def test_the_bullets_of_lists_stand_inside_their_card(visit: Callable[..., Page]
     page = visit("/explore?unit=FOG-0001", size=size)
     settled(page)
     page.get_by_text("Effects that this recording cannot test").click()
+    page.evaluate(LIST)  # as a card has it that lists what was left out
     within_px = page.evaluate(BULLETS)
     assert within_px
     assert min(within_px) >= BULLET_PX
