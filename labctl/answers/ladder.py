@@ -30,7 +30,10 @@ class LadderRow(ResponseModel):
     effects: EffectIds
     applied_rms_dps: float | None = Field(
         default=None,
-        description="Only for versions in `others`: RMS error on this recording without refitting, deg/s.",
+        description=(
+            "RMS error on this recording alone without refitting, deg/s: of versions in `others` and, where there are "
+            "others, of versions fitted to several recordings together."
+        ),
     )
     raw_rms_dps: RawRms
     rms_dps: FittedRms

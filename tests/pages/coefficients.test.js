@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { columnsBeside, differenceText } from "../../labctl/web/static/js/unit/coefficient_table.js";
+import { columnsBeside, differenceText, termsText } from "../../labctl/web/static/js/unit/coefficient_table.js";
 
 /** @param {Record<string, unknown>} coefficients */
 const version = (coefficients) => /** @type {any} */ ({ axes: { x: { coefficients } } });
@@ -40,4 +40,16 @@ test("versions that differ only in how their coefficients follow the temperature
     ),
     "Version 2 has warm up more and lacks dead band than version 3.",
   );
+});
+
+test("the reference temperature and the parameters of effects are said beside the coefficients", () => {
+  const term = (/** @type {string} */ effect, /** @type {Record<string, number>} */ parameters) => ({
+    effect,
+    parameters,
+  });
+  const model = { terms: [term("rate_temperature_surface", {}), term("saturation", { knee_dps: 82.86656 })] };
+  const said = (/** @type {Record<string, unknown>} */ coefficients) =>
+    termsText(/** @type {any} */ ({ axes: { z: { coefficients } }, model, reference_temperature_c: 36 }));
+  assert.equal(said({ c_r1_t1: {} }), "T_ref is 36 deg C; saturation: knee 82.87 deg/s.");
+  assert.equal(said({ bias: {} }), "saturation: knee 82.87 deg/s.");
 });

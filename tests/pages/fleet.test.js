@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { brushed } from "../../labctl/web/static/js/fleet/brushed.js";
+import { jobText, progressText } from "../../labctl/web/static/js/fleet/jobs.js";
 
 /**
  * @param {string} level
@@ -50,4 +51,35 @@ test("a group without others beside it differs from nothing, and not by 0", () =
     brushed(POINTS.slice(0, 1), "", "").map(({ level, off }) => [level, off]),
     [["B1", null]],
   );
+});
+
+const REQUEST = {
+  accept_warnings: false,
+  again: false,
+  batch: "",
+  effects: /** @type {string[]} */ ([]),
+  engine: "local",
+  kind: /** @type {const} */ ("fit"),
+  model: "",
+  search: "",
+  source: "",
+  supplier: "",
+  type: "",
+};
+
+test("a job is what it does and of which units", () => {
+  assert.deepEqual(jobText({ kind: "criticise", request: REQUEST }), ["Criticise", "all units"]);
+  assert.deepEqual(
+    jobText({ kind: "fit", request: { ...REQUEST, model: "cubic", effects: ["lag"], type: "FOG-A", batch: "B2" } }),
+    ["Fit cubic + lag", "FOG-A, batch B2"],
+  );
+  assert.deepEqual(jobText({ kind: "criticise", request: { ...REQUEST, supplier: "Acme", search: "7" } }), [
+    "Criticise",
+    "from Acme, “7”",
+  ]);
+});
+
+test("the finished units are those that do not wait, and the others are told apart", () => {
+  assert.equal(progressText({ units: 2000, waiting: 1990, failed: 0, skipped: 0 }), "10 of 2,000");
+  assert.equal(progressText({ units: 30, waiting: 0, failed: 2, skipped: 4 }), "30 of 30, 4 skipped, 2 failed");
 });

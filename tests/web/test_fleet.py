@@ -103,6 +103,40 @@ def test_types_are_small_multiples_and_a_type_has_its_chart_and_report(
 
 
 @pytest.mark.usefixtures("fleet")
+def test_jobs_say_how_far_they_are_and_why_units_failed_and_one_is_cancelled(
+    service: Service, visit: Callable[..., Page]
+) -> None:
+    from playwright.sync_api import expect
+
+    store, now = service.lab_service.store, service.lab_service.clock.utc()
+    request = {"kind": "fit", "model": "bias", "type": "FOG-A", "effects": ["warm_up"]}
+    running = FIELDS | {"request": request, "units": 3, "state": "waiting", "runner": "another", "seen_at": now}
+    why = "G002: recording 3 has no rates; import the log with its rate column"
+    with store._database.writing() as connection:
+        connection.execute(sa.insert(tables.fleet_jobs).values(**running))
+        for serial, row in (("G000", {"state": "done"}), ("G001", {"state": "waiting"}), ("G002", {"state": "failed"})):
+            fields = {"job_id": 3, "serial": serial, "kind": "fit", "reason": why if serial == "G002" else "", **row}
+            connection.execute(sa.insert(tables.fleet_units).values(**fields))
+    page = visit("/fleet")
+    jobs = page.get_by_role("region", name="Jobs")
+    row = jobs.get_by_role("row").filter(has_text="warm_up")
+    expect(row).to_contain_text("Fit bias + warm_up")
+    expect(row).to_contain_text("2 of 3, 1 failed")
+    expect(jobs.get_by_role("row")).to_have_count(4)
+    row.get_by_role("button", name="Reasons").click()
+    expect(jobs.get_by_role("group", name="Failed units of job 3")).to_contain_text(why)
+    row.get_by_role("button", name="Cancel job").click()
+    dialog = page.get_by_role("dialog", name="Cancel job 3")
+    dialog.get_by_label("Who").fill("Ann")
+    dialog.get_by_label("Why").fill("the wrong model")
+    dialog.get_by_role("button", name="Cancel job").click()
+    expect(row).to_contain_text("cancelled by Ann: the wrong model")
+    expect(row.get_by_role("button", name="Cancel job")).to_have_count(0)
+    answer = service.get("/api/fleet/jobs/3")
+    assert (answer["state"], answer["why"]) == ("cancelled", "cancelled by Ann: the wrong model")
+
+
+@pytest.mark.usefixtures("fleet")
 def test_on_a_phone_nothing_is_wider_than_the_page(visit: Callable[..., Page]) -> None:
     page = visit("/fleet?type=FOG-A", size=NARROW, dark=True)
     page.get_by_role("region", name="Report").wait_for()

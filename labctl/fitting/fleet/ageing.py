@@ -18,6 +18,7 @@ from labctl.fitting.fleet.group_effects import robust_fit
 from labctl.fitting.fleet.reml import reml
 from labctl.fitting.fleet.unit_coefficients import YEAR, UnitCoefficients
 from labctl.fitting.numeric.arrays import Array
+from labctl.texts import counted
 
 #: Units without which nothing is said of the ageing of a type.
 MIN_UNITS = 3
@@ -74,8 +75,8 @@ def ageing_of(units: Sequence[UnitCoefficients]) -> tuple[CoefficientAgeing, ...
             ageings.append(_ageing(name, of_unit[name], slopes))
     if not ageings:
         raise NotEnoughData(
-            f"{len(several)} units of the type were calibrated more than once on known days; at least {MIN_UNITS} are "
-            "needed: calibrate units of the type again"
+            f"{counted(len(several), 'unit')} of the type {'was' if len(several) == 1 else 'were'} calibrated more "
+            f"than once on known days; at least {MIN_UNITS} are needed: calibrate units of the type again"
         )
     return tuple(ageings)
 

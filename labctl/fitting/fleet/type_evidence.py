@@ -28,6 +28,7 @@ from labctl.fitting.fleet.shape_evidence import (
 )
 from labctl.fitting.fleet.type_sums import AxisSums, TypeSums
 from labctl.fitting.numeric.arrays import Array
+from labctl.texts import counted
 
 #: Log evidence, nats, without which nothing is named; and that of a further effect beside one.
 ENOUGH, ENOUGH_NEXT = 6.0, 9.0
@@ -139,7 +140,12 @@ def judged(sums: TypeSums) -> TypeCriticism:
     """Return what a type is missing by the sums over its units."""
     if sums.units < MIN_UNITS:
         return TypeCriticism(
-            sums.units, (), (), 1.0, f"{sums.units} units are too few; criticise at least {MIN_UNITS} units of the type"
+            sums.units,
+            (),
+            (),
+            1.0,
+            f"{counted(sums.units, 'unit')} {'is' if sums.units == 1 else 'are'} too few; criticise at least "
+            f"{MIN_UNITS} units of the type",
         )
     axes = sums.total()
     evidence = {axis: evidence_of(each) for axis, each in axes.items()}

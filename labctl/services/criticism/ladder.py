@@ -17,7 +17,8 @@ QUICK_VERSIONS = 4
 def ladder(store: Store, serial: str, recording: int | None = None) -> LadderResponse:
     """Return the versions fitted to a recording (default: that of the newest version), each after its parent.
 
-    Versions of other recordings stand apart, with their error when they are applied to this recording as they are.
+    Versions of other recordings stand apart, with their error when they are applied to this recording as they are;
+    versions fitted to several recordings together have this error too where there are others.
     Raises NotFound, BadInput where the unit has no version of this recording.
     """
     rows = sorted(store.calibrations.of_unit(store.units.get(serial).serial), key=lambda row: row.version)
@@ -34,14 +35,18 @@ def ladder(store: Store, serial: str, recording: int | None = None) -> LadderRes
             f"recordings {', '.join(map(str, fitted)) or 'none'}); `labctl fit {serial} --recording "
             f"{recording}` makes a version"
         )
-    steps = [_step(row) for row in _by_parentage(on_recording)]
+    others = [row for row in rows if not _is_of(row, chosen, together)]
+    applied = _applied_here(
+        store, [*(row for row in on_recording if others and len(row.recordings) > 1), *others], chosen
+    )
+    steps = [_step(row, applied.get(row.version)) for row in _by_parentage(on_recording)]
     newest = max(steps, key=lambda step: step.version)
     return LadderResponse(
         serial=serial,
         recording=chosen,
         recordings=list(on_recording[0].recordings),
         steps=steps,
-        others=_applied_here(store, [row for row in rows if not _is_of(row, chosen, together)], chosen),
+        others=[_step(row, applied.get(row.version)) for row in others],
         noise_floor_dps=newest.noise_floor_dps,
     )
 
@@ -83,11 +88,13 @@ def _step(row: CalibrationRecord, applied_rms_dps: float | None = None) -> Ladde
     )
 
 
-def _applied_here(store: Store, others: Sequence[CalibrationRecord], recording: int | None) -> list[LadderRow]:
-    """Return versions of other recordings, each with its error on this one (None where it cannot be applied)."""
-    if not others or recording is None:
-        return [_step(row) for row in others]
-    if len(others) > QUICK_VERSIONS:
+def _applied_here(
+    store: Store, versions: Sequence[CalibrationRecord], recording: int | None
+) -> dict[int, float | None]:
+    """Return version -> its error on this recording without refitting, deg/s (None where it cannot be applied)."""
+    if not versions or recording is None:
+        return {}
+    if len(versions) > QUICK_VERSIONS:
         compute(UNNAMED)
     from labctl.services.criticism.measurements import Measurements  # noqa: PLC0415  loads the fit's libraries
     from labctl.services.criticism.verification.of_version import left_by  # noqa: PLC0415  as above
@@ -101,4 +108,4 @@ def _applied_here(store: Store, others: Sequence[CalibrationRecord], recording: 
         except LabctlError:
             return None
 
-    return [_step(row, applied(row)) for row in others]
+    return {row.version: applied(row) for row in versions}

@@ -37,7 +37,7 @@ def _answer(store: Store, row: DiagnosisRow) -> DiagnosisResponse:
         state=row.state, ended=row.state == "done",
         outcome=cast(DiagnosisOutcome, row.outcome) if row.outcome else None,
         named=list(rounds[-1].named) if rounds else [], why=row.why if row.state in _EXPLAINED else "",
-        next=_next(row, rounds), ended_at=row.ended_at, recordings=list(row.recordings),
+        next=_next(store, row, rounds), ended_at=row.ended_at, recordings=list(row.recordings),
         rounds=[_round(each, later) for each, later in zip_longest(rounds, rounds[1:])],
     )  # fmt: skip
 
@@ -72,7 +72,7 @@ def verdict_text(verdict: str, named: object) -> str:
     return f"{verdict}: {effects}" if effects else verdict
 
 
-def _next(row: DiagnosisRow, rounds: list[RoundRow]) -> str:
+def _next(store: Store, row: DiagnosisRow, rounds: list[RoundRow]) -> str:
     if row.state == "awaiting_confirmation":
         return (
             f"check bench {row.bench_name}, then confirm the experiment of round {rounds[-1].number}, or answer that "
@@ -86,7 +86,24 @@ def _next(row: DiagnosisRow, rounds: list[RoundRow]) -> str:
     if row.state in {"stopped", "failed"}:
         return f"`labctl diagnose {row.serial}` continues it; `labctl diagnose {row.serial} --end` ends it for good"
     if row.outcome in {"one_cause", "several_causes"}:
+        made = _version_with(store, row, rounds[-1])
+        if made is not None:
+            return f"version {made} contains what was found; `labctl criticise {row.serial} --version {made}` judges it"
         of = ",".join(map(str, rounds[-1].recordings))
         effects = ",".join(rounds[-1].named)
         return f"`labctl improve {row.serial} --version {row.version} --recording {of} --add {effects}`"
     return ""
+
+
+def _version_with(store: Store, row: DiagnosisRow, found: RoundRow) -> int | None:
+    """Return the newest version that was made of the diagnosed one with what a round has found; None: there is none."""
+    return max(
+        (
+            each.version
+            for each in store.calibrations.of_unit(row.serial)
+            if each.parent == row.version
+            and set(found.recordings) <= set(each.recordings)
+            and set(found.named) <= set(each.answer["model"]["effects"])
+        ),
+        default=None,
+    )

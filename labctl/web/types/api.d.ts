@@ -81,8 +81,10 @@ export type TiltedDesign = Schema<"TiltedDesign">;
 export type Batch = Schema<"BatchResponse">;
 export type FleetChart = Schema<"FleetChartResponse">;
 export type FleetChartPoint = Schema<"FleetChartPoint">;
+export type FleetJob = Schema<"FleetJobResponse">;
 export type FleetReport = Schema<"FleetReportResponse">;
 export type FleetType = Schema<"FleetTypeResponse">;
+export type FleetUnit = Schema<"FleetUnitResponse">;
 export type UncertaintyCourse = Schema<"UncertaintyCourseResponse">;
 export type Unit = Schema<"UnitResponse">;
 export type Validity = Schema<"Validity">;
@@ -164,6 +166,7 @@ export interface ProblemDocument {
   detail?: string;
   warnings?: Warning[];
   problems?: string[];
+  missing?: { fact: string; where: string }[];
 }
 
 /* Requests: path, parameters, body and answer of each operation */

@@ -10491,7 +10491,7 @@ export interface components {
             effects: string[];
             /**
              * Applied Rms Dps
-             * @description Only for versions in `others`: RMS error on this recording without refitting, deg/s.
+             * @description RMS error on this recording alone without refitting, deg/s: of versions in `others` and, where there are others, of versions fitted to several recordings together.
              */
             applied_rms_dps: number | null;
             /**

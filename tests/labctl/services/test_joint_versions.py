@@ -31,6 +31,12 @@ def test_a_version_keeps_all_its_recordings_and_what_they_say_together(lab: Lab)
     said = lab.run("fit", "J-1", "--recording", "1,2,3", "--effects", ",".join(EFFECTS)).stdout
     assert "recordings         1, 2, 3, fitted together" in said
     assert "bias repeatability, turn-on to turn-on" in said
+    ladder = lab.json("ladder", "J-1")
+    (step,) = ladder["steps"]
+    assert (ladder["recording"], step["recordings"]) == (3, [1, 2, 3])
+    left = lab.json("verify", "J-1", "--version", "2", "--recording", "3")["rms_dps"]
+    assert step["applied_rms_dps"] == pytest.approx(left, rel=1e-12)
+    assert step["rms_dps"] != pytest.approx(left, rel=1e-3)  # which is of all three
     one = lab.json("fit", "J-1", "--recording", "3", "--effects", ",".join(EFFECTS))
     assert (one["recording"], one["recordings"], one["joint"]) == (3, [3], None)
     steps = lab.json("ladder", "J-1", "--recording", "3")

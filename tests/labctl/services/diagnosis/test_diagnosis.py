@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from labctl.answers.calibrations import ImproveRequest
 from labctl.answers.campaigns import BENCH_CHECKS, CampaignResponse
 from labctl.answers.criticism import CriticismResponse
 from labctl.answers.diagnosis import ConfirmExperimentRequest, DiagnosisRequest, DiagnosisResponse
 from labctl.errors import BadInput, Conflict, NotEnoughData, StartNotConfirmed, Stopped
+from labctl.services.calibrations.revision import improve_unit
 from labctl.services.commands.foreground_control import CampaignTerminal, OpenTerminal, no_terminal
 from labctl.services.diagnosis import begin
 from labctl.services.diagnosis.answer import diagnosis_answer
@@ -223,6 +225,18 @@ def test_a_recording_that_cannot_be_judged_with_the_others_is_left_out(location:
     assert answer.rounds[0].came_text.startswith("recording 2 cannot be judged with the others, and is left out: the")
     assert (answer.outcome, answer.rounds[-1].recordings) == ("one_cause", [1, 3])
     assert answer.spent_hours == pytest.approx(sum(each.took_hours or 0.0 for each in answer.rounds))
+
+
+@pytest.mark.slow
+def test_what_is_next_is_the_version_that_was_made_with_the_effect(location: str) -> None:
+    answer = run(location)
+    assert answer.next == f"`labctl improve {UNIT} --version 1 --recording 1,2,3 --add warm_up`"
+    made = ImproveRequest(version=1, recordings=answer.rounds[-1].recordings, add=["warm_up"], accept_warnings=True)
+    with open_store(location, write=True) as store:
+        version = improve_unit(store, UNIT, made, NOW).version
+        found = diagnosis_answer(store, answer.id)
+    said = f"version {version} contains what was found; `labctl criticise {UNIT} --version {version}` judges it"
+    assert found.next == said
 
 
 def test_a_unit_that_was_imported_needs_a_bench(location: str) -> None:

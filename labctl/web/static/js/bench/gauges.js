@@ -59,6 +59,17 @@ function gauge(title, unit, low, high, digits) {
 }
 
 /**
+ * How fast the table turns; a rate that is not known is not rest.
+ * @param {Numeric} rate_dps
+ */
+export const turnsText = (rate_dps) =>
+  !isNumber(rate_dps)
+    ? "no step has begun"
+    : rate_dps
+      ? `${(Math.abs(rate_dps) / 6).toPrecision(3)} turns a minute`
+      : "at rest";
+
+/**
  * The gauges of a campaign; the scales are those of its plan.
  * @param {Timeline} timeline
  */
@@ -90,8 +101,7 @@ export function gauges(timeline) {
   const set = ({ chamber_c, gyro_c, rate_dps, references: beside }, setpoint_c) => {
     chamber.set(chamber_c, setpoint_c, apart(chamber_c, setpoint_c));
     gyro.set(gyro_c, setpoint_c, apart(gyro_c, setpoint_c));
-    const turns = rate_dps ? `${(Math.abs(rate_dps) / 6).toPrecision(3)} turns a minute` : "at rest";
-    rate.set(rate_dps, null, turns);
+    rate.set(rate_dps, null, turnsText(rate_dps));
     const read = Object.entries(beside).map(
       ([column, value]) => `${channelName(column)} ${plainNumber(value, 6)} ${channelUnit(column)}`,
     );

@@ -109,6 +109,11 @@ export const fitWarnings = (answer) =>
         answer.warnings.map((each) => h("p", {}, `${each.severity === "certain" ? "Wrong" : "Check"}: ${each.text}`)),
       )
     : null;
+/**
+ * A sentence whose commands stand between backticks.
+ * @param {string} text
+ */
+export const withCommands = (text) => text.split("`").map((part, k) => (k % 2 ? h("code", {}, part) : part));
 /** @param {...Child} children */
 export const emptyState = (...children) => h("div", { class: "empty stack" }, ...children);
 /** @param {string} text */

@@ -9,6 +9,7 @@ import { asked, recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { finishLine, stepOf } from "./finish_line.js";
 import { heldOutName } from "./first_models.js";
+import { errorOn } from "./ladder_error.js";
 import { ticksOf } from "./ladder_ticks.js";
 import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap } from "./residual_map.js";
@@ -241,7 +242,7 @@ function versionTable(ladder, state) {
         ? {
             title: `Without refitting, on recording ${ladder.recording}, deg/s`,
             number: true,
-            cell: (step) => number(step.applied_rms_dps ?? (step.recording === ladder.recording ? step.rms_dps : null)),
+            cell: (step) => number(errorOn(ladder.recording, step)),
           }
         : null,
     ],

@@ -33,6 +33,8 @@ export async function chartCard(type, signal) {
   const load = async (changed) => {
     choice = { ...choice, ...changed };
     const chart = await get("/api/fleet/chart", { query: { type, ...choice }, signal });
+    setChildren(body, ...drawn(chart));
+    if (!chart.coefficients.length) return; // there is nothing to choose from
     setChildren(
       choices,
       selectField(
@@ -46,7 +48,6 @@ export async function chartCard(type, signal) {
       ),
       selectField("Grouped by", FACTORS, choice.factor, (factor) => load({ factor })),
     );
-    setChildren(body, ...drawn(chart));
   };
   await load({});
   return cardWithHeader("Control chart", choices, body);

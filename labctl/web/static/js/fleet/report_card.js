@@ -1,6 +1,6 @@
 // What the units of a type have in common: the report in sentences, what is missing, coefficients, units unlike others.
 
-import { card, cardWithHeader, table, chip } from "../core/components.js";
+import { card, cardWithHeader, chip, table, withCommands } from "../core/components.js";
 import { h } from "../core/elements.js";
 import { count, idText, withUncertainty, withUnit } from "../core/format.js";
 import { shownUnit } from "../core/shown_unit.js";
@@ -58,7 +58,7 @@ const whose = ({ of_bench: bench, common }) =>
 const saidCard = (report) =>
   card(
     "Report",
-    report.text.map((sentence) => h("p", {}, sentence)),
+    report.text.map((sentence) => h("p", {}, withCommands(sentence))),
   );
 
 /**

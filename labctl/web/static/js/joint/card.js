@@ -1,8 +1,9 @@
 // What several recordings say together: repeatability, agreement, each predicted by the others.
 
 import { h } from "../core/elements.js";
-import { idText, number, sizeText } from "../core/format.js";
-import { cardWithHeader, chip, notice, table } from "../core/components.js";
+import { idText, number, percent, sizeText } from "../core/format.js";
+import { cardWithHeader, chip, table } from "../core/components.js";
+import { deviationTexts } from "./deviation.js";
 import { shiftFigures } from "./shifts.js";
 
 /** @import { Joint } from "../../../types/api.js" */
@@ -42,14 +43,14 @@ function repeatability(joint) {
       [
         { title: "Axis", cell: (row) => row.axis },
         { title: "What", prose: true, cell: (row) => row.term },
-        { title: "Standard deviation", number: true, cell: (row) => size(row, row.value) },
-        { title: "u", number: true, cell: (row) => size(row, row.u) },
+        { title: "Standard deviation", number: true, cell: (row) => deviationTexts(row)[0] },
+        { title: "u", number: true, cell: (row) => deviationTexts(row)[1] },
         {
           title: "95 %",
           number: true,
           cell: (row) => `${size(row, row.low)} to ${size(row, row.high)}`,
         },
-        { title: "Chance of noise alone", number: true, cell: (row) => chance(row.p_value) },
+        { title: "Chance of noise alone", number: true, cell: (row) => percent(row.p_value) },
         { title: "Shift", cell: (row) => (row.seen ? chip("seen", "warn") : chip("not seen", "good")) },
       ],
       rows,
@@ -60,7 +61,7 @@ function repeatability(joint) {
 
 /** @param {Joint} joint */
 function agreement(joint) {
-  if (joint.not_compared) return notice("", `The recordings were not compared: ${joint.not_compared}`);
+  if (joint.not_compared) return null; // a sentence of the text says why
   return [
     h("h3", {}, "Agreement of the recordings, each fitted alone"),
     table(
@@ -102,7 +103,7 @@ function heldOut(joint) {
       [
         {
           title: "Recording",
-          cell: (row) => h("a", { href: `/recordings/${row.recording}` }, `Recording ${row.recording}`),
+          cell: (row) => h("a", { href: `/recordings/${row.recording}` }, `Recording\u00a0${row.recording}`),
         },
         { title: "RMS error, deg/s", number: true, cell: (row) => number(row.rms_dps) },
         { title: "Note", prose: true, cell: (row) => row.why },

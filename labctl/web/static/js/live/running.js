@@ -2,7 +2,7 @@
 
 import { get, post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { count, duration, number, plainNumber } from "../core/format.js";
+import { count, duration, plainNumber, resultTexts } from "../core/format.js";
 import { shownUnit } from "../core/shown_unit.js";
 import { axisColour, figure } from "../core/figure.js";
 import { actButton, card, chip, table } from "../core/components.js";
@@ -18,6 +18,15 @@ const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
 const factorOf = ({ unit, name }) => shownUnit(unit, name)[0];
 
 /**
+ * A coefficient and its U as texts of the same place.
+ * @param {LiveMoment["coefficients"][number]} row
+ */
+function resultOf({ value, expanded, unit, name }) {
+  const { middle, half, power } = resultTexts(value, expanded, unit, name);
+  return [middle, half ?? "–"].map((text) => [text, power].filter(Boolean).join(" "));
+}
+
+/**
  * The coefficients with U and limit.
  * @param {readonly LiveMoment["coefficients"][number][]} coefficients
  */
@@ -26,11 +35,11 @@ export const coefficientTable = (coefficients) =>
     [
       { title: "Axis", cell: (row) => row.axis },
       { title: "Coefficient", cell: (row) => h("code", {}, row.name) },
-      { title: "Value", number: true, cell: (row) => number(factorOf(row) * row.value) },
+      { title: "Value", number: true, cell: (row) => resultOf(row)[0] },
       {
         title: "U, k = 2",
         number: true,
-        cell: (row) => h("span", { "data-u": row.expanded }, number(factorOf(row) * row.expanded, 2)),
+        cell: (row) => h("span", { "data-u": row.expanded }, resultOf(row)[1]),
       },
       {
         title: "Limit",

@@ -3,7 +3,7 @@
 
 import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { instant } from "../core/format.js";
+import { capitalised, instant } from "../core/format.js";
 import { card, factList, notice, pageHeader } from "../core/components.js";
 import { labelledField } from "../core/fields.js";
 import { Problem } from "../core/http/errors.js";
@@ -36,7 +36,7 @@ async function found(number, calibration, signal) {
     return shown(await get("/api/certificates/state", { query: { number, calibration }, signal }));
   } catch (error) {
     if (error instanceof Problem && error.status === 404)
-      return notice("bad", h("p", {}, h("strong", {}, "Unknown certificate. "), error.message));
+      return notice("bad", h("p", {}, h("strong", {}, "Unknown certificate. "), `${capitalised(error.message)}.`));
     throw error;
   }
 }

@@ -32,8 +32,10 @@ const SPANS = [
   ["1800", "the last 30 min"],
   ["300", "the last 5 min"],
 ];
-const SHADES = ["axis-x", "axis-y", "axis-z", "accent", "good", "warn", "bad"];
+/** Colours that differ from each other; further traces differ by their dashes, and points by their symbols. */
+const SHADES = ["axis-x", "axis-y", "axis-z", "text-muted"];
 const DASHES = ["solid", "dash", "dot"];
+const SYMBOLS = ["circle", "square", "diamond"];
 
 /** @param {PageContext} context */
 export async function page({ params, query, signal }) {
@@ -241,8 +243,9 @@ function picture(shown, height) {
       const top = 1 - k / rows.length;
       axes[`yaxis${k ? k + 1 : ""}`] = { title: { text }, domain: [top - 0.92 / rows.length, top] };
     });
+    const before = rows.map((_, row) => rows.slice(0, row).reduce((n, [, members]) => n + members.length, 0));
     const data = rows.flatMap(([text, members], row) =>
-      members.map((each, k) => trace(each, k, text, row ? `y${row + 1}` : "y", unit.seconds)),
+      members.map((each, k) => trace(each, before[row] + k, text, row ? `y${row + 1}` : "y", unit.seconds)),
     );
     return {
       data,
@@ -272,7 +275,7 @@ function picture(shown, height) {
 
 /**
  * @param {Series} series
- * @param {number} k place in its panel
+ * @param {number} k place in the legend: no two traces look the same
  * @param {string} unit
  * @param {string} axis
  * @param {number} seconds of a unit of the axis of time
@@ -285,7 +288,11 @@ const trace = (series, k, unit, axis, seconds) => ({
   x: series.t_s.map((t) => t / seconds),
   y: series.values,
   yaxis: axis,
-  marker: { size: 5, color: colour(SHADES[k % SHADES.length]) },
+  marker: {
+    size: 5,
+    color: colour(SHADES[k % SHADES.length]),
+    symbol: SYMBOLS[Math.floor(k / SHADES.length) % SYMBOLS.length],
+  },
   line: {
     color: colour(SHADES[k % SHADES.length]),
     width: 1.6,

@@ -6,6 +6,7 @@ import { count } from "../core/format.js";
 import { get } from "../core/http/api.js";
 import { isAbort, messageOf } from "../core/http/errors.js";
 import { chartCard } from "../fleet/chart.js";
+import { jobsCard } from "../fleet/jobs.js";
 import { reportCards } from "../fleet/report_card.js";
 import { typeCard } from "../fleet/type_card.js";
 
@@ -29,17 +30,21 @@ export async function page({ query, signal }) {
       ),
     );
   if (query.type !== undefined || types.length === 1) return typePage(types[0], signal);
-  return allTypes(types);
+  return allTypes(types, signal);
 }
 
-/** @param {readonly FleetType[]} types */
-function allTypes(types) {
+/**
+ * @param {readonly FleetType[]} types
+ * @param {AbortSignal} signal
+ */
+async function allTypes(types, signal) {
   const most = [...types].sort((a, b) => b.units - a.units).slice(0, SHOWN);
   return h(
     "div",
     { class: "page" },
     pageHeader("Fleet", "Units by type: how good, how judged, when due."),
     most.map((each) => typeCard(each, true)),
+    await jobsCard(signal),
     types.length > SHOWN
       ? h(
           "p",
@@ -68,6 +73,7 @@ async function typePage(figures, signal) {
     typeCard(figures, false),
     await chartCard(figures.type, signal),
     report,
+    await jobsCard(signal),
   );
 }
 

@@ -9,7 +9,7 @@ import { card, emptyState, loadInto, notice, pageHeader, table } from "../core/c
 import { pointPlace, selectPoints } from "../core/figure_point.js";
 import { longList } from "../core/long_list.js";
 import { updateQuery } from "../core/router.js";
-import { allanPoint, askedAllan } from "../recordings/allan.js";
+import { allanPoint, askedAllan, NOISE_FIGURES } from "../recordings/allan.js";
 
 /** @import { Allan, NoiseFigure, RecordingRow } from "../../../types/api.js" */
 /** @import { PageContext } from "../../../types/pages.js" */
@@ -206,10 +206,10 @@ function overlay(records) {
           [
             { title: "Record", cell: ({ row, axis }) => `${row.id} ${row.serial}, axis ${axis}` },
             { title: "Length", cell: ({ found }) => duration(found?.duration_s ?? null) },
-            ...["N", "B", "K"].map((letter) => ({
-              title: letter,
+            ...NOISE_FIGURES.map(([letter, name]) => ({
+              title: `${letter}, ${name}`,
               /** @param {typeof lines[number]} line */
-              cell: ({ noise }) => figureText(noise[/** @type {"N" | "B" | "K"} */ (letter)]),
+              cell: ({ noise }) => figureText(noise[letter]),
             })),
           ],
           lines,

@@ -189,7 +189,11 @@ function overview(units, found) {
           ),
         ),
         units.some((unit) => unit.calibrations.length)
-          ? h("p", { class: "muted small" }, "Lines: error of each version over the noise floor (dashed).")
+          ? h(
+              "p",
+              { class: "muted small" },
+              "Lines: error of each version over the noise floor (dashed); number: that of the newest version, in noise floors.",
+            )
           : null,
         units.length === SHOWN ? h("a", { class: "small", href: "/units" }, "All units") : null,
       ),

@@ -18,7 +18,7 @@ import { pointPlace, pythonValue, selectPoints } from "../core/figure_point.js";
 const TRACES_OF_AXIS = 3;
 
 /** @type {["N" | "B" | "K", string][]} */
-const NOISE_FIGURES = [
+export const NOISE_FIGURES = [
   ["N", "angle random walk"],
   ["B", "bias instability"],
   ["K", "rate random walk"],

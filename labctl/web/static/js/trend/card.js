@@ -131,7 +131,7 @@ function drifts(trend) {
       },
       {
         title: "Significance",
-        cell: (row) => (row.u === null ? "" : row.significant ? chip("drifts", "warn") : chip("no drift")),
+        cell: (row) => (row.u === null ? "" : row.significant ? chip("drifts", "warn") : chip("not significant")),
       },
       { title: "Leaves the limit", cell: when },
     ],

@@ -4,6 +4,7 @@ import { download, get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { actButton, button, notice } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
+import { capitalised } from "../core/format.js";
 import { Problem } from "../core/http/errors.js";
 import { show } from "../core/router.js";
 import { stateChip } from "./certificate_state.js";
@@ -44,6 +45,7 @@ const FIELDS = [
     name: "own_axis",
     label: "The item turns about the axis of one output at a time",
     type: "checkbox",
+    hint: "Needed where U is known about the axis of each output alone (“own axis”).",
     required: false,
   },
   {
@@ -52,6 +54,20 @@ const FIELDS = [
     type: "checkbox",
     required: false,
   },
+];
+
+/** The laboratory, asked for where the bench file of the campaign does not name it. @type {readonly Field[]} */
+const LABORATORY_FIELDS = [
+  { name: "laboratory_name", label: "Laboratory" },
+  { name: "laboratory_street", label: "Street and number of the laboratory" },
+  { name: "laboratory_post_code", label: "Post code of the laboratory" },
+  { name: "laboratory_city", label: "City of the laboratory" },
+  {
+    name: "laboratory_country",
+    label: "Country of the laboratory",
+    hint: "Two letters, such as DE (ISO 3166-1).",
+  },
+  { name: "laboratory_email", label: "E-mail of the laboratory", type: "email" },
 ];
 
 /**
@@ -102,12 +118,14 @@ async function askCertificate(serial, version, replaced) {
   /** @type {Answers} */
   let given = {};
   let refusal = "";
+  let [lacksLaboratory, asksLaboratory] = [false, false];
   for (;;) {
-    const fields = [...why, ...FIELDS].map((field) => ({ ...field, value: given[field.name] }));
+    const asked = [...why, ...(asksLaboratory ? LABORATORY_FIELDS : []), ...FIELDS];
+    const fields = asked.map((field) => ({ ...field, value: given[field.name] }));
     const lacking = imported ? notice("warn", h("p", {}, IMPORTED)) : null;
     const answers = await dialog(`Issue a certificate of version ${version}`, fields, {
-      text: "A certificate is a document for a customer; which version is in force does not change. Laboratory and reference standards come from the bench file of the campaign. The certificate is written to the audit trail.",
-      body: refusal ? notice("bad", h("p", {}, refusal)) : lacking,
+      text: "A certificate is a document for a customer; which version is in force does not change. Laboratory and reference standards come from the bench file of the campaign; a laboratory that it does not name is asked for. The certificate is written to the audit trail.",
+      body: refusal ? refusalNotice(refusal, lacksLaboratory) : lacking,
       confirm: "Issue certificate",
     });
     if (!answers) return;
@@ -118,9 +136,29 @@ async function askCertificate(serial, version, replaced) {
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
       [given, refusal] = [answers, error.message];
+      lacksLaboratory = error.missing.some(({ fact }) => fact.startsWith("laboratory's"));
+      asksLaboratory ||= lacksLaboratory;
     }
   }
 }
+
+/**
+ * Why a certificate was not issued, and what the form asks for because of that.
+ * @param {string} refusal
+ * @param {boolean} lacksLaboratory
+ */
+const refusalNotice = (refusal, lacksLaboratory) =>
+  notice(
+    "bad",
+    h("p", {}, `${capitalised(refusal)}.`),
+    lacksLaboratory
+      ? h(
+          "p",
+          {},
+          "The laboratory is asked for below. A [laboratory] in the bench file states it in every certificate of later campaigns.",
+        )
+      : null,
+  );
 
 /** What the certificate of a version needs beyond this form where no campaign measured it. */
 const IMPORTED =
@@ -143,6 +181,18 @@ async function wasImported(serial, version) {
 function orderOf(given) {
   const { name, street, post_code, city, country, email, contact, order } = given;
   return {
+    ...(given.laboratory_name
+      ? {
+          laboratory: {
+            name: given.laboratory_name,
+            street: given.laboratory_street,
+            post_code: given.laboratory_post_code,
+            city: given.laboratory_city,
+            country: given.laboratory_country,
+            email: given.laboratory_email,
+          },
+        }
+      : {}),
     customer: { name, street, post_code, city, country, email, contact, order },
     item: {
       manufacturer: given.manufacturer,

@@ -6,6 +6,7 @@ import { instant, number } from "../core/format.js";
 import { actButton, chip, factList, notice, table, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { show } from "../core/router.js";
+import { withoutPart } from "./uncertainty_parts.js";
 
 /** @import { AnyAxisUncertainty, Assessment, Certification, Fetch, ReleaseRequest } from "../../../types/api.js" */
 /** @import { Fact, Field } from "../../../types/pages.js" */
@@ -232,7 +233,7 @@ const largestUncertainty = ([axis, found]) => [
   `Largest U of ${axis} in use, k = 2`,
   found.bound_dps === null ? chip("unknown", "warn") : number(found.bound_dps),
   found.bound_dps === null ? null : "deg/s",
-  found.bound_dps === null ? found.why : `any axis, up to ${number(found.reach_dps)} deg/s`,
+  found.bound_dps === null ? `any axis: ${withoutPart(found.why)}` : `any axis, up to ${number(found.reach_dps)} deg/s`,
 ];
 
 /** @param {readonly Certification[]} history */

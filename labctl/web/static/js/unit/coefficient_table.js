@@ -1,6 +1,6 @@
 // Coefficients of a version that are columns over temperature.
 
-import { idText } from "../core/format.js";
+import { idText, plainNumber } from "../core/format.js";
 
 /** @import { Coefficient, CoefficientAxis, CoefficientTable, Version } from "../../../types/api.js" */
 /**
@@ -78,3 +78,26 @@ export function differenceText(first, second) {
 /** @param {Pick<Version, "axes">} version */
 export const coefficientColumns = (version) =>
   Object.entries(version.axes).flatMap(([axis, values]) => columnsOf(axis, values));
+
+/** @type {Readonly<Record<string, string>>} units of the parameters of effects by the end of their name */
+const PARAMETER_UNITS = { dps: "deg/s", s: "s", hz: "Hz", c: "deg C" };
+
+/**
+ * What the coefficients of a version are relative to, and the parameters of its effects that no coefficient states.
+ * @param {Pick<Version, "axes" | "model" | "reference_temperature_c">} version
+ */
+export function termsText({ axes, model, reference_temperature_c }) {
+  const names = Object.values(axes).flatMap(({ coefficients }) => Object.keys(coefficients));
+  const reference = names.some((name) => /_t\d$/.test(name))
+    ? [`T_ref is ${plainNumber(reference_temperature_c)} deg C`]
+    : [];
+  const parameters = (model.terms ?? []).flatMap(({ effect, parameters: own }) =>
+    Object.entries(own).map(([name, value]) => {
+      const [, words = name, end = ""] = /^(.*)_([a-z]+)$/.exec(name) ?? [];
+      const unit = PARAMETER_UNITS[end];
+      return `${idText(effect)}: ${idText(unit ? words : name)} ${plainNumber(value)}${unit ? ` ${unit}` : ""}`;
+    }),
+  );
+  const said = [...reference, ...parameters].join("; ");
+  return said && `${said}.`;
+}

@@ -6,7 +6,7 @@ import { number, resultTexts, idText, withUncertainty } from "../core/format.js"
 import { shownUnit } from "../core/shown_unit.js";
 import { factList, table } from "../core/components.js";
 import { byHand } from "./by_hand.js";
-import { coefficientColumns, columnsBeside, differenceText, isSingle } from "./coefficient_table.js";
+import { coefficientColumns, columnsBeside, differenceText, isSingle, termsText } from "./coefficient_table.js";
 import { heldText } from "./held.js";
 
 /** @import { Coefficient, Version } from "../../../types/api.js" */
@@ -61,9 +61,24 @@ export function coefficients(first, second) {
   const isKnown =
     columns.some(({ u }) => u.some((each) => each !== null)) || singles(first).some(({ u }) => u !== null);
   const note = isKnown ? h("p", { class: "muted small" }, FIT_ALONE) : null;
-  if (columns.length) return h("div", { class: "stack" }, held, overTemperature(first, second), note);
-  return h("div", { class: "stack" }, held, list(first, second), note, byHand(first));
+  const terms = termsText(first);
+  const meaning = h("p", { class: "muted small" }, terms ? `${terms} ` : null, equations(first));
+  if (columns.length) return h("div", { class: "stack" }, held, overTemperature(first, second), meaning, note);
+  return h("div", { class: "stack" }, held, list(first, second), meaning, note, byHand(first));
 }
+
+/**
+ * Links to the equations of the effects of a version, which define its coefficients.
+ * @param {Version} version
+ */
+const equations = ({ model }) => [
+  "Equations: ",
+  ...model.effects.flatMap((id, k) => [
+    k ? ", " : "",
+    h("a", { href: `/effects/${encodeURIComponent(id)}` }, idText(id)),
+  ]),
+  ".",
+];
 
 /**
  * One plot per coefficient: its value over temperature with expanded uncertainty, one colour per axis.

@@ -3,7 +3,7 @@
 import { get, post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { idText } from "../core/format.js";
-import { actButton, cardWithHeader, chip, table } from "../core/components.js";
+import { actButton, cardWithHeader, chip, table, withCommands } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { askBenchClear, askingButton } from "../bench/actions.js";
 import { diagnosisState, lineOfRound, suspectColumns } from "./diagnosis_rounds.js";
@@ -84,14 +84,7 @@ function rounds(diagnosis) {
         ),
       ),
     ),
-    diagnosis.next
-      ? h(
-          "p",
-          { class: "small" },
-          "Next: ",
-          diagnosis.next.split("`").map((part, k) => (k % 2 ? h("code", {}, part) : part)),
-        )
-      : null,
+    diagnosis.next ? h("p", { class: "small" }, "Next: ", withCommands(diagnosis.next)) : null,
   );
 }
 

@@ -8,7 +8,7 @@ import { busyIndicator, notice, table } from "../core/components.js";
 import { labelledField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
 import { budgetLines, contributionFigures } from "./budget.js";
-import { atPlace, joined, shown, titleOf, unknown } from "./uncertainty_parts.js";
+import { atPlace, joined, shown, titleOf, unknown, withoutPart } from "./uncertainty_parts.js";
 
 /** @import { AxisUncertainty, Uncertainty, Validity, Version } from "../../../types/api.js" */
 
@@ -142,7 +142,7 @@ function aboutAnyAxis({ any_axis }) {
       rows,
       { dense: true, label: "Uncertainty about any axis" },
     ),
-    whys.length ? notice("warn", h("p", {}, h("strong", {}, "Unknown: "), whys.join("; "))) : null,
+    whys.length ? notice("warn", h("p", {}, h("strong", {}, "Unknown: "), whys.map(withoutPart).join("; "))) : null,
   );
 }
 

@@ -131,3 +131,9 @@ function byAxis(axes, text) {
   if (new Set(texts.map(([, said]) => said)).size === 1) return texts[0][1];
   return texts.map(([axis, said]) => h("div", {}, `axis ${axis}: ${said}`));
 }
+
+/**
+ * Why an uncertainty is unknown, without the name of the line of the budget that it is said of.
+ * @param {string} why
+ */
+export const withoutPart = (why) => why.replace(/^(model|coefficients|repeatability): /, "");
