@@ -57,7 +57,11 @@ export async function jobsCard(signal) {
     const jobs = await get("/api/fleet/jobs", { query: { limit: SHOWN }, signal });
     if (!jobs.length) return;
     setChildren(place, card("Jobs", jobTable(jobs, reasons, signal, again), reasons));
-    if (jobs.some(({ ended }) => !ended)) waiting = window.setTimeout(() => next().catch(quiet), POLL_MS);
+    if (jobs.some(({ ended }) => !ended)) later();
+  };
+  // a request that fails is made again: the header says meanwhile that the service does not answer
+  const later = () => {
+    waiting = window.setTimeout(() => next().catch((error) => isAbort(error) || later()), POLL_MS);
   };
   const next = async () => {
     await untilVisible(signal);
@@ -65,11 +69,6 @@ export async function jobsCard(signal) {
   };
   await again();
   return place;
-}
-
-/** @param {unknown} error */
-function quiet(error) {
-  if (!isAbort(error)) throw error;
 }
 
 /**
