@@ -52,11 +52,14 @@ def criticise_unit(
 def criticise_seen(
     store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...], seen: Callable[[Criticism], None]
 ) -> CriticismResponse:
-    """Compare a version with recordings, whatever is cached; `seen` is given the criticism itself. Raises BadInput."""
+    """Compare a version with recordings, whatever is cached; `seen` is given the criticism itself. Raises BadInput.
+
+    The answer proposes nothing to measure next: a fleet job keeps the verdict.
+    """
     with reading_beside(store, measured) as decimated:
         from labctl.services.criticism.evaluation import evaluate  # noqa: PLC0415  slow to import
 
-        return evaluate(store, row, measured, (), decimated, seen)[0]
+        return evaluate(store, row, measured, (), decimated, seen, plans_next=False)[0]
 
 
 def _with_undistinguished(

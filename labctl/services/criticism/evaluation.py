@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from labctl.answers.criticism import CriticismResponse, Experiment
+from labctl.answers.laws import LawTest, ProposedLaw
 from labctl.answers.residuals import ResidualsResponse
 from labctl.answers.verification import VerificationResponse
 from labctl.errors import BadInput, LabctlError
@@ -53,11 +54,14 @@ def evaluate(
     competing: Sequence[Formula],
     decimated: Decimated | None = None,
     seen: Callable[[Criticism], None] = lambda _: None,
+    *,
+    plans_next: bool = True,
 ) -> tuple[CriticismResponse, ResidualsResponse]:
     """Return the criticism of a version against recordings, and its residuals. Raises BadInput, NotEnoughData.
 
     `competing` formulas are added to the catalogue. `decimated` gives readings that are being read already. `seen` is
-    given the criticism itself.
+    given the criticism itself. Without `plans_next` no experiments and no laws are proposed: most of the time where
+    the verdict is open.
     """
     catalogue, measured = catalogue_with(competing), Measurements(store, recordings, decimated)
     report_stage("inspecting the recording")
@@ -79,11 +83,8 @@ def evaluate(
     seen(criticised)
     columns = residual_columns(criticised.data, criticised.residuals, measured.points, measured.row.id, criticised.base)
     serial, version = calibration.serial, calibration.version
-    experiments = _experiments(store, recordings, criticised)
+    experiments, laws, law_test = _proposals(store, recordings, criticised) if plans_next else ([], [], None)
     criticism = answer_of(serial, version, measured.recordings, criticised, experiments)
-    laws, law_test = proposed_laws(criticised)
-    if law_test is not None:
-        law_test = {**law_test, "toml": _recipe_for_laws(store, recordings, criticised)}
     text = [*criticism.text, *held_sentences(model)]
     criticism = criticism.model_copy(update={"text": text, "laws": laws, "law_test": law_test})
     return (
@@ -96,6 +97,17 @@ def evaluate(
             columns=columns,
         ),
     )
+
+
+def _proposals(
+    store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism
+) -> tuple[list[Experiment], list[ProposedLaw], LawTest | None]:
+    """Return what to measure next, laws for what has no name, and the measurement that tells these apart."""
+    experiments = _experiments(store, rows, criticism)
+    laws, law_test = proposed_laws(criticism)
+    if law_test is not None:
+        law_test["toml"] = _recipe_for_laws(store, rows, criticism)
+    return experiments, laws, law_test
 
 
 def _experiments(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism) -> list[Experiment]:

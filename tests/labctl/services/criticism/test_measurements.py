@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 
 from labctl.answers.calibrations import FitRequest
+from labctl.fitting.criticism import Criticism
 from labctl.fitting.data.static_record import static_record
 from labctl.recording import Recording, RecordingInfo
 from labctl.services import forked
 from labctl.services.calibrations.fitting import fit_unit
-from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.criticism.criticise import criticise_seen, criticise_unit
 from labctl.services.criticism.decimated_readings import read_recording_of
-from labctl.services.recordings.loading import points_of
+from labctl.services.criticism.versions import version_of
+from labctl.services.recordings.loading import chosen_rows, points_of
 from labctl.store import open_store
 from labctl.store.repositories.recordings import Recordings
 from tests.helpers.simulated_recordings import single_axis
@@ -110,3 +112,18 @@ def test_readings_that_a_fork_has_read_give_the_same_criticism(tmp_path: Path, m
                 answers.append(criticise_unit(store, "FOG-0001", 1, None))
             assert calls["iter_datasets"] == (2 if forks else 3)  # the inspection reads them too, twice
     assert answers[0] == answers[1]
+
+
+@pytest.mark.slow
+def test_a_criticism_for_a_fleet_has_the_same_verdict_and_plans_nothing(tmp_path: Path) -> None:
+    seen: list[Criticism] = []
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        store.recordings.add_import(single_axis(3, saturation=-7e-4), AT)
+        fit_unit(store, "FOG-0001", FitRequest(model="ojeda2000"), AT)
+        row, measured = version_of(store, "FOG-0001", 1), chosen_rows(store, "FOG-0001", None)
+        kept = criticise_seen(store, row, measured, seen.append)
+        whole = criticise_unit(store, "FOG-0001", 1, None)
+    assert (kept.verdict, kept.named, kept.error) == (whole.verdict, whole.named, whole.error)
+    assert (kept.verdict, len(seen)) == ("ambiguous", 1)
+    assert whole.experiments
+    assert kept.experiments == []
