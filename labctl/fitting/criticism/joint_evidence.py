@@ -226,7 +226,7 @@ class Outcomes:
         return np.asarray(logsumexp(each, axis=0) - np.log(len(each))) if len(each) else None
 
     def evidence_of_sizes(self, effect: str, k: int) -> float | None:
-        """Return the same in outcome `k` where the size is averaged over as that of draws is."""
+        """Return the log evidence for an effect in outcome `k`, nats, its size averaged over as that of draws is."""
         shapes = self._axis.shapes_of(effect)
         of_sizes = [
             log_bf + s.after.size_nats(self._products[k, s.columns])

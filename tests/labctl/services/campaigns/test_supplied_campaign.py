@@ -14,6 +14,7 @@ from instruments.clock import VirtualClock
 from instruments.errors import NoReply
 from labctl.answers.campaigns import ResumeRequest
 from labctl.errors import BadInput
+from labctl.recording import Recording
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.resume import prepare_resume
@@ -62,19 +63,25 @@ def killed_in(store: Store, recipe: str, bench: BenchFile, step: str, silent: st
     return prepared.id
 
 
+def resumed_at_right_voltages(store: Store, number: int, bench: BenchFile) -> Recording:
+    """Resume a campaign to its end, hold each data set's voltage to the recipe's, and return what was recorded."""
+    request = ResumeRequest(by="Ada", power="kept")
+    prepared = prepare_resume(store, number, bench, lambda point: VirtualClock(point.last_at), request)
+    answer = run(store, prepared, Control(), lambda _: None)
+    assert answer.state == "done"
+    points = store.recordings.points(answer.recordings["FOG-0001"])
+    assert np.asarray(points.columns["supply_v"], dtype=np.float64) == pytest.approx(VOLTAGES_V, abs=0.01)
+    supply: Any = prepared.bench.supply
+    assert supply.limits.nominal_v == 5.0
+    return points
+
+
 @pytest.mark.parametrize("voltage", ["4.75 V", "5.25 V", "5 V"])
 def test_killed_in_a_step_of_the_supply_it_sets_that_voltage_again(tmp_path: Path, voltage: str) -> None:
     bench = bench_of()
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         number = killed_in(store, recipe_in(tmp_path), bench, f"supply of the units to {voltage}", "supply")
-        request = ResumeRequest(by="Ada", power="kept")
-        prepared = prepare_resume(store, number, bench, lambda point: VirtualClock(point.last_at), request)
-        answer = run(store, prepared, Control(), lambda _: None)
-        assert answer.state == "done"
-        points = store.recordings.points(answer.recordings["FOG-0001"])
-        assert np.asarray(points.columns["supply_v"], dtype=np.float64) == pytest.approx(VOLTAGES_V, abs=0.01)
-        supply: Any = prepared.bench.supply
-        assert supply.limits.nominal_v == 5.0
+        resumed_at_right_voltages(store, number, bench)
 
 
 @pytest.mark.parametrize("safe_state", ["nominal", "off"])
@@ -82,16 +89,9 @@ def test_killed_in_the_middle_it_goes_on_at_the_right_voltage(tmp_path: Path, sa
     bench = bench_of(safe_state=safe_state)
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         number = killed_in(store, recipe_in(tmp_path), bench, "data set 6 of")
-        request = ResumeRequest(by="Ada", power="kept")
-        prepared = prepare_resume(store, number, bench, lambda point: VirtualClock(point.last_at), request)
-        answer = run(store, prepared, Control(), lambda _: None)
-        assert answer.state == "done"
-        points = store.recordings.points(answer.recordings["FOG-0001"])
-        assert np.asarray(points.columns["supply_v"], dtype=np.float64) == pytest.approx(VOLTAGES_V, abs=0.01)
+        points = resumed_at_right_voltages(store, number, bench)
         runs = np.asarray(points.columns["run"]).tolist()
         assert runs == ([1] * 6 if safe_state == "nominal" else [1] * 5 + [2])  # off: another powered session
-        supply: Any = prepared.bench.supply
-        assert supply.limits.nominal_v == 5.0
 
 
 def test_a_voltage_outside_of_the_limits_is_refused_and_no_campaign_is_written(tmp_path: Path) -> None:
