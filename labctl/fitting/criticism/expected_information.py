@@ -30,6 +30,7 @@ from labctl.fitting.criticism.verdict import ENOUGH, has_as_simple_a_shape, refi
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.log_evidence import on_all_axes_or_one
 
 #: Suspects that are less likely than this are left out, unless the verdict names them.
 MIN_PROBABILITY = 0.01
@@ -222,18 +223,9 @@ def _evidence(
         of_axes = [(axes[axis].evidence_before(name), outcomes[axis].evidence(name)) for axis in axes]
         present = [(old, new) for old, new in of_axes if old is not None and new is not None]
         if present:
-            before[k] = _over_axes(np.array([[old] for old, _ in present]))[0]
-            after[:, k] = _over_axes(np.stack([new for _, new in present]))
+            before[k] = on_all_axes_or_one([old for old, _ in present])
+            after[:, k] = on_all_axes_or_one([new for _, new in present])
     return before, after
-
-
-def _over_axes(per_axis: NDArray[np.float64]) -> Array:
-    """Return the log evidence of an effect over all axes, (n,), as the ranking has it: on all of them, or on one."""
-    axes = len(per_axis)
-    if axes == 1:
-        return np.asarray(per_axis[0])
-    joint = per_axis.sum(axis=0) - np.log(2.0)
-    return np.asarray(logsumexp(np.vstack([joint, per_axis - np.log(2.0 * axes)]), axis=0))
 
 
 @dataclass(frozen=True)
@@ -321,5 +313,5 @@ def _beside(outcomes: Mapping[str, Outcomes], candidate: Candidate, other: Candi
     if is_drawn(candidate) == is_drawn(other):
         return log_bf
     of_axes = (each.evidence_of_sizes(candidate.id, k) for each in outcomes.values())
-    present = [[nats] for nats in of_axes if nats is not None]
-    return float(_over_axes(np.array(present))[0]) if present else log_bf
+    present = [nats for nats in of_axes if nats is not None]
+    return float(on_all_axes_or_one(present)) if present else log_bf

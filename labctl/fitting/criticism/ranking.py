@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.effects import CATALOGUE, Term
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.log_evidence import mean_evidence, on_all_axes_or_one
 
 #: The size of a coefficient counts as its estimate less this many standard uncertainties.
 SPARE_U = 2.0
@@ -148,13 +149,13 @@ def _candidate(
     gain = 0.0
     for axis, places in which.items():
         options, values = designs[axis].options, axes[axis].log_bf[places]
-        tried = np.isfinite(values).sum()
+        tried = int(np.isfinite(values).sum())
         if priors is not None:
             values = values + priors[axis][places]
         if not np.any(np.isfinite(values)):
             continue
-        per_axis.append(float(np.logaddexp.reduce(values) - np.log(tried)))
-        of_sizes.append(float(np.logaddexp.reduce(values + axes[axis].size_nats[places]) - np.log(tried)))
+        per_axis.append(mean_evidence(values, tried))
+        of_sizes.append(mean_evidence(values + axes[axis].size_nats[places], tried))
         best[axis] = places[int(np.argmax(values))]
         gain += float(axes[axis].gain[best[axis]])
         for i, value in zip(places, values.tolist(), strict=True):
@@ -163,15 +164,8 @@ def _candidate(
     if not per_axis:
         return None
     term = max(terms.values(), key=lambda pair: pair[1])[0]
-    log_bf = _over_axes(per_axis)
-    return Candidate(*key, log_bf, best, term, gain, priors is not None, _over_axes(of_sizes) - log_bf)
-
-
-def _over_axes(per_axis: Sequence[float]) -> float:
-    """Return the log Bayes factor of a candidate by those of its axes, nats: on all of them, or on one."""
-    n, joint = len(per_axis), sum(per_axis)
-    alternatives = [joint - np.log(2.0), *(value - np.log(2.0 * n) for value in per_axis)] if n > 1 else [joint]
-    return float(np.logaddexp.reduce(alternatives))
+    log_bf, by_sizes = float(on_all_axes_or_one(per_axis)), float(on_all_axes_or_one(of_sizes))
+    return Candidate(*key, log_bf, best, term, gain, priors is not None, by_sizes - log_bf)
 
 
 def _shape_of(option: CandidateShape) -> tuple[object, ...]:

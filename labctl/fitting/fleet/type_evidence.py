@@ -28,6 +28,7 @@ from labctl.fitting.fleet.shape_evidence import (
 )
 from labctl.fitting.fleet.type_sums import AxisSums, TypeSums
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.log_evidence import mean_evidence, on_all_axes_or_one
 from labctl.texts import counted
 
 #: Log evidence, nats, without which nothing is named; and that of a further effect beside one.
@@ -189,19 +190,11 @@ def _candidates(axes: Mapping[str, AxisSums], evidence: Mapping[str, ShapeEviden
             if not np.any(np.isfinite(values)):
                 continue
             best[axis] = places[int(np.argmax(values))]
-            per_axis.append(float(np.logaddexp.reduce(values) - np.log(np.isfinite(values).sum())))
+            per_axis.append(mean_evidence(values, int(np.isfinite(values).sum())))
             gain += float(evidence[axis].gain[best[axis]])
         if per_axis:
-            candidates.append(_Candidate(effect, _over_axes(per_axis), best, gain))
+            candidates.append(_Candidate(effect, float(on_all_axes_or_one(per_axis)), best, gain))
     return sorted(candidates, key=lambda c: -c.log_bf)
-
-
-def _over_axes(per_axis: Sequence[float]) -> float:
-    n = len(per_axis)
-    if n == 1:
-        return per_axis[0]
-    alternatives = [sum(per_axis) - np.log(2.0), *(value - np.log(2.0 * n) for value in per_axis)]
-    return float(np.logaddexp.reduce(alternatives))
 
 
 def _type_effect(
