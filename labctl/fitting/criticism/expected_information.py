@@ -200,7 +200,8 @@ def forecast(question: OpenQuestion, planned: ReducedRecording, seed: int = 1) -
         before = np.log(p[question.nodes == question.nodes[h]].sum())
         gained.append(np.maximum(of_cause, before - MAX_LOSS) - before)
         weights.append(probability)
-        alone = [_named_alone(question, axes, outcomes, after_it[k], k) for k in range(n)]
+        beside_draws = _beside_draws(question, outcomes, after_it)
+        alone = [_named_alone(question, axes, outcomes, after_it[k], beside_draws[k], k) for k in range(n)]
         one += probability * float(np.mean([name is not None for name in alone]))
         wrong += probability * float(np.mean([name is not None and name != question.nodes[h] for name in alone]))
         if h == int(np.argmax(p)):
@@ -285,9 +286,12 @@ class _ForeseenPair(Pair):
 
 def _named_alone(
     question: OpenQuestion, axes: Mapping[str, AxisForecast], outcomes: Mapping[str, Outcomes],
-    log_bf: Array, k: int,
+    log_bf: Array, beside_draws: Array, k: int,
 ) -> int | None:  # fmt: skip
-    """Return the number of the cause that the verdict names alone in outcome `k`; None where it names none, or more."""
+    """Return the number of the cause that the verdict names alone in outcome `k`; None where it names none, or more.
+
+    `log_bf` and `beside_draws` (h,) are the evidence of each hypothesis there, nats.
+    """
     h = int(np.argmax(log_bf))
     if log_bf[h] < ENOUGH:
         return None
@@ -297,21 +301,29 @@ def _named_alone(
     gain = sum(each.size for each in signal.values())
     if gain <= 0:
         return None
+    of_candidates = {False: log_bf, True: beside_draws}
+    same_prior = (of_candidates[is_drawn(leader) != is_drawn(rival)] for rival in question.candidates)
     rivals = (
-        _ForeseenPair(
-            leader, rival, _beside(outcomes, leader, rival, float(log_bf[h]), k),
-            _beside(outcomes, rival, leader, float(log_bf[j]), k), gain, question, axes, outcomes, k, signal,
-        )
-        for j, rival in enumerate(question.candidates)
+        _ForeseenPair(leader, rival, float(nats[h]), float(nats[j]), gain, question, axes, outcomes, k, signal)
+        for j, (rival, nats) in enumerate(zip(question.candidates, same_prior, strict=True))
         if question.nodes[j] != question.nodes[h] and rival.id != NOTHING
     )  # fmt: skip
     return None if any(map(cannot_be_distinguished, rivals)) else int(question.nodes[h])
 
 
-def _beside(outcomes: Mapping[str, Outcomes], candidate: Candidate, other: Candidate, log_bf: float, k: int) -> float:
-    """Return the evidence for a candidate in outcome `k` with the same prior of its size as another one has, nats."""
-    if is_drawn(candidate) == is_drawn(other):
-        return log_bf
-    of_axes = (each.evidence_of_sizes(candidate.id, k) for each in outcomes.values())
-    present = [nats for nats in of_axes if nats is not None]
-    return float(on_all_axes_or_one(present)) if present else log_bf
+def _beside_draws(
+    question: OpenQuestion, outcomes: Mapping[str, Outcomes], log_bf: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the evidence of hypotheses, (n, h) nats, with the prior of their size with which draws compete.
+
+    `log_bf` (n, h) is that with their own priors; the two are the same for draws.
+    """
+    beside = log_bf.copy()
+    if not any(map(is_drawn, question.candidates)):
+        return beside
+    for j, candidate in enumerate(question.candidates):
+        of_axes = [each.evidence_of_sizes(candidate.id) for each in outcomes.values()]
+        present = [nats for nats in of_axes if nats is not None]
+        if present and not is_drawn(candidate):
+            beside[:, j] = on_all_axes_or_one(present)
+    return beside

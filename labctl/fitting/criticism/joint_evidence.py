@@ -225,14 +225,13 @@ class Outcomes:
         each = self._shapes(effect)
         return np.asarray(logsumexp(each, axis=0) - np.log(len(each))) if len(each) else None
 
-    def evidence_of_sizes(self, effect: str, k: int) -> float | None:
-        """Return the log evidence for an effect in outcome `k`, nats, its size averaged over as that of draws is."""
-        shapes = self._axis.shapes_of(effect)
-        of_sizes = [
-            log_bf + s.after.size_nats(self._products[k, s.columns])
-            for s, log_bf in zip(shapes, self._shapes(effect)[:, k] if shapes else (), strict=True)
-        ]
-        return float(logsumexp(of_sizes) - np.log(len(shapes))) if shapes else None
+    def evidence_of_sizes(self, effect: str) -> Array | None:
+        """Return the same where the size of the effect is averaged over as that of draws is, (n,) nats."""
+        each = self._shapes(effect)
+        if not len(each):
+            return None
+        of_sizes = [s.after.size_nats(self._products[:, s.columns]) for s in self._axis.shapes_of(effect)]
+        return np.asarray(logsumexp(each + np.array(of_sizes), axis=0) - np.log(len(each)))
 
     def best(self, effect: str, k: int) -> Shape | None:
         """Return the shape of an effect with the most evidence in outcome `k`."""
