@@ -30,7 +30,6 @@ class BiasInstability:
         self._taus_s = np.asarray(taus_s)
         self._sd_dps = sd_dps / np.sqrt(len(self._taus_s))
         self._axes = axes
-        self._step = self._over(GRID_S)
         self._here = rng.normal(0.0, self._sd_dps, (len(self._taus_s), axes))
         self._next = self._here.copy()
         self._here_s = 0.0
@@ -40,16 +39,11 @@ class BiasInstability:
         if len(t_s) == 0:
             return np.empty((0, self._axes))
         intervals = self._intervals(t_s.tolist())
-        draws = self._rng.standard_normal((sum(i.draws for i in intervals), *self._here.shape))
-        ends = np.empty((len(intervals), 2, *self._here.shape))
-        drawn = 0
-        for interval, end in zip(intervals, ends, strict=True):
-            self._advance(interval, draws[drawn : drawn + interval.draws])
-            drawn += interval.draws
-            end[0], end[1] = self._here, self._next
+        ends = self._ends(intervals)
+        drawn = np.cumsum([i.draws for i in intervals])
         number = np.repeat(np.arange(len(intervals)), [i.readings for i in intervals])
         share = ((t_s - np.array([i.from_s for i in intervals])[number]) / GRID_S)[:, None]
-        bias: Array = ends.sum(2)
+        bias: Array = np.stack([ends[drawn], ends[drawn + 1]], axis=1).sum(2)
         return np.asarray(bias[number, 0] * (1 - share) + bias[number, 1] * share)
 
     def _intervals(self, times_s: list[float]) -> list[_Interval]:
@@ -67,19 +61,25 @@ class BiasInstability:
         self._here_s = here_s
         return intervals
 
-    def _advance(self, interval: _Interval, draws: Array) -> None:
-        """Move to an interval by its draws from the normal distribution, (draws, taus, axes)."""
-        if interval.draws:
-            last = self._next
-            self._here = _after(last, self._over(interval.skipped_s), draws[0]) if interval.skipped_s else last
-            self._next = _after(self._here, self._step, draws[-1])
+    def _ends(self, intervals: list[_Interval]) -> Array:
+        """Return the processes at the ends of the last interval and then after each draw, (draws + 2, taus, axes).
 
-    def _over(self, elapsed_s: float) -> tuple[Array, Array]:
-        """Return what share of each process stays over a time, and the scatter that it gains, deg/s; (taus, 1) each."""
-        keep = np.exp(-elapsed_s / self._taus_s)[:, None]
+        Plain numbers in one loop: for the nine processes of a unit that takes a third of the time of sums of arrays.
+        """
+        over_s = [GRID_S if last else i.skipped_s for i in intervals for last in (False, True)[2 - i.draws :]]
+        draws = self._rng.standard_normal((len(over_s), *self._here.shape))
+        keep, scatter = self._over(np.array(over_s))
+        ends = np.concatenate([[self._here, self._next], scatter[:, :, None] * draws])
+        for tau, axis in np.ndindex(self._here.shape):
+            value, course = float(self._next[tau, axis]), []
+            for kept, change in zip(keep[:, tau].tolist(), ends[2:, tau, axis].tolist(), strict=True):
+                value = kept * value + change
+                course.append(value)
+            ends[2:, tau, axis] = course
+        self._here, self._next = ends[-2], ends[-1]
+        return ends
+
+    def _over(self, elapsed_s: Array) -> tuple[Array, Array]:
+        """Return what share of each process stays over times (n,), and the scatter that it gains, deg/s; (n, taus)."""
+        keep = np.exp(-elapsed_s[:, None] / self._taus_s)
         return keep, self._sd_dps * np.sqrt(1 - keep**2)
-
-
-def _after(bias: Array, over: tuple[Array, Array], draws: Array) -> Array:
-    keep, scatter = over
-    return keep * bias + scatter * draws
