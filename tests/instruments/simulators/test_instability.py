@@ -1,4 +1,4 @@
-"""The simulated bias instability: an Ornstein-Uhlenbeck process for each time constant, whatever times it is read at."""
+"""The simulated bias instability: an Ornstein-Uhlenbeck process for each time constant, whenever it is read."""
 
 from __future__ import annotations
 
