@@ -25,7 +25,7 @@ from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
 from labctl.fitting.criticism.planned_addition import may_be_joined, with_planned
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.criticism.rivals import LEAD, Pair, cannot_be_distinguished, is_drawn
+from labctl.fitting.criticism.rivals import LEAD, Pair, cannot_be_distinguished, is_drawn, is_size_averaged
 from labctl.fitting.criticism.verdict import ENOUGH, has_as_simple_a_shape, refines_base
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.numeric.arrays import Array
@@ -302,7 +302,7 @@ def _named_alone(
     if gain <= 0:
         return None
     of_candidates = {False: log_bf, True: beside_draws}
-    same_prior = (of_candidates[is_drawn(leader) != is_drawn(rival)] for rival in question.candidates)
+    same_prior = (of_candidates[is_size_averaged(leader, rival)] for rival in question.candidates)
     rivals = (
         _ForeseenPair(leader, rival, float(nats[h]), float(nats[j]), gain, question, axes, outcomes, k, signal)
         for j, (rival, nats) in enumerate(zip(question.candidates, same_prior, strict=True))

@@ -82,13 +82,17 @@ def is_drawn(candidate: Candidate) -> bool:
     return kind is not None and kind.is_random
 
 
-def log_bf_beside(candidate: Candidate, other: Candidate) -> float:
-    """Return the log Bayes factor of a candidate with the same prior of its size as another one has, nats.
+def is_size_averaged(one: Candidate, other: Candidate) -> bool:
+    """Return whether the size of both of a pair is averaged over in their odds: where one of the two is drawn.
 
-    Where one of the two is drawn, the size of both is averaged over: odds between a single size and an average over
-    sizes would come from these priors, and not from the data.
+    Odds between a single size and an average over sizes would come from these priors, and not from the data.
     """
-    return candidate.log_bf + (candidate.size_nats if is_drawn(candidate) != is_drawn(other) else 0.0)
+    return is_drawn(one) != is_drawn(other)
+
+
+def log_bf_beside(candidate: Candidate, other: Candidate) -> float:
+    """Return the log Bayes factor of a candidate with the same prior of its size as another one has, nats."""
+    return candidate.log_bf + (candidate.size_nats if is_size_averaged(candidate, other) else 0.0)
 
 
 def are_aliases_by_draws(pair: Pair) -> bool:
@@ -98,10 +102,9 @@ def are_aliases_by_draws(pair: Pair) -> bool:
     reading. Beside that, the evidence weighs no data, but how a coefficient and draws are distributed: the pair cannot
     be distinguished whatever the odds, as long as the other draws are not larger than noise makes them.
     """
-    drawn = is_drawn(pair.leader), is_drawn(pair.rival)
-    if drawn[0] == drawn[1] or pair.share_by_draws <= ALIKE:
+    if not is_size_averaged(pair.leader, pair.rival) or pair.share_by_draws <= ALIKE:
         return False
-    if drawn[1] or pair.further_directions >= 0:
+    if is_drawn(pair.rival) or pair.further_directions >= 0:
         return True
     return by_chance(-pair.further_gain, -pair.further_directions) >= MIN_CHANCE
 
