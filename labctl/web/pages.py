@@ -15,12 +15,14 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from labctl.web.assets import IMMUTABLE, REVALIDATED, Asset, Assets, accepted_codings
+from labctl.web.bundles import links
 
 FOLDER = Path(__file__).parent / "static"
 PLOTLY = Path(str(plotly.__file__)).parent / "package_data" / "plotly.min.js"
 #: Plotly's own build of the same version without maps, finance and three dimensions: a third of the size.
 PLOTLY_CARTESIAN = Path(__file__).parent / "vendor" / "plotly-cartesian.min.js"
 STATIC = "/static/"
+HEAD_END = "</head>"
 #: Address prefixes of the pages; the router in the browser handles the rest of an address.
 PAGES = (
     "/start", "/bench", "/live", "/campaigns", "/units", "/explore", "/recordings", "/noise", "/effects",
@@ -47,7 +49,9 @@ def install(app: FastAPI) -> None:
 
     def index(request: Request) -> Response:
         """Return the document of every page, which names the files of this release."""
-        body = document.replace(STATIC, f"{STATIC}{assets.release()}/").encode()
+        release = assets.release()
+        whole = document.replace(HEAD_END, f"{links(assets.bundles, request.url.path)}{HEAD_END}")
+        body = whole.replace(STATIC, f"{STATIC}{release}/").encode()
         return _response(request, Asset.of(body, "text/html"), REVALIDATED)
 
     def static(request: Request, address: str) -> Response:
