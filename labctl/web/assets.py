@@ -55,12 +55,14 @@ class Asset:
 class Assets:
     """The files of a folder, others by name, and bundles of them; read when first asked for, and again when changed.
 
-    `names` are relative addresses with slashes. Nothing outside `folder` and `others` is ever opened.
+    `heads` are lines that some files are served with at their beginning. Names are relative addresses with slashes.
+    Nothing outside `folder` and `others` is ever opened.
     """
 
-    def __init__(self, folder: Path, others: dict[str, Path]) -> None:
+    def __init__(self, folder: Path, others: dict[str, Path], heads: dict[str, bytes] | None = None) -> None:
         own_paths = {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*")) if path.is_file()}
         self._paths = own_paths | others
+        self._heads = heads or {}
         self._kept: dict[tuple[str, str], tuple[str, Asset]] = {}
         self._digests: dict[str, tuple[str, str]] = {}
         self._lock = threading.Lock()
@@ -107,6 +109,7 @@ class Assets:
             kept = self._kept.get((name, wanted))
             if kept is None or kept[0] != state:
                 body = self.bundles.content(name).encode() if path is None else path.read_bytes()
+                body = self._heads.get(name, b"") + body
                 kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
                 kept = self._kept[name, wanted] = (state, Asset.of(body, kind, wanted))
         return kept[1]

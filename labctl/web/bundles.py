@@ -1,12 +1,13 @@
-"""The modules and the style sheets of a page in a few files: made from the sources when a browser first asks for them.
+"""The modules and style sheets of a page in a few files, made from the sources when a browser first asks for them.
 
-A page is some hundred modules. Each of them as a request of its own costs the browser and the service more time than its
-content; and a browser sees what a module imports only when it has read it, so that the requests wait for one another.
+A page is some hundred modules. Each of them as a request of its own costs the browser and the service more time than
+its content; and a browser sees what a module imports only when it has read it, so that requests wait for one another.
 The sources stay as they are: plain modules, which a browser, node and the tests also load one by one.
 
 A bundle has each module as a function of its own (so that names of two modules never meet), which is called when it is
 first imported, and once in a page, whichever bundle it came with. `main.js` is the entry point and what it imports;
-every other bundle is a module that is imported by `import()`, with all it needs beside that.
+every other bundle is of a module that `import()` names, with all that it needs beside the entry point. The document of
+a page has the bundle of that page before the entry point, which so finds it there; others are loaded when needed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ ENTRY = "js/main.js"
 STYLE = "css/main.css"
 #: Names of bundles begin with it; what follows is the name of the module or style sheet below `js/` or `css/`.
 PREFIX = "bundles/"
-PLOTLY = "plotly-cartesian.js"
+PLOTLY_BUILD = "plotly-cartesian.js"
 
 #: The forms that the sources use (a test reads every one of them); any other is refused.
 IMPORT = re.compile(r'^import \{([^}]*)\} from "(\.[^"]+)";$', re.MULTILINE)
@@ -36,18 +37,19 @@ ROUTE = re.compile(
 )
 SHEET = re.compile(r'^@import "([^"]+)";$', re.MULTILINE)
 
-HEAD = """\
-// Made of the modules that it names by labctl/web/bundles.py; they are also files of their own.
-const $known = {}, $made = new Map();
-const $url = (name) => new URL(`../${name}`, import.meta.url).href;
-const $take = (name) => {
-  if (!$made.has(name)) $made.set(name, $known[name]());
+#: The functions of all bundles of a page are in one object, from which the entry point takes them.
+KNOWN = "(globalThis.labctlModules ??= {})"
+HEAD = f"""\
+const $known = {KNOWN}, $made = new Map();
+const $url = (name) => new URL(`../${{name}}`, import.meta.url).href;
+const $take = (name) => {{
+  if (!$made.has(name)) $made.set(name, $known[name]($take, $later, $url));
   return $made.get(name);
-};
-const $later = async (name) => {
-  if (!(name in $known)) Object.assign($known, (await import($url(`bundles/${name.slice(3)}`))).modules($take, $later, $url));
+}};
+const $later = async (name) => {{
+  if (!(name in $known)) await import($url(`bundles/${{name.slice(3)}}`));
   return $take(name);
-};
+}};
 """
 
 
@@ -87,9 +89,8 @@ class Bundles:
             return self._style(module)
         if module == ENTRY:
             inner = [each for each in self._entry if each != ENTRY]
-            return f"{HEAD}Object.assign($known, {self._functions(inner)});\n{self._body(ENTRY)[0]}"
-        beside = [each for each in self._closure(module) if each not in self._entry]
-        return f"export const modules = ($take, $later, $url) => ({self._functions(beside)});\n"
+            return f"{self._functions(inner)}{HEAD}{self._body(ENTRY)[0]}"
+        return self._functions([each for each in self._closure(module) if each not in self._entry])
 
     def route_of(self, path: str) -> Route | None:
         """Return the kind of the address of a page; None where there is no such page."""
@@ -129,12 +130,12 @@ class Bundles:
         found[module] = None
 
     def _functions(self, modules: list[str]) -> str:
-        """Return the modules as an object: name -> function that runs the module and returns what it exports."""
+        """Return the statement that makes modules known: name -> function that runs one and returns what it exports."""
         parts = []
         for module in modules:
             body, names = self._body(module)
-            parts.append(f'"{module}": (() => {{\n{body}return {{ {", ".join(names)} }};\n}}),\n')
-        return "{\n" + "".join(parts) + "}"
+            parts.append(f'"{module}": (($take, $later, $url) => {{\n{body}return {{ {", ".join(names)} }};\n}}),\n')
+        return f"Object.assign({KNOWN}, {{\n{''.join(parts)}}});\n"
 
     def _body(self, module: str) -> tuple[str, list[str]]:
         """Return the statements of a module without imports and exports, and the names that it exports.
@@ -166,10 +167,10 @@ def _taken(names: str, module: str) -> str:
 
 
 def links(bundles: Bundles, path: str) -> str:
-    """Return the elements by which a page's document asks at once for what its entry point will ask for."""
+    """Return the elements by which the document of a page loads what the page needs beside its entry point."""
     route = bundles.route_of(path)
     if route is None:
         return ""
     module = f"{PREFIX}{route.module.removeprefix('js/')}"
-    plots = f'  <link rel="preload" as="script" href="/static/{PLOTLY}">\n' if route.has_plots else ""
-    return f'{plots}  <link rel="modulepreload" href="/static/{module}">\n'
+    plots = f'  <script async data-plotly src="/static/{PLOTLY_BUILD}"></script>\n' if route.has_plots else ""
+    return f'{plots}  <script type="module" src="/static/{module}"></script>\n'
