@@ -49,11 +49,14 @@ def lines_over(
     position = np.asarray(channels["position"]).astype(np.str_)
     level = rate_levels(rate)
     rates = np.unique(level_centres(rate, level))
+    temperatures_of = {}
+    for axis in (axis for axis in data.info.axes if axis in fitted.axes):
+        temperatures_c = channels.temperature_c(axis)
+        rows = temperature_rows(temperatures_c, position, level)
+        temperatures_of[axis] = np.unique(level_centres(temperatures_c, rows))
     over_rate, over_temperature = [], []
     for up_axis in np.unique(position).tolist():
-        for axis in (axis for axis in data.info.axes if axis in fitted.axes):
-            temperatures_c = channels.temperature_c(axis)
-            temperatures = np.unique(level_centres(temperatures_c, temperature_rows(temperatures_c, position, level)))
+        for axis, temperatures in temperatures_of.items():
 
             def error(across: Array, down: Array, *, by_rate: bool, axis: str = axis, up_axis: str = up_axis) -> Any:
                 grid = np.meshgrid(across, down)
