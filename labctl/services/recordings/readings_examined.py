@@ -11,6 +11,7 @@ from labctl.recording import Recording
 from labctl.recording.recording import Columns
 from labctl.recording.sanity.readings import examination, joined_examinations
 from labctl.services.cache import cached
+from labctl.services.recordings.envelopes import EnvelopesMade
 from labctl.services.recordings.warnings import warning_of
 from labctl.store import RecordingRow, Store
 
@@ -34,17 +35,21 @@ def _examined(store: Store, row: RecordingRow, recording: Recording | None) -> R
         result = examination(recording)
     else:
         info = row.recording_info
-        result = joined_examinations([examination(Recording(info, columns)) for columns in _together(store, row.id)])
+        made = EnvelopesMade()
+        together = _together(store, row.id, made)
+        result = joined_examinations([examination(Recording(info, columns)) for columns in together])
+        made.save(store, row.id)
     return ReadingsExamined(
         warnings=[warning_of(finding) for finding in result.findings], courses=result.courses, marks=result.marks
     )
 
 
-def _together(store: Store, recording: int) -> Iterator[Columns]:
-    """Yield the readings of consecutive data sets, of many at once."""
+def _together(store: Store, recording: int, made: EnvelopesMade) -> Iterator[Columns]:
+    """Yield the readings of consecutive data sets, of many at once; each is taken into `made`."""
     parts: list[Columns] = []
     n = 0
     for _, columns in store.recordings.iter_datasets(recording):
+        made.add(columns)
         length = len(columns["t_s"]) if "t_s" in columns else 0
         if n and n + length > READINGS_TOGETHER:
             yield _one(parts)
