@@ -13,9 +13,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from labctl.recording import Recording, RecordingInfo, read_recording
-from labctl.services.recordings import envelopes
+from labctl.services.recordings import envelopes, readings_examined
 from tests.helpers.recordings import STARTED
-from tests.helpers.service import add_recording
+from tests.helpers.service import add_recording, service_of
 
 SETS, EACH = 40, 1500
 TRACE = "/api/recordings/1/trace"
@@ -69,6 +69,19 @@ def test_a_whole_recording_is_drawn_from_envelopes(
     assert trace["t_s"] == sorted(trace["t_s"])
     assert (trace["from_s"], trace["until_s"], trace["unit"]) == (t_s[0], t_s[-1], "deg/s")
     monkeypatch.setattr(envelopes, "_made", None)  # kept: the readings are not read again
+    assert ask(fast, points=500) == trace
+
+
+def test_the_first_trace_of_an_examined_recording_reads_no_readings(
+    fast: TestClient, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = ask(fast, points=500)
+    (file,) = cache.rglob("*.npz")
+    file.unlink()
+    row = service_of(fast).store.recordings.get(1)
+    examine = readings_examined._examined
+    examine(service_of(fast).store, row, None)
+    monkeypatch.setattr(envelopes, "_made", None)
     assert ask(fast, points=500) == trace
 
 
