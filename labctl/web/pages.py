@@ -14,8 +14,8 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from labctl.web.assets import IMMUTABLE, REVALIDATED, Asset, Assets, accepted_codings
-from labctl.web.bundles import PLOTLY_BUILD, links
+from labctl.web.assets import CODINGS, IMMUTABLE, REVALIDATED, Asset, Assets, accepted_codings
+from labctl.web.bundles import PLOTLY_BUILD, PREFIX, links
 
 FOLDER = Path(__file__).parent / "static"
 PLOTLY = Path(str(plotly.__file__)).parent / "package_data" / "plotly.min.js"
@@ -88,6 +88,12 @@ def _assets() -> Assets:
     """Return the files, compressed once per process."""
     others = {"plotly.js": PLOTLY, PLOTLY_BUILD: PLOTLY_CARTESIAN}
     return Assets(FOLDER, others, {PLOTLY_BUILD: COMPILED_BEFORE})
+
+
+def prepare() -> None:
+    """Bundle and compress what every page loads first, before a browser asks for it: 0.2 s of processor time."""
+    for name in (f"{PREFIX}main.css", f"{PREFIX}main.js", PLOTLY_BUILD):
+        _assets().get(name, CODINGS)
 
 
 def _is_of_a_browser(request: Request) -> bool:
