@@ -65,7 +65,10 @@ def _question(readings: str, channel: str) -> dict[str, object]:
 
 def _encoded(made: Envelope) -> bytes:
     packed = io.BytesIO()
-    np.savez(packed, t_s=made.t_s, bounds=np.stack([made.low, made.high, made.mean, made.n]).astype(np.float32))
+    bounds: NDArray[np.floating] = np.stack([made.low, made.high, made.mean, made.n])
+    if np.all(np.isinf(bounds) | (np.abs(bounds) <= np.finfo(np.float32).max)):  # larger ones are no rates, yet stored
+        bounds = bounds.astype(np.float32)
+    np.savez(packed, t_s=made.t_s, bounds=bounds)
     return packed.getvalue()
 
 
@@ -126,11 +129,7 @@ def _bounds(values: Array, begins: NDArray[np.int64], width: NDArray[np.int64]) 
     if not is_finite.all():  # an instrument may send no number with a reading that it marks as bad
         count = np.add.reduceat(is_finite.astype(np.int64), begins)
         low, high, total = (np.where(is_finite, values, instead) for instead in (np.inf, -np.inf, 0.0))
-    return np.stack(
-        [
-            np.minimum.reduceat(low, begins),
-            np.maximum.reduceat(high, begins),
-            np.add.reduceat(total, begins) / np.maximum(count, 1),
-            count.astype(np.float64),
-        ]
-    )
+    with np.errstate(over="ignore"):  # the mean of readings near the largest number is infinite
+        mean = np.add.reduceat(total, begins) / np.maximum(count, 1)
+    low, high = np.minimum.reduceat(low, begins), np.maximum.reduceat(high, begins)
+    return np.stack([low, high, mean, count.astype(np.float64)])
