@@ -13,7 +13,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from labctl.recording import Recording, RecordingInfo, read_recording
-from labctl.services.recordings import envelopes, readings_examined
+from labctl.services.recordings import envelopes
+from labctl.services.recordings.readings_examined import examined_stored
 from tests.helpers.recordings import STARTED
 from tests.helpers.service import add_recording, service_of
 
@@ -72,15 +73,15 @@ def test_a_whole_recording_is_drawn_from_envelopes(
     assert ask(fast, points=500) == trace
 
 
+@pytest.mark.parametrize("in_memory", [False, True])
 def test_the_first_trace_of_an_examined_recording_reads_no_readings(
-    fast: TestClient, cache: Path, monkeypatch: pytest.MonkeyPatch
+    fast: TestClient, samples: Recording, cache: Path, monkeypatch: pytest.MonkeyPatch, in_memory: bool
 ) -> None:
     trace = ask(fast, points=500)
     (file,) = cache.rglob("*.npz")
     file.unlink()
-    row = service_of(fast).store.recordings.get(1)
-    examine = readings_examined._examined
-    examine(service_of(fast).store, row, None)
+    store = service_of(fast).store
+    examined_stored(store, store.recordings.get(1), samples if in_memory else None)
     monkeypatch.setattr(envelopes, "_made", None)
     assert ask(fast, points=500) == trace
 
