@@ -126,7 +126,7 @@ def cached(kind: type[ResponseT], question: Mapping[str, object], work: Callable
 
 
 def cached_here(kind: type[ResponseT], question: Mapping[str, object], work: Callable[[], ResponseT]) -> ResponseT:
-    """Return the same for `work` of less than 0.2 s, which is never worth a worker process: whoever asks does it."""
+    """Return a response as `cached` does, for `work` of less than 0.2 s: the caller does it, no worker process."""
     file = RESPONSES.file({"kind": kind.__name__, **question})
     response = RESPONSES.load(file, kind.model_validate_json)
     if response is None:

@@ -19,7 +19,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 ENTRY = "js/main.js"
-STYLE = "css/main.css"
 #: Names of bundles begin with it; what follows is the name of the module or style sheet below `js/` or `css/`.
 PREFIX = "bundles/"
 PLOTLY_BUILD = "plotly-cartesian.js"

@@ -79,7 +79,7 @@ def _decoded(content: bytes) -> Envelope:
 
 
 class EnvelopesMade:
-    """The envelopes of the channels of a recording whose data sets pass by in order, for whoever reads them anyway."""
+    """The envelopes of the channels of a recording, made while another examination reads its data sets in order."""
 
     def __init__(self, wanted: Collection[str] | None = None) -> None:
         """Make those of the channels `wanted`; None: of each channel that was measured by the unit or the chamber."""
