@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 import uvicorn
 
 from instruments.clock import WallClock
+from labctl import web
 from labctl.api.access_policy import MIB, AccessPolicy, ReadOnlyAccess
 from labctl.api.app import create_app
 from labctl.api.connection_limits import limits_for, raise_open_files
@@ -139,6 +140,7 @@ def serve(line: Connection, settings: WebSettings) -> None:
     tell(line, "ready")
     log.info("process.started", version=VERSION, host=settings.at, asks_for_a_key=access.keys)
     threading.Thread(target=_end_with, args=(line,), name="supervisor", daemon=True).start()
+    threading.Thread(target=web.prepare, name="pages", daemon=True).start()
     SupervisorWatch(os.getppid(), lambda: _stop_for(settings)).start()
     with socket.socket(fileno=settings.listener) as listener, until_sigterm():
         server.run(sockets=[listener])

@@ -21,6 +21,8 @@ if sys.version_info >= (3, 14):
 else:
     from backports import zstd
 
+from labctl.web.bundles import Bundles
+
 #: Names of content codings (IANA, RFC 9659) in the order in which they are preferred, and what makes them. The level is
 #: the highest that takes less than 0.2 s for 5 MB.
 CODINGS = {"zstd": lambda body: zstd.compress(body, 12), "gzip": lambda body: gzip.compress(body, 9, mtime=0)}
@@ -51,24 +53,29 @@ class Asset:
 
 
 class Assets:
-    """The files of a folder, and others by name; read when first asked for, and again when they changed on the disk.
+    """The files of a folder, others by name, and bundles of them; read when first asked for, and again when changed.
 
-    `names` are relative addresses with slashes. Nothing outside `folder` and `others` is ever opened.
+    `heads` are lines that some files are served with at their beginning. Names are relative addresses with slashes.
+    Nothing outside `folder` and `others` is ever opened.
     """
 
-    def __init__(self, folder: Path, others: dict[str, Path]) -> None:
+    def __init__(self, folder: Path, others: dict[str, Path], heads: dict[str, bytes] | None = None) -> None:
         own_paths = {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*")) if path.is_file()}
         self._paths = own_paths | others
+        self._heads = heads or {}
         self._kept: dict[tuple[str, str], tuple[str, Asset]] = {}
         self._digests: dict[str, tuple[str, str]] = {}
         self._lock = threading.Lock()
-        self._release = self.release()
+        self._release = ""
+        self.release()
 
     def release(self) -> str:
         """Return the part of addresses that stands for the content of all files of now: 12 hexadecimal digits."""
         digests = "\n".join(f"{name} {self._digest(name)}" for name in sorted(self._paths))
-        self._release = sha256(digests.encode()).hexdigest()[:12]
-        return self._release
+        release = sha256(digests.encode()).hexdigest()[:12]
+        if release != self._release:
+            self._release, self.bundles = release, Bundles(lambda name: self._paths[name].read_text(encoding="utf-8"))
+        return release
 
     def _digest(self, name: str) -> str:
         """Return the digest of a file; size and time alone do not tell, as installers may give all files one time."""
@@ -84,22 +91,27 @@ class Assets:
         An open page of an earlier release goes on to ask for its own files: it gets those of now, revalidated.
         """
         first, slash, rest = address.partition("/")
-        if slash and address not in self._paths and rest in self._paths:
+        if slash and not self._has(address) and self._has(rest):
             return rest, first == self._release
         return address, False
 
+    def _has(self, name: str) -> bool:
+        return name in self._paths or Bundles.source_of(name) in self._paths
+
     def get(self, name: str, accepted: Iterable[str]) -> Asset | None:
         """Return a file in the best of the accepted codings (`accepted_codings`); None for no such file."""
-        path = self._paths.get(name)
-        if path is None:
+        if not self._has(name):
             return None
         wanted = next((coding for coding in CODINGS if coding in set(accepted)), "")
         with self._lock:  # of two first visitors one compresses
-            state = _state(path)
+            path = self._paths.get(name)
+            state = self._release if path is None else _state(path)
             kept = self._kept.get((name, wanted))
             if kept is None or kept[0] != state:
-                kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
-                kept = self._kept[name, wanted] = (state, Asset.of(path.read_bytes(), kind, wanted))
+                body = self.bundles.content(name).encode() if path is None else path.read_bytes()
+                body = self._heads.get(name, b"") + body
+                kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+                kept = self._kept[name, wanted] = (state, Asset.of(body, kind, wanted))
         return kept[1]
 
 

@@ -14,13 +14,19 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from labctl.web.assets import IMMUTABLE, REVALIDATED, Asset, Assets, accepted_codings
+from labctl.web.assets import CODINGS, IMMUTABLE, REVALIDATED, Asset, Assets, accepted_codings
+from labctl.web.bundles import PLOTLY_BUILD, PREFIX, links
 
 FOLDER = Path(__file__).parent / "static"
 PLOTLY = Path(str(plotly.__file__)).parent / "package_data" / "plotly.min.js"
 #: Plotly's own build of the same version without maps, finance and three dimensions: a third of the size.
 PLOTLY_CARTESIAN = Path(__file__).parent / "vendor" / "plotly-cartesian.min.js"
+#: Tells a browser to compile all functions of a script in another thread, while it comes; without it the page stands
+#: still longer when they are first called (Chromium's explicit compile hints; a comment to other browsers).
+COMPILED_BEFORE = b"//# allFunctionsCalledOnLoad\n"
 STATIC = "/static/"
+#: Before it stands what a page needs beside the entry point: module scripts run in the order of the document.
+ENTRY_SCRIPT = '  <script type="module"'
 #: Address prefixes of the pages; the router in the browser handles the rest of an address.
 PAGES = (
     "/start", "/bench", "/live", "/campaigns", "/units", "/explore", "/recordings", "/noise", "/effects",
@@ -47,7 +53,9 @@ def install(app: FastAPI) -> None:
 
     def index(request: Request) -> Response:
         """Return the document of every page, which names the files of this release."""
-        body = document.replace(STATIC, f"{STATIC}{assets.release()}/").encode()
+        release = assets.release()
+        whole = document.replace(ENTRY_SCRIPT, f"{links(assets.bundles, request.url.path)}{ENTRY_SCRIPT}")
+        body = whole.replace(STATIC, f"{STATIC}{release}/").encode()
         return _response(request, Asset.of(body, "text/html"), REVALIDATED)
 
     def static(request: Request, address: str) -> Response:
@@ -78,7 +86,14 @@ def install(app: FastAPI) -> None:
 @cache
 def _assets() -> Assets:
     """Return the files, compressed once per process."""
-    return Assets(FOLDER, {"plotly.js": PLOTLY, "plotly-cartesian.js": PLOTLY_CARTESIAN})
+    others = {"plotly.js": PLOTLY, PLOTLY_BUILD: PLOTLY_CARTESIAN}
+    return Assets(FOLDER, others, {PLOTLY_BUILD: COMPILED_BEFORE})
+
+
+def prepare() -> None:
+    """Bundle and compress what every page loads first, before a browser asks for it: 0.1 s of processor time."""
+    for name in (f"{PREFIX}main.css", f"{PREFIX}main.js", PLOTLY_BUILD):
+        _assets().get(name, CODINGS)
 
 
 def _is_of_a_browser(request: Request) -> bool:

@@ -61,7 +61,8 @@ def test_every_reading_is_within_what_is_drawn_and_short_data_sets_are_dots(
         assert (np.nanmin(shown), np.nanmax(shown)) == pytest.approx((values.min(), values.max()), rel=1e-6)
         times = np.array([np.nan if each is None else each for each in trace["x"]], dtype=np.float64)
         assert 60 * (np.nanmax(times) - np.nanmin(times)) == pytest.approx(t_s.max() - t_s.min(), rel=0.01)
-        assert (trace["mode"], trace["marker"]["size"]) == ("lines+markers", 4)
+        dotted = drawn[f"{channel}: dots"]
+        assert (trace["mode"], dotted["mode"], dotted["marker"]["size"]) == ("lines", "markers", 4)
     dots = page.locator('.plot[aria-label^="Inspection"] .scatterlayer .point')
     assert dots.count() >= 15  # at least one of each data set
 

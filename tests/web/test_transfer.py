@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 FIRST_VISIT_BYTES = 1_500_000
 #: Of a unit with 121 data sets; in proportion to the 50 kB of one with 630.
 LATER_VISIT_BYTES = 10_000
+#: Style sheet, theme, entry point, the bundle of the page, Plotly, two icons.
+MAX_STATIC_FILES = 7
 #: Bytes as they travelled, headers included; 0 for what came out of the cache.
 MOVED = """() => Object.fromEntries(["navigation", "resource"].flatMap((kind) =>
   performance.getEntriesByType(kind).map((entry) => [new URL(entry.name).pathname, entry.transferSize])))"""
@@ -60,6 +62,7 @@ def test_a_visit_moves_at_most_1500_kb_and_a_later_one_what_has_changed(
     static = {address: size for address, size in again.items() if address.startswith("/static/")}
     assert static
     assert set(static.values()) == {0}
+    assert len(static) <= MAX_STATIC_FILES, static
 
 
 @pytest.mark.slow

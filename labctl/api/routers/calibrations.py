@@ -37,7 +37,7 @@ from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
 from labctl.services.commands.registry import FIT, IMPROVE
 from labctl.services.commands.requests import ToNewestOrVersion, ToUnit
-from labctl.services.criticism.comparison import compare_version
+from labctl.services.criticism.comparison import comparison_of_version
 from labctl.services.criticism.criticise import criticise_unit, residuals_unit
 from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
@@ -235,7 +235,7 @@ async def comparison(
 ) -> ComparisonResponse:
     """Measured and modelled error, data set by data set, and the version's model as lines; nothing is refitted."""
     return await while_connected(
-        request, service, compare_version, serial, version, recording, recordings=tuple(recordings or ()),
+        request, service, comparison_of_version, serial, version, recording, recordings=tuple(recordings or ()),
         other_unit=other_unit,
     )  # fmt: skip
 

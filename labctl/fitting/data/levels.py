@@ -42,7 +42,12 @@ def level_centres(values: Array, level: NDArray[np.int64]) -> Array:
 
 def widest(values: Array, level: NDArray[np.int64]) -> float:
     """Return the largest span of values within one level, in their unit; 0 without any."""
-    return max((float(np.ptp(values[level == one])) for one in np.unique(level)), default=0.0)
+    if not len(values):
+        return 0.0
+    order = np.argsort(level, kind="stable")
+    begins = np.flatnonzero(np.diff(level[order], prepend=level[order[0]] - 1))
+    ordered = values[order]
+    return float(np.max(np.maximum.reduceat(ordered, begins) - np.minimum.reduceat(ordered, begins)))
 
 
 def _widest_cell(

@@ -24,10 +24,11 @@ from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.positions import axis_in
+from labctl.services.cache import cached_here
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.residuals import own_numbers
 from labctl.services.criticism.verification.of_version import applied_errors
-from labctl.services.recordings.loading import chosen_rows
+from labctl.services.recordings.loading import chosen_rows, readings_question
 from labctl.store import Store
 
 #: Points of a line, besides those at the measured rates or temperatures themselves.
@@ -49,11 +50,14 @@ def lines_over(
     position = np.asarray(channels["position"]).astype(np.str_)
     level = rate_levels(rate)
     rates = np.unique(level_centres(rate, level))
+    temperatures_of = {}
+    for axis in (axis for axis in data.info.axes if axis in fitted.axes):
+        temperatures_c = channels.temperature_c(axis)
+        rows = temperature_rows(temperatures_c, position, level)
+        temperatures_of[axis] = np.unique(level_centres(temperatures_c, rows))
     over_rate, over_temperature = [], []
     for up_axis in np.unique(position).tolist():
-        for axis in (axis for axis in data.info.axes if axis in fitted.axes):
-            temperatures_c = channels.temperature_c(axis)
-            temperatures = np.unique(level_centres(temperatures_c, temperature_rows(temperatures_c, position, level)))
+        for axis, temperatures in temperatures_of.items():
 
             def error(across: Array, down: Array, *, by_rate: bool, axis: str = axis, up_axis: str = up_axis) -> Any:
                 grid = np.meshgrid(across, down)
@@ -140,10 +144,25 @@ def compare_version(
     )  # fmt: skip
 
 
+def comparison_of_version(
+    store: Store, serial: str, version: int, recording: int | None, *, recordings: Sequence[int] = (),
+    other_unit: bool = False,
+) -> ComparisonResponse:  # fmt: skip
+    """Return what `compare_version` returns, and raise the same; computed once for what the recordings hold now."""
+    row = store.calibrations.get(store.units.get(serial).serial, version)
+    rows = chosen_rows(store, serial, recording, recordings, other_unit=other_unit)
+    question = {"compare": [row.serial, version, row.hash], **readings_question(store, rows)}
+
+    def work() -> ComparisonResponse:
+        return compare_version(store, serial, version, recording, recordings=recordings, other_unit=other_unit)
+
+    return cached_here(ComparisonResponse, question, work)
+
+
 def drawn_comparison(store: Store, serial: str, version: int, recording: int) -> ComparisonResponse | None:
     """Return what is drawn beside a criticism; None where the version cannot be applied to the recording."""
     try:
-        return compare_version(store, serial, version, recording, other_unit=True)
+        return comparison_of_version(store, serial, version, recording, other_unit=True)
     except LabctlError:
         return None
 

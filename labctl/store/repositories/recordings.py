@@ -68,13 +68,17 @@ def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArr
     means = connection.execute(
         sa.select(m.channel, m.number, m.mean, m.std, m.white_std).where(m.recording_id == recording)
     )
-    for channel, number, mean, std, white in means:
+    for channel, number, *values in means.all():
         if number not in index:
             continue
         row = index[number]
-        for name, value in ((channel, mean), (f"{channel}_std", std), (f"{channel}_white_std", white)):
-            if value is not None and (name == channel or channel.startswith("gyro_")):
-                columns.setdefault(name, np.full(len(heads), np.nan))[row] = value
+        names = (channel, f"{channel}_std", f"{channel}_white_std") if channel.startswith("gyro_") else (channel,)
+        for name, value in zip(names, values, strict=False):
+            if value is None:
+                continue
+            if name not in columns:
+                columns[name] = np.full(len(heads), np.nan)
+            columns[name][row] = value
     return {name: values for name, values in columns.items() if values.dtype.kind != "f" or np.isfinite(values).all()}
 
 
@@ -325,7 +329,7 @@ def _environment(connection: sa.Connection, recording: int) -> dict[str, NDArray
     e = tables.environment.c
     names = ("t_s", "run", "temperature_c", "chamber_c", "chamber_setpoint_c")
     query = sa.select(*(e[name] for name in names)).where(e.recording_id == recording).order_by(e.id)
-    rows = [tuple(row) for row in connection.execute(query)]
+    rows = connection.execute(query).all()
     if not rows:
         return None
     columns = dict(zip(names, zip(*rows, strict=True), strict=True))

@@ -15,6 +15,7 @@ from labctl.calibration import read_calibration
 from labctl.error_per_turn import MIN_RATE_DPS
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.recording import Recording
+from labctl.services.criticism import comparison
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.recordings import Triaxial
 from tests.helpers.service import add_recording, open_client
@@ -60,6 +61,13 @@ def test_every_data_set_of_every_output_is_there_as_it_was_measured(three: tuple
             measured = np.mean(recording.columns[f"gyro_{axis}"][here]) - true
             assert columns["measured_error_dps"][k] == pytest.approx(measured, abs=1e-9)
     assert columns["residual_dps"] == pytest.approx(columns["measured_error_dps"] - columns["modelled_error_dps"])
+
+
+def test_a_comparison_is_computed_once(three: tuple[TestClient, Recording], monkeypatch: pytest.MonkeyPatch) -> None:
+    client, _ = three
+    first = compared(client)
+    monkeypatch.setattr(comparison, "compare_version", None)
+    assert compared(client) == compared(client, recording=1) == first
 
 
 def test_what_remains_is_what_the_fit_said(three: tuple[TestClient, Recording]) -> None:

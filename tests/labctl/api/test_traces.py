@@ -14,8 +14,9 @@ from fastapi.testclient import TestClient
 
 from labctl.recording import Recording, RecordingInfo, read_recording
 from labctl.services.recordings import envelopes
+from labctl.services.recordings.readings_examined import examined_stored
 from tests.helpers.recordings import STARTED
-from tests.helpers.service import add_recording
+from tests.helpers.service import add_recording, service_of
 
 SETS, EACH = 40, 1500
 TRACE = "/api/recordings/1/trace"
@@ -69,6 +70,19 @@ def test_a_whole_recording_is_drawn_from_envelopes(
     assert trace["t_s"] == sorted(trace["t_s"])
     assert (trace["from_s"], trace["until_s"], trace["unit"]) == (t_s[0], t_s[-1], "deg/s")
     monkeypatch.setattr(envelopes, "_made", None)  # kept: the readings are not read again
+    assert ask(fast, points=500) == trace
+
+
+@pytest.mark.parametrize("in_memory", [False, True])
+def test_the_first_trace_of_an_examined_recording_reads_no_readings(
+    fast: TestClient, samples: Recording, cache: Path, monkeypatch: pytest.MonkeyPatch, in_memory: bool
+) -> None:
+    trace = ask(fast, points=500)
+    (file,) = cache.rglob("*.npz")
+    file.unlink()
+    store = service_of(fast).store
+    examined_stored(store, store.recordings.get(1), samples if in_memory else None)
+    monkeypatch.setattr(envelopes, "_made", None)
     assert ask(fast, points=500) == trace
 
 

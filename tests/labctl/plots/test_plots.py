@@ -271,9 +271,9 @@ def test_headings_of_an_inspection_begin_at_the_left_and_its_time_is_in_hours() 
     assert (layout.shapes[0].x0, layout.shapes[0].x1) == (1.0, 2.0)
 
 
-@pytest.mark.parametrize(("between_s", "mode"), [(20.0, "lines"), (3600.0, "lines+markers")])
-def test_short_data_sets_far_apart_are_seen_in_an_inspection(between_s: float, mode: str) -> None:
-    """20 s in an hour are a fifth of a pixel wide as a line."""
+@pytest.mark.parametrize(("between_s", "dots"), [(20.0, 0), (3600.0, 5)])
+def test_short_data_sets_far_apart_are_seen_in_an_inspection(between_s: float, dots: int) -> None:
+    """20 s in an hour are a fifth of a pixel wide as a line: dots mark their least and largest readings."""
     from labctl.answers.inspection import CourseJson
     from labctl.plots.inspection import inspection_picture
 
@@ -281,8 +281,12 @@ def test_short_data_sets_far_apart_are_seen_in_an_inspection(between_s: float, m
     course: CourseJson = {
         "channel": "gyro_x", "unit": "deg/s", "readings": 9, "bins": 6,
         "t_s": [t_s for begin_s in begins_s for t_s in (begin_s, begin_s + 20.0, None)],
-        "low": [1.0, 1.0, None] * 3, "high": [1.0, 2.0, None] * 3,
+        "low": [1.0, 1.0, None] * 3, "high": [1.0, 2.0, None] * 2 + [1.0, 1.001, None],
     }  # fmt: skip
     picture = inspection_picture([course], [])
     assert picture is not None
-    assert picture.figure.data[0].mode == mode
+    line, *marks = picture.figure.data
+    assert (line.mode, [each.mode for each in marks]) == ("lines", ["markers"] * (dots > 0))
+    assert sum(len(each.y) for each in marks) == dots
+    for each in marks:  # of the last data set both readings are within one dot
+        assert list(each.y) == [1.0, 2.0, 1.0, 2.0, 1.0]

@@ -1,7 +1,7 @@
 // Chart of a plan: temperature over time with its data sets, their rates below, positions as bands.
 
 import { colour, figure } from "../core/figure.js";
-import { duration, plainNumber } from "../core/format.js";
+import { duration, isNumber, plainNumber } from "../core/format.js";
 import { axisOf } from "../core/positions.js";
 import { planSteps, positionBands, setPointCourse } from "./plan_steps.js";
 
@@ -22,6 +22,9 @@ const STATES = [
 ];
 /** Plans longer than this are drawn in hours, shorter ones in minutes, s. */
 const HOURS_FROM_S = 3 * 3600;
+
+/** Half the height of a mark at the set point, as a share of the temperatures of the plan. */
+const TICK_SHARE = 0.03;
 
 /**
  * The colour of the axis that points up; of a tilted unit that of plain text.
@@ -45,43 +48,46 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
     const steps = planSteps(timeline, unit_s);
     const sets = steps.filter((step) => step.dataset !== null);
     const byHand = sets.length > 0 && sets.every((step) => step.kind === "turn");
+    const warm = sets.map((step) => step.warm).filter(isNumber);
+    const tick_c = TICK_SHARE * (Math.max(...warm) - Math.min(...warm) || 2); // of one temperature the axis spans 2 K
     const narrow = window.innerWidth < 760;
     const marks = STATES.flatMap(([state, shade]) => {
       const here = sets.filter((step) => step.state === state);
       if (!here.length) return [];
+      const middles = here.map((step) => (step.from + step.until) / 2);
+      const texts = here.map(
+        (step) =>
+          `data set ${step.dataset}: ${byHand ? `${plainNumber(step.turn)} deg by hand` : `${plainNumber(step.rate)} deg/s at ${plainNumber(step.warm)} deg C`}, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`,
+      );
       /** @type {PlotTrace} */
       const common = {
         type: "scatter",
-        mode: "markers",
         name: live ? `${state} (${here.length})` : "data sets",
         legendgroup: state,
-        x: here.map((step) => (step.from + step.until) / 2),
-        customdata: here.map((step) => step.dataset),
-        text: here.map(
-          (step) =>
-            `data set ${step.dataset}: ${byHand ? `${plainNumber(step.turn)} deg by hand` : `${plainNumber(step.rate)} deg/s at ${plainNumber(step.warm)} deg C`}, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`,
-        ),
         hovertemplate: "%{text}<extra></extra>",
-        selected: { marker: { opacity: 1 } },
       };
       const fill = colour(live ? shade : "accent");
       return [
         {
-          ...common,
-          y: here.map((step) => step.warm),
+          ...common, // one line with gaps: a browser draws it at once, but hundreds of markers one by one
+          mode: "lines",
+          x: here.flatMap((_, k) => [middles[k], middles[k], null]),
+          y: here.flatMap(({ warm }) => (isNumber(warm) ? [warm - tick_c, warm + tick_c, null] : [null, null, null])),
+          customdata: here.flatMap(({ dataset }) => [dataset, dataset, null]),
+          text: texts.flatMap((text) => [text, text, ""]),
           showlegend: live && !byHand,
-          marker: {
-            symbol: "line-ns",
-            size: 11,
-            color: fill,
-            line: { color: fill, width: state === "running" ? 4 : 1.6 },
-          },
+          line: { color: fill, width: state === "running" ? 4 : 1.6 },
         },
         {
           ...common,
+          mode: "markers",
+          x: middles,
           y: here.map((step) => (byHand ? step.turn : step.rate)),
+          customdata: here.map((step) => step.dataset),
+          text: texts,
           yaxis: "y2",
           showlegend: live && byHand,
+          selected: { marker: { opacity: 1 } },
           marker: {
             size: sets.length > 200 ? 4 : 5.5,
             color: fill,

@@ -6,8 +6,16 @@ import { staticUrl } from "./static_url.js";
 /** @import { Plot, Plotly, PlotTrace } from "../../../types/pages.js" */
 /** @typedef {"plotly-cartesian.js" | "plotly.js"} Build */
 
+/** @type {Build} */
+const NAMED = "plotly-cartesian.js";
+
 /** Types of traces that the small build draws, of those that the pages use. */
 const FLAT = new Set(["bar", "heatmap", "scatter"]);
+
+/** The script of the small build, where the document of the page names it, and what it has set before this module ran. */
+const [named, set] = globalThis.document
+  ? [document.querySelector("script[data-plotly]"), window.Plotly]
+  : [null, undefined];
 
 /** @type {Map<Build, Promise<Plotly>>} */
 const asked = new Map();
@@ -21,8 +29,7 @@ const builds = new WeakMap();
  * @param {readonly PlotTrace[]} data
  * @returns {Build}
  */
-export const buildFor = (data) =>
-  data.every(({ type }) => FLAT.has(type ?? "scatter")) ? "plotly-cartesian.js" : "plotly.js";
+export const buildFor = (data) => (data.every(({ type }) => FLAT.has(type ?? "scatter")) ? NAMED : "plotly.js");
 
 /**
  * The build that draws some traces where it is loaded.
@@ -37,8 +44,26 @@ export const loadedFor = (data) => loaded.get(buildFor(data));
  */
 export function loadPlotly(data = []) {
   const build = buildFor(data);
-  const found = asked.get(build) ?? load(build);
+  const found = asked.get(build) ?? (named && build === NAMED ? awaitNamed(named) : load(build));
   asked.set(build, found);
+  return found;
+}
+
+/**
+ * The build that the document loads, or, where that failed, loaded now. The document's own `load` event comes after its
+ * scripts have run or failed: whichever of the two comes first tells.
+ * @param {Element} script
+ * @returns {Promise<Plotly>}
+ */
+async function awaitNamed(script) {
+  if (!set && document.readyState !== "complete")
+    await new Promise((resolve) => {
+      script.addEventListener("load", resolve);
+      window.addEventListener("load", resolve);
+    });
+  const found = set ?? window.Plotly;
+  if (!found) return load(NAMED);
+  loaded.set(NAMED, found);
   return found;
 }
 

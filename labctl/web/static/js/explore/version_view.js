@@ -11,7 +11,7 @@ import { navigate, show } from "../core/router.js";
 import { planAddress } from "../core/routes.js";
 import { jointCard } from "../joint/card.js";
 import { asked as askedFor } from "./chosen_recordings.js";
-import { errorComparison } from "./compare/error_comparison.js";
+import { askComparison, errorComparison, isByRates } from "./compare/error_comparison.js";
 import { axisNames, inDatasetOrder } from "./dataset_rows.js";
 import { errorLadder } from "./error_ladder.js";
 import { extendModel } from "./extend_model.js";
@@ -21,7 +21,7 @@ import { selectedRows } from "./residual_map.js";
 import { ExploreState } from "./state.js";
 import { suspectList, verdictCard } from "./verdict_card.js";
 
-/** @import { Criticism, Effect, RecordingRow, Unit, Version } from "../../../types/api.js" */
+/** @import { Comparison, Criticism, Effect, RecordingRow, Unit, Version } from "../../../types/api.js" */
 /** @import { Query } from "../../../types/pages.js" */
 /** @import { Chosen } from "./chosen_recordings.js" */
 
@@ -49,7 +49,7 @@ const COUNT_MS = 1000;
 
 /** @param {Given} given */
 export function versionView(given) {
-  const { unit, calibration, chosen, query, signal } = given;
+  const { unit, calibration, chosen, motion, query, signal } = given;
   const stage = h("p", { class: "muted", "aria-live": "polite" });
   const since = h("p", { class: "muted small" });
   const finish = takeKept(unit.serial, calibration.version);
@@ -62,6 +62,13 @@ export function versionView(given) {
   const endWait = countWait(since, signal);
   let steps = 0;
   const path = { serial: unit.serial, version: calibration.version };
+  // the first figure needs it: it does not wait for the criticism
+  const comparing = isByRates({ ...chosen, motion })
+    ? askComparison(
+        { serial: unit.serial, version: calibration.version, ...chosen, recordings: [...chosen.recordings] },
+        signal,
+      )
+    : null;
   const asking = Promise.all([
     getFollowed("/api/units/{serial}/calibrations/{version}/criticism/events", {
       path,
@@ -75,7 +82,7 @@ export function versionView(given) {
     .then(([criticism, catalogue]) => {
       endWait();
       const end = finish ? null : toCertify(given, criticism);
-      setChildren(place, finish?.element ?? null, sections(given, criticism, catalogue.effects, end));
+      setChildren(place, finish?.element ?? null, sections(given, criticism, comparing, catalogue.effects, end));
       finish?.settle(nextSteps(given, criticism));
       if (query.tour) import("../tour/tour.js").then(({ showTour }) => showTour(place, signal));
       else if (location.hash) document.getElementById(location.hash.slice(1))?.scrollIntoView();
@@ -119,10 +126,11 @@ function countWait(place, signal) {
 /**
  * @param {Given} given
  * @param {Criticism} criticism
+ * @param {Promise<Comparison> | null} comparing
  * @param {readonly Effect[]} effects
  * @param {HTMLElement | null} end what is done with a version that nothing is missing from
  */
-function sections({ unit, calibration, versions, chosen, motion, query, signal }, criticism, effects, end) {
+function sections({ unit, calibration, versions, chosen, motion, query, signal }, criticism, comparing, effects, end) {
   const axes = axisNames(criticism);
   const state = new ExploreState({
     serial: unit.serial,
@@ -139,11 +147,17 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   const joint = criticism.joint ? jointCard(criticism.joint) : null;
   if (!axes.length) {
     const alone = chosen.recordings.length < 2 && motion !== "rates";
-    return [verdictCard(state), end, joint, alone ? errorComparison(state, signal) : null, errorLadder(state, signal)];
+    return [
+      verdictCard(state),
+      end,
+      joint,
+      alone ? errorComparison(state, null, signal) : null,
+      errorLadder(state, signal),
+    ];
   }
   const adding = extendModel(state, effects);
   const parts = [
-    errorComparison(state, signal),
+    errorComparison(state, comparing, signal),
     residualDiagnostics(state),
     suspectList(state, effects, {
       onadd: adding.put,

@@ -23,7 +23,7 @@ const LISTED = 100;
 /** @param {PageContext} context */
 export async function page({ query: asked, signal }) {
   // with the unit in the address, what is asked for does not wait for the list
-  const asking = asked.unit ? unitAndRecordings(asked.unit, signal) : null;
+  const asking = asked.unit ? readUnit(asked.unit, asked, signal) : null;
   asking?.catch(() => {}); // awaited below
   const units = await get("/api/units", { query: { limit: LISTED }, signal });
   if (!units.length) {
@@ -38,13 +38,7 @@ export async function page({ query: asked, signal }) {
     );
   }
   const { serial } = asked.unit ? { serial: asked.unit } : (units.find((each) => each.calibrations.length) ?? units[0]);
-  const [unit, own] = await (asking ?? unitAndRecordings(serial, signal));
-  const versions = [...unit.calibrations].sort((a, b) => a - b);
-  const version = asked.version ? Number(asked.version) : versions.at(-1);
-  const calibration =
-    version === undefined
-      ? undefined
-      : await get("/api/units/{serial}/calibrations/{version}", { path: { serial: unit.serial, version }, signal });
+  const { unit, own, versions, version, calibration } = await (asking ?? readUnit(serial, asked, signal));
   const chosen = chosenRecordings(asked, own, calibration);
   const motion = own.find((row) => row.id === chosen.recording)?.motion ?? "rates";
   const element = h(
@@ -65,14 +59,23 @@ export async function page({ query: asked, signal }) {
 }
 
 /**
+ * A unit, its recordings, its versions, and the version that is asked for, or its newest.
  * @param {string} serial
+ * @param {Query} asked
  * @param {AbortSignal} signal
  */
-const unitAndRecordings = (serial, signal) =>
-  Promise.all([
-    get("/api/units/{serial}", { path: { serial }, signal }),
-    get("/api/recordings", { query: { unit: serial }, signal }),
-  ]);
+async function readUnit(serial, asked, signal) {
+  const recordings = get("/api/recordings", { query: { unit: serial }, signal });
+  recordings.catch(() => {}); // awaited below
+  const unit = await get("/api/units/{serial}", { path: { serial }, signal });
+  const versions = [...unit.calibrations].sort((a, b) => a - b);
+  const version = asked.version ? Number(asked.version) : versions.at(-1);
+  const calibration =
+    version === undefined
+      ? undefined
+      : await get("/api/units/{serial}/calibrations/{version}", { path: { serial: unit.serial, version }, signal });
+  return { unit, own: await recordings, versions, version, calibration };
+}
 
 /**
  * What the figures of the page are of.

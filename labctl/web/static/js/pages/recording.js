@@ -13,10 +13,10 @@ import { REFERENCE_TEXTS } from "../recordings/motion_texts.js";
 import { datasetReadings } from "../recordings/readings.js";
 import { inspectionCard } from "../recordings/inspection.js";
 import { datasetTable } from "../recordings/dataset_table.js";
-import { trace } from "../recordings/trace.js";
+import { askTrace, trace } from "../recordings/trace.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
 
-/** @import { DataSets, Recording } from "../../../types/api.js" */
+/** @import { DataSets, Recording, Trace } from "../../../types/api.js" */
 
 /** @import { PageContext, Part, RecordingState } from "../../../types/pages.js" */
 
@@ -30,23 +30,29 @@ const KIND_TEXTS = {
 /** @param {PageContext} context */
 export async function page({ params, query, signal }) {
   const path = { recording: params.id };
-  const [about, sets] = await Promise.all([
-    get("/api/recordings/{recording}", { path, query: { points: false }, signal }),
-    get("/api/recordings/{recording}/datasets", { path, signal }),
-  ]);
+  const askedSets = get("/api/recordings/{recording}/datasets", { path, signal });
+  askedSets.catch(() => {}); // awaited below
+  const about = await get("/api/recordings/{recording}", { path, query: { points: false }, signal });
   const { info } = about;
   /** @param {string | undefined} text */
   const numberIn = (text) => (text && Number.isFinite(Number(text)) ? Number(text) : null);
+  const window = {
+    id: about.id,
+    channel: query.channel ?? `gyro_${info.axes[0]}`,
+    from: numberIn(query.from),
+    until: numberIn(query.until),
+  };
+  // the first figure: it does not wait for the data sets; readings always have times
+  const askedTrace = about.kind === "samples" ? askTrace(window, signal) : null;
+  askedTrace?.catch(() => {}); // shown where it is awaited
+  const sets = await askedSets;
   /** @type {RecordingState} */
   const state = {
-    id: about.id,
+    ...window,
     kind: about.kind,
     sets,
     motion: info.motion ?? "rates",
     output: info.output ?? {},
-    channel: query.channel ?? `gyro_${info.axes[0]}`,
-    from: numberIn(query.from),
-    until: numberIn(query.until),
     dataset: numberIn(query.dataset),
     pick: (dataset) => {
       state.dataset = dataset === state.dataset ? null : dataset;
@@ -75,7 +81,7 @@ export async function page({ params, query, signal }) {
   /** @type {Part[]} */
   const parts = [readings, datasetTable(state, query)];
   if (!timed && sets.number.length && (info.motion ?? "rates") === "rates") parts.unshift(meanPlots(state));
-  if (timed) parts.unshift(shownTrace(state, signal));
+  if (timed) parts.unshift(shownTrace(state, askedTrace, signal));
   const motion = info.motion ?? "rates";
   if (motion !== "rates") element.append(motionCard(about.id, motion, info.axes, signal));
   if (about.kind === "samples" && info.motion !== "poses") parts.push(allan(state, signal));
@@ -87,10 +93,11 @@ export async function page({ params, query, signal }) {
 /**
  * The trace, and in the state how to show a data set in it.
  * @param {RecordingState} state
+ * @param {Promise<Trace> | null} asked
  * @param {AbortSignal} signal
  */
-function shownTrace(state, signal) {
-  const found = trace(state, signal);
+function shownTrace(state, asked, signal) {
+  const found = trace(state, asked, signal);
   state.showInTrace = (k) => {
     const [from, until] = [state.sets.t_from_s[k] ?? 0, state.sets.t_until_s[k] ?? 0];
     const beside = 0.5 * (until - from);

@@ -19,16 +19,22 @@ import { uncertaintyInUse } from "../unit/uncertainty.js";
 import { versionFacts } from "../unit/version_facts.js";
 import { versionsCard } from "../unit/versions.js";
 
-/** @import { CalibrationRow } from "../../../types/api.js" */
+/** @import { CalibrationRow, Ladder } from "../../../types/api.js" */
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
 /** @param {PageContext} context */
 export async function page({ params, signal }) {
   const path = { serial: params.serial };
+  const calibrations = get("/api/units/{serial}/calibrations", { path, signal });
+  // the first figure needs it: it does not wait for the other answers
+  const asking = calibrations.then((each) =>
+    each.length ? get("/api/units/{serial}/ladder", { path, signal }) : null,
+  );
+  asking.catch(() => {}); // shown where it is awaited
   const [unit, rows, history, issued, waiting, sensors, diagnoses] = await Promise.all([
     get("/api/units/{serial}", { path, signal }),
-    get("/api/units/{serial}/calibrations", { path, signal }),
+    calibrations,
     get("/api/units/{serial}/certifications", { path, signal }),
     get("/api/units/{serial}/certificates", { path, signal }),
     get("/api/units/{serial}/release-requests", { path, signal }),
@@ -53,7 +59,7 @@ export async function page({ params, signal }) {
     rows.length
       ? [
           versionsCard(unit, rows, issued, explore),
-          ladder(unit.serial, signal),
+          ladder(asking),
           diagnosisCard(unit.serial, diagnoses, signal),
           unit.recordings.length > 1 ? trendCard(unit.serial, rows, signal) : null,
           ...versionCards(unit.serial, rows, unit.certified_version, signal),
@@ -84,15 +90,13 @@ export async function page({ params, signal }) {
   );
 }
 
-/**
- * @param {string} serial
- * @param {AbortSignal} signal
- */
-function ladder(serial, signal) {
+/** @param {Promise<Ladder | null>} asking */
+function ladder(asking) {
   const place = h("div", { style: "min-height: 20rem" });
-  loadInto(place, "RMS error by version", async () =>
-    ladderFigure(await get("/api/units/{serial}/ladder", { path: { serial }, signal })),
-  );
+  loadInto(place, "RMS error by version", async () => {
+    const answer = await asking;
+    return answer && ladderFigure(answer);
+  });
   return cardWithHeader("Error of the versions", null, place);
 }
 

@@ -23,11 +23,24 @@ const SETTLE_MS = 200;
 const HOURS_FROM_S = 7200;
 
 /**
- * The trace of a recording. `state` has {id, channel, from, until, dataset, sets}; a change is written to the address.
- * @param {RecordingState} state
+ * Request a channel in a window, s; null: to its end.
+ * @param {Pick<RecordingState, "id" | "channel" | "from" | "until">} window
  * @param {AbortSignal} signal
  */
-export function trace(state, signal) {
+export const askTrace = ({ id, channel, from, until }, signal) =>
+  get("/api/recordings/{recording}/trace", {
+    path: { recording: id },
+    query: { channel, from_s: from, until_s: until, points: COLUMNS },
+    signal,
+  });
+
+/**
+ * The trace of a recording. `state` has {id, channel, from, until, dataset, sets}; a change is written to the address.
+ * @param {RecordingState} state
+ * @param {Promise<Trace> | null} first the trace that is shown first, where it is requested already
+ * @param {AbortSignal} signal
+ */
+export function trace(state, first, signal) {
   /** @type {Trace | null} */
   let found = null;
   /** How many seconds a unit of the time axis has. */
@@ -118,15 +131,15 @@ export function trace(state, signal) {
     };
   }
 
-  async function load() {
+  /** @param {Promise<Trace> | null} [requested] */
+  async function load(requested) {
     asked.abort();
     asked = new AbortController();
+    const own = AbortSignal.any([signal, asked.signal]);
     try {
-      found = await get("/api/recordings/{recording}/trace", {
-        path: { recording: state.id },
-        query: { channel: state.channel, from_s: state.from, until_s: state.until, points: COLUMNS },
-        signal: AbortSignal.any([signal, asked.signal]),
-      });
+      const answer = await (requested ?? askTrace(state, own));
+      if (own.aborted) return;
+      found = answer;
     } catch (error) {
       if (!isAbort(error)) setChildren(place, notice("", messageOf(error)));
       return;
@@ -233,7 +246,7 @@ export function trace(state, signal) {
     tool("−", "Zoom out", () => move(-0.5, 0.5)),
     tool("All", "The whole recording", () => show({ from: null, until: null })),
   );
-  load();
+  load(first);
   const element = cardWithHeader(
     "Trace",
     h("div", { class: "row", style: "align-items: end" }, channels, tools),

@@ -31,25 +31,45 @@ const VIEWS = [
 ];
 
 /**
- * @param {ExploreState} state
+ * Whether a motion is compared by the answer of a comparison, or by one of its own.
+ * @param {{ motion: ExploreState["motion"], recordings: readonly number[] }} chosen
+ */
+export const isByRates = ({ motion, recordings }) => motion === "rates" || recordings.length > 1;
+
+/**
+ * Request the comparison that will be drawn.
+ * @param {Pick<ExploreState, "serial" | "version" | "recording" | "recordings">} chosen
  * @param {AbortSignal} signal
  */
-export function errorComparison(state, signal) {
+export function askComparison(chosen, signal) {
+  const asking = get("/api/units/{serial}/calibrations/{version}/comparison", {
+    path: { serial: chosen.serial, version: chosen.version },
+    query: asked(chosen),
+    signal,
+  });
+  asking.catch(() => {}); // shown where it is awaited
+  return asking;
+}
+
+/**
+ * @param {ExploreState} state
+ * @param {Promise<Comparison> | null} asking the comparison, where it is requested already
+ * @param {AbortSignal} signal
+ */
+export function errorComparison(state, asking, signal) {
   const place = h("div", { style: "min-height: 28rem" });
   const source = h("p", { class: "muted small" });
-  if (state.motion !== "rates" && state.recordings.length < 2) return motionComparison(state, signal);
+  if (!isByRates(state)) return motionComparison(state, signal);
   const views = VIEWS.filter(
     ([id]) => (state.motion !== "rest" || AT_REST.has(id)) && (state.recordings.length < 2 || SEVERAL.has(id)),
   );
   let view = views.find(([id]) => id === query().view) ?? views[0];
-  /** @type {Comparison | null} */
-  let comparison = null;
   const shown = () =>
     loadInto(place, "Reading the data sets", async () => {
-      comparison ??= await get("/api/units/{serial}/calibrations/{version}/comparison", {
-        path: { serial: state.serial, version: state.version },
-        query: asked(state),
-        signal,
+      asking ??= askComparison(state, signal);
+      const comparison = await asking.catch((error) => {
+        asking = null; // it is sent again
+        throw error;
       });
       source.textContent = sourceText(comparison);
       return view[2](comparison, state, signal);
