@@ -18,7 +18,7 @@ import {
   scaled,
   toRanges,
 } from "../../labctl/web/static/js/explore/dataset_rows.js";
-import { usualRecording } from "../../labctl/web/static/js/explore/chosen_recordings.js";
+import { usualRecording, usualVersion } from "../../labctl/web/static/js/explore/chosen_recordings.js";
 import { cellsText, colourLimit, mapCells } from "../../labctl/web/static/js/explore/residual_cells.js";
 
 test("a selection is written as ranges and read again", () => {
@@ -120,4 +120,10 @@ test("the recording of a campaign that has not ended is not compared while there
   assert.equal(usualRecording([row(7, 84), row(45, 42)]), 45);
   assert.equal(usualRecording([row(4, 121), row(5, 23)]), 4);
   assert.equal(usualRecording([row(45, 3, true)]), 45);
+});
+
+test("without a version in the address, the one in force is shown; else the newest", () => {
+  assert.equal(usualVersion({ calibrations: [1, 2, 3], certified_version: 2 }), 2);
+  assert.equal(usualVersion({ calibrations: [3, 1, 2], certified_version: null }), 3);
+  assert.equal(usualVersion({ calibrations: [], certified_version: null }), undefined);
 });

@@ -35,13 +35,21 @@ function power(value, digits) {
   const [factor, exponent] = value.toExponential(digits - 1).split("e");
   return `${signed(factor)} × 10${superscript(exponent)}`;
 }
+/** Odds from so many decades on are written as a power of ten; those of more than the second number as a bound. */
+const [POWER_DECADES, MOST_DECADES] = [6, 100];
 /**
- * The odds for an effect as people say them; `nats` is the natural logarithm of the Bayes factor.
+ * The odds for an effect as people say them; `nats` is the natural logarithm of the Bayes factor. Beyond 10¹⁰⁰ only the
+ * bound is stated. `odds_text` of `labctl/probability_text.py` is the same.
  * @param {number} nats
  */
 export function oddsText(nats) {
   const decades = Math.abs(nats) / Math.LN10;
-  const odds = decades < 6 ? String(Number((10 ** decades).toPrecision(2))) : `10${superscript(Math.round(decades))}`;
+  const odds =
+    decades > MOST_DECADES
+      ? `more than 10${superscript(MOST_DECADES)}`
+      : decades >= POWER_DECADES
+        ? `10${superscript(Math.round(decades))}`
+        : String(Number((10 ** decades).toPrecision(2)));
   return nats >= 0 ? `${odds} to 1` : `1 to ${odds}`;
 }
 

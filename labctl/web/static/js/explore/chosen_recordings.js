@@ -1,6 +1,6 @@
-// Which recordings are compared: one, or several as one; in the address, in a query and in words.
+// Which version is compared with which recordings: one, or several as one; in the address, in a query and in words.
 
-/** @import { RecordingRow } from "../../../types/api.js" */
+/** @import { RecordingRow, Unit } from "../../../types/api.js" */
 
 /** @typedef {{ recording: number, recordings: readonly number[] }} Chosen `recording` is the newest of them */
 
@@ -49,3 +49,11 @@ export function usualRecording(own) {
   const most = Math.max(...rows.map((row) => row.datasets));
   return Math.max(...rows.filter((row) => 2 * row.datasets >= most).map((row) => row.id));
 }
+
+/**
+ * The version that is shown where none is asked for: the one in force, as on the page of the unit; else the newest.
+ * @param {Pick<Unit, "calibrations" | "certified_version">} unit
+ * @returns {number | undefined} undefined where the unit has no version
+ */
+export const usualVersion = ({ calibrations, certified_version: inForce }) =>
+  inForce ?? (calibrations.length ? Math.max(...calibrations) : undefined);
