@@ -169,6 +169,24 @@ test("evidence is said as odds", () => {
   ]);
 });
 
+test("effects in a sentence of the service are written as their links are", () => {
+  const ids = ["scale_factor_odd", "scale_factor", "bias"];
+  assert.equal(
+    format.inWords("adding scale_factor_odd, not bias_temperature: `labctl improve A --add scale_factor_odd`", ids),
+    "adding scale factor odd, not bias_temperature: `labctl improve A --add scale_factor_odd`",
+  );
+  assert.equal(format.inWords("scale_factor.", ids), "scale factor.");
+  assert.equal(format.inWords("nothing", []), "nothing");
+});
+
+test("an instant of another year has its year", () => {
+  const now = new Date();
+  assert.doesNotMatch(format.instant(now.toISOString()), new RegExp(String(now.getFullYear())));
+  assert.match(format.instant("2019-06-05T08:00:00Z"), /5 Jun 2019/);
+  assert.match(format.dated(now.toISOString()), new RegExp(`${now.getFullYear()}, \\d\\d:\\d\\d$`));
+  assert.equal(format.dated(null), "–");
+});
+
 test("a mean that is rounded to zero has no sign", () => {
   holds(format.mean, [
     [[-0.00004, 1], "0.00"],

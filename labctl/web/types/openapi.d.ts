@@ -13463,6 +13463,12 @@ export interface components {
              * @default false
              */
             unfinished: boolean;
+            /**
+             * Experiment
+             * @description Whether its campaign was an experiment of a diagnosis: a few points, which rarely determine a model alone.
+             * @default false
+             */
+            experiment: boolean;
         };
         /**
          * RecordingWithPoints
@@ -16883,7 +16889,7 @@ export interface components {
             share: number;
             /**
              * Smallest Size
-             * @description Smallest size of the effect that the plan can detect, in `unit`.
+             * @description Smallest size of the effect that the plan can detect, in `unit`; of `why` size it is larger than the effect can be.
              */
             smallest_size: number | null;
             /**
@@ -16894,9 +16900,9 @@ export interface components {
             unit: string;
             /**
              * Why
-             * @description What hides the effect: a channel that is not logged, or the schedule; null: it is visible.
+             * @description What hides the effect: a channel that is not logged; the schedule; or that the schedule would show it only from a size on that it cannot have; null: it is visible.
              */
-            why: ("channel" | "schedule") | null;
+            why: ("channel" | "schedule" | "size") | null;
             /**
              * Needs
              * @description Channels that would have to be logged; empty: none.

@@ -39,13 +39,14 @@ export function recordingsText({ recording, recordings }) {
 }
 
 /**
- * The newest recording with at least half as many data sets as the largest: an experiment has few. That of a campaign
- * that has not ended is taken only where the unit has no other.
- * @param {readonly Pick<RecordingRow, "id" | "datasets" | "unfinished">[]} own
+ * The newest recording with at least half as many data sets as the largest. An experiment of a diagnosis, which rarely
+ * determines a model alone, and what a campaign measures that has not ended are taken only where there is no other.
+ * @param {readonly Pick<RecordingRow, "id" | "datasets" | "unfinished" | "experiment">[]} own
  */
 export function usualRecording(own) {
   const ended = own.filter((row) => !row.unfinished);
-  const rows = ended.length ? ended : own;
+  const whole = ended.filter((row) => !row.experiment);
+  const rows = whole.length ? whole : ended.length ? ended : own;
   const most = Math.max(...rows.map((row) => row.datasets));
   return Math.max(...rows.filter((row) => 2 * row.datasets >= most).map((row) => row.id));
 }

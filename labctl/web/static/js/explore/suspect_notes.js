@@ -1,16 +1,29 @@
 // What stands beside the suspected effects: why none is named, formulas, experiments, what cannot be tested.
 
 import { h } from "../core/elements.js";
-import { number, probabilityText, idText } from "../core/format.js";
+import { inWords, number, probabilityText, idText } from "../core/format.js";
 import { button, notice } from "../core/components.js";
 import { planAddress } from "../core/routes.js";
+import { channelName } from "../recordings/channels.js";
+import { sharedReasons } from "./experiment_reasons.js";
 import { heldOutName } from "./first_models.js";
 
 /** @import { Criticism } from "../../../types/api.js" */
 /** @import { ExploreState } from "./state.js" */
 
+/** So many experiments are listed, the best first. */
+const EXPERIMENTS_SHOWN = 3;
 /** A smaller probability that an experiment names a wrong cause is not worth a word. */
 const MIN_WRONG = 0.005;
+
+/**
+ * The ids of all effects that a criticism speaks of.
+ * @param {Pick<Criticism, "named" | "not_testable" | "suspects">} criticism
+ */
+export const effectsOf = ({ named, not_testable: untestable, suspects }) => [
+  ...named,
+  ...[...suspects, ...untestable].map(({ effect }) => effect),
+];
 
 /**
  * Why an adequate model has suspects and names none of them.
@@ -96,31 +109,31 @@ export function lawList({ criticism, axis, motion }, onlaw) {
 /** @param {Criticism} criticism */
 export function experimentList(criticism) {
   if (!criticism.experiments.length) return null;
+  const ids = effectsOf(criticism);
+  const experiments = criticism.experiments.slice(0, EXPERIMENTS_SHOWN);
+  const { common, own } = sharedReasons(experiments.map(({ why }) => inWords(why, ids)));
   return h(
     "div",
     { class: "stack" },
     h("h3", {}, "Experiments that show most of which effect is real"),
-    criticism.experiments
-      .slice(0, 3)
-      .map((each) =>
+    common ? h("p", { class: "muted small" }, `Of all these: ${common}`) : null,
+    experiments.map((each, place) =>
+      h(
+        "div",
+        { class: "notice" },
         h(
-          "div",
-          { class: "notice" },
-          h(
-            "p",
-            {},
-            each.do,
-            each.hours ? ` (${number(each.hours, 2)} h)` : "",
-            each.names_wrong < MIN_WRONG
-              ? ""
-              : `; a wrong cause is then named with a probability of ${unbroken(probabilityText(each.names_wrong))}`,
-          ),
-          h("p", { class: "muted small" }, each.why),
-          each.toml
-            ? h("a", { class: "button tiny", href: planAddress(each.toml, criticism.serial) }, "Plan it")
-            : null,
+          "p",
+          {},
+          inWords(each.do, ids),
+          each.hours ? ` (${number(each.hours, 2)} h)` : "",
+          each.names_wrong < MIN_WRONG
+            ? ""
+            : `; a wrong cause is then named with a probability of ${unbroken(probabilityText(each.names_wrong))}`,
         ),
+        own[place] ? h("p", { class: "muted small" }, own[place]) : null,
+        each.toml ? h("a", { class: "button tiny", href: planAddress(each.toml, criticism.serial) }, "Plan it") : null,
       ),
+    ),
   );
 }
 
@@ -130,7 +143,7 @@ export function untestableEffects(criticism) {
   /** @param {Criticism["not_testable"][number]} line */
   const why = (line) =>
     line.why === "channel"
-      ? `not recorded: ${line.needs.map(idText).join(", ")}`
+      ? `not recorded: ${line.needs.map(channelName).join(", ")}`
       : "this schedule cannot detect the effect";
   return h(
     "details",

@@ -1,13 +1,21 @@
 // The verdict in words, and the suspected effects with their evidence.
 
 import { scrollTo, setChildren, h } from "../core/elements.js";
-import { withUncertainty, number, oddsText, probabilityText, idText } from "../core/format.js";
+import { inWords, withUncertainty, number, oddsText, probabilityText, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader } from "../core/components.js";
 import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { heldOutName } from "./first_models.js";
-import { aliasNotice, experimentList, lawList, unbroken, untestableEffects, whyNoneIsNamed } from "./suspect_notes.js";
+import {
+  aliasNotice,
+  effectsOf,
+  experimentList,
+  lawList,
+  unbroken,
+  untestableEffects,
+  whyNoneIsNamed,
+} from "./suspect_notes.js";
 
 /** @import { Criticism, Effect, Suspect } from "../../../types/api.js" */
 /** @import { Child } from "../../../types/pages.js" */
@@ -53,7 +61,8 @@ export function verdictCard(state) {
   const [title, kind] = criticism.further.length ? NONE_NAMED : VERDICTS[criticism.verdict];
   const of = new Set(criticism.joint?.text); // stands in the card of the recordings together
   of.add(criticism.why_not_named); // stands beside the suspects
-  const [first, ...others] = criticism.text.filter((line) => !of.has(line));
+  const ids = effectsOf(criticism);
+  const [first, ...others] = criticism.text.filter((line) => !of.has(line)).map((line) => inWords(line, ids));
   const { error, noise } = criticism;
   const ratio = (error.rms_dps ?? NaN) / (error.noise_floor_dps ?? NaN);
   return h(
@@ -179,7 +188,6 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
               draw(s),
               openWhatIf(s),
             ),
-            equationDetails(effects, s.effect),
           ),
           evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
           evidenceItem(
@@ -200,6 +208,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
             `Coefficient ± U (95.45 %)${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
             coefficientText(s, state.axis),
           ),
+          equationDetails(effects, s.effect),
         ),
       ),
     );
@@ -217,7 +226,9 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
         : "Suspected effects"
       : "Which effects are missing",
     null,
-    isAdequate && speaking.length ? h("p", { class: "muted" }, whyNoneIsNamed(criticism)) : null,
+    isAdequate && speaking.length
+      ? h("p", { class: "muted" }, inWords(whyNoneIsNamed(criticism), effectsOf(criticism)))
+      : null,
     speaking.length
       ? [drawnNow, list, open]
       : h(

@@ -60,7 +60,7 @@ async function allTypes(types, signal) {
  * @param {AbortSignal} signal
  */
 async function typePage(figures, signal) {
-  const report = h("div", { class: "stack" }, busyIndicator("Comparing the units …"));
+  const report = h("div", { class: "page" }, busyIndicator("Comparing the units …"));
   loadReport(figures.type, report, signal);
   return h(
     "div",

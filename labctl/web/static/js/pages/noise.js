@@ -4,6 +4,7 @@ import { get, getPart } from "../core/http/api.js";
 import { Problem } from "../core/http/errors.js";
 import { h, setChildren } from "../core/elements.js";
 import { figure } from "../core/figure.js";
+import { ticksOf } from "../core/log_ticks.js";
 import { duration, number } from "../core/format.js";
 import { card, emptyState, loadInto, notice, pageHeader, table } from "../core/components.js";
 import { pointPlace, selectPoints } from "../core/figure_point.js";
@@ -171,7 +172,11 @@ function overlay(records) {
     ],
     layout: {
       xaxis: { type: "log", title: { text: "averaging time, s" } },
-      yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } },
+      yaxis: {
+        type: "log",
+        title: { text: "Allan deviation, deg/s" },
+        ...ticksOf(lines.flatMap(({ noise }) => noise.deviation_dps)),
+      },
       margin: { l: 70, r: 12, t: 8, b: 46 },
     },
   });
