@@ -85,14 +85,14 @@ class Visibility(ResponseModel):
     share: float = Field(description="Share of the effect that the rest of the model does not absorb, 0 to 1.")
     smallest_size: float | None = Field(
         default=None,
-        description="Smallest size of the effect that the plan can detect, in `unit`; of `why` size it is larger than the "
-        "effect can be.",
+        description="Smallest size of the effect that the plan can detect, in `unit`; where `why` is size, it is "
+        "larger than the effect can be.",
     )
     unit: str = Field(default="", description="Unit of `smallest_size`; empty: none.")
     why: Literal["channel", "schedule", "size"] | None = Field(
         default=None,
-        description="What hides the effect: a channel that is not logged; the schedule; or that the schedule would show "
-        "it only from a size on that it cannot have; null: it is visible.",
+        description="What hides the effect: a channel that is not logged; the schedule; or its size, where the "
+        "schedule shows it only from a size on that it cannot have; null: it is visible.",
     )
     needs: list[str] = Field(default_factory=list, description="Channels that would have to be logged; empty: none.")
     experiment: str = Field(

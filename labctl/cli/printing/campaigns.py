@@ -63,7 +63,7 @@ def print_plan(answer: PlanResponse) -> None:
 
 
 def _hidden_by(line: Visibility) -> str:
-    """Return why a plan cannot detect an effect: what would have to be logged, or how large the effect would have to be."""
+    """Return why a plan cannot detect an effect: the channel, the schedule, or how large it would have to be."""
     if line.why == "channel":
         return f"no channel {', '.join(line.needs)}"
     if line.why == "size":

@@ -61,7 +61,7 @@ def largest_plausible(effect_id: str, technology: str) -> float | None:
 def largest_physical(effect_id: str, unit_symbol: str, technology: str) -> float:
     """Return the largest first coefficient that an effect can have at all, in its unit; infinity where none is known.
 
-    Of a part of a whole (`labctl.shown_unit.PARTS`) it is the whole, 1; of others what the criticism takes for physical.
+    Of a part of a whole (`labctl.shown_unit.PARTS`) it is the whole, 1; of others what a criticism takes for physical.
     """
     if unit_symbol == "1" and shown_unit(unit_symbol, effect_id).unit == "%":
         return 1.0

@@ -55,7 +55,7 @@ class EffectVisibility:
     effect: str
     visible: bool
     share: float  #: of the effect, that the model beside it does not absorb, 0 to 1
-    smallest_size: float | None = None  #: just detectable, in `unit`; of `why` "size" more than the effect can have
+    smallest_size: float | None = None  #: just detectable, in `unit`; where `why` is "size": more than it can be
     unit: str = ""
     why: Literal["channel", "schedule", "size"] | None = None  #: what hides it
     needs: tuple[str, ...] = ()  #: channels that are not logged
@@ -119,7 +119,8 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
         return EffectVisibility(effect_id, False, share, why="schedule", experiment=CATALOGUE[effect_id].experiment)
     unit_symbol = next(iter(sizes), "")  # of the lowest order that is visible
     smallest = sizes.get(unit_symbol)
-    if smallest is not None and smallest > largest_physical(effect_id, unit_symbol, schedule.data.info.technology or ""):
+    technology = schedule.data.info.technology or ""
+    if smallest is not None and smallest > largest_physical(effect_id, unit_symbol, technology):
         experiment = CATALOGUE[effect_id].experiment
         return EffectVisibility(effect_id, False, share, smallest, unit_symbol, "size", experiment=experiment)
     return EffectVisibility(effect_id, True, share, smallest, unit_symbol)

@@ -166,8 +166,11 @@ def test_the_air_may_be_anywhere_while_nothing_is_measured(guards: Guards) -> No
 
 def test_at_rest_any_motion_is_a_wrong_rate(guards: Guards) -> None:
     assert [trip.kind for trip in guards.check(replace(WELL, asked_dps=0.0, rate_dps=0.01))] == ["rate"]
-    titles = {kind: each.title for now in (WELL, replace(WELL, asked_dps=0.0, rate_dps=0.0))
-              for (kind, _), each in guards.watched(now).items()}
+    titles = {
+        kind: each.title
+        for now in (WELL, replace(WELL, asked_dps=0.0, rate_dps=0.0))
+        for (kind, _), each in guards.watched(now).items()
+    }
     assert titles["rate"] == "motion while at rest"
 
 

@@ -22,7 +22,7 @@ const smallestSize = ({ effect, smallest_size, unit }) => sizeText(smallest_size
  */
 const unseenText = (row) =>
   row.why === "size"
-    ? `not detectable by this plan: the effect would have to be ${smallestSize(row)}, which is more than it can be`
+    ? `not detectable by this plan: the effect would have to be ${smallestSize(row)}, which is more than this type of gyro can have`
     : "this schedule does not distinguish the effect from other effects";
 
 /** @param {readonly Visibility[]} rows */
