@@ -59,7 +59,7 @@ function themedLayout(layout) {
     hovermode: "closest",
     dragmode: "zoom",
     modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("border-strong"), activecolor: colour("accent") },
-    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, traceorder: "normal" }, // a band would turn it round
     hoverlabel: { bgcolor: colour("surface"), bordercolor: colour("border-strong"), font: { color: colour("text") } },
     xaxis: axis,
     yaxis: axis,

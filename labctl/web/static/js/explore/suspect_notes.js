@@ -17,15 +17,6 @@ const EXPERIMENTS_SHOWN = 3;
 const MIN_WRONG = 0.005;
 
 /**
- * The ids of all effects that a criticism speaks of.
- * @param {Pick<Criticism, "named" | "not_testable" | "suspects">} criticism
- */
-export const effectsOf = ({ named, not_testable: untestable, suspects }) => [
-  ...named,
-  ...[...suspects, ...untestable].map(({ effect }) => effect),
-];
-
-/**
  * Why an adequate model has suspects and names none of them.
  * @param {Pick<Criticism, "why_not_named" | "suspects">} criticism
  */
@@ -106,10 +97,12 @@ export function lawList({ criticism, axis, motion }, onlaw) {
   );
 }
 
-/** @param {Criticism} criticism */
-export function experimentList(criticism) {
+/**
+ * @param {Criticism} criticism
+ * @param {readonly string[]} ids of the effects of the catalogue
+ */
+export function experimentList(criticism, ids) {
   if (!criticism.experiments.length) return null;
-  const ids = effectsOf(criticism);
   const experiments = criticism.experiments.slice(0, EXPERIMENTS_SHOWN);
   const { common, own } = sharedReasons(experiments.map(({ why }) => inWords(why, ids)));
   return h(

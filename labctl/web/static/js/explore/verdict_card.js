@@ -7,15 +7,7 @@ import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { heldOutName } from "./first_models.js";
-import {
-  aliasNotice,
-  effectsOf,
-  experimentList,
-  lawList,
-  unbroken,
-  untestableEffects,
-  whyNoneIsNamed,
-} from "./suspect_notes.js";
+import { aliasNotice, experimentList, lawList, unbroken, untestableEffects, whyNoneIsNamed } from "./suspect_notes.js";
 
 /** @import { Criticism, Effect, Suspect } from "../../../types/api.js" */
 /** @import { Child } from "../../../types/pages.js" */
@@ -55,13 +47,16 @@ const TWO_NOISES =
 const DRAW =
   "“Draw” shows the part of the residual that an effect would explain. “Add” previews a model with the effect; nothing is stored before you make a version.";
 
-/** @param {ExploreState} state */
-export function verdictCard(state) {
+/**
+ * @param {ExploreState} state
+ * @param {readonly Effect[]} effects of the catalogue
+ */
+export function verdictCard(state, effects) {
   const { criticism } = state;
   const [title, kind] = criticism.further.length ? NONE_NAMED : VERDICTS[criticism.verdict];
   const of = new Set(criticism.joint?.text); // stands in the card of the recordings together
   of.add(criticism.why_not_named); // stands beside the suspects
-  const ids = effectsOf(criticism);
+  const ids = effects.map(({ id }) => id);
   const [first, ...others] = criticism.text.filter((line) => !of.has(line)).map((line) => inWords(line, ids));
   const { error, noise } = criticism;
   const ratio = (error.rms_dps ?? NaN) / (error.noise_floor_dps ?? NaN);
@@ -126,6 +121,7 @@ const chanceText = (p) =>
  */
 export function suspectList(state, effects, { onadd, onlaw, explain }) {
   const { criticism } = state;
+  const ids = effects.map(({ id }) => id);
   const named = new Set(criticism.named);
   const drawnNow = h("p", { class: "muted small", "aria-live": "polite" }, DRAW);
   /** @param {Suspect} suspect */
@@ -226,9 +222,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
         : "Suspected effects"
       : "Which effects are missing",
     null,
-    isAdequate && speaking.length
-      ? h("p", { class: "muted" }, inWords(whyNoneIsNamed(criticism), effectsOf(criticism)))
-      : null,
+    isAdequate && speaking.length ? h("p", { class: "muted" }, inWords(whyNoneIsNamed(criticism), ids)) : null,
     speaking.length
       ? [drawnNow, list, open]
       : h(
@@ -238,7 +232,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
         ),
     aliasNotice(criticism),
     lawList(state, onlaw),
-    experimentList(criticism),
+    experimentList(criticism, ids),
     untestableEffects(criticism),
   );
 }

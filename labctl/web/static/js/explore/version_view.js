@@ -139,7 +139,13 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   const joint = criticism.joint ? jointCard(criticism.joint) : null;
   if (!axes.length) {
     const alone = chosen.recordings.length < 2 && motion !== "rates";
-    return [verdictCard(state), end, joint, alone ? errorComparison(state, signal) : null, errorLadder(state, signal)];
+    return [
+      verdictCard(state, effects),
+      end,
+      joint,
+      alone ? errorComparison(state, signal) : null,
+      errorLadder(state, signal),
+    ];
   }
   const adding = extendModel(state, effects);
   const parts = [
@@ -156,7 +162,7 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   parts.forEach((part, k) => {
     part.id = SECTIONS[k][0];
   });
-  return [verdictCard(state), end, joint, pageNavigation(state, axes), ...parts];
+  return [verdictCard(state, effects), end, joint, pageNavigation(state, axes), ...parts];
 }
 
 /**

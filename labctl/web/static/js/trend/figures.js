@@ -61,7 +61,6 @@ export function driftFigure(serial, trend, what, place) {
       xaxis: { type: "date" },
       yaxis: { title: { text: `${share ? "scale factor" : "bias"} left, ${unit}` } },
       showlegend: true,
-      legend: { traceorder: "normal" }, // bands would turn it round
     },
   });
   const drawn = figure(
