@@ -64,7 +64,7 @@ async function typePage(figures, signal) {
   loadReport(figures.type, report, signal);
   return h(
     "div",
-    { class: "page" },
+    { class: "page", "data-source": `units of type ${figures.type}` },
     pageHeader(
       "Fleet",
       "What the units of a type have in common, and which differ.",

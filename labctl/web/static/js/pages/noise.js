@@ -46,6 +46,7 @@ export async function page({ query, signal }) {
   const show = () =>
     loadInto(place, "Working out the Allan deviations", async () => {
       const rows = [...chosen].sort((a, b) => b - a).flatMap((id) => known.get(id) ?? []);
+      place.setAttribute("data-source", rows.map((row) => `unit ${row.serial}, recording ${row.id}`).join("; "));
       const records = await Promise.all(rows.map((row) => recordOf(row, signal)));
       if (!records.length && !leftOut.length) return emptyState("Choose one recording or more.");
       return [leftOutNotice(records, leftOut), overlay(records)];
