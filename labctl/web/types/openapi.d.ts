@@ -16889,7 +16889,7 @@ export interface components {
             share: number;
             /**
              * Smallest Size
-             * @description Smallest size of the effect that the plan can detect, in `unit`; of `why` size it is larger than the effect can be.
+             * @description Smallest size of the effect that the plan can detect, in `unit`; where `why` is size, it is larger than the effect can be.
              */
             smallest_size: number | null;
             /**
@@ -16900,7 +16900,7 @@ export interface components {
             unit: string;
             /**
              * Why
-             * @description What hides the effect: a channel that is not logged; the schedule; or that the schedule would show it only from a size on that it cannot have; null: it is visible.
+             * @description What hides the effect: a channel that is not logged; the schedule; or its size, where the schedule shows it only from a size on that it cannot have; null: it is visible.
              */
             why: ("channel" | "schedule" | "size") | null;
             /**
