@@ -8,6 +8,8 @@ import math
 MIN_STATED, MAX_STATED = 0.005, 0.995
 #: Odds from so many decades on are written as a power of ten.
 MAX_DECADES = 6.0
+#: Odds of more decades are written as a bound: a larger number would say how far the noise is believed to be Gaussian.
+MAX_STATED_DECADES = 100.0
 #: A risk of a wrong decision beyond these is written as a bound.
 MIN_RISK, MAX_RISK = 1e-4, 0.99
 
@@ -25,10 +27,16 @@ def probability_text(probability: float) -> str:
 def odds_text(nats: float) -> str:
     """Write the odds for an effect as people say them: 1300 to 1; `nats` is the natural logarithm of the Bayes factor.
 
+    Beyond 10^100 only the bound is stated: more than 10^100 to 1, or 1 to more than 10^100.
     `oddsText` in `core/format.js` of the pages does the same, with raised digits; `tests/pages/odds.json` holds both.
     """
     decades = abs(nats) / math.log(10.0)
-    odds = f"{float(f'{10.0**decades:.2g}'):.7g}" if decades < MAX_DECADES else f"10^{math.floor(decades + 0.5)}"
+    if decades > MAX_STATED_DECADES:
+        odds = f"more than 10^{MAX_STATED_DECADES:.0f}"
+    elif decades >= MAX_DECADES:
+        odds = f"10^{math.floor(decades + 0.5)}"
+    else:
+        odds = f"{float(f'{10.0**decades:.2g}'):.7g}"
     return f"{odds} to 1" if nats >= 0.0 else f"1 to {odds}"
 
 

@@ -125,6 +125,7 @@ from labctl.answers.certificates import (
     OrderedMagnetometer as OrderedMagnetometer,
     OrderedMethod as OrderedMethod,
     OrderedSensor as OrderedSensor,
+    MissingFactResponse as MissingFactResponse,
     PublicCertificate as PublicCertificate,
     RoomConditions as RoomConditions,
     SignatoryResponse as SignatoryResponse,

@@ -18,6 +18,8 @@ DecisionRule = Literal["simple", "guard-band"]
 Use = Literal["any axis", "own axis"]
 #: Most characters of a text, and of one that is one line of a certificate.
 TEXT, LINE = 2000, 300
+#: Tables of an order in which a mandatory fact can be stated.
+OrderTable = Literal["laboratory", "customer", "item", "method", "accelerometer", "magnetometer"]
 CertificateState = Literal["valid", "amended", "superseded", "withdrawn"]
 
 # descriptions of the state of a certificate, for those who keep it and for the public
@@ -192,6 +194,16 @@ class CertificateRequest(Request):
         min_length=1,
         max_length=TEXT,
         description="Reason for replacing the version's present certificate by this one; null: do not replace it.",
+    )
+
+
+class MissingFactResponse(ResponseModel):
+    """A mandatory fact of a certificate that is not stated."""
+
+    fact: str = Field(description="The fact, in words.")
+    where: str = Field(description="Where to state it, in words.")
+    table: OrderTable | None = Field(
+        description="Table of the order that can state it (`order.laboratory`, ...); null: the order cannot."
     )
 
 

@@ -84,12 +84,15 @@ class Visibility(ResponseModel):
     visible: bool = Field(description="Whether the plan could show the effect.")
     share: float = Field(description="Share of the effect that the rest of the model does not absorb, 0 to 1.")
     smallest_size: float | None = Field(
-        default=None, description="Smallest size of the effect that the plan can detect, in `unit`."
+        default=None,
+        description="Smallest size of the effect that the plan can detect, in `unit`; where `why` is size, it is "
+        "larger than the effect can be.",
     )
     unit: str = Field(default="", description="Unit of `smallest_size`; empty: none.")
-    why: Literal["channel", "schedule"] | None = Field(
+    why: Literal["channel", "schedule", "size"] | None = Field(
         default=None,
-        description="What hides the effect: a channel that is not logged, or the schedule; null: it is visible.",
+        description="What hides the effect: a channel that is not logged; the schedule; or its size, where the "
+        "schedule shows it only from a size on that it cannot have; null: it is visible.",
     )
     needs: list[str] = Field(default_factory=list, description="Channels that would have to be logged; empty: none.")
     experiment: str = Field(

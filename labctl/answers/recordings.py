@@ -121,6 +121,11 @@ class RecordingResponse(ResponseModel):
     unfinished: bool = Field(
         default=False, description="Whether its campaign has not ended, so that more data sets may be measured."
     )
+    experiment: bool = Field(
+        default=False,
+        description="Whether its campaign was an experiment of a diagnosis: a few points, which rarely determine a "
+        "model alone.",
+    )
 
 
 class RecordingFacts(ResponseModel):

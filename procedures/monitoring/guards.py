@@ -208,7 +208,8 @@ def _rate(guards: Guards, now: BenchSnapshot) -> Iterator[WatchedValue]:
     if now.taking_readings or now.rate_dps != now.asked_dps:
         text = f"runs {now.rate_dps:g} deg/s instead of {now.asked_dps:g} deg/s, off by"
         limit_dps = guards.rules.max_rate_error_fraction * abs(now.asked_dps)
-        yield _at_most(guards.table, abs(now.rate_dps - now.asked_dps), limit_dps, "deg/s", "rate error", text)
+        title = "rate error" if now.asked_dps else "motion while at rest"
+        yield _at_most(guards.table, abs(now.rate_dps - now.asked_dps), limit_dps, "deg/s", title, text)
 
 
 CHECKS: Mapping[GuardKind, Check] = {

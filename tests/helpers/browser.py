@@ -225,7 +225,7 @@ def on_page(text: str) -> str:
 
     text = re.sub(r"(?<![\w.-])(-?\d+(?:\.\d+)?)e([+-]?\d+)(?![\w.]*\w)", power, text)
     text = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(SUPERSCRIPTS), text)
-    return re.sub(r"(?<![\w-])-(?=\d)", MINUS, text)
+    return re.sub(r"(?<![\w-])-(?=\d|[xyz]\b)", MINUS, text)
 
 
 def number_of(text: str) -> float:

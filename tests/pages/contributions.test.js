@@ -30,6 +30,19 @@ test("a single place is a marker", () => {
   );
 });
 
+test("where U is not known, the sources that are known have lines of their own, however small their numbers", () => {
+  const unknown = {
+    at: [0, 100],
+    contributions: { coefficients: [0.00017, 0.0002], model: [0.0003, 0.0004], repeatability: [null, null] },
+    combined: [null, null],
+    expanded: [null, null],
+  };
+  assert.deepEqual(
+    contributionTraces(unknown, "#000").map(({ name }) => name),
+    ["model", "coefficients"],
+  );
+});
+
 const many = {
   at: [0, 100],
   contributions: {

@@ -34,6 +34,14 @@ test("a choice and its result are two sentences, each with one full stop", () =>
   assert.deepEqual([line.experiment, line.result], ["The probability is > 99 %.", "Expected: one cause."]);
 });
 
+test("effects in a sentence are named as its columns name them; a command keeps their ids", () => {
+  const line = lineOfRound(
+    { ...ROUND, why: "if it is warm_up, add it by `labctl improve --add warm_up`", came_text: "" },
+    [],
+  );
+  assert.equal(line.experiment, "If it is warm up, add it by `labctl improve --add warm_up`.");
+});
+
 test("what waits for a person is marked, and so is an end without a cause", () => {
   assert.equal(diagnosisState({ state: "awaiting_confirmation", outcome: null, begins_at: null }).kind, "warn");
   assert.equal(diagnosisState({ state: "measuring", outcome: null, begins_at: null }).kind, "");

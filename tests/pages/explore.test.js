@@ -18,7 +18,8 @@ import {
   scaled,
   toRanges,
 } from "../../labctl/web/static/js/explore/dataset_rows.js";
-import { usualRecording } from "../../labctl/web/static/js/explore/chosen_recordings.js";
+import { usualRecording, usualVersion } from "../../labctl/web/static/js/explore/chosen_recordings.js";
+import { sharedReasons } from "../../labctl/web/static/js/explore/experiment_reasons.js";
 import { cellsText, colourLimit, mapCells } from "../../labctl/web/static/js/explore/residual_cells.js";
 
 test("a selection is written as ranges and read again", () => {
@@ -32,6 +33,8 @@ test("a selection is written as ranges and read again", () => {
 test("labels have as many digits as tell them apart", () => {
   assert.deepEqual(distinctLabels([1, 2.5]), ["1", "2.5"]);
   assert.deepEqual(distinctLabels([100.01, 100.02]), ["100.01", "100.02"]);
+  assert.deepEqual(distinctLabels([-20, 0.00964, 25]), ["−20", "0", "25"]);
+  assert.deepEqual(distinctLabels([-0.001, 0.001, 25]), ["−0.001", "0.001", "25"]); // two near 0 stay apart
 });
 
 test("times are in hours", () => {
@@ -115,9 +118,36 @@ test("the recording of a campaign that has not ended is not compared while there
     id,
     datasets,
     unfinished,
+    experiment: false,
   });
   assert.equal(usualRecording([row(7, 84), row(45, 42, true)]), 7);
   assert.equal(usualRecording([row(7, 84), row(45, 42)]), 45);
   assert.equal(usualRecording([row(4, 121), row(5, 23)]), 4);
   assert.equal(usualRecording([row(45, 3, true)]), 45);
+});
+
+test("an experiment of a diagnosis is no recording to begin with, while there is another", () => {
+  const rows = [
+    { id: 22, datasets: 84, unfinished: false, experiment: false },
+    { id: 26, datasets: 69, unfinished: false, experiment: true },
+  ];
+  assert.equal(usualRecording(rows), 22);
+  assert.equal(usualRecording(rows.slice(1)), 26);
+});
+
+test("what the reasons of experiments have in common is said once", () => {
+  const { common, own } = sharedReasons([
+    "1.2 h are expected to give 0.04 bit; 35 experiments are ordered by hour; a verdict requires evidence.",
+    "1.7 h are expected to give 0.05 bit; 35 experiments are ordered by hour; a verdict requires evidence.",
+  ]);
+  assert.equal(common, "35 experiments are ordered by hour; a verdict requires evidence.");
+  assert.deepEqual(own, ["1.2 h are expected to give 0.04 bit.", "1.7 h are expected to give 0.05 bit."]);
+  assert.deepEqual(sharedReasons(["one; two."]), { common: "", own: ["one; two."] });
+  assert.deepEqual(sharedReasons(["a; b", "c; d"]), { common: "", own: ["a; b.", "c; d."] });
+});
+
+test("without a version in the address, the one in force is shown; else the newest", () => {
+  assert.equal(usualVersion({ calibrations: [1, 2, 3], certified_version: 2 }), 2);
+  assert.equal(usualVersion({ calibrations: [3, 1, 2], certified_version: null }), 3);
+  assert.equal(usualVersion({ calibrations: [], certified_version: null }), undefined);
 });

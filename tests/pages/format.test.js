@@ -164,8 +164,27 @@ test("evidence is said as odds", () => {
     [[Math.log(20)], "20 to 1"],
     [[-Math.log(20)], "1 to 20"],
     [[7.16], "1300 to 1"],
-    [[22600], "10⁹⁸¹⁵ to 1"],
+    [[200], "10⁸⁷ to 1"],
+    [[22600], "more than 10¹⁰⁰ to 1"],
   ]);
+});
+
+test("effects in a sentence of the service are written as their links are", () => {
+  const ids = ["scale_factor_odd", "scale_factor", "bias"];
+  assert.equal(
+    format.inWords("adding scale_factor_odd, not bias_temperature: `labctl improve A --add scale_factor_odd`", ids),
+    "adding scale factor odd, not bias_temperature: `labctl improve A --add scale_factor_odd`",
+  );
+  assert.equal(format.inWords("scale_factor.", ids), "scale factor.");
+  assert.equal(format.inWords("nothing", []), "nothing");
+});
+
+test("an instant of another year has its year", () => {
+  const now = new Date();
+  assert.doesNotMatch(format.instant(now.toISOString()), new RegExp(String(now.getFullYear())));
+  assert.match(format.instant("2019-06-05T08:00:00Z"), /5 Jun 2019/);
+  assert.match(format.dated(now.toISOString()), new RegExp(`${now.getFullYear()}, \\d\\d:\\d\\d$`));
+  assert.equal(format.dated(null), "–");
 });
 
 test("a mean that is rounded to zero has no sign", () => {

@@ -50,10 +50,30 @@ test("a number of things has no distance; a single reading beyond a share is no 
   const alarms = { ...AIR, title: "alarms", value: 0, low: null, high: 0, unit: "" };
   assert.equal(usedShare(alarms), 0);
   assert.equal(distanceText(alarms), "none");
+  assert.equal(limitText(alarms), "none allowed");
   assert.equal(distanceText({ ...alarms, value: 1, is_beyond: true }), "beyond its limit");
   const share = { ...AIR, value: 10, low: null, high: 2, unit: "%" };
   assert.equal(levelOf(share), "warn");
   assert.equal(distanceText(share), "a single reading");
+});
+
+test("of a table that is to stand no motion is allowed", () => {
+  const still = {
+    ...AIR,
+    kind: "rate",
+    device: "table",
+    title: "motion while at rest",
+    low: null,
+    high: 0,
+    unit: "deg/s",
+  };
+  assert.equal(limitText({ ...still, value: 0 }), "none allowed");
+  assert.equal(distanceText({ ...still, value: 0 }), "none");
+  assert.equal(levelOf({ ...still, value: 0 }), "good");
+  const moves = { ...still, value: 0.01, is_beyond: true };
+  assert.equal(valueText(moves), "0.01 deg/s");
+  assert.equal(distanceText(moves), "0.01 deg/s beyond");
+  assert.equal(levelOf(moves), "bad");
 });
 
 test("the tab and the sound say what needs a person", () => {

@@ -19,8 +19,10 @@ test("numbers have the minus sign, plus or minus is one sign, and powers are of 
     ["k_squared -0.0003 (rad/(rad/s))^2", "k_squared −0.0003 (rad/(rad/s))²"],
     ["0.0012 (deg/s)^-1 K^-1", "0.0012 (deg/s)⁻¹ K⁻¹"],
     ["the Bayes factor is e^254", "the Bayes factor is e²⁵⁴"],
+    ["body axis -y pointing up", "body axis −y pointing up"],
+    ["body axes x and -z pointing up equally", "body axes x and −z pointing up equally"],
   ];
-  for (const [text, shown] of cases) assert.equal(typeset(text), shown);
+  for (const [text, shown] of cases) assert.equal(typeset(text).replaceAll("\u00a0", " "), shown);
 });
 
 test("names, dates, ranges, files and hashes stay as they are", () => {
@@ -30,6 +32,7 @@ test("names, dates, ranges, files and hashes stay as they are", () => {
     "2026-11-29 03:15",
     "data sets 3-12",
     "closed-loop",
+    "-zeta and x-y",
     "7c9e-4a5b-129e-4111",
     "log_1e-3.csv",
     "run-2e-05.csv",
@@ -37,6 +40,14 @@ test("names, dates, ranges, files and hashes stay as they are", () => {
     "page",
   ])
     assert.equal(typeset(text), text);
+});
+
+test("no line ends within a number with its sign, its power or its percent sign", () => {
+  assert.equal(typeset("a probability of > 99 % is stated"), "a probability of >\u00a099\u00a0% is stated");
+  assert.equal(typeset("(95 %: 1 to 2)"), "(95\u00a0%: 1 to 2)");
+  assert.equal(typeset("1.2 ± 0.3 deg/s"), "1.2\u00a0± 0.3 deg/s");
+  assert.equal(typeset("-2.96e-05 deg/s"), "−2.96\u00a0×\u00a010⁻⁵ deg/s");
+  assert.equal(typeset("10 values < limit"), "10 values < limit");
 });
 
 test("a power is raised, its plus sign left out", () => {

@@ -237,6 +237,8 @@ def test_no_value_is_broken_and_no_title_lies_over_another(
     assert upper_end <= lower_begin
     page.goto(f"{service.url}/bench?wall=1")
     expect(page.get_by_role("region", name="Limits").get_by_role("listitem").first).to_be_visible()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Bench single-axis-sim")
+    expect(page.get_by_role("heading", level=1)).to_be_in_viewport()
     lines = page.evaluate(LINES)
     assert len(lines) >= 5
     assert set(lines) == {1}
@@ -249,5 +251,6 @@ def test_a_wall_stays_one_while_no_campaign_runs(service: Service, visit: Callab
     page.get_by_role("link", name="Wall view").click()
     expect(page.get_by_role("region", name="No campaign is running")).to_be_visible()
     expect(page.get_by_role("navigation", name="Pages")).to_be_hidden()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Bench single-axis-sim")
     page.get_by_role("link", name="Leave this view").click()
     expect(page.get_by_role("navigation", name="Pages")).to_be_visible()

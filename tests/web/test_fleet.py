@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from labctl.recording import RecordingInfo
 from labctl.store.schema import tables
-from tests.helpers.browser import NARROW, Service
+from tests.helpers.browser import NARROW, Faults, Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -134,6 +134,64 @@ def test_jobs_say_how_far_they_are_and_why_units_failed_and_one_is_cancelled(
     expect(row.get_by_role("button", name="Cancel job")).to_have_count(0)
     answer = service.get("/api/fleet/jobs/3")
     assert (answer["state"], answer["why"]) == ("cancelled", "cancelled by Ann: the wrong model")
+
+
+def running_job(service: Service) -> None:
+    """Write a third job that another service carries out."""
+    store, now = service.lab_service.store, service.lab_service.clock.utc()
+    row = FIELDS | {"units": 3, "state": "running", "runner": "another", "seen_at": now}
+    with store._database.writing() as connection:
+        connection.execute(sa.insert(tables.fleet_jobs).values(**row))
+        for number in range(3):
+            fields = {"job_id": 3, "serial": f"G00{number}", "kind": "fit", "state": "waiting"}
+            connection.execute(sa.insert(tables.fleet_units).values(**fields))
+
+
+@pytest.mark.usefixtures("fleet")
+def test_jobs_that_go_on_are_read_again_until_they_have_ended(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    running_job(service)
+    page = visit("/effects")
+    page.clock.install()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url) if "/api/fleet/jobs" in request.url else None)
+    page.goto(service.url + "/fleet")
+    row = page.get_by_role("region", name="Jobs").get_by_role("row").nth(1)
+    expect(row).to_contain_text("0 of 3")
+    store = service.lab_service.store
+    with store._database.writing() as connection:
+        connection.execute(sa.update(tables.fleet_units).where(tables.fleet_units.c.job_id == 3).values(state="done"))
+        connection.execute(sa.update(tables.fleet_jobs).where(tables.fleet_jobs.c.id == 3).values(state="done"))
+    with page.expect_response("**/api/fleet/jobs?*"):
+        page.clock.run_for(2_000)
+    expect(row).to_contain_text("3 of 3")
+    expect(row).to_contain_text("done")
+    before = len(asked)
+    page.clock.run_for(10_000)
+    assert len(asked) == before  # nothing goes on any more
+
+
+@pytest.mark.usefixtures("fleet")
+def test_a_failed_request_for_jobs_is_said_in_their_card_alone(
+    service: Service, visit: Callable[..., Page], faults: Faults
+) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/effects")
+    page.clock.install()
+    problem = {"type": "about:blank", "title": "Failed", "status": 500, "detail": "the table of jobs is damaged"}
+    page.route("**/api/fleet/jobs?*", lambda route: route.fulfill(status=500, json=problem))
+    page.goto(service.url + "/fleet")
+    jobs = page.get_by_role("region", name="Jobs")
+    expect(jobs).to_contain_text("The fleet jobs could not be read")
+    expect(jobs).to_contain_text("the table of jobs is damaged")
+    expect(page.get_by_role("region", name="FOG-A").first).to_be_visible()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Fleet")
+    page.unroute("**/api/fleet/jobs?*")
+    page.clock.run_for(2_000)
+    expect(jobs.get_by_role("row")).to_have_count(3)
+    faults.clear()  # the browser complains of the answer 500
 
 
 @pytest.mark.usefixtures("fleet")

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Of A4 upright within margins of 10 mm, CSS px.
 PAPER_PX = 718
+#: Height of such a sheet, CSS px.
+SHEET_PX = 1046
 #: For each figure on paper: whether it is drawn, and how far its drawing reaches beyond the paper.
 FIGURES = """() => [...document.querySelectorAll("figure.figure")].map((each) => {
   const svg = each.querySelector(".main-svg");
@@ -94,6 +96,26 @@ def test_tables_are_printed_as_tables_and_without_their_buttons(visit: Callable[
     text = "\n".join(lines)
     for button in ("Certify: put in force", "Action", "Download JSON", "File format"):
         assert button not in text
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("fitted")
+def test_data_sets_have_their_numbers_and_no_figure_is_higher_than_a_sheet(
+    visit: Callable[..., Page], tmp_path: Path
+) -> None:
+    page = visit("/recordings/1", alone=True)
+    settled(page)
+    page.get_by_text("complete", exact=True).first.wait_for()
+    lines = [line for sheet in sheets_of(page, tmp_path) for line in sheet]
+    numbered = [line.split()[0] for line in lines if re.search(r"^\d+ +complete ", line)]
+    assert numbered == [str(number) for number in range(1, len(numbered) + 1)]
+    assert len(numbered) >= 15
+    page.evaluate("() => { window.dispatchEvent(new Event('beforeprint')); }")
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": PAPER_PX, "height": 1000})
+    heights = page.evaluate("() => [...document.querySelectorAll('.figure')].map((each) => each.offsetHeight)")
+    assert heights
+    assert max(heights) <= SHEET_PX
 
 
 PRINTED = """() => {

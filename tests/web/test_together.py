@@ -83,7 +83,7 @@ def test_the_trend_is_drawn_with_its_interval_and_the_limit(unit: Service, visit
     years = page.get_by_role("region", name="Over the years")
     said = unit.get(f"{UNIT}/trend?version=1&limit_dps=0.05")
     for line in said["text"]:
-        expect(years.get_by_text(on_page(line))).to_be_visible()
+        expect(years.get_by_text(on_page(line).replace("scale_factor", "scale factor"))).to_be_visible()
     drawn = figure(page, "Bias over the years")
     points, line = trace_of(drawn, "axis z"), trace_of(drawn, "drift z")
     assert points["y"] == pytest.approx([point["axes"]["z"]["bias_dps"] for point in said["points"]])

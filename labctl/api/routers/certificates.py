@@ -6,10 +6,17 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
 
-from labctl.answers.certificates import CertificateRequest, CertificateResponse, PublicCertificate, WithdrawRequest
+from labctl.answers.certificates import (
+    CertificateRequest,
+    CertificateResponse,
+    MissingFactResponse,
+    PublicCertificate,
+    WithdrawRequest,
+)
 from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.computation import execute
 from labctl.api.dependencies import ServiceDep, command_route
+from labctl.services.certificates.issue import missing_facts
 from labctl.services.certificates.served import certificate_file, public_certificate
 from labctl.services.certificates.states import list_certificates
 from labctl.services.commands.registry import ISSUE_CERTIFICATE, WITHDRAW_CERTIFICATE
@@ -59,11 +66,21 @@ def certificates(serial: str, service: ServiceDep) -> list[CertificateResponse]:
 async def issue(serial: str, version: int, request: CertificateRequest, service: ServiceDep) -> CertificateResponse:
     """Issue the certificate of the version from stored facts and those of the order; one that was issued is answered.
 
-    400 with `missing` where mandatory facts are missing: each one, and where to state it. 409 for a revoked version, a
+    400 with `missing` where mandatory facts are missing: each one, where to state it, and the table of the order that
+    can state it (null: none can). 409 for a revoked version, a
     reference standard past its due date, and other facts than those of the one that was issued, unless `amend` says
     why it is replaced. Needs an approver's key.
     """
     return await execute(service, ISSUE_CERTIFICATE, ToVersion(serial, version, request))
+
+
+@router.get(UNIT + "/calibrations/{version}/certificate/missing", summary="What an order has to state")
+def missing(serial: str, version: int, service: ServiceDep) -> list[MissingFactResponse]:
+    """Each mandatory fact that the version does not state; a form asks for those that a table of the order can state.
+
+    What the readings have to show is examined when the certificate is issued.
+    """
+    return missing_facts(service.store, serial, version)
 
 
 @router.get(

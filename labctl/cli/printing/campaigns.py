@@ -16,7 +16,7 @@ from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 if TYPE_CHECKING:
     from labctl.answers.campaigns import CampaignResponse
     from labctl.answers.drafts import DraftResponse
-    from labctl.answers.plans import AttendanceResponse, MisalignmentOutlook, PlanResponse
+    from labctl.answers.plans import AttendanceResponse, MisalignmentOutlook, PlanResponse, Visibility
     from labctl.answers.schedule import ScheduledResponse
 
 
@@ -58,9 +58,18 @@ def print_plan(answer: PlanResponse) -> None:
     hidden = table("\nand what not", "effect", "because of", "experiment that would detect it")
     for line in answer.visibility:
         if not line.visible:
-            reason = f"no channel {', '.join(line.needs)}" if line.why == "channel" else "the schedule"
-            hidden.add_row(line.effect, reason, line.experiment)
+            hidden.add_row(line.effect, _hidden_by(line), line.experiment)
     console.print(hidden)
+
+
+def _hidden_by(line: Visibility) -> str:
+    """Return why a plan cannot detect an effect: the channel, the schedule, or how large it would have to be."""
+    if line.why == "channel":
+        return f"no channel {', '.join(line.needs)}"
+    if line.why == "size":
+        shown = shown_unit(line.unit, line.effect)
+        return f"its size: {format_number(shown.scaled(line.smallest_size), 2)} {shown.unit} would be needed"
+    return "the schedule"
 
 
 def _print_warning(attendance: AttendanceResponse) -> None:

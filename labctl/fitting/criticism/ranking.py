@@ -14,6 +14,7 @@ from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.effects import CATALOGUE, Term
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.log_evidence import mean_evidence, on_all_axes_or_one
+from labctl.shown_unit import shown_unit
 
 #: The size of a coefficient counts as its estimate less this many standard uncertainties.
 SPARE_U = 2.0
@@ -56,6 +57,17 @@ def largest_plausible(effect_id: str, technology: str) -> float | None:
     ranges = CATALOGUE[effect_id].ranges
     spans = [ranges[technology]] if technology in ranges else [] if technology else list(ranges.values())
     return max((max(abs(low), abs(high)) for low, high in spans), default=None)
+
+
+def largest_physical(effect_id: str, unit_symbol: str, technology: str) -> float:
+    """Return the largest first coefficient that an effect can have at all, in its unit; infinity where none is known.
+
+    Of a part of a whole (`labctl.shown_unit.PARTS`) it is the whole, 1; of others what a criticism takes for physical.
+    """
+    if unit_symbol == "1" and shown_unit(unit_symbol, effect_id).unit == "%":
+        return 1.0
+    largest = largest_plausible(effect_id, technology)
+    return min(LARGEST.get(unit_symbol, np.inf), np.inf if largest is None else FARTHEST * largest)
 
 
 def _has_wrong_sign(option: CandidateShape, value: float, least: float, technology: str) -> bool:

@@ -18,6 +18,7 @@ from labctl.fitting.criticism.evidence.elimination import eliminate_base
 from labctl.fitting.criticism.evidence.gains import visible_share
 from labctl.fitting.criticism.evidence.noise_grid import Noise, expected_drift_dps
 from labctl.fitting.criticism.model_comparison import Comparison, design_of
+from labctl.fitting.criticism.ranking import largest_physical
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Effect
@@ -54,9 +55,9 @@ class EffectVisibility:
     effect: str
     visible: bool
     share: float  #: of the effect, that the model beside it does not absorb, 0 to 1
-    smallest_size: float | None = None  #: just detectable, in `unit`
+    smallest_size: float | None = None  #: just detectable, in `unit`; where `why` is "size": more than it can be
     unit: str = ""
-    why: Literal["channel", "schedule"] | None = None  #: what hides it
+    why: Literal["channel", "schedule", "size"] | None = None  #: what hides it
     needs: tuple[str, ...] = ()  #: channels that are not logged
     experiment: str = ""  #: what would show it
 
@@ -117,7 +118,12 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
     if share < MIN_VISIBLE:
         return EffectVisibility(effect_id, False, share, why="schedule", experiment=CATALOGUE[effect_id].experiment)
     unit_symbol = next(iter(sizes), "")  # of the lowest order that is visible
-    return EffectVisibility(effect_id, True, share, sizes.get(unit_symbol), unit_symbol)
+    smallest = sizes.get(unit_symbol)
+    technology = schedule.data.info.technology or ""
+    if smallest is not None and smallest > largest_physical(effect_id, unit_symbol, technology):
+        experiment = CATALOGUE[effect_id].experiment
+        return EffectVisibility(effect_id, False, share, smallest, unit_symbol, "size", experiment=experiment)
+    return EffectVisibility(effect_id, True, share, smallest, unit_symbol)
 
 
 def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> list[NotTestable]:

@@ -11,7 +11,7 @@ from instruments.laboratory import Laboratory
 from instruments.standards import SIMULATED, Standard
 from labctl.answers.certificates import CertificateOrder
 from labctl.calibration import Calibration, read_calibration
-from labctl.services.certificates.missing import of_contact
+from labctl.services.certificates.missing import MissingFact, of_contact
 from labctl.services.certificates.sensors import Sensors, missing_of
 from labctl.services.standards.usage import performed
 from labctl.store import CalibrationRecord, CampaignRow, CertificationRow, RecordingRow, Store
@@ -54,45 +54,49 @@ class Facts:
         """The manufacturer of the item, as the order states it."""
         return self.order.item.manufacturer
 
-    def missing(self) -> Iterator[tuple[str, str]]:
+    def missing(self) -> Iterator[MissingFact]:
         """Yield each mandatory fact that is not stated, and where to state it."""
         yield from of_contact(self.laboratory, "laboratory", BENCH)
         yield from of_contact(self.order.customer, "customer", "[customer] of the order")
         if not self.manufacturer:
-            yield "item's manufacturer", "[item] of the order"
+            yield MissingFact("item's manufacturer", "[item] of the order", "item")
         if not self.order.item.condition.strip():
-            yield "item's condition", "[item] of the order"
+            yield MissingFact("item's condition", "[item] of the order", "item")
         if not self.calibration.document["unit"]["model"]:
-            yield "item's model", "model of [[gyros]] of the bench file, or of recording.toml"
+            yield MissingFact("item's model", "model of [[gyros]] of the bench file, or of recording.toml")
         if not self.recordings:
-            yield "measured recording", f"`labctl fit {self.row.serial}` on one"
+            yield MissingFact("measured recording", f"`labctl fit {self.row.serial}` on one")
         if not self.method:
-            yield "name of the method", "[method] of the order"
+            yield MissingFact("name of the method", "[method] of the order", "method")
         for day, name in ((self.performed_from, "performed_from"), (self.performed_until, "performed_until")):
             if day is None:
-                yield name, "[method] of the order"
-        if self.authorised is None:
-            yield "authorisation", f"`labctl certify {self.row.serial} {self.row.version} --by NAME --reason TEXT`"
-        elif self.order.state_due and self.authorised.due_at is None:
-            yield (
-                "date of the next calibration, which state_due of the order asks for",
-                f"`labctl certify {self.row.serial} {self.row.version} --due-days DAYS ...`, or leave state_due out",
-            )
+                yield MissingFact(name, "[method] of the order", "method")
+        yield from self._authorisation()
         yield from missing_of(self.order)
         yield from self._traceability()
 
-    def _traceability(self) -> Iterator[tuple[str, str]]:
+    def _authorisation(self) -> Iterator[MissingFact]:
+        certify = f"`labctl certify {self.row.serial} {self.row.version}"
+        if self.authorised is None:
+            yield MissingFact("authorisation", f"{certify} --by NAME --reason TEXT`")
+        elif self.order.state_due and self.authorised.due_at is None:
+            yield MissingFact(
+                "date of the next calibration, which state_due of the order asks for",
+                f"{certify} --due-days DAYS ...`, or leave state_due out",
+            )
+
+    def _traceability(self) -> Iterator[MissingFact]:
         if self.standards and not {standard.quantity for standard in self.standards} & RATE:
-            yield "standard of the rate", STANDARDS
+            yield MissingFact("standard of the rate", STANDARDS)
         if not self.standards:
-            yield "reference standards", STANDARDS
+            yield MissingFact("reference standards", STANDARDS)
         measured = any(standard.quantity in RATE and standard.certificate for standard in self.standards)
         for standard in self.standards:
             if standard.quantity in RATE and measured and not standard.certificate:
                 continue  # follows from the time base that has one
             lacking = [name for name in ("certificate", "issued_by", "due") if not getattr(standard, name)]
             if lacking and not standard.traceability:
-                yield f"{', '.join(lacking)} (or traceability) of standard {standard.label}", STANDARDS
+                yield MissingFact(f"{', '.join(lacking)} (or traceability) of standard {standard.label}", STANDARDS)
 
 
 def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -> Facts:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from labctl.certificates.document import Condition
 from labctl.services.certificates import measured
 from labctl.services.certificates.facts import Facts
+from labctl.services.certificates.missing import MissingFact
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.room_environment import of_campaign
 from labctl.store import Store
@@ -33,8 +34,10 @@ class Found:
         room = measured.environment_of_room(spans, facts.order.environment)
         return Found(measurements, results, measured.environment(measurements.points), room)
 
-    def missing(self) -> Iterator[tuple[str, str]]:
+    def missing(self) -> Iterator[MissingFact]:
         """Yield what is not known of the results, and what makes it known."""
         yield from self.results.missing()
         if self.measurements is not None and not any(condition.unit == "°C" for condition in self.conditions):
-            yield "temperature of the item or of the chamber", "a recording with temperature_c or chamber_c"
+            yield MissingFact(
+                "temperature of the item or of the chamber", "a recording with temperature_c or chamber_c"
+            )

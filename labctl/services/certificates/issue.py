@@ -6,7 +6,13 @@ from datetime import date, datetime
 
 from instruments.standards import Standard
 from labctl.acting_user import acting_key
-from labctl.answers.certificates import CertificateOrder, CertificateRequest, CertificateResponse, WithdrawRequest
+from labctl.answers.certificates import (
+    CertificateOrder,
+    CertificateRequest,
+    CertificateResponse,
+    MissingFactResponse,
+    WithdrawRequest,
+)
 from labctl.certificates.document import hash_of_certificate
 from labctl.config import SIGN_KEY_VARIABLE
 from labctl.errors import Conflict
@@ -58,6 +64,15 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
         signed_by=None if certificate.signed_by is None else certificate.signed_by.model_dump(mode="json"),
     )  # fmt: skip
     return certificate_by_number(store, store.certificates.add(row, forms, last).number)
+
+
+def missing_facts(store: Store, serial: str, version: int) -> list[MissingFactResponse]:
+    """Return the mandatory facts of a certificate that a version and an empty order do not state. Raises NotFound.
+
+    What the readings have to show, such as a temperature, is examined when the certificate is issued.
+    """
+    facts = facts_of(store, serial, version, CertificateOrder())
+    return [MissingFactResponse.model_validate(each._asdict()) for each in facts.missing()]
 
 
 def withdraw(store: Store, request: WithdrawRequest, at: datetime) -> CertificateResponse:

@@ -28,6 +28,7 @@ from labctl.fitting.uncertainty.budget import Budget
 from labctl.recording import Recording
 from labctl.services.calibrations.surface import errors_on_grid
 from labctl.services.calibrations.uncertainty import coefficients_at, over_any_axis, places_of, uncertainty_of
+from labctl.services.certificates.missing import MissingFact
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_version import applied_errors, mounting_angles_of
 from labctl.store import CalibrationRecord, RoomSpan, Store
@@ -62,11 +63,11 @@ class Results:
     axes_without: frozenset[str] = frozenset()
     any_axis: tuple[AnyAxisResult, ...] = ()
 
-    def missing(self) -> Iterator[tuple[str, str]]:
+    def missing(self) -> Iterator[MissingFact]:
         """Yield the parts of U that are not known, where an axis has no result without them."""
         if self.axes_without:
             for part, why in self.unknown:
-                yield f"uncertainty of the {part}", why
+                yield MissingFact(f"uncertainty of the {part}", why)
 
     @property
     def left_out(self) -> tuple[str, ...]:

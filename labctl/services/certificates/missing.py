@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple
 
 from instruments.laboratory import Contact
+from labctl.answers.certificates import OrderTable
 from labctl.answers.json_object import JsonObject
 from labctl.errors import BadInput
 
@@ -12,35 +14,43 @@ from labctl.errors import BadInput
 ADDRESS = ("name", "street", "post_code", "city", "country")
 
 
+class MissingFact(NamedTuple):
+    """A mandatory fact that is not stated."""
+
+    fact: str
+    where: str  #: where to state it, in words
+    table: OrderTable | None = None  #: the table of the order that can state it; None: the order cannot
+
+
 class MissingFacts(BadInput):
     """Mandatory facts of a certificate are missing; nothing was written."""
 
     slug = "missing-facts"
 
-    def __init__(self, text: str, facts: Sequence[tuple[str, str]] = ()) -> None:
+    def __init__(self, text: str, facts: Sequence[MissingFact] = ()) -> None:
         super().__init__(text)
         self.facts = list(facts)
 
     @classmethod
-    def of(cls, what: str, facts: Sequence[tuple[str, str]]) -> MissingFacts:
+    def of(cls, what: str, facts: Sequence[MissingFact]) -> MissingFacts:
         """Return the error that names every fact with the place where it is stated."""
         places: dict[str, list[str]] = {}
-        for fact, place in facts:
-            places.setdefault(place, []).append(fact)
+        for each in facts:
+            places.setdefault(each.where, []).append(each.fact)
         count = "1 fact is missing" if len(facts) == 1 else f"{len(facts)} facts are missing"
         text = "; ".join(f"{', '.join(names)}: {place}" for place, names in places.items())
         return cls(f"no certificate of {what}: {count}. {text}", facts)
 
     @property
     def members(self) -> JsonObject:
-        """Each fact, and where it is stated."""
-        return {"missing": [{"fact": fact, "where": place_text} for fact, place_text in self.facts]}
+        """Each fact, where it is stated, and the table of the order that can state it."""
+        return {"missing": [each._asdict() for each in self.facts]}
 
 
-def of_contact(contact: Contact, whose: str, where: str) -> Iterator[tuple[str, str]]:
+def of_contact(contact: Contact, whose: Literal["customer", "laboratory"], where: str) -> Iterator[MissingFact]:
     """Yield what is missing of an address, and a way to reach it."""
     for name in ADDRESS:
         if not getattr(contact, name):
-            yield f"{whose}'s {name.replace('_', ' ')}", where
+            yield MissingFact(f"{whose}'s {name.replace('_', ' ')}", where, whose)
     if not (contact.email or contact.phone):
-        yield f"{whose}'s email or phone", where
+        yield MissingFact(f"{whose}'s email or phone", where, whose)

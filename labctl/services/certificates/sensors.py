@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from labctl.fitting.poses.at_rest.accelerometer import PARAMETERS as ACCELEROMET
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.triad import UPPER
 from labctl.fitting.uncertainty.budget import BudgetLine, budget_of
+from labctl.services.certificates.missing import MissingFact
 from labctl.services.sensor_versions import one_accelerometer, one_magnetometer
 from labctl.store import Store
 
@@ -74,7 +76,7 @@ class Sensors:
             yield magnetometer_result(self.magnetometer, order.magnetometer, included_by)
 
 
-def missing_of(order: CertificateOrder) -> Iterator[tuple[str, str]]:
+def missing_of(order: CertificateOrder) -> Iterator[MissingFact]:
     """Yield the mandatory facts of the named versions that the order does not state. Raises BadInput for wrong ones."""
     force, field = order.accelerometer, order.magnetometer
     if force is not None:
@@ -85,18 +87,22 @@ def missing_of(order: CertificateOrder) -> Iterator[tuple[str, str]]:
             ("traceability of the local gravity", force.traceability.strip()),
         ):
             if not value:
-                yield name, "[accelerometer] of the order"
+                yield MissingFact(name, "[accelerometer] of the order", "accelerometer")
     if field is not None:
         yield from _missing_day(field, "magnetometer")
         stated = (field.field_ut, field.field_u_ut, field.traceability.strip())
         if any(stated) and not all(stated):
-            yield "field_ut, field_u_ut and traceability together", "[magnetometer] of the order, or none of the three"
+            yield MissingFact(
+                "field_ut, field_u_ut and traceability together",
+                "[magnetometer] of the order, or none of the three",
+                "magnetometer",
+            )
 
 
-def _missing_day(sensor: OrderedSensor, name: str) -> Iterator[tuple[str, str]]:
+def _missing_day(sensor: OrderedSensor, name: Literal["accelerometer", "magnetometer"]) -> Iterator[MissingFact]:
     where = f"[{name}] of the order"
     if sensor.performed_from is None:
-        yield f"performed_from of the {name}", where
+        yield MissingFact(f"performed_from of the {name}", where, name)
     elif sensor.performed_until is not None and sensor.performed_until < sensor.performed_from:
         raise BadInput(
             f"{where}: performed_until = {sensor.performed_until} is before performed_from = {sensor.performed_from}; "

@@ -21,6 +21,7 @@ from labctl.fitting.fleet.population import population_of
 from labctl.fitting.fleet.type_evidence import TypeEffect, judged
 from labctl.fitting.fleet.type_sums import TypeSums
 from labctl.fitting.fleet.unit_coefficients import UnitCoefficients
+from labctl.probability_text import odds_text
 from labctl.services.fleet.evidence import sums_in
 from labctl.shown_unit import shown_unit, size_text
 from labctl.store import Store
@@ -166,8 +167,8 @@ def _missing(effect: TypeEffect) -> FleetMissing:
     )
     who = "The type is missing" if effect.of_bench is None else f"Bench {effect.of_bench} adds to all its units"
     text = (
-        f"{who} {' or '.join(effect.group)}: {size}; the Bayes factor of all units together is "
-        f"e^{effect.log_bayes_factor:.0f}, while single units show {effect.rms_unit_z:.1f} standard uncertainties."
+        f"{who} {' or '.join(effect.group)}: {size}; the odds for it from all units together are "
+        f"{odds_text(effect.log_bayes_factor)}, while single units show {effect.rms_unit_z:.1f} standard uncertainties."
     )
     return FleetMissing(
         effects=list(effect.group), log_bayes_factor=effect.log_bayes_factor, common=effect.is_common, sizes=sizes,

@@ -31,9 +31,16 @@ def page_of_recordings(
     page = store.recordings.page(request, serial, kind)
     simulated = _of_simulated_time(store, page.rows)
     origins = _origins(store, page.rows)
-    unfinished = store.campaigns.not_ended(_campaigns_of(page.rows))
+    campaigns = _campaigns_of(page.rows)
+    unfinished, experiments = store.campaigns.not_ended(campaigns), store.diagnoses.experiments(campaigns)
     lines = [
-        _line(row, row.campaign in simulated, origins[row.id], row.campaign in unfinished) for row in page.rows
+        RecordingResponse(
+            id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
+            readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
+            motion=row.recording_info.motion, simulated_time=row.campaign in simulated, origin=origins[row.id],
+            unfinished=row.campaign in unfinished, experiment=row.campaign in experiments,
+        )
+        for row in page.rows
     ]  # fmt: skip
     return Page(lines, page.total, page.next_after)
 
@@ -55,15 +62,6 @@ def _of_simulated_time(store: Store, rows: Sequence[RecordingRow]) -> set[int | 
 
 def _campaigns_of(rows: Sequence[RecordingRow]) -> list[int]:
     return sorted({row.campaign for row in rows if row.campaign is not None})
-
-
-def _line(row: RecordingRow, simulated_time: bool, origin: RecordingOrigin, unfinished: bool) -> RecordingResponse:
-    return RecordingResponse(
-        id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
-        readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
-        motion=row.recording_info.motion, simulated_time=simulated_time, origin=origin,
-        unfinished=unfinished,
-    )  # fmt: skip
 
 
 def data_sets(store: Store, recording: int) -> DataSetsResponse:

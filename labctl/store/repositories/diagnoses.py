@@ -149,6 +149,13 @@ class Diagnoses:
         with self._database.reading() as connection:
             return connection.scalar(sa.select(sa.func.min(c.id)).where(c.recipe_name == recipe_name))
 
+    def experiments(self, campaigns: Sequence[int]) -> set[int]:
+        """Return which of some campaigns were experiments of a diagnosis."""
+        r = tables.diagnosis_rounds.c
+        with self._database.reading() as connection:
+            rows = connection.execute(sa.select(r.campaign_id).where(r.campaign_id.in_(campaigns)))
+            return {row.campaign_id for row in rows}
+
     @transaction
     def add_round(self, diagnosis: int, new: NewRound, state: DiagnosisState, outcome: str, at: datetime) -> None:
         """Write down a criticism with its decision: the next state, and the outcome where it is the end.

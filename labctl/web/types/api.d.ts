@@ -60,6 +60,7 @@ export type Plan = Schema<"PlannedResponse">;
 export type Prompt = Schema<"PromptResponse">;
 export type Turn = Schema<"TurnResponse">;
 export type WatchedLimit = Schema<"WatchedLimitResponse">;
+export type MissingFact = Schema<"MissingFactResponse">;
 export type PublicCertificate = Schema<"PublicCertificate">;
 export type Recipe = Schema<"RecipeResponse">;
 export type RecordingRow = Schema<"RecordingResponse">;
@@ -166,7 +167,6 @@ export interface ProblemDocument {
   detail?: string;
   warnings?: Warning[];
   problems?: string[];
-  missing?: { fact: string; where: string }[];
 }
 
 /* Requests: path, parameters, body and answer of each operation */

@@ -860,11 +860,34 @@ export interface paths {
          * Issue a certificate
          * @description Issue the certificate of the version from stored facts and those of the order; one that was issued is answered.
          *
-         *     400 with `missing` where mandatory facts are missing: each one, and where to state it. 409 for a revoked version, a
+         *     400 with `missing` where mandatory facts are missing: each one, where to state it, and the table of the order that
+         *     can state it (null: none can). 409 for a revoked version, a
          *     reference standard past its due date, and other facts than those of the one that was issued, unless `amend` says
          *     why it is replaced. Needs an approver's key.
          */
         post: operations["issue_api_units__serial__calibrations__version__certificate_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/calibrations/{version}/certificate/missing": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * What an order has to state
+         * @description Each mandatory fact that the version does not state; a form asks for those that a table of the order can state.
+         *
+         *     What the readings have to show is examined when the certificate is issued.
+         */
+        get: operations["missing_api_units__serial__calibrations__version__certificate_missing_get"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -11783,6 +11806,27 @@ export interface components {
             not_stated: string[];
         };
         /**
+         * MissingFactResponse
+         * @description A mandatory fact of a certificate that is not stated.
+         */
+        MissingFactResponse: {
+            /**
+             * Fact
+             * @description The fact, in words.
+             */
+            fact: string;
+            /**
+             * Where
+             * @description Where to state it, in words.
+             */
+            where: string;
+            /**
+             * Table
+             * @description Table of the order that can state it (`order.laboratory`, ...); null: the order cannot.
+             */
+            table: ("laboratory" | "customer" | "item" | "method" | "accelerometer" | "magnetometer") | null;
+        };
+        /**
          * ModelLines
          * @description The model's error (output minus true rate) of one output axis in one position.
          *
@@ -13419,6 +13463,12 @@ export interface components {
              * @default false
              */
             unfinished: boolean;
+            /**
+             * Experiment
+             * @description Whether its campaign was an experiment of a diagnosis: a few points, which rarely determine a model alone.
+             * @default false
+             */
+            experiment: boolean;
         };
         /**
          * RecordingWithPoints
@@ -16839,7 +16889,7 @@ export interface components {
             share: number;
             /**
              * Smallest Size
-             * @description Smallest size of the effect that the plan can detect, in `unit`.
+             * @description Smallest size of the effect that the plan can detect, in `unit`; where `why` is size, it is larger than the effect can be.
              */
             smallest_size: number | null;
             /**
@@ -16850,9 +16900,9 @@ export interface components {
             unit: string;
             /**
              * Why
-             * @description What hides the effect: a channel that is not logged, or the schedule; null: it is visible.
+             * @description What hides the effect: a channel that is not logged; the schedule; or its size, where the schedule shows it only from a size on that it cannot have; null: it is visible.
              */
-            why: ("channel" | "schedule") | null;
+            why: ("channel" | "schedule" | "size") | null;
             /**
              * Needs
              * @description Channels that would have to be logged; empty: none.
@@ -18430,6 +18480,38 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CertificateResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    missing_api_units__serial__calibrations__version__certificate_missing_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MissingFactResponse"][];
                 };
             };
             /** @description Validation Error */

@@ -166,6 +166,11 @@ def test_the_air_may_be_anywhere_while_nothing_is_measured(guards: Guards) -> No
 
 def test_at_rest_any_motion_is_a_wrong_rate(guards: Guards) -> None:
     assert [trip.kind for trip in guards.check(replace(WELL, asked_dps=0.0, rate_dps=0.01))] == ["rate"]
+    turning, still = (
+        {kind: each.title for kind, each in guards.watched(now)}
+        for now in (WELL, replace(WELL, asked_dps=0.0, rate_dps=0.0))
+    )
+    assert (turning["rate"], still["rate"]) == ("rate error", "motion while at rest")
 
 
 def test_a_guard_that_is_already_beyond_its_limit_trips_when_armed(rig: Any) -> None:

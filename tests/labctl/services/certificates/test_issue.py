@@ -16,7 +16,7 @@ from instruments.standards import Standard
 from labctl.answers.certificates import CertificateRequest
 from labctl.errors import BadInput, NotFound
 from labctl.recording import Recording
-from labctl.services.certificates.issue import CertificateRefused, issue
+from labctl.services.certificates.issue import CertificateRefused, issue, missing_facts
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.served import certificate_file, list_certificates
 from labctl.store import Store, copy_database, open_store
@@ -61,7 +61,7 @@ def test_every_missing_fact_is_named_at_once_and_nothing_is_written(empty: Store
     before = empty.audit.rows()
     with pytest.raises(MissingFacts) as refused:
         issue(empty, SERIAL, 1, CertificateRequest(by="I. Issuer"), AT)
-    facts = dict(refused.value.facts)
+    facts = {each.fact: each.where for each in refused.value.facts}
     for fact in (
         "laboratory's name", "laboratory's street", "laboratory's country", "laboratory's email or phone",
         "customer's name", "customer's city", "item's manufacturer", "item's condition", "name of the method",
@@ -74,7 +74,14 @@ def test_every_missing_fact_is_named_at_once_and_nothing_is_written(empty: Store
     text = str(refused.value)
     assert f"{len(refused.value.facts)} facts are missing" in text
     assert all(fact in text for fact in facts)
-    assert refused.value.members["missing"]
+    assert {"fact": "customer's city", "where": "[customer] of the order", "table": "customer"} in (
+        refused.value.members["missing"]
+    )
+    tables = {each.fact: each.table for each in refused.value.facts}
+    assert tables["laboratory's name"] == "laboratory"
+    assert tables["name of the method"] == "method"
+    assert tables["authorisation"] is None
+    assert [each.fact for each in missing_facts(empty, SERIAL, 1)] == list(facts)
     assert rows_of(empty) == 0
     assert empty.audit.rows() == before
 

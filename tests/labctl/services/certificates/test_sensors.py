@@ -161,7 +161,7 @@ def test_what_the_order_has_to_state_is_named(store: Store) -> None:
     with pytest.raises(MissingFacts) as refused:
         issue(store, SERIAL, version, request(accelerometer={"version": 1}, magnetometer={
             "version": 1, "performed_from": "2026-01-05", "field_ut": 48.0}), AT)  # fmt: skip
-    assert set(dict(refused.value.facts)) == {
+    assert {each.fact for each in refused.value.facts} == {
         "performed_from of the accelerometer", "local gravity (gravity_m_s2)",
         "standard uncertainty of the local gravity (gravity_u_m_s2)", "traceability of the local gravity",
         "field_ut, field_u_ut and traceability together",

@@ -40,15 +40,22 @@ const digits = (value) => (Math.abs(value) >= 100 ? 0 : Math.abs(value) >= 10 ? 
 export const valueText = ({ value, unit }) =>
   `${unit ? fixed(value, digits(value)) : plainNumber(value)} ${unit}`.trim();
 
+/**
+ * Whether nothing at all is allowed: an alarm, or a motion while the table is to stand.
+ * @param {WatchedLimit} limit
+ */
+const allowsNone = ({ low, high }) => low === null && high === 0;
+
 /** @param {WatchedLimit} limit */
 export function limitText(limit) {
+  if (allowsNone(limit)) return "none allowed";
   const { low, high, unit } = limit;
   return `${low === null ? "at most" : `${plainNumber(low, 4)} to`} ${plainNumber(high, 4)} ${unit}`.trim();
 }
 
 /** @param {WatchedLimit} limit */
 export function distanceText(limit) {
-  if (!limit.unit) return limit.is_beyond ? "beyond its limit" : "none";
+  if (!limit.unit || (allowsNone(limit) && !limit.is_beyond)) return limit.is_beyond ? "beyond its limit" : "none";
   const { distance } = nearest(limit);
   const size = `${fixed(Math.abs(distance), digits(distance))} ${limit.unit === "deg C" ? "K" : limit.unit}`;
   if (limit.is_beyond) return `${size} beyond`;

@@ -218,7 +218,7 @@ function statusBar(status, plan) {
   /** @param {Campaign} now */
   const show = (now) => {
     setChildren(state, stateChip(now));
-    text.textContent = now.step_text || "About to begin";
+    setChildren(text, now.step_text || "About to begin");
     bar.style.width = `${(100 * now.progress).toFixed(2)}%`;
     meter.setAttribute("aria-valuenow", String(Math.round(100 * now.progress)));
     setChildren(

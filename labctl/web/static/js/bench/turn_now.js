@@ -19,7 +19,7 @@ export function turnNow() {
     element.hidden = !turn;
     if (!turn) return;
     const now = turnText(turn);
-    text.textContent = now.text;
+    setChildren(text, now.text);
     bar.style.width = `${(100 * now.share).toFixed(1)}%`;
     if (turn.refused === shown) return;
     shown = turn.refused;

@@ -24,10 +24,14 @@ export function mountingWorth(outlook) {
       ? table(
           [
             { title: "With", cell: (each) => each.turned },
-            { title: "U, mrad", cell: (each) => number(MRAD * each.expanded, 2) },
-            { title: "More mountings", cell: (each) => String(each.mountings) },
-            { title: "More time", cell: (each) => duration(each.more_s) },
-            { title: "Table of the recipe then", cell: (each) => h("pre", { class: "small" }, each.recipe_toml) },
+            { title: "U, mrad", number: true, cell: (each) => number(MRAD * each.expanded, 2) },
+            { title: "More mountings", number: true, cell: (each) => String(each.mountings) },
+            { title: "More time", cell: (each) => h("span", { class: "nowrap" }, duration(each.more_s)) },
+            {
+              title: "Table of the recipe then",
+              prose: true,
+              cell: (each) => h("pre", { class: "small" }, each.recipe_toml),
+            },
           ],
           further,
           { label: "What further mountings of each position are worth" },

@@ -3,6 +3,7 @@
 import { h } from "../core/elements.js";
 import { percent, sizeText, idText } from "../core/format.js";
 import { notice, table } from "../core/components.js";
+import { channelName } from "../recordings/channels.js";
 
 /** @import { Visibility } from "../../../types/api.js" */
 
@@ -14,6 +15,15 @@ const effectLink = (row) => h("a", { href: `/effects/${row.effect}` }, idText(ro
 
 /** @param {Visibility} row */
 const smallestSize = ({ effect, smallest_size, unit }) => sizeText(smallest_size, unit, effect);
+
+/**
+ * Why the schedule cannot show an effect.
+ * @param {Visibility} row
+ */
+const unseenText = (row) =>
+  row.why === "size"
+    ? `not detectable by this plan: the effect would have to be ${smallestSize(row)}, which is more than this type of gyro can have`
+    : "this schedule does not distinguish the effect from other effects";
 
 /** @param {readonly Visibility[]} rows */
 export function visibilityReport(rows) {
@@ -54,9 +64,9 @@ export function visibilityReport(rows) {
               prose: true,
               cell: (row) =>
                 row.why === "channel"
-                  ? `needs ${row.needs.map(idText).join(", ")}, which is not logged`
+                  ? `needs ${row.needs.map(channelName).join(", ")}, which is not logged`
                   : [
-                      h("span", {}, "this schedule does not distinguish the effect from other effects"),
+                      h("span", {}, unseenText(row)),
                       row.experiment ? h("span", { class: "muted small secondary" }, `Try: ${row.experiment}`) : null,
                     ],
             },

@@ -229,7 +229,7 @@ export function errorPage(error, again) {
     "div",
     { class: "page" },
     h("h1", {}, what),
-    notice("bad", h("p", {}, messageOf(error))),
+    notice("bad", h("p", {}, withCommands(messageOf(error)))),
     again
       ? h("div", { class: "row" }, h("button", { class: "button", type: "button", onclick: again }, "Try again"))
       : null,

@@ -59,7 +59,7 @@ function themedLayout(layout) {
     hovermode: "closest",
     dragmode: "zoom",
     modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("border-strong"), activecolor: colour("accent") },
-    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, traceorder: "normal" }, // a band would turn it round
     hoverlabel: { bgcolor: colour("surface"), bordercolor: colour("border-strong"), font: { color: colour("text") } },
     xaxis: axis,
     yaxis: axis,
@@ -194,7 +194,7 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
   async function drawWith(Plotly, { data, layout = {} }) {
     setDrawnBy(plot, Plotly);
     const first = !plot.data;
-    const sized = paper_px === null ? { autosize: true } : { autosize: false, width: paper_px };
+    const sized = paper_px === null ? { autosize: true } : { autosize: false, width: paper_px, ...paperHeight(layout) };
     await Plotly.react(plot, data, { ...themedLayout(layout), ...sized }, config(data));
     if (first) {
       drawnFigures.add(element);
@@ -230,6 +230,14 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
   whenNearViewport(element, update); // draw on demand: a page with ten figures opens as fast as one with two
   return element;
 }
+
+/** Height of a figure on paper at most, CSS px: one sheet (A4 or letter) with the caption below it. */
+const MAX_PAPER_PX = 860;
+/**
+ * A figure that is higher than a sheet is drawn lower on paper, so that none is broken.
+ * @param {{ height?: number }} layout
+ */
+const paperHeight = ({ height }) => (height ? { height: Math.min(height, MAX_PAPER_PX) } : {});
 
 /**
  * @param {string} name

@@ -35,13 +35,21 @@ function power(value, digits) {
   const [factor, exponent] = value.toExponential(digits - 1).split("e");
   return `${signed(factor)} × 10${superscript(exponent)}`;
 }
+/** Odds from so many decades on are written as a power of ten; those of more than the second number as a bound. */
+const [POWER_DECADES, MOST_DECADES] = [6, 100];
 /**
- * The odds for an effect as people say them; `nats` is the natural logarithm of the Bayes factor.
+ * The odds for an effect as people say them; `nats` is the natural logarithm of the Bayes factor. Beyond 10¹⁰⁰ only the
+ * bound is stated. `odds_text` of `labctl/probability_text.py` is the same.
  * @param {number} nats
  */
 export function oddsText(nats) {
   const decades = Math.abs(nats) / Math.LN10;
-  const odds = decades < 6 ? String(Number((10 ** decades).toPrecision(2))) : `10${superscript(Math.round(decades))}`;
+  const odds =
+    decades > MOST_DECADES
+      ? `more than 10${superscript(MOST_DECADES)}`
+      : decades >= POWER_DECADES
+        ? `10${superscript(Math.round(decades))}`
+        : String(Number((10 ** decades).toPrecision(2)));
   return nats >= 0 ? `${odds} to 1` : `1 to ${odds}`;
 }
 
@@ -117,10 +125,21 @@ export function duration(seconds) {
 /** @type {Intl.DateTimeFormatOptions} */
 const DAY = { weekday: "short", day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };
 /**
- * An instant in the time zone of the browser.
+ * An instant in the time zone of the browser; with the year where it is not the present one.
  * @param {string | null | undefined} text
  */
-export const instant = (text) => (text ? new Date(text).toLocaleString("en-GB", DAY) : "–");
+export function instant(text) {
+  if (!text) return "–";
+  const at = new Date(text);
+  const isThisYear = at.getFullYear() === new Date().getFullYear();
+  return at.toLocaleString("en-GB", isThisYear ? DAY : { ...DAY, year: "numeric" });
+}
+/**
+ * The same always with the year, for what is read again in later years: 30 Nov 2026, 02:38.
+ * @param {string | null | undefined} text
+ */
+export const dated = (text) =>
+  text ? `${day(text)}, ${new Date(text).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" })}` : "–";
 /** @param {string | null | undefined} text */
 export const day = (text) =>
   text ? new Date(text).toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" }) : "–";
@@ -132,6 +151,22 @@ export const clock = (text) => (text ? new Date(text).toLocaleTimeString("en-GB"
  * @param {string} id
  */
 export const idText = (id) => String(id).replaceAll("_", " ");
+
+/**
+ * A sentence of the service with effects as the links beside it name them: "scale factor odd", not "scale_factor_odd".
+ * A command between backticks keeps the ids, which it needs.
+ * @param {string} text
+ * @param {Iterable<string>} ids of effects
+ */
+export function inWords(text, ids) {
+  const compound = [...new Set(ids)].filter((id) => id.includes("_"));
+  if (!compound.length) return text;
+  const whole = new RegExp(`(?<![\\w-])(${compound.join("|")})(?![\\w-])`, "g");
+  return text
+    .split("`")
+    .map((part, k) => (k % 2 ? part : part.replaceAll(whole, idText)))
+    .join("`");
+}
 
 /** @param {string} text */
 export const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1);

@@ -10,17 +10,18 @@ const PARTS =
 /** Plain numbers near 1, or elements of a matrix with ones on its diagonal: they stay as they are. */
 const RATIOS = /^(?:[xyz][. ])?soft iron(?![a-z])/;
 
+/** A power as the catalogue writes it: ^-1, ^k, ^-(k-1). */
+const POWER = /\^(-?(?:\d+|[ik]|\([\dik-]+\)))/g;
 /** A plain number, and one for each of something: 1, 1/K, 1 K^-2. */
 const PLAIN = /^1(?![^ /])/;
 
 /** @typedef {readonly [factor: number, unit: string]} ShownUnit a shown number is the stored one times the factor */
 
 /**
- * A unit as text: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none.
+ * A unit as text: (deg/s)^-1 -> (deg/s)⁻¹, K^-k -> K⁻ᵏ. A plain number has none.
  * @param {string | null | undefined} unit
  */
-export const unitText = (unit) =>
-  unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => superscript(power));
+export const unitText = (unit) => (unit === "1" ? "" : (unit ?? "").replace(POWER, (_, power) => superscript(power)));
 
 /**
  * The unit in which a quantity is shown, whatever its value. Of plain numbers angles are in mrad, parts of a whole in %,

@@ -3,8 +3,17 @@
 import { splitAtNames } from "./names.js";
 import { MINUS } from "./rounding.js";
 
+/** A space at which no line ends. */
+const NO_BREAK = "\u00a0";
 /** @type {Record<string, string>} */
-const SUPERSCRIPTS = { "-": "⁻", ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])) };
+const SUPERSCRIPTS = {
+  "-": "⁻",
+  "(": "⁽",
+  ")": "⁾",
+  i: "ⁱ",
+  k: "ᵏ",
+  ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])),
+};
 /** @param {string | number} text */
 export const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? "").join("");
 
@@ -12,8 +21,13 @@ export const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPT
 const POWER = /(?<![\w.-])(-?\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?![\w.]*\w)/g;
 /** A power as programs write it: (deg/s)^-1, e^254. */
 const RAISED = /\^(-?\d+)/g;
-/** A plus or minus before a number, and the sign of a negative number; not the hyphen of a word, a range or a date. */
-const [PLUS_MINUS, NEGATIVE] = [/\+-(?=\s*\d)/g, /(?<![\w-])-(?=\d)/g];
+/** What stays together in a line: "< 1 %", "0.0012 ± 0.0003". */
+const UNBROKEN = /(?<=\d) %|(?<=(^|[\s(])[<>]) (?=\d)|(?<=×) (?=10)|(?<=\d) (?=×)| ± /g;
+/**
+ * A plus or minus before a number, and the sign of a negative number or of the negative end of an axis (-y); not the
+ * hyphen of a word, a range or a date.
+ */
+const [PLUS_MINUS, NEGATIVE] = [/\+-(?=\s*\d)/g, /(?<![\w-])-(?=\d|[xyz]\b)/g];
 
 /**
  * A text with the minus sign, ± and powers: "+-90 deg/s, -5e-05 K^-1" is "±90 deg/s, −5 × 10⁻⁵ K⁻¹". Names that people
@@ -21,7 +35,7 @@ const [PLUS_MINUS, NEGATIVE] = [/\+-(?=\s*\d)/g, /(?<![\w-])-(?=\d)/g];
  * @param {string} text
  */
 export function typeset(text) {
-  if (!/-|e\+|\^/.test(text)) return text;
+  if (!/-|e\+|\^|[%<>×±]/.test(text)) return text;
   return splitAtNames(text)
     .map((part, k) => (k % 2 ? part : withSigns(part)))
     .join("");
@@ -33,5 +47,6 @@ function withSigns(text) {
     .replace(POWER, (_, factor, sign, power) => `${factor} × 10${superscript(sign + power)}`)
     .replace(RAISED, (_, power) => superscript(power))
     .replace(PLUS_MINUS, "±")
-    .replace(NEGATIVE, MINUS);
+    .replace(NEGATIVE, MINUS)
+    .replace(UNBROKEN, (gap) => gap.replace(/^ /, NO_BREAK));
 }

@@ -59,12 +59,18 @@ const symbolTable = (effect) =>
       { title: "Unit", cell: (each) => unitOf(each.unit) },
       {
         title: "Where",
-        cell: (each) => [each.name ? h("code", {}, each.name) : null, each.name ? " " : null, KINDS[each.kind]],
+        cell: (each) => [each.name ? h("code", {}, each.name) : null, each.name ? " " : null, whereOf(each)],
       },
     ],
     effect.equation?.symbols ?? [],
     { label: `Symbols of ${effect.id}` },
   );
+
+/**
+ * Where the value of a symbol is from: an index of the equation, which has no unit, is from nowhere.
+ * @param {EquationSymbol} symbol
+ */
+const whereOf = ({ kind, unit, name }) => (unit === "" && !name ? "" : KINDS[kind]);
 
 /** @param {string} unit */
 const unitOf = (unit) => (unit === "" ? "index" : unit === "1" ? "1" : unitText(unit));

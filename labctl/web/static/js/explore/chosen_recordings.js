@@ -1,6 +1,6 @@
-// Which recordings are compared: one, or several as one; in the address, in a query and in words.
+// Which version is compared with which recordings: one, or several as one; in the address, in a query and in words.
 
-/** @import { RecordingRow } from "../../../types/api.js" */
+/** @import { RecordingRow, Unit } from "../../../types/api.js" */
 
 /** @typedef {{ recording: number, recordings: readonly number[] }} Chosen `recording` is the newest of them */
 
@@ -39,13 +39,22 @@ export function recordingsText({ recording, recordings }) {
 }
 
 /**
- * The newest recording with at least half as many data sets as the largest: an experiment has few. That of a campaign
- * that has not ended is taken only where the unit has no other.
- * @param {readonly Pick<RecordingRow, "id" | "datasets" | "unfinished">[]} own
+ * The newest recording with at least half as many data sets as the largest. An experiment of a diagnosis, which rarely
+ * determines a model alone, and what a campaign measures that has not ended are taken only where there is no other.
+ * @param {readonly Pick<RecordingRow, "id" | "datasets" | "unfinished" | "experiment">[]} own
  */
 export function usualRecording(own) {
   const ended = own.filter((row) => !row.unfinished);
-  const rows = ended.length ? ended : own;
+  const whole = ended.filter((row) => !row.experiment);
+  const rows = whole.length ? whole : ended.length ? ended : own;
   const most = Math.max(...rows.map((row) => row.datasets));
   return Math.max(...rows.filter((row) => 2 * row.datasets >= most).map((row) => row.id));
 }
+
+/**
+ * The version that is shown where none is asked for: the one in force, as on the page of the unit; else the newest.
+ * @param {Pick<Unit, "calibrations" | "certified_version">} unit
+ * @returns {number | undefined} undefined where the unit has no version
+ */
+export const usualVersion = ({ calibrations, certified_version: inForce }) =>
+  inForce ?? (calibrations.length ? Math.max(...calibrations) : undefined);

@@ -92,13 +92,18 @@ export function inDatasetOrder(state, columns, name) {
   });
 }
 
+/** What is smaller than this share of the largest value is no more than scatter about 0. */
+const ZERO_SHARE = 1e-3;
+
 /**
- * Numbers as short texts that all differ, so that no two categories of an axis become one.
+ * Numbers as short texts that all differ, so that no two categories of an axis become one: one that is near 0 beside the
+ * others is 0, not 0.00964.
  * @param {readonly number[]} values
  */
 export function distinctLabels(values) {
+  const least = ZERO_SHARE * Math.max(0, ...values.map(Math.abs));
   for (let digits = 3; digits < 17; digits += 1) {
-    const labels = values.map((value) => plainNumber(value, digits));
+    const labels = values.map((value) => plainNumber(digits === 3 && Math.abs(value) < least ? 0 : value, digits));
     if (new Set(labels).size === values.length) return labels;
   }
   return values.map(String);

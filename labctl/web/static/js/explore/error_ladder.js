@@ -10,7 +10,7 @@ import { axisNames } from "./dataset_rows.js";
 import { finishLine, stepOf } from "./finish_line.js";
 import { heldOutName } from "./first_models.js";
 import { errorOn } from "./ladder_error.js";
-import { ticksOf } from "./ladder_ticks.js";
+import { ticksOf } from "../core/log_ticks.js";
 import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap } from "./residual_map.js";
 

@@ -1,14 +1,18 @@
 // What stands beside the suspected effects: why none is named, formulas, experiments, what cannot be tested.
 
 import { h } from "../core/elements.js";
-import { number, probabilityText, idText } from "../core/format.js";
+import { inWords, number, probabilityText, idText } from "../core/format.js";
 import { button, notice } from "../core/components.js";
 import { planAddress } from "../core/routes.js";
+import { channelName } from "../recordings/channels.js";
+import { sharedReasons } from "./experiment_reasons.js";
 import { heldOutName } from "./first_models.js";
 
 /** @import { Criticism } from "../../../types/api.js" */
 /** @import { ExploreState } from "./state.js" */
 
+/** So many experiments are listed, the best first. */
+const EXPERIMENTS_SHOWN = 3;
 /** A smaller probability that an experiment names a wrong cause is not worth a word. */
 const MIN_WRONG = 0.005;
 
@@ -93,34 +97,36 @@ export function lawList({ criticism, axis, motion }, onlaw) {
   );
 }
 
-/** @param {Criticism} criticism */
-export function experimentList(criticism) {
+/**
+ * @param {Criticism} criticism
+ * @param {readonly string[]} ids of the effects of the catalogue
+ */
+export function experimentList(criticism, ids) {
   if (!criticism.experiments.length) return null;
+  const experiments = criticism.experiments.slice(0, EXPERIMENTS_SHOWN);
+  const { common, own } = sharedReasons(experiments.map(({ why }) => inWords(why, ids)));
   return h(
     "div",
     { class: "stack" },
     h("h3", {}, "Experiments that show most of which effect is real"),
-    criticism.experiments
-      .slice(0, 3)
-      .map((each) =>
+    common ? h("p", { class: "muted small" }, `Of all these: ${common}`) : null,
+    experiments.map((each, place) =>
+      h(
+        "div",
+        { class: "notice" },
         h(
-          "div",
-          { class: "notice" },
-          h(
-            "p",
-            {},
-            each.do,
-            each.hours ? ` (${number(each.hours, 2)} h)` : "",
-            each.names_wrong < MIN_WRONG
-              ? ""
-              : `; a wrong cause is then named with a probability of ${unbroken(probabilityText(each.names_wrong))}`,
-          ),
-          h("p", { class: "muted small" }, each.why),
-          each.toml
-            ? h("a", { class: "button tiny", href: planAddress(each.toml, criticism.serial) }, "Plan it")
-            : null,
+          "p",
+          {},
+          inWords(each.do, ids),
+          each.hours ? ` (${number(each.hours, 2)} h)` : "",
+          each.names_wrong < MIN_WRONG
+            ? ""
+            : `; a wrong cause is then named with a probability of ${unbroken(probabilityText(each.names_wrong))}`,
         ),
+        own[place] ? h("p", { class: "muted small" }, own[place]) : null,
+        each.toml ? h("a", { class: "button tiny", href: planAddress(each.toml, criticism.serial) }, "Plan it") : null,
       ),
+    ),
   );
 }
 
@@ -130,7 +136,7 @@ export function untestableEffects(criticism) {
   /** @param {Criticism["not_testable"][number]} line */
   const why = (line) =>
     line.why === "channel"
-      ? `not recorded: ${line.needs.map(idText).join(", ")}`
+      ? `not recorded: ${line.needs.map(channelName).join(", ")}`
       : "this schedule cannot detect the effect";
   return h(
     "details",

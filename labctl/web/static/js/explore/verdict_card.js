@@ -1,7 +1,7 @@
 // The verdict in words, and the suspected effects with their evidence.
 
 import { scrollTo, setChildren, h } from "../core/elements.js";
-import { withUncertainty, number, oddsText, probabilityText, idText } from "../core/format.js";
+import { inWords, withUncertainty, number, oddsText, probabilityText, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader } from "../core/components.js";
 import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
@@ -47,13 +47,17 @@ const TWO_NOISES =
 const DRAW =
   "“Draw” shows the part of the residual that an effect would explain. “Add” previews a model with the effect; nothing is stored before you make a version.";
 
-/** @param {ExploreState} state */
-export function verdictCard(state) {
+/**
+ * @param {ExploreState} state
+ * @param {readonly Effect[]} effects of the catalogue
+ */
+export function verdictCard(state, effects) {
   const { criticism } = state;
   const [title, kind] = criticism.further.length ? NONE_NAMED : VERDICTS[criticism.verdict];
   const of = new Set(criticism.joint?.text); // stands in the card of the recordings together
   of.add(criticism.why_not_named); // stands beside the suspects
-  const [first, ...others] = criticism.text.filter((line) => !of.has(line));
+  const ids = effects.map(({ id }) => id);
+  const [first, ...others] = criticism.text.filter((line) => !of.has(line)).map((line) => inWords(line, ids));
   const { error, noise } = criticism;
   const ratio = (error.rms_dps ?? NaN) / (error.noise_floor_dps ?? NaN);
   return h(
@@ -117,6 +121,7 @@ const chanceText = (p) =>
  */
 export function suspectList(state, effects, { onadd, onlaw, explain }) {
   const { criticism } = state;
+  const ids = effects.map(({ id }) => id);
   const named = new Set(criticism.named);
   const drawnNow = h("p", { class: "muted small", "aria-live": "polite" }, DRAW);
   /** @param {Suspect} suspect */
@@ -179,7 +184,6 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
               draw(s),
               openWhatIf(s),
             ),
-            equationDetails(effects, s.effect),
           ),
           evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
           evidenceItem(
@@ -200,6 +204,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
             `Coefficient ± U (95.45 %)${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
             coefficientText(s, state.axis),
           ),
+          equationDetails(effects, s.effect),
         ),
       ),
     );
@@ -217,7 +222,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
         : "Suspected effects"
       : "Which effects are missing",
     null,
-    isAdequate && speaking.length ? h("p", { class: "muted" }, whyNoneIsNamed(criticism)) : null,
+    isAdequate && speaking.length ? h("p", { class: "muted" }, inWords(whyNoneIsNamed(criticism), ids)) : null,
     speaking.length
       ? [drawnNow, list, open]
       : h(
@@ -227,7 +232,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
         ),
     aliasNotice(criticism),
     lawList(state, onlaw),
-    experimentList(criticism),
+    experimentList(criticism, ids),
     untestableEffects(criticism),
   );
 }

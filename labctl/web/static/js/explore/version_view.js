@@ -148,7 +148,7 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   if (!axes.length) {
     const alone = chosen.recordings.length < 2 && motion !== "rates";
     return [
-      verdictCard(state),
+      verdictCard(state, effects),
       end,
       joint,
       alone ? errorComparison(state, null, signal) : null,
@@ -170,7 +170,7 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   parts.forEach((part, k) => {
     part.id = SECTIONS[k][0];
   });
-  return [verdictCard(state), end, joint, pageNavigation(state, axes), ...parts];
+  return [verdictCard(state, effects), end, joint, pageNavigation(state, axes), ...parts];
 }
 
 /**

@@ -4,7 +4,7 @@ import { cardWithHeader, table } from "../core/components.js";
 import { h, setChildren } from "../core/elements.js";
 import { labelledField, selectField } from "../core/fields.js";
 import { colour, figure } from "../core/figure.js";
-import { count, idText, withUnit } from "../core/format.js";
+import { capitalised, count, idText, withUnit } from "../core/format.js";
 import { shownUnit } from "../core/shown_unit.js";
 import { get } from "../core/http/api.js";
 import { brushed } from "./brushed.js";
@@ -128,7 +128,7 @@ function groupTable(chart, groups) {
   const [factor, unit] = shownUnit(chart.unit, chart.name);
   return table(
     [
-      { title: chart.factor, cell: ({ level }) => level || "not stated" },
+      { title: capitalised(chart.factor), cell: ({ level }) => level || "not stated" },
       { title: "Units", number: true, cell: ({ units }) => count(units) },
       { title: "Mean", number: true, cell: ({ mean }) => withUnit(factor * mean, unit, 4) },
       {

@@ -1,11 +1,11 @@
 // Fleet jobs: how far each is, what it has cost, why units failed, and the button that cancels one.
 
-import { actButton, button, card, chip, table } from "../core/components.js";
+import { actButton, button, card, chip, notice, table } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { h, setChildren } from "../core/elements.js";
 import { count, duration, instant, number } from "../core/format.js";
 import { get, post } from "../core/http/api.js";
-import { isAbort } from "../core/http/errors.js";
+import { isAbort, messageOf } from "../core/http/errors.js";
 import { untilVisible } from "../core/visible.js";
 
 /** @import { FleetJob, FleetUnit } from "../../../types/api.js" */
@@ -13,6 +13,8 @@ import { untilVisible } from "../core/visible.js";
 /** Jobs that are shown, the newest, and failed units of one of them. */
 const SHOWN = 10;
 const FAILED_SHOWN = 20;
+/** In the place of the jobs, until a request for them is answered; the rest of the page does not need them. */
+const UNREAD = "The fleet jobs could not be read; they are asked for again every 2 s.";
 /** How often jobs that go on are read again, ms. */
 const POLL_MS = 2000;
 
@@ -45,7 +47,8 @@ export const progressText = ({ units, waiting, failed, skipped }) =>
     .join(", ");
 
 /**
- * A card of the newest fleet jobs, read again as long as one goes on; without a child where there was never one.
+ * A card of the newest fleet jobs, read again as long as one goes on; without a child where there was never one. A
+ * request that fails is said there, and made again.
  * @param {AbortSignal} signal
  */
 export async function jobsCard(signal) {
@@ -55,8 +58,7 @@ export async function jobsCard(signal) {
   const again = async () => {
     clearTimeout(waiting);
     const jobs = await get("/api/fleet/jobs", { query: { limit: SHOWN }, signal });
-    if (!jobs.length) return;
-    setChildren(place, card("Jobs", jobTable(jobs, reasons, signal, again), reasons));
+    setChildren(place, jobs.length ? card("Jobs", jobTable(jobs, reasons, signal, again), reasons) : null);
     if (jobs.some(({ ended }) => !ended)) later();
   };
   // a request that fails is made again: the header says meanwhile that the service does not answer
@@ -67,7 +69,13 @@ export async function jobsCard(signal) {
     await untilVisible(signal);
     if (!signal.aborted) await again();
   };
-  await again();
+  try {
+    await again();
+  } catch (error) {
+    if (isAbort(error)) throw error;
+    setChildren(place, card("Jobs", notice("bad", h("p", {}, `${UNREAD} ${messageOf(error)}`))));
+    later();
+  }
   return place;
 }
 

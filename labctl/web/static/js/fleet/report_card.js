@@ -2,13 +2,22 @@
 
 import { card, cardWithHeader, chip, table, withCommands } from "../core/components.js";
 import { h } from "../core/elements.js";
-import { count, idText, withUncertainty, withUnit } from "../core/format.js";
+import { count, idText, inWords, withUncertainty, withUnit } from "../core/format.js";
 import { shownUnit } from "../core/shown_unit.js";
 import { bars } from "./bars.js";
 
 /** @import { FleetReport } from "../../../types/api.js" */
 
 const effectLink = (/** @type {string} */ id) => h("a", { href: `/effects/${encodeURIComponent(id)}` }, idText(id));
+
+/**
+ * The ids of all effects that a report speaks of.
+ * @param {FleetReport} report
+ */
+const effectsOf = ({ missing, figures }) => [
+  ...missing.flatMap(({ effects }) => effects),
+  ...Object.keys(figures.missing),
+];
 
 /** @param {FleetReport} report */
 export const reportCards = (report) => [missingCard(report), saidCard(report), coefficientCard(report)];
@@ -40,7 +49,7 @@ function missingCard(report) {
                   each.effects.flatMap((id, k) => (k ? [" or ", effectLink(id)] : [effectLink(id)])),
                   " ",
                   chip(whose(each), "warn"),
-                  h("p", { class: "muted" }, each.text),
+                  h("p", { class: "muted" }, inWords(each.text, effectsOf(report))),
                 ),
               ),
             )
@@ -58,7 +67,7 @@ const whose = ({ of_bench: bench, common }) =>
 const saidCard = (report) =>
   card(
     "Report",
-    report.text.map((sentence) => h("p", {}, withCommands(sentence))),
+    report.text.map((sentence) => h("p", {}, withCommands(inWords(sentence, effectsOf(report))))),
   );
 
 /**

@@ -1,7 +1,7 @@
 // What several recordings say together: repeatability, agreement, each predicted by the others.
 
 import { h } from "../core/elements.js";
-import { idText, number, percent, sizeText } from "../core/format.js";
+import { idText, number, probabilityText, sizeText } from "../core/format.js";
 import { cardWithHeader, chip, table } from "../core/components.js";
 import { deviationTexts } from "./deviation.js";
 import { shiftFigures } from "./shifts.js";
@@ -50,7 +50,7 @@ function repeatability(joint) {
           number: true,
           cell: (row) => `${size(row, row.low)} to ${size(row, row.high)}`,
         },
-        { title: "Chance of noise alone", number: true, cell: (row) => percent(row.p_value) },
+        { title: "Chance of noise alone", number: true, cell: (row) => probabilityText(row.p_value) },
         { title: "Shift", cell: (row) => (row.seen ? chip("seen", "warn") : chip("not seen", "good")) },
       ],
       rows,

@@ -8,6 +8,8 @@ import { axesInPicture, depthBelow, seenFaces } from "./pose_axes.js";
 const NAMES = /** @type {const} */ (["x", "y", "z"]);
 const [CENTRE_X, CENTRE_Y, SCALE] = [150, 128, 42];
 const TABLE = 2.1;
+/** Cosine of the angle to the vertical, from which on an axis is said to point up. */
+const AT_TOP = 0.95;
 
 /**
  * @param {readonly number[]} point
@@ -75,7 +77,12 @@ export function poseDrawing(up, label, name = "") {
   ];
   // an axis that points away from the eye is behind the cube
   const behind = NAMES.filter((_, k) => axes[k][0] + axes[k][1] + 0.84 * axes[k][2] < 0);
-  const arrows = NAMES.map((each, k) => ({ name: each, drawing: arrow(each, axes[k]) }));
+  // the arrow and the name of an axis that points up would lie under "y up"
+  const atTop = NAMES.filter((_, k) => axes[k][2] > AT_TOP);
+  const arrows = NAMES.filter((each) => !atTop.includes(each)).map((each) => ({
+    name: each,
+    drawing: arrow(each, axes[NAMES.indexOf(each)]),
+  }));
   return svg(
     "svg",
     { viewBox: "0 -40 300 310", class: "mounting pose", role: "img", "aria-label": label },
@@ -83,6 +90,6 @@ export function poseDrawing(up, label, name = "") {
     arrows.filter((each) => behind.includes(each.name)).map(({ drawing }) => drawing),
     seenFaces(axes).map(({ corners, side }) => svg("polygon", { points: outline(corners), class: `cube ${side}` })),
     arrows.filter((each) => !behind.includes(each.name)).map(({ drawing }) => drawing),
-    upwards(depthBelow(axes), name),
+    upwards(depthBelow(axes), name || atTop.join("")),
   );
 }

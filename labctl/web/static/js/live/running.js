@@ -141,7 +141,7 @@ export function runningLive(first, signal) {
   /** @param {LiveState} state */
   function update(state) {
     const { moment, target } = state;
-    request.textContent = state.text;
+    setChildren(request, state.text);
     if (!moment || !target) return;
     const need = moment.request?.name ?? "";
     if (need !== shown)

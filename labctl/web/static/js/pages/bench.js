@@ -43,11 +43,11 @@ export async function page({ query, signal }) {
     "div",
     { class: "page bench", "data-source": now ? `bench ${bench.name}, campaign ${now.id}` : `bench ${bench.name}` },
     pageHeader(
-      "Bench",
+      query.wall === "1" ? `Bench ${bench.name}` : "Bench", // on a wall the name is read from afar
       h(
         "span",
         { class: "row" },
-        h("strong", {}, bench.name),
+        query.wall === "1" ? null : h("strong", {}, bench.name),
         bench.simulated ? chip("simulated", "accent") : null,
         h(
           "span",

@@ -3,7 +3,7 @@
 
 import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { capitalised, instant } from "../core/format.js";
+import { capitalised, dated } from "../core/format.js";
 import { card, factList, notice, pageHeader } from "../core/components.js";
 import { labelledField } from "../core/fields.js";
 import { Problem } from "../core/http/errors.js";
@@ -22,7 +22,7 @@ export async function page({ signal }) {
     { class: "page" },
     pageHeader("State of a certificate", number ? `Certificate ${number}` : null),
     asked ? await found(number, calibration, signal) : null,
-    card("Another certificate", lookUp(number, calibration)),
+    card(asked ? "Another certificate" : "Certificate to look up", lookUp(number, calibration)),
   );
 }
 
@@ -66,7 +66,7 @@ function shown(known) {
       ["Number", known.number],
       ["Laboratory", known.laboratory],
       ["Unit", known.serial, null, `version ${known.version}`],
-      ["Issued", instant(known.issued_at)],
+      ["Issued", dated(known.issued_at)],
       known.replaced_by ? ["Amended by", `certificate ${known.replaced_by}`] : null,
       known.superseded_by ? ["Superseded by", `certificate ${known.superseded_by}`] : null,
     ]),

@@ -7,7 +7,7 @@ import { card, emptyState, pageHeader, notice } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { navigate, query } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
-import { inAddress, numbersIn, recordingsText, usualRecording } from "../explore/chosen_recordings.js";
+import { inAddress, numbersIn, recordingsText, usualRecording, usualVersion } from "../explore/chosen_recordings.js";
 import { fitForm } from "../explore/fit_form.js";
 import { posesView } from "../explore/poses_view.js";
 import { recordingChoice } from "../explore/recording_choice.js";
@@ -59,7 +59,7 @@ export async function page({ query: asked, signal }) {
 }
 
 /**
- * A unit, its recordings, its versions, and the version that is asked for, or its newest.
+ * A unit, its recordings, its versions, and the version that is asked for, or the usual one.
  * @param {string} serial
  * @param {Query} asked
  * @param {AbortSignal} signal
@@ -69,7 +69,7 @@ async function readUnit(serial, asked, signal) {
   recordings.catch(() => {}); // awaited below
   const unit = await get("/api/units/{serial}", { path: { serial }, signal });
   const versions = [...unit.calibrations].sort((a, b) => a - b);
-  const version = asked.version ? Number(asked.version) : versions.at(-1);
+  const version = asked.version ? Number(asked.version) : usualVersion(unit);
   const calibration =
     version === undefined
       ? undefined

@@ -60,11 +60,11 @@ async function allTypes(types, signal) {
  * @param {AbortSignal} signal
  */
 async function typePage(figures, signal) {
-  const report = h("div", { class: "stack" }, busyIndicator("Comparing the units …"));
+  const report = h("div", { class: "page" }, busyIndicator("Comparing the units …"));
   loadReport(figures.type, report, signal);
   return h(
     "div",
-    { class: "page" },
+    { class: "page", "data-source": `units of type ${figures.type}` },
     pageHeader(
       "Fleet",
       "What the units of a type have in common, and which differ.",

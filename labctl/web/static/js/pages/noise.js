@@ -4,6 +4,7 @@ import { get, getPart } from "../core/http/api.js";
 import { Problem } from "../core/http/errors.js";
 import { h, setChildren } from "../core/elements.js";
 import { figure } from "../core/figure.js";
+import { ticksOf } from "../core/log_ticks.js";
 import { duration, number } from "../core/format.js";
 import { card, emptyState, loadInto, notice, pageHeader, table } from "../core/components.js";
 import { pointPlace, selectPoints } from "../core/figure_point.js";
@@ -45,6 +46,7 @@ export async function page({ query, signal }) {
   const show = () =>
     loadInto(place, "Working out the Allan deviations", async () => {
       const rows = [...chosen].sort((a, b) => b - a).flatMap((id) => known.get(id) ?? []);
+      place.setAttribute("data-source", rows.map((row) => `unit ${row.serial}, recording ${row.id}`).join("; "));
       const records = await Promise.all(rows.map((row) => recordOf(row, signal)));
       if (!records.length && !leftOut.length) return emptyState("Choose one recording or more.");
       return [leftOutNotice(records, leftOut), overlay(records)];
@@ -171,7 +173,11 @@ function overlay(records) {
     ],
     layout: {
       xaxis: { type: "log", title: { text: "averaging time, s" } },
-      yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } },
+      yaxis: {
+        type: "log",
+        title: { text: "Allan deviation, deg/s" },
+        ...ticksOf(lines.flatMap(({ noise }) => noise.deviation_dps)),
+      },
       margin: { l: 70, r: 12, t: 8, b: 46 },
     },
   });

@@ -100,7 +100,7 @@ const unitTable = (units) =>
       },
     ],
     units,
-    { label: "Units", first: "9rem" },
+    { label: "Units", first: "8rem" },
   );
 
 const noUnits = () =>

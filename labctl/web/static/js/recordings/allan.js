@@ -6,6 +6,7 @@ import { setChildren, h, whenNearViewport } from "../core/elements.js";
 import { faded } from "../core/colour_scales.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
+import { ticksOf } from "../core/log_ticks.js";
 import { cardWithHeader, loadInto, notice, table } from "../core/components.js";
 import { toggleGroup } from "../core/fields.js";
 import { pointPlace, pythonValue, selectPoints } from "../core/figure_point.js";
@@ -118,7 +119,11 @@ function allanFigure(dataset, found) {
     ]),
     layout: {
       xaxis: { type: "log", title: { text: "averaging time, s" } },
-      yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } },
+      yaxis: {
+        type: "log",
+        title: { text: "Allan deviation, deg/s" },
+        ...ticksOf(axes.flatMap(([, noise]) => noise.deviation_dps)),
+      },
       margin: { l: 70, r: 12, t: 8, b: 46 },
     },
   });

@@ -2,7 +2,7 @@
 
 import { get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { day, number, sizeText, withUncertainty } from "../core/format.js";
+import { day, number, sizeText, withUncertainty, inWords } from "../core/format.js";
 import { cardWithHeader, chip, loadInto, table } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
@@ -74,7 +74,7 @@ function shown(serial, trend) {
   place.open((key) => askedTrend(serial, trend, key));
   const turned = trend.drifts.some((drift) => drift.what === "scale_factor");
   return [
-    trend.text.map((line) => h("p", {}, line)),
+    trend.text.map((line) => h("p", {}, inWords(line, ["scale_factor"]))),
     trend.drifts.length
       ? h(
           "div",

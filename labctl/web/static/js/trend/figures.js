@@ -3,6 +3,8 @@
 import { faded } from "../core/colour_scales.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { pointPlace, selectPoints } from "../core/figure_point.js";
+import { isNumber } from "../core/format.js";
+import { ticksOf } from "../core/log_ticks.js";
 import { shownUnit } from "../core/shown_unit.js";
 import { trendPoint } from "./point.js";
 
@@ -195,6 +197,10 @@ export function errorFigure(serial, trend, place) {
       hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>",
     };
   };
+  const sizes = () =>
+    trend.points.flatMap(({ as_found, as_left, rms_dps }) =>
+      [as_found?.rms_dps, as_left?.rms_dps, rms_dps].filter(isNumber),
+    );
   /** @returns {Picture} */
   const draw = () => ({
     data: [
@@ -207,7 +213,11 @@ export function errorFigure(serial, trend, place) {
         colour("accent"),
       ),
     ],
-    layout: { xaxis: { type: "date" }, yaxis: { type: "log", title: { text: "RMS error, deg/s" } }, showlegend: true },
+    layout: {
+      xaxis: { type: "date" },
+      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, ...ticksOf(sizes()) },
+      showlegend: true,
+    },
   });
   const drawn = figure(
     "Error over the years",

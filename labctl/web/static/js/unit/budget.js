@@ -3,7 +3,7 @@
 import { h } from "../core/elements.js";
 import { chip, notice, table } from "../core/components.js";
 import { colour, figure } from "../core/figure.js";
-import { number, plainNumber } from "../core/format.js";
+import { isNumber, number, plainNumber } from "../core/format.js";
 import { contributionRows, contributionTraces } from "./contribution_lines.js";
 
 /** @import { BudgetLine, ContributionsOver, Uncertainty } from "../../../types/api.js" */
@@ -127,7 +127,7 @@ function one(name, lines, along, at) {
   };
   return figure(
     name,
-    `${at}: the largest standard uncertainties of the budget, the others together (root of the sum of their squares). Dashed: the expanded uncertainty U. Uncertainties that the bench does not state have no line.`,
+    `${at}: the largest standard uncertainties of the budget, the others together (root of the sum of their squares). ${lines.expanded.some(isNumber) ? "Dashed: the expanded uncertainty U" : "U is not known"}. Uncertainties that the bench does not state have no line.`,
     draw,
     { height: innerWidth < NARROW_PX ? "26rem" : "21rem", csv: () => contributionRows(lines, along) },
   );

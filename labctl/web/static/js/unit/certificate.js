@@ -9,7 +9,7 @@ import { Problem } from "../core/http/errors.js";
 import { show } from "../core/router.js";
 import { stateChip } from "./certificate_state.js";
 
-/** @import { Certificate } from "../../../types/api.js" */
+/** @import { Certificate, MissingFact } from "../../../types/api.js" */
 /** @import { Answers, Field } from "../../../types/pages.js" */
 
 /** @type {readonly ["pdf" | "xml" | "json", string][]} */
@@ -56,7 +56,7 @@ const FIELDS = [
   },
 ];
 
-/** The laboratory, asked for where the bench file of the campaign does not name it. @type {readonly Field[]} */
+/** The laboratory, asked for where the measurement does not name it. @type {readonly Field[]} */
 const LABORATORY_FIELDS = [
   { name: "laboratory_name", label: "Laboratory" },
   { name: "laboratory_street", label: "Street and number of the laboratory" },
@@ -114,18 +114,16 @@ export function certificateFiles(serial, version, issued) {
  */
 async function askCertificate(serial, version, replaced) {
   const why = replaced ? [{ name: "amend", label: `Why certificate ${replaced.number} is replaced` }] : [];
-  const imported = await wasImported(serial, version);
+  const [imported, missing] = await Promise.all([wasImported(serial, version), missingFacts(serial, version)]);
   /** @type {Answers} */
   let given = {};
   let refusal = "";
-  let [lacksLaboratory, asksLaboratory] = [false, false];
+  const asked = [...why, ...(asksLaboratory(missing) ? LABORATORY_FIELDS : []), ...FIELDS];
   for (;;) {
-    const asked = [...why, ...(asksLaboratory ? LABORATORY_FIELDS : []), ...FIELDS];
     const fields = asked.map((field) => ({ ...field, value: given[field.name] }));
-    const lacking = imported ? notice("warn", h("p", {}, IMPORTED)) : null;
     const answers = await dialog(`Issue a certificate of version ${version}`, fields, {
-      text: "A certificate is a document for a customer; which version is in force does not change. Laboratory and reference standards come from the bench file of the campaign; a laboratory that it does not name is asked for. The certificate is written to the audit trail.",
-      body: refusal ? refusalNotice(refusal, lacksLaboratory) : lacking,
+      text: "A certificate is a document for a customer; which version is in force does not change. The certificate is written to the audit trail.",
+      body: refusal ? notice("bad", h("p", {}, `${capitalised(refusal)}.`)) : notesOf(imported, missing),
       confirm: "Issue certificate",
     });
     if (!answers) return;
@@ -136,33 +134,45 @@ async function askCertificate(serial, version, replaced) {
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
       [given, refusal] = [answers, error.message];
-      lacksLaboratory = error.missing.some(({ fact }) => fact.startsWith("laboratory's"));
-      asksLaboratory ||= lacksLaboratory;
     }
   }
 }
 
 /**
- * Why a certificate was not issued, and what the form asks for because of that.
- * @param {string} refusal
- * @param {boolean} lacksLaboratory
+ * The mandatory facts that the version does not state, each with the table of the order that can state it.
+ * @param {string} serial
+ * @param {number} version
  */
-const refusalNotice = (refusal, lacksLaboratory) =>
-  notice(
-    "bad",
-    h("p", {}, `${capitalised(refusal)}.`),
-    lacksLaboratory
-      ? h(
-          "p",
-          {},
-          "The laboratory is asked for below. A [laboratory] in the bench file states it in every certificate of later campaigns.",
-        )
-      : null,
+const missingFacts = (serial, version) =>
+  get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path: { serial, version } });
+
+/** @param {readonly MissingFact[]} missing */
+const asksLaboratory = (missing) => missing.some(({ table }) => table === "laboratory");
+
+/**
+ * What the form says before anything is filled in: where the laboratory comes from, and what it does not ask for.
+ * @param {boolean} imported
+ * @param {readonly MissingFact[]} missing
+ */
+const notesOf = (imported, missing) =>
+  h(
+    "div",
+    { class: "stack" },
+    h(
+      "p",
+      {},
+      asksLaboratory(missing) ? NO_LABORATORY : "Laboratory and reference standards come from the bench file.",
+    ),
+    imported ? notice("warn", h("p", {}, IMPORTED)) : null,
   );
+
+/** Where the campaign of the version states no laboratory. */
+const NO_LABORATORY =
+  "The measurement states no laboratory, so this form asks for it. A [laboratory] in the bench file states it in every certificate of later campaigns.";
 
 /** What the certificate of a version needs beyond this form where no campaign measured it. */
 const IMPORTED =
-  "This version was fitted to an imported recording. Its certificate also states the laboratory, the method, the days of the measurement, the reference standards and the repeatability, which this form does not ask for: give them in recording.toml, import it again, and issue the certificate with labctl certificate and a file of the order.";
+  "This version was fitted to an imported recording. Its certificate also states the method, the days of the measurement, the reference standards and the repeatability, which this form does not ask for: give them in recording.toml, import it again, and issue the certificate with labctl certificate and a file of the order.";
 
 /**
  * Whether a recording of a version is from another bench than that of a campaign.

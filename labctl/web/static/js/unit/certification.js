@@ -2,7 +2,7 @@
 
 import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { instant, number } from "../core/format.js";
+import { dated, instant, number } from "../core/format.js";
 import { actButton, chip, factList, notice, table, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { show } from "../core/router.js";
@@ -240,8 +240,8 @@ const largestUncertainty = ([axis, found]) => [
 export function certificationTable(history) {
   return table(
     [
-      { title: "When", cell: (act) => instant(act.at) },
-      { title: "What", cell: (act) => `${act.act} version ${act.version}` },
+      { title: "When", cell: (act) => h("span", { class: "nowrap" }, dated(act.at)) },
+      { title: "What", cell: (act) => h("span", { class: "nowrap" }, `${act.act} version ${act.version}`) },
       {
         title: "Verdict",
         cell: (act) =>

@@ -29,12 +29,11 @@ const MIN_SHARE = 0.1;
 /** @typedef {readonly (number | null)[]} Values */
 
 /**
- * The largest share of the combined uncertainty that a source has; where nothing is combined, its largest value.
+ * The largest share that a source has of a whole.
  * @param {Values} values
- * @param {Values} combined
+ * @param {Values} whole the combined uncertainty, place by place; where it is not known, that of the known sources
  */
-const shareOf = (values, combined) =>
-  Math.max(0, ...values.map((value, k) => Math.abs(value ?? 0) / (combined[k] || 1)));
+const shareOf = (values, whole) => Math.max(0, ...values.map((value, k) => Math.abs(value ?? 0) / (whole[k] || 1)));
 
 /**
  * The root of the sum of squares of some sources, place by place; null where none of them is known.
@@ -55,8 +54,10 @@ function together(several) {
  * @returns {{ name: string, y: Values, nr: number | null }[]}
  */
 function sourcesOf(lines) {
+  const ofKnown = together(Object.values(lines.contributions));
+  const whole = ofKnown.map((value, k) => lines.combined[k] ?? value);
   const known = Object.entries(lines.contributions)
-    .map(([name, y], nr) => ({ name: idText(name), y, nr, share: shareOf(y, lines.combined) }))
+    .map(([name, y], nr) => ({ name: idText(name), y, nr, share: shareOf(y, whole) }))
     .filter(({ y }) => y.some((value) => value !== null));
   const bySize = [...known].sort((a, b) => b.share - a.share);
   const named = bySize.filter(({ share }, k) => k < MAX_NAMED && share >= MIN_SHARE);

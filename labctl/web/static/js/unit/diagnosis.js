@@ -2,11 +2,11 @@
 
 import { get, post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { idText } from "../core/format.js";
+import { idText, inWords } from "../core/format.js";
 import { actButton, cardWithHeader, chip, table, withCommands } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { askBenchClear, askingButton } from "../bench/actions.js";
-import { diagnosisState, lineOfRound, suspectColumns } from "./diagnosis_rounds.js";
+import { diagnosisState, effectsOfRounds, lineOfRound, suspectColumns } from "./diagnosis_rounds.js";
 
 /** @import { Diagnosis } from "../../../types/api.js" */
 
@@ -45,7 +45,8 @@ const explanation = () =>
 function rounds(diagnosis) {
   const { text, kind } = diagnosisState(diagnosis);
   const columns = suspectColumns(diagnosis.rounds);
-  const lines = diagnosis.rounds.map((round) => lineOfRound(round, columns));
+  const ids = effectsOfRounds(diagnosis.rounds);
+  const lines = diagnosis.rounds.map((round) => lineOfRound(round, columns, ids));
   return h(
     "div",
     { class: "stack" },
@@ -55,7 +56,7 @@ function rounds(diagnosis) {
       chip(text, kind),
       ` version ${diagnosis.version} on bench ${diagnosis.bench}, ${diagnosis.spent_hours.toFixed(1)} h of ${diagnosis.hours} h on the bench`,
     ),
-    diagnosis.why ? h("p", { class: "strong" }, diagnosis.why) : null,
+    diagnosis.why ? h("p", { class: "strong" }, inWords(diagnosis.why, ids)) : null,
     lines.length
       ? table(
           [

@@ -1,6 +1,6 @@
 // What is shown of the rounds of a diagnosis; no DOM here.
 
-import { capitalised, idText, instant, probabilityText } from "../core/format.js";
+import { capitalised, idText, instant, inWords, probabilityText } from "../core/format.js";
 
 /** @import { Diagnosis, DiagnosisRound } from "../../../types/api.js" */
 
@@ -61,11 +61,19 @@ export function suspectColumns(rounds) {
 }
 
 /**
+ * The ids of all effects that the rounds speak of.
+ * @param {readonly Pick<DiagnosisRound, "named" | "suspects">[]} rounds
+ */
+export const effectsOfRounds = (rounds) =>
+  rounds.flatMap(({ named, suspects }) => [...named, ...Object.keys(suspects)]);
+
+/**
  * The cells of a round.
  * @param {Pick<DiagnosisRound, "spent_hours" | "verdict" | "named" | "suspects" | "why" | "came_text">} round
  * @param {readonly string[]} columns
+ * @param {readonly string[]} [ids] of the effects that its texts name
  */
-export function lineOfRound(round, columns) {
+export function lineOfRound(round, columns, ids = effectsOfRounds([round])) {
   return {
     hours: round.spent_hours.toFixed(1),
     verdict: round.named.length ? `${round.verdict}: ${round.named.map(idText).join(", ")}` : round.verdict,
@@ -73,8 +81,8 @@ export function lineOfRound(round, columns) {
       const probability = round.suspects[effect];
       return probability === undefined ? "–" : probabilityText(probability);
     }),
-    experiment: sentence(round.why),
-    result: sentence(round.came_text),
+    experiment: sentence(inWords(round.why, ids)),
+    result: sentence(inWords(round.came_text, ids)),
   };
 }
 

@@ -18,8 +18,6 @@ export class Problem extends Error {
     this.warnings = document.warnings;
     /** @type {string[] | undefined} */
     this.problems = document.problems;
-    /** @type {{ fact: string, where: string }[]} facts that a certificate needs */
-    this.missing = document.missing ?? [];
   }
 }
 

@@ -1,7 +1,7 @@
 // Compare, for a recording at rest, in turns, of a profile or in poses: the version without refitting beside it.
 
 import { get } from "../../core/http/api.js";
-import { h } from "../../core/elements.js";
+import { h, setChildren } from "../../core/elements.js";
 import { cardWithHeader, loadInto } from "../../core/components.js";
 import { motionView } from "../../motions/view.js";
 
@@ -24,7 +24,7 @@ export function motionComparison(state, signal) {
         query: { recording: state.recording },
         signal,
       });
-      source.textContent = `Model: ${found.source}.${leftOut(state.calibration.left_out)}`;
+      setChildren(source, `Model: ${found.source}.${leftOut(state.calibration.left_out)}`);
       return motionView(found, state.axis);
     });
   shown();

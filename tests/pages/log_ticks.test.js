@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { ticksOf } from "../../labctl/web/static/js/explore/ladder_ticks.js";
+import { ticksOf } from "../../labctl/web/static/js/core/log_ticks.js";
 
 /** @type {Record<string, readonly number[]>} the digits that Plotly names for a choice */
 const DIGITS = { D1: [1, 2, 3, 4, 5, 6, 7, 8, 9], D2: [1, 2, 5] };

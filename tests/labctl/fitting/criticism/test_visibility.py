@@ -1,0 +1,41 @@
+"""Which effects a schedule can show: not one that would have to be larger than it can be."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from labctl.fitting.criticism import effect_visibilities, visibility
+from labctl.fitting.criticism.ranking import FARTHEST, largest_physical
+from labctl.services.planning.loading import limits_of, load_bench, load_recipe
+from labctl.services.simulation.visibility import planned_schedule
+from procedures.planning.plan import make_plan
+
+
+@pytest.mark.parametrize(
+    ("effect", "unit", "technology", "largest"),
+    [
+        ("dead_band", "1", "mems", 1.0),  # a part of a whole: 100 %
+        ("missed_steps", "1", "fog", 1.0),
+        ("misalignment", "1", "mems", FARTHEST * 0.02),
+        ("bias", "deg/s", "mems", FARTHEST * 3.0),
+        ("sine_response", "(rad/(rad/s))^2", "mems", 0.0),  # of interferometers only
+        ("rate_temperature_surface", "deg/s", "mems", math.inf),  # no range is known
+    ],
+)
+def test_no_effect_is_larger_than_it_can_be(effect: str, unit: str, technology: str, largest: float) -> None:
+    assert largest_physical(effect, unit, technology) == pytest.approx(largest)
+
+
+def test_a_size_beyond_what_is_physical_is_not_detectable() -> None:
+    bench = load_bench("single-axis-sim")
+    schedule = planned_schedule(make_plan(load_recipe("short"), limits_of(bench)), bench)
+    found = {each.effect: each for each in effect_visibilities(schedule)}
+    hidden = found["dead_band"]  # the slowest rate of the recipe is far above any dead band
+    assert (hidden.visible, hidden.why, hidden.unit) == (False, "size", "1")
+    assert hidden.smallest_size is not None
+    assert hidden.smallest_size > 1.0  # more than the whole band
+    assert hidden.share > visibility.MIN_VISIBLE  # the schedule alone would not hide it
+    assert hidden.experiment
+    assert found["scale_factor_asymmetry"].visible
