@@ -65,6 +65,12 @@ export function trendCard(serial, rows, signal) {
   return cardWithHeader("Over the years", choose, place);
 }
 
+/** Why the error of a version on its own recording is larger here than the RMS of its fit. */
+const AS_APPLIED =
+  "The RMS errors are those of the version applied without refitting: they include what the Earth's rate adds while the " +
+  "table turns, and the angles of fixture and table, which a fit estimates beside the model. The RMS error of the fit under " +
+  "Calibrations is without them.";
+
 /**
  * @param {string} serial
  * @param {Trend} trend
@@ -75,6 +81,7 @@ function shown(serial, trend) {
   const turned = trend.drifts.some((drift) => drift.what === "scale_factor");
   return [
     trend.text.map((line) => h("p", {}, inWords(line, ["scale_factor"]))),
+    trend.drifts.length ? h("p", { class: "muted small" }, AS_APPLIED) : null,
     trend.drifts.length
       ? h(
           "div",
