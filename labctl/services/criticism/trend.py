@@ -109,7 +109,7 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
         undated=[row.id for row in undated],
         text=[
             *_text(drifts, len(points)), *occasions_text(occasions, drifted=bool(drifts)),
-            *_leaving_text(leaves, limit), *undated_text(undated),
+            *_leaving_text(leaves, drifts, limit), *undated_text(undated),
         ],
     )  # fmt: skip
 
@@ -298,7 +298,8 @@ def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
             yield f"{text}: {is_drift} {per_year} (95 %: {shown.number(drift.low)} to {shown.number(drift.high)})."
 
 
-def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[str]:
+def _leaving_text(leaves: Sequence[Leaving], drifts: Sequence[Drift], limit: float | None) -> Iterator[str]:
+    drifting = {drift.axis for drift in drifts if drift.what == "bias" and (drift.significant or drift.u is None)}
     for each in leaves:
         if each.outside:
             yield f"Axis {each.axis}: the bias is already outside {limit:.3g} deg/s at the newest recording."
@@ -307,6 +308,10 @@ def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[st
             name: f"{value:%Y-%m-%d}" if value else "not within 50 years"
             for name, value in (("expected", each.expected), ("earliest", each.earliest), ("latest", each.latest))
         }
+        if each.axis not in drifting:  # the date at which a line of no known sign passes a limit means nothing
+            first = f"not before {when['earliest']}" if each.earliest else when["earliest"]
+            yield f"Axis {each.axis}: by this uncertainty the bias passes the limit of {limit:.3g} deg/s {first} (95 %)."
+            continue
         yield (
             f"Axis {each.axis}: the bias passes the limit of {limit:.3g} deg/s: expected {when['expected']}, earliest "
             f"{when['earliest']}, latest {when['latest']}."

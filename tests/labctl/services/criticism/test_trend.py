@@ -18,11 +18,11 @@ YEAR_DAYS = 365.25
 DRIFT_DPS_PER_YEAR = 0.02
 
 
-def lab_over_years(folder: Path, years: int) -> Lab:
+def lab_over_years(folder: Path, years: int, drift_dps_per_year: float = DRIFT_DPS_PER_YEAR) -> Lab:
     """Return a database with one recording a year of a unit whose bias drifts, each year shifted a little by chance."""
     rng, lab = np.random.default_rng(8), Lab(folder)
     for year in range(years):
-        shift = DRIFT_DPS_PER_YEAR * year + rng.normal(0, 1e-3)
+        shift = drift_dps_per_year * year + rng.normal(0, 1e-3)
         write_recording(recording_of_day(rng, YEAR_DAYS * year, bias_shift_dps=shift), folder / f"year-{year}")
         lab.run("import", str(folder / f"year-{year}"))
         lab.run("fit", "J-1", "--effects", ",".join(EFFECTS))
@@ -55,6 +55,9 @@ def test_the_drift_of_a_unit_is_found_with_its_uncertainty_and_when_it_leaves_it
     (leaves,) = found["leaves"]
     assert leaves["earliest"] < leaves["expected"] < leaves["latest"]
     assert leaves["expected"].startswith("2033")  # 0.15 deg/s at 0.02 deg/s a year, from 2026 on
+    assert any(
+        line.startswith("Axis z: the bias passes the limit of 0.15 deg/s: expected 2033-") for line in found["text"]
+    )
     said = lab.run("trend", "J-1").stdout
     assert "Axis z, bias: drifts by 0.02 deg/s/year (95 %:" in said
     assert "Axis z, scale_factor: no drift beyond repeatability" in said
@@ -94,6 +97,23 @@ def test_a_bias_that_is_outside_its_limit_is_said_to_be_outside_already(five_yea
     expected = lab.json("verify", "J-1", "--version", str(joint["version"]), "--recording", "1")["expected_dps"]
     limit = lab.json("trend", "J-1", "--version", str(joint["version"]))["limit_dps"]
     assert limit == pytest.approx(2 * expected)  # what `verify` accepts of a version of several recordings
+
+
+def test_a_drift_that_is_not_significant_has_no_expected_date_in_the_text(tmp_path: Path) -> None:
+    found = lab_over_years(tmp_path, 3, 0.0).json("trend", "J-1", "--limit-dps", "0.02")
+    (bias,) = (each for each in found["drifts"] if each["what"] == "bias")
+    (leaves,) = found["leaves"]
+    assert not bias["significant"]
+    # the first crossing of the limit by the interval of the line is what the text states
+    at = [datetime.fromisoformat(each).timestamp() for each in bias["line"]["at"]]
+    crossing = [
+        np.interp(0.02, bias["line"]["high"], at),
+        np.interp(0.02, [-low for low in bias["line"]["low"]], at),
+    ]
+    assert datetime.fromisoformat(leaves["earliest"]).timestamp() == pytest.approx(min(crossing), abs=5e6)
+    said = f"Axis z: by this uncertainty the bias passes the limit of 0.02 deg/s not before {leaves['earliest'][:10]} (95 %)."
+    assert said in found["text"]
+    assert not any("expected" in line for line in found["text"])
 
 
 @pytest.mark.slow

@@ -106,6 +106,8 @@ function drifts(trend) {
     const each = leaves.get(row.axis);
     if (row.what !== "bias" || !each) return "–";
     if (each.outside) return chip("outside already", "bad");
+    if (row.u !== null && !row.significant)
+      return each.earliest ? `not before ${day(each.earliest)} (95 %)` : "not within 50 years";
     if (!each.expected) return "not within 50 years";
     const between = `${day(each.earliest)} to ${each.latest ? day(each.latest) : "not within 50 years"}`;
     return [day(each.expected), each.earliest ? h("div", { class: "muted small" }, `95 %: ${between}`) : null];
