@@ -310,7 +310,8 @@ def _leaving_text(leaves: Sequence[Leaving], drifts: Sequence[Drift], limit: flo
         }
         if each.axis not in drifting:  # the date at which a line of no known sign passes a limit means nothing
             first = f"not before {when['earliest']}" if each.earliest else when["earliest"]
-            yield f"Axis {each.axis}: by this uncertainty the bias passes the limit of {limit:.3g} deg/s {first} (95 %)."
+            passes = f"by this uncertainty the bias passes the limit of {limit:.3g} deg/s"
+            yield f"Axis {each.axis}: {passes} {first} (95 %)."
             continue
         yield (
             f"Axis {each.axis}: the bias passes the limit of {limit:.3g} deg/s: expected {when['expected']}, earliest "
