@@ -89,10 +89,11 @@ class Visibility(ResponseModel):
         "larger than the effect can be.",
     )
     unit: str = Field(default="", description="Unit of `smallest_size`; empty: none.")
-    why: Literal["channel", "schedule", "size"] | None = Field(
+    why: Literal["channel", "schedule", "size", "technology"] | None = Field(
         default=None,
-        description="What hides the effect: a channel that is not logged; the schedule; or its size, where the "
-        "schedule shows it only from a size on that it cannot have; null: it is visible.",
+        description="What hides the effect: a channel that is not logged; the schedule; its size, where the "
+        "schedule shows it only from a size on that it cannot have; or the technology of the gyro, which does not "
+        "have the effect; null: it is visible.",
     )
     needs: list[str] = Field(default_factory=list, description="Channels that would have to be logged; empty: none.")
     experiment: str = Field(

@@ -63,9 +63,11 @@ def print_plan(answer: PlanResponse) -> None:
 
 
 def _hidden_by(line: Visibility) -> str:
-    """Return why a plan cannot detect an effect: the channel, the schedule, or how large it would have to be."""
+    """Return why a plan cannot detect an effect: channel, schedule, technology, or how large it would have to be."""
     if line.why == "channel":
         return f"no channel {', '.join(line.needs)}"
+    if line.why == "technology":
+        return "the technology of the gyro, which does not have it"
     if line.why == "size":
         shown = shown_unit(line.unit, line.effect)
         return f"its size: {format_number(shown.scaled(line.smallest_size), 2)} {shown.unit} would be needed"

@@ -57,7 +57,7 @@ class EffectVisibility:
     share: float  #: of the effect, that the model beside it does not absorb, 0 to 1
     smallest_size: float | None = None  #: just detectable, in `unit`; where `why` is "size": more than it can be
     unit: str = ""
-    why: Literal["channel", "schedule", "size"] | None = None  #: what hides it
+    why: Literal["channel", "schedule", "size", "technology"] | None = None  #: what hides it, or why there is none
     needs: tuple[str, ...] = ()  #: channels that are not logged
     experiment: str = ""  #: what would show it
 
@@ -119,8 +119,10 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
         return EffectVisibility(effect_id, False, share, why="schedule", experiment=CATALOGUE[effect_id].experiment)
     unit_symbol = next(iter(sizes), "")  # of the lowest order that is visible
     smallest = sizes.get(unit_symbol)
-    technology = schedule.data.info.technology or ""
-    if smallest is not None and smallest > largest_physical(effect_id, unit_symbol, technology):
+    largest = largest_physical(effect_id, unit_symbol, schedule.data.info.technology or "")
+    if largest == 0:
+        return EffectVisibility(effect_id, False, share, why="technology")
+    if smallest is not None and smallest > largest:
         experiment = CATALOGUE[effect_id].experiment
         return EffectVisibility(effect_id, False, share, smallest, unit_symbol, "size", experiment=experiment)
     return EffectVisibility(effect_id, True, share, smallest, unit_symbol)

@@ -16900,9 +16900,9 @@ export interface components {
             unit: string;
             /**
              * Why
-             * @description What hides the effect: a channel that is not logged; the schedule; or its size, where the schedule shows it only from a size on that it cannot have; null: it is visible.
+             * @description What hides the effect: a channel that is not logged; the schedule; its size, where the schedule shows it only from a size on that it cannot have; or the technology of the gyro, which does not have the effect; null: it is visible.
              */
-            why: ("channel" | "schedule" | "size") | null;
+            why: ("channel" | "schedule" | "size" | "technology") | null;
             /**
              * Needs
              * @description Channels that would have to be logged; empty: none.

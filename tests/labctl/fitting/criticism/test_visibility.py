@@ -28,6 +28,15 @@ def test_no_effect_is_larger_than_it_can_be(effect: str, unit: str, technology: 
     assert largest_physical(effect, unit, technology) == pytest.approx(largest)
 
 
+def test_an_effect_that_the_technology_does_not_have_needs_no_experiment() -> None:
+    bench = load_bench("triaxial-sim")  # of MEMS gyros
+    schedule = planned_schedule(make_plan(load_recipe("short"), limits_of(bench)), bench)
+    found = {each.effect: each for each in effect_visibilities(schedule)}
+    sine = found["sine_response"]  # of interferometers
+    assert (sine.visible, sine.why, sine.experiment, sine.smallest_size) == (False, "technology", "", None)
+    assert [each.effect for each in found.values() if each.why == "technology"] == ["sine_response"]
+
+
 def test_a_size_beyond_what_is_physical_is_not_detectable() -> None:
     bench = load_bench("single-axis-sim")
     schedule = planned_schedule(make_plan(load_recipe("short"), limits_of(bench)), bench)

@@ -17,13 +17,21 @@ const effectLink = (row) => h("a", { href: `/effects/${row.effect}` }, idText(ro
 const smallestSize = ({ effect, smallest_size, unit }) => sizeText(smallest_size, unit, effect);
 
 /**
- * Why the schedule cannot show an effect.
+ * Why a plan cannot show an effect.
  * @param {Visibility} row
  */
-const unseenText = (row) =>
-  row.why === "size"
-    ? `not detectable by this plan: the effect would have to be ${smallestSize(row)}, which is more than this type of gyro can have`
-    : "this schedule does not distinguish the effect from other effects";
+function unseenText(row) {
+  switch (row.why) {
+    case "channel":
+      return `needs ${row.needs.map(channelName).join(", ")}, which is not logged`;
+    case "technology":
+      return "gyros of this technology do not have it";
+    case "size":
+      return `not detectable by this plan: the effect would have to be ${smallestSize(row)}, which is more than this type of gyro can have`;
+    default:
+      return "this schedule does not distinguish the effect from other effects";
+  }
+}
 
 /** @param {readonly Visibility[]} rows */
 export function visibilityReport(rows) {
@@ -62,13 +70,10 @@ export function visibilityReport(rows) {
             {
               title: "Reason, and which experiment would detect it",
               prose: true,
-              cell: (row) =>
-                row.why === "channel"
-                  ? `needs ${row.needs.map(channelName).join(", ")}, which is not logged`
-                  : [
-                      h("span", {}, unseenText(row)),
-                      row.experiment ? h("span", { class: "muted small secondary" }, `Try: ${row.experiment}`) : null,
-                    ],
+              cell: (row) => [
+                h("span", {}, unseenText(row)),
+                row.experiment ? h("span", { class: "muted small secondary" }, `Try: ${row.experiment}`) : null,
+              ],
             },
           ],
           unseen,
