@@ -176,6 +176,8 @@ test("effects in a sentence of the service are written as their links are", () =
     "adding scale factor odd, not bias_temperature: `labctl improve A --add scale_factor_odd`",
   );
   assert.equal(format.inWords("scale_factor.", ids), "scale factor.");
+  assert.equal(format.inWords("Missing: scale_factor (Scale factor).", ids), "Missing: scale factor.");
+  assert.equal(format.inWords("scale_factor_odd (Cubic error) or more", ids), "scale factor odd (Cubic error) or more");
   assert.equal(format.inWords("nothing", []), "nothing");
 });
 

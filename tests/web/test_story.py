@@ -27,7 +27,7 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     page.get_by_label("Model", exact=True).select_option("ojeda2000")
     page.get_by_role("button", name="Fit").click()
     verdict = page.get_by_role("region", name="Verdict")
-    expect(verdict).to_contain_text("Missing: scale_factor_asymmetry")
+    expect(verdict).to_contain_text("Missing: scale factor asymmetry.")
 
     learn = page.get_by_role("region", name="Which effects are missing")
     learn.get_by_role("button", name="Draw").first.click()
