@@ -38,6 +38,7 @@ def _number(value: float | None) -> str:
 
 def _errors(error: CriticisedErrors) -> str:
     figures = (
+        *([("as applied to the output", direct)] if (direct := error["direct_form_rms_dps"]) is not None else []),
         ("residual RMS", error["rms_dps"]),
         ("at temperatures left out of the fit", error["heldout_rms_dps"]),
         ("noise floor", error["noise_floor_dps"]),

@@ -52,8 +52,12 @@ def print_criticism(answer: CriticismResponse) -> None:
         console.print(line, style="bold" if line is answer.text[0] else None, soft_wrap=prints_all)
     error = answer.error
     of = ", ".join(map(str, answer.recordings or [answer.recording]))
+    direct = error["direct_form_rms_dps"]
+    residual = (
+        "residual" if direct is None else f"residual {format_number(direct)} as applied to the output, compared as"
+    )
     console.print(
-        f"{answer.serial} version {answer.version}, recording {of}: residual "
+        f"{answer.serial} version {answer.version}, recording {of}: {residual} "
         f"{format_number(error['rms_dps'])} deg/s RMS, "
         f"held-out {format_number(error['heldout_rms_dps'])}, noise floor {format_number(error['noise_floor_dps'])}",
         style="dim",

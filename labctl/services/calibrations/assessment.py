@@ -32,7 +32,7 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
     """
     row = store.calibrations.get(store.units.get(serial).serial, version)
     criticism, reason, unusable = _criticised(store, row)
-    objections = [*unusable, *_of_verdict(criticism), *_of_errors(store, row), *_of_data(store, row)]
+    objections = [*unusable, *_of_verdict(criticism, _errors(row)), *_of_errors(store, row), *_of_data(store, row)]
     objections += _of_standards(store, row)
     due_days, due_from = interval_days(store, serial, version, None)
     return AssessmentResponse(
@@ -81,17 +81,16 @@ def _sentence(criticism: CriticismResponse) -> str:
     return criticism.text[len(criticism.warnings)]
 
 
-def _of_verdict(criticism: CriticismResponse | None) -> Iterator[Objection]:
-    """Yield the objection of a verdict by which the model lacks something."""
+def _of_verdict(criticism: CriticismResponse | None, error: CertifiedErrors) -> Iterator[Objection]:
+    """Yield the objection of a verdict by which the model lacks something; its figures are those of the version."""
     if criticism is None or not _lacks_something(criticism):
         return
-    error = criticism.error
     figures = ", ".join(
         f"{name} {figure:.4g} deg/s"
         for name, figure in (
-            ("RMS error", error["rms_dps"]),
-            ("held-out", error["heldout_rms_dps"]),
-            ("noise floor", error["noise_floor_dps"]),
+            ("RMS error", error.rms_dps),
+            ("held-out", error.heldout_rms_dps),
+            ("noise floor", error.noise_floor_dps),
         )
         if figure is not None
     )

@@ -172,7 +172,9 @@ def test_which_verdicts_speak_against_a_version(
         known = assess(store, FOG, 1)
     assert (known.verdict, known.override_needed) == (verdict, refused)
     if refused:
-        assert "(RMS error 0.05 deg/s, noise floor 0.01 deg/s): So it is" in known.objections[0]["text"]
+        # the figures are those of the version, which the answer has too, and not of its model refitted for the verdict
+        stated = f"(RMS error {known.error.rms_dps:.4g} deg/s, held-out {known.error.heldout_rms_dps:.4g} deg/s, noise "
+        assert stated + f"floor {known.error.noise_floor_dps:.4g} deg/s): So it is" in known.objections[0]["text"]
 
 
 def test_a_version_whose_fit_was_worse_than_none_is_refused(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:

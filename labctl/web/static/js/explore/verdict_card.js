@@ -1,7 +1,7 @@
 // The verdict in words, and the suspected effects with their evidence.
 
 import { scrollTo, setChildren, h } from "../core/elements.js";
-import { inWords, withUncertainty, number, oddsText, probabilityText, idText } from "../core/format.js";
+import { inWords, withUncertainty, number, oddsText, probabilityText, idText, isNumber } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader } from "../core/components.js";
 import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
@@ -60,6 +60,8 @@ export function verdictCard(state, effects) {
   const [first, ...others] = criticism.text.filter((line) => !of.has(line)).map((line) => inWords(line, ids));
   const { error, noise } = criticism;
   const ratio = (error.rms_dps ?? NaN) / (error.noise_floor_dps ?? NaN);
+  const ofFloor = Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null;
+  const isDirect = isNumber(error.direct_form_rms_dps);
   return h(
     "section",
     { class: `card stack verdict ${kind}`, "aria-label": "Verdict" },
@@ -73,15 +75,22 @@ export function verdictCard(state, effects) {
     h("p", { class: "verdict-statement" }, first),
     others.map((line) => h("p", { class: "muted" }, line)),
     factList([
+      isDirect
+        ? ["RMS residual of the model as it corrects the output", number(error.direct_form_rms_dps), "deg/s"]
+        : null,
       [
-        "RMS residual of the fitted model",
+        isDirect ? "RMS residual as a law of the true rate" : "RMS residual of the fitted model",
         number(error.rms_dps),
         "deg/s",
-        Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null,
+        isDirect ? [ofFloor, "effects are compared in this form"].filter(Boolean).join("; ") : ofFloor,
       ],
       error.heldout_rms_dps === null
         ? null
-        : [`RMS ${heldOutName(state.motion)} of the fit`, number(error.heldout_rms_dps), "deg/s"],
+        : [
+            `RMS ${heldOutName(state.motion)} of ${isDirect ? "this law" : "the fit"}`,
+            number(error.heldout_rms_dps),
+            "deg/s",
+          ],
       ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s", FLOORS[error.noise_floor_source] ?? null],
       noise.drift_dps === null
         ? null
