@@ -52,4 +52,8 @@ test("the reference temperature and the parameters of effects are said beside th
     termsText(/** @type {any} */ ({ axes: { z: { coefficients } }, model, reference_temperature_c: 36 }));
   assert.equal(said({ c_r1_t1: {} }), "T_ref is 36 deg C; saturation: knee 82.87 deg/s.");
   assert.equal(said({ bias: {} }), "saturation: knee 82.87 deg/s.");
+  // a law that is fitted: k is where it was tried, and the coefficients have what the fit found
+  const sine = { terms: [term("sine_response", { k: 0.67, k_squared_z: 0.064 })] };
+  const coefficients = { bias: {}, k: {}, k_squared: {} };
+  assert.equal(termsText(/** @type {any} */ ({ axes: { z: { coefficients } }, model: sine })), "");
 });

@@ -91,12 +91,16 @@ export function termsText({ axes, model, reference_temperature_c }) {
   const reference = names.some((name) => /_t\d$/.test(name))
     ? [`T_ref is ${plainNumber(reference_temperature_c)} deg C`]
     : [];
+  /** @param {string} name */
+  const isCoefficient = (name) => names.includes(name) || names.includes(name.replace(/_[xyz]$/, ""));
   const parameters = (model.terms ?? []).flatMap(({ effect, parameters: own }) =>
-    Object.entries(own).map(([name, value]) => {
-      const [, words = name, end = ""] = /^(.*)_([a-z]+)$/.exec(name) ?? [];
-      const unit = PARAMETER_UNITS[end];
-      return `${idText(effect)}: ${idText(unit ? words : name)} ${plainNumber(value)}${unit ? ` ${unit}` : ""}`;
-    }),
+    Object.entries(own)
+      .filter(([name]) => !isCoefficient(name)) // where its law is fitted, a shape is only where it was tried
+      .map(([name, value]) => {
+        const [, words = name, end = ""] = /^(.*)_([a-z]+)$/.exec(name) ?? [];
+        const unit = PARAMETER_UNITS[end];
+        return `${idText(effect)}: ${idText(unit ? words : name)} ${plainNumber(value)}${unit ? ` ${unit}` : ""}`;
+      }),
   );
   const said = [...reference, ...parameters].join("; ");
   return said && `${said}.`;
