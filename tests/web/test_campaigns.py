@@ -166,6 +166,30 @@ def test_a_plan_says_what_further_mountings_are_worth(tmp_path: Path, chromium: 
         serving.stop()
 
 
+@pytest.mark.slow
+def test_a_plan_for_a_unit_without_a_bench_says_that_another_unit_is_simulated(
+    tmp_path: Path, chromium: Browser
+) -> None:
+    from playwright.sync_api import expect
+
+    serving = Service(tmp_path, bench=None)
+    serving.start()
+    try:
+        page = chromium.new_page()
+        page.goto(f"{serving.url}/campaigns/new?recipe=short&unit=OSU-FOG-2024")
+        expect(
+            page.get_by_text("This experiment is for OSU-FOG-2024, and this service drives no bench.")
+        ).to_be_visible()
+        page.get_by_role("button", name="Simulate the recording").click()
+        page.wait_for_url("**/explore?**recording=1**")
+        (made,) = serving.get("/api/recordings")
+        assert made["serial"] != "OSU-FOG-2024"
+        expect(page.get_by_text(f"Recording 1 of the simulated unit {made['serial']}")).to_be_visible()
+        page.close()
+    finally:
+        serving.stop()
+
+
 def test_what_the_bench_cannot_do_is_refused_or_left_out(visit: Callable[..., Page], faults: Faults) -> None:
     from playwright.sync_api import expect
 

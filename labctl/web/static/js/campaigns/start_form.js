@@ -109,7 +109,7 @@ export function startForm(bench, order) {
   }
   async function simulated() {
     const made = await post("/api/recordings/simulated", { body: { ...order(), seed: Number(seed.value) } });
-    toast("good", `Recording ${made.recording}: ${made.datasets} data sets.`);
+    toast("good", `Recording ${made.recording} of the simulated unit ${made.serial}: ${made.datasets} data sets.`);
     await navigate(`/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}`);
   }
   /** @param {Bench} there */
@@ -158,7 +158,7 @@ export function startForm(bench, order) {
       h(
         "p",
         { class: "muted" },
-        "Simulates a recording of this plan and imports it immediately. No bench moves, and no campaign is stored.",
+        "Simulates a recording of this plan by a simulated unit, and imports it immediately. No bench moves, no real unit is measured, and no campaign is stored.",
       ),
       labelledField("Seed", seed, "Seed of the random numbers; the same seed gives the same recording."),
       h("div", { class: "row" }, actButton("Simulate the recording", simulated, { kind: "primary large" })),

@@ -221,9 +221,9 @@ function nextSteps(given, criticism) {
         "a",
         {
           class: `button ${isEnd ? "" : "primary"}`,
-          href: plan ? planAddress(plan, given.unit.serial) : "/campaigns/new",
+          href: planAddress(plan ?? "", given.unit.serial),
         },
-        "Next experiment",
+        plan ? "Next experiment" : "Plan a campaign",
       ),
     ),
   ];

@@ -31,7 +31,13 @@ const TURNS_TELL =
  * @param {Bench | null} bench
  */
 function absentNotice(unit, bench) {
-  if (!unit || !bench || bench.units.some(({ serial }) => serial === unit)) return null;
+  if (!unit || bench?.units.some(({ serial }) => serial === unit)) return null;
+  if (!bench)
+    return notice(
+      "warn",
+      h("strong", {}, `This experiment is for ${unit}, and this service drives no bench. `),
+      `What is simulated here is another, simulated unit: it says nothing of ${unit}. To measure ${unit}, start labctl with its bench (labctl serve --bench FILE).`,
+    );
   const there = bench.units.map(({ serial }) => serial).join(", ") || "no unit";
   return notice(
     "warn",
