@@ -210,7 +210,15 @@ function nextSteps(given, criticism) {
     notice(
       isEnd ? "good" : "warn",
       h("p", {}, h("strong", {}, criticism.text[0])),
-      isEnd ? h("p", {}, "These data say nothing more: no effect of the catalogue has evidence in them.") : null,
+      isEnd
+        ? h(
+            "p",
+            {},
+            criticism.why_not_named
+              ? "These data say nothing more that can be relied on; see the suspects that are not named."
+              : "These data say nothing more: no effect of the catalogue has evidence in them.",
+          )
+        : null,
       unknownCauses(criticism),
     ),
     h(
