@@ -205,6 +205,10 @@ class MissingFactResponse(ResponseModel):
     table: OrderTable | None = Field(
         description="Table of the order that can state it (`order.laboratory`, ...); null: the order cannot."
     )
+    key: str = Field(default="", description="Its key in that table; empty: the order cannot state it, or has several.")
+    remedy: str = Field(
+        default="", description="What a person does where the order cannot state it, in a sentence; else empty."
+    )
 
 
 class SignatoryResponse(ResponseModel):

@@ -74,9 +74,9 @@ def test_every_missing_fact_is_named_at_once_and_nothing_is_written(empty: Store
     text = str(refused.value)
     assert f"{len(refused.value.facts)} facts are missing" in text
     assert all(fact in text for fact in facts)
-    assert {"fact": "customer's city", "where": "[customer] of the order", "table": "customer"} in (
-        refused.value.members["missing"]
-    )
+    city = {"fact": "customer's city", "where": "[customer] of the order", "table": "customer", "key": "city"}
+    assert {**city, "remedy": ""} in refused.value.members["missing"]
+    assert all((each.table is None) == bool(each.remedy) == (not each.key) for each in refused.value.facts)
     tables = {each.fact: each.table for each in refused.value.facts}
     assert tables["laboratory's name"] == "laboratory"
     assert tables["name of the method"] == "method"
@@ -177,6 +177,47 @@ def test_a_revoked_version_gets_no_certificate(store: Store) -> None:
 def test_an_item_that_came_after_its_calibration_is_refused(store: Store) -> None:
     with pytest.raises(CertificateRefused, match="received = 2099-01-01 is after the calibration"):
         issue(store, SERIAL, 1, request(item={**ORDER["item"], "received": "2099-01-01"}), AT)
+
+
+@pytest.mark.parametrize(("years", "refused"), [(9, False), (11, True)])
+def test_an_item_that_came_more_than_ten_years_before_its_calibration_is_refused(
+    store: Store, years: int, refused: bool
+) -> None:
+    begun = simulated().info.started_at.date()
+    received = begun.replace(year=begun.year - years, day=1)
+    ordered = request(item={**ORDER["item"], "received": received.isoformat()})
+    if not refused:
+        assert issue(store, SERIAL, 1, ordered, AT).state == "valid"
+        return
+    with pytest.raises(CertificateRefused, match=f"received = {received} is more than 10 years before") as error:
+        issue(store, SERIAL, 1, ordered, AT)
+    assert error.value.members["errors"] == [{"place": ["body", "order", "item", "received"], "text": str(error.value)}]
+    assert rows_of(store) == 0
+
+
+def test_measurements_end_on_the_day_they_begin_unless_the_order_says_more(store: Store) -> None:
+    day = simulated().info.started_at.date()
+    method = {**ORDER["method"], "performed_from": (day - timedelta(days=1)).isoformat()}
+    imported = replace(simulated(), info=simulated().info.model_copy(update={"date_known": False}))
+    version = add_version(store, imported)
+    issue(store, SERIAL, version, request(method={**method, "performed_from": day.isoformat()}), AT)
+    document = json.loads(certificate_file(store, SERIAL, version, "json").content)
+    assert document["performed_from"] == document["performed_until"] == day.isoformat()
+    with pytest.raises(CertificateRefused, match=r"performed_until = .* is before the first day"):
+        issue(store, SERIAL, 1, request(method={**method, "performed_until": "2000-01-01"}), AT)
+
+
+def test_what_the_readings_do_not_show_is_missing_before_the_order_with_what_to_do(empty: Store) -> None:
+    bare = replace(
+        simulated(),
+        info=simulated().info.model_copy(update={"standards": (), "datasheet": {}, "datasheet_conventions": {}}),
+    )
+    add_version(empty, bare, certified=False)
+    remedies = {each.fact: each.remedy for each in missing_facts(empty, SERIAL, 1) if each.table is None}
+    assert "[[standards]]" in remedies["reference standards"]
+    assert "import it again" in remedies["reference standards"]
+    assert "*Certify: put in force*" in remedies["authorisation"]
+    assert "bias_repeatability_dps" in remedies["uncertainty of the repeatability"]
 
 
 def test_a_simulated_bench_gives_a_specimen_that_claims_no_traceability(empty: Store) -> None:
