@@ -30,8 +30,6 @@ from labctl.store import CertificateRow, Store, Withdrawal
 
 #: An item comes at most so long before it is measured, ten years: an earlier date is a slip, such as 1900-01-01.
 MAX_BEFORE_MEASUREMENT = timedelta(days=3653)
-#: Where a request states the date of receipt.
-RECEIVED = ("order", "item", "received")
 
 
 class CertificateRefused(Conflict):
@@ -39,14 +37,20 @@ class CertificateRefused(Conflict):
 
     slug = "certificate-refused"
 
-    def __init__(self, text: str, place: Sequence[str] = ()) -> None:
+    def __init__(self, text: str, errors: Sequence[JsonObject] = ()) -> None:
         super().__init__(text)
-        self.place = place  #: where the body of the request states what is refused; empty: nowhere
+        self.errors = list(errors)  #: what is wrong with keys of the order, as errors of requests say it
+
+    @classmethod
+    def of_key(cls, table: str, key: str, words: str) -> CertificateRefused:
+        """Return the refusal of what a key of the order states; `words` begin with its value."""
+        place: JsonObject = {"place": ["body", "order", table, key], "text": words}
+        return cls(f"[{table}] of the order: {key} = {words}", [place])
 
     @property
     def members(self) -> JsonObject:
-        """Where the request states what is refused, as errors of requests say it."""
-        return {"errors": [{"place": ["body", *self.place], "text": str(self)}]} if self.place else {}
+        """What is wrong with keys of the order, each with its place in the request."""
+        return {"errors": [*self.errors]} if self.errors else {}
 
 
 def issue(store: Store, serial: str, version: int, request: CertificateRequest, at: datetime) -> CertificateResponse:
@@ -149,11 +153,8 @@ def _refuse_dates(facts: Facts) -> None:
     if first is None or last is None:
         return
     if last < first:
-        raise CertificateRefused(
-            f"[method] of the order: performed_until = {last} is before the first day of the measurements of "
-            f"{facts.what}, {first}; correct the dates",
-            ("order", "method", "performed_until"),
-        )
+        words = f"{last} is before the first day of the measurements of {facts.what}, {first}; correct the dates"
+        raise CertificateRefused.of_key("method", "performed_until", words)
     _refuse_receipt(facts, first)
     if bad := [standard for standard in facts.standards if _off(standard, first, last)]:
         text = "; ".join(f"{each.label}: calibrated {each.calibrated or 'not stated'}, due {each.due}" for each in bad)
@@ -167,17 +168,11 @@ def _refuse_receipt(facts: Facts, first: date) -> None:
     """Raise CertificateRefused for an item that came after its first day of measurement, or long before."""
     received = facts.order.item.received
     if received is not None and received > first:
-        raise CertificateRefused(
-            f"[item] of the order: received = {received} is after the calibration of {facts.what} began, {first}; "
-            "correct the date",
-            RECEIVED,
-        )
+        words = f"{received} is after the calibration of {facts.what} began, {first}; correct the date"
+        raise CertificateRefused.of_key("item", "received", words)
     if received is not None and first - received > MAX_BEFORE_MEASUREMENT:
-        raise CertificateRefused(
-            f"[item] of the order: received = {received} is more than 10 years before the calibration of {facts.what} "
-            f"began, {first}; correct the date",
-            RECEIVED,
-        )
+        words = f"{received} is more than 10 years before the calibration of {facts.what} began, {first}"
+        raise CertificateRefused.of_key("item", "received", f"{words}; correct the date")
 
 
 def _refuse_bad(store: Store, facts: Facts) -> None:

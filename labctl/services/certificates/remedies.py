@@ -20,7 +20,7 @@ DUE = "Certify the version again with a number of days until it is due."
 
 def of_authorisation(version: int) -> str:
     """Return what puts a version in force."""
-    return f"Certify version {version}: on the page of its unit, press the button *Certify: put in force*."
+    return f'Certify version {version}: on the page of its unit, press the button "Certify: put in force".'
 
 
 def of_model(imported: bool) -> str:
@@ -46,13 +46,13 @@ def of_standards(imported: bool) -> str:
 def of_uncertainty(why: str, imported: bool) -> str:
     """Return what makes a part of U known; `why` says why it is not."""
     if why != NO_POWER_ON:
-        return "U is not known without it: measure or fit again as the reason says, and certify that version."
+        return f"Not known: {why}. Measure or fit again as this says, and certify that version."
     if imported:
         return (
-            "State bias_repeatability_dps, from the maker's data sheet, in [datasheet] of "
+            f"Not known: {why}. State bias_repeatability_dps, from the maker's data sheet, in [datasheet] of "
             f"{FILES.format(map='[info.datasheet]')}, {IMPORT_AGAIN}; or import a recording of two power-ons or more."
         )
     return (
-        "State bias_repeatability_dps, from the maker's data sheet, in datasheet of the gyro in the bench file, or "
-        f"choose a recipe with two power-ons or more; then {MEASURE_AGAIN}."
+        f"Not known: {why}. State bias_repeatability_dps, from the maker's data sheet, in datasheet of the gyro in the "
+        f"bench file, or choose a recipe with two power-ons or more; then {MEASURE_AGAIN}."
     )
