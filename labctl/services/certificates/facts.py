@@ -33,6 +33,7 @@ class Facts:
     campaign: CampaignRow | None  #: of the newest recording
     order: CertificateOrder
     laboratory: Laboratory
+    names_laboratory: bool  #: whether the bench file of the campaign names the laboratory, which then counts
     standards: tuple[Standard, ...]
     authorised: CertificationRow | None
     performed_from: date | None
@@ -62,7 +63,7 @@ class Facts:
 
     def missing(self) -> Iterator[MissingFact]:
         """Yield each mandatory fact that is not stated, and where to state it."""
-        yield from of_contact(self.laboratory, "laboratory", BENCH)
+        yield from self._laboratory()
         yield from of_contact(self.order.customer, "customer", "[customer] of the order")
         if not self.manufacturer:
             yield MissingFact("item's manufacturer", "[item] of the order", "item", "manufacturer")
@@ -82,6 +83,11 @@ class Facts:
         yield from self._authorisation()
         yield from missing_of(self.order)
         yield from self._traceability()
+
+    def _laboratory(self) -> Iterator[MissingFact]:
+        """Yield what is missing of the laboratory; the order states none beside that of the bench file."""
+        for fact in of_contact(self.laboratory, "laboratory", BENCH):
+            yield fact._replace(table=None, key="", remedy=remedies.LABORATORY) if self.names_laboratory else fact
 
     def _authorisation(self) -> Iterator[MissingFact]:
         certify = f"`labctl certify {self.row.serial} {self.row.version}"
@@ -130,6 +136,7 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
         campaign=campaign,
         order=order,
         laboratory=(bench.laboratory if bench else None) or order.laboratory or Laboratory(),
+        names_laboratory=bench is not None and bench.laboratory is not None,
         standards=_standards(measured),
         authorised=next((act for act in store.calibrations.history(serial) if act.version == version), None),
         performed_from=min(since, default=None) if campaign else method.performed_from

@@ -15,6 +15,7 @@ NO_TEMPERATURE = (
     "Measure the unit again with a thermometer in the chamber or on the unit, or import the log again with its column "
     "of temperature (temperature_c or chamber_c); then fit the new recording and certify that version."
 )
+LABORATORY = f"Complete [laboratory] in the bench file, which counts in place of one in the order, {MEASURE_AGAIN}."
 DUE = "Certify the version again with a number of days until it is due."
 
 

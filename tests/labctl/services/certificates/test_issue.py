@@ -12,10 +12,12 @@ from pathlib import Path
 
 import pytest
 
+from instruments.laboratory import Laboratory
 from instruments.standards import Standard
-from labctl.answers.certificates import CertificateRequest
+from labctl.answers.certificates import CertificateOrder, CertificateRequest
 from labctl.errors import BadInput, NotFound
 from labctl.recording import Recording
+from labctl.services.certificates.facts import facts_of
 from labctl.services.certificates.issue import CertificateRefused, issue, missing_facts
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.served import certificate_file, list_certificates
@@ -264,3 +266,12 @@ def test_the_due_date_is_stated_where_the_customer_agreed(store: Store) -> None:
 def _document(store: Store, version: int) -> bytes:
     issue(store, SERIAL, version, request(), AT)
     return certificate_file(store, SERIAL, version, "json").content
+
+
+def test_an_order_cannot_complete_the_laboratory_of_a_bench_file(store: Store) -> None:
+    facts = facts_of(store, SERIAL, 1, CertificateOrder())
+    named = replace(facts, laboratory=Laboratory(name="Inertial Laboratory"), names_laboratory=True)
+    found = {each.fact: each for each in named.missing()}
+    assert found["laboratory's city"].table is None
+    assert "Complete [laboratory] in the bench file" in found["laboratory's city"].remedy
+    assert {each.fact: each.table for each in facts.missing()}["laboratory's city"] == "laboratory"
