@@ -12257,7 +12257,7 @@ export interface components {
             condition?: string;
             /**
              * Received
-             * @description Date of receipt; null: the results do not depend on it.
+             * @description Date of receipt, at most 10 years before the first day of measurement and not after it; null: the results do not depend on it.
              */
             received?: string | null;
         };
