@@ -60,7 +60,11 @@ class OrderedItem(Request):
     manufacturer: str = Field(default="", max_length=LINE, description="Manufacturer of the item; empty: not stated.")
     identification: str = Field(default="", max_length=LINE, description="The customer's own number of the item.")
     condition: LongText = Field(default="", max_length=TEXT, description="Condition of the item on receipt.")
-    received: date | None = Field(default=None, description="Date of receipt; null: the results do not depend on it.")
+    received: date | None = Field(
+        default=None,
+        description="Date of receipt, at most 10 years before the first day of measurement and not after it; null: the "
+        "results do not depend on it.",
+    )
 
 
 class OrderedMethod(Request):
@@ -204,6 +208,10 @@ class MissingFactResponse(ResponseModel):
     where: str = Field(description="Where to state it, in words.")
     table: OrderTable | None = Field(
         description="Table of the order that can state it (`order.laboratory`, ...); null: the order cannot."
+    )
+    key: str = Field(default="", description="Its key in that table; empty: the order cannot state it, or has several.")
+    remedy: str = Field(
+        default="", description="What a person does where the order cannot state it, in a sentence; else empty."
     )
 
 

@@ -13,11 +13,10 @@ from starlette.exceptions import HTTPException
 
 from instruments.errors import InstrumentError
 from instruments.toml_documents import listed
+from labctl.api.request_errors import MAX_ERRORS, in_words
 from labctl.errors import DiskFull, LabctlError, NotIdentified, Overloaded, TooBusy, TooLarge
 from procedures.contracts.errors import PlanRefused, ProcedureError, StalePrompt
 
-#: A key that is not known is shown up to here.
-LONGEST_KEY = 80
 #: How the framework says that the JSON reader gave up for another reason than a wrong character.
 UNREADABLE = "There was an error parsing the body"
 #: How it says that a field of a form that is no file is too long; the limit follows.
@@ -62,10 +61,10 @@ def _of_a_procedure(request: Request, error: ProcedureError) -> JSONResponse:
 
 
 def _of_the_request(request: Request, error: RequestValidationError) -> JSONResponse:
-    places = listed(f"{'.'.join(str(p)[:LONGEST_KEY] for p in e['loc'])}: {e['msg']}" for e in error.errors())
-    return problem(
-        422, "bad-request", "The request does not match the API description (api-docs)", places, request.url.path
-    )
+    errors = in_words(error.errors())
+    detail = listed(f"{'.'.join(each['place'])}: {each['text']}" for each in errors)
+    title = "The request does not match the API description (api-docs)"
+    return problem(422, "bad-request", title, detail, request.url.path, errors=errors[:MAX_ERRORS])
 
 
 def _of_a_number(request: Request, error: OverflowError) -> JSONResponse:

@@ -11,6 +11,7 @@ import {
 } from "../../labctl/web/static/js/bench/campaign_history.js";
 import { planSteps, positionBands, setPointCourse } from "../../labctl/web/static/js/campaigns/plan_steps.js";
 import { canResume, hasEnded, isRunning, stateKind, stateText } from "../../labctl/web/static/js/campaigns/states.js";
+import { withButtonNamed } from "../../labctl/web/static/js/campaigns/draft_text.js";
 
 test("what a campaign permits is what the service says of it", () => {
   assert.ok(isRunning({ active: true }) && !isRunning({ active: false }));
@@ -89,4 +90,12 @@ test("progress is kept in order of time, and only the newest of it", () => {
 
 test("what remains is the share that has not passed", () => {
   assert.equal(remainingSeconds({ progress: 0.25 }, 400), 300);
+});
+
+test("a draft names the button that puts it in force, not the command", () => {
+  const text = "It is not certified; `labctl certify FOG-0001 1 --by NAME --reason TEXT` puts it in force.";
+  assert.equal(
+    withButtonNamed(text),
+    "It is not certified; the button “Certify: put in force” on the page of the unit puts it in force.",
+  );
 });

@@ -102,16 +102,30 @@ def test_the_dialog_asks_for_every_fact_names_what_is_missing_and_gives_the_cert
     dialog.get_by_label("City").fill("Rochester")
     dialog.get_by_label("With a guard band").check()
     dialog.get_by_label("The item turns about the axis of one output at a time").check()
-    dialog.get_by_label("Condition of the item").fill(" ")
+    wrong = {"Condition of the item": " ", "Country": "Germany", "Limit of the error": "0,1"}
+    for label, text in wrong.items():
+        dialog.get_by_label(label).first.fill(text)
     dialog.get_by_role("button", name="Issue").click()
-    refused = dialog.get_by_text(f"no certificate of {UNIT} version 1: 1 fact is missing.")
-    expect(refused).to_contain_text("item's condition: [item] of the order")
-    assert service.get(f"/api/units/{UNIT}/certificates") == []  # nothing was written
-    faults.clear()  # the browser complains of the answer 400
+    for words in ("a blank entry is not enough", "Write the two letters of the country", "a number with a point"):
+        expect(dialog.locator(".field-problem").filter(has_text=words)).to_be_visible()
+    dialog.get_by_role("button", name="Cancel").click()
+    page.get_by_role("button", name="Issue certificate").click()
     expect(dialog.get_by_label("Customer", exact=True)).to_have_value("Vehicle Works")  # nothing is typed twice
     expect(dialog.get_by_label("With a guard band")).to_be_checked()
+    for label, text in {
+        "Condition of the item": "No visible damage.",
+        "Country": "gb",
+        "Limit of the error": "3",
+    }.items():
+        dialog.get_by_label(label).first.fill(text)
+    dialog.get_by_label("Received on").fill("1900-01-01")
+    dialog.get_by_role("button", name="Issue").click()
+    expect(dialog.locator(".field-problem")).to_contain_text("is more than 10 years before the calibration")
+    assert service.get(f"/api/units/{UNIT}/certificates") == []  # nothing was written
+    faults.clear()  # the browser complains of the answer 409
+    expect(dialog.get_by_label("Customer", exact=True)).to_have_value("Vehicle Works")
 
-    dialog.get_by_label("Condition of the item").fill("No visible damage.")
+    dialog.get_by_label("Received on").fill("")
     dialog.get_by_role("button", name="Issue").click()
     files = page.get_by_role("group", name="Certificate ICL-")
     expect(files).to_be_visible()
@@ -122,6 +136,7 @@ def test_the_dialog_asks_for_every_fact_names_what_is_missing_and_gives_the_cert
     document = json.loads(download.value.path().read_text(encoding="utf-8"))
     assert document["laboratory"]["name"] == LABORATORY["name"]
     assert (document["customer"]["name"], document["item"]["condition"]) == ("Vehicle Works", "No visible damage.")
+    assert document["customer"]["country"] == "GB"
     assert document["conformity"]["rule"] == "guard-band"
     assert document["conformity"]["about"] == "own axis"
     with page.expect_download() as download:

@@ -28,6 +28,8 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     certify, dialog = page.get_by_role("button", name="Certify"), page.get_by_role("dialog")
     in_force = page.get_by_role("region", name="In force")
 
+    expect(page.get_by_role("button", name="Issue certificate")).to_have_count(0)  # of none that is not certified
+    expect(page.get_by_text("Certificate: only once it is certified")).to_have_count(2)
     certify.last.click()  # version 1
     expect(dialog).to_contain_text("Adequate: no effect is missing")
     expect(dialog.get_by_role("checkbox")).to_have_count(0)
@@ -52,9 +54,11 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     expect(in_force).to_contain_text("version 2")
     expect(in_force).to_contain_text("Certified despite objections")
     page.get_by_role("button", name="Issue certificate").first.click()
-    expect(dialog).to_contain_text("a document for a customer; which version is in force does not change")
-    expect(dialog).to_contain_text("This version was fitted to an imported recording.")
-    dialog.get_by_role("button", name="Cancel").click()
+    expect(dialog).to_contain_text("Missing: reference standards. State [[standards]]")  # before anything is asked for
+    expect(dialog).to_contain_text("Missing: uncertainty of the repeatability.")
+    expect(dialog).to_contain_text("import it again")
+    expect(dialog.get_by_role("textbox")).to_have_count(0)
+    dialog.get_by_role("button", name="Close").click()
     acts = page.get_by_role("region", name="Certifications").first
     expect(acts).to_contain_text("overridden")
     expect(acts).to_contain_text("needed on the robot today")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 
 from labctl.answers.certificates import (
     CertificateRequest,
@@ -14,7 +14,7 @@ from labctl.answers.certificates import (
     WithdrawRequest,
 )
 from labctl.api.access_policy import NEEDS_APPROVER
-from labctl.api.computation import execute
+from labctl.api.computation import execute, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.certificates.issue import missing_facts
 from labctl.services.certificates.served import certificate_file, public_certificate
@@ -75,12 +75,13 @@ async def issue(serial: str, version: int, request: CertificateRequest, service:
 
 
 @router.get(UNIT + "/calibrations/{version}/certificate/missing", summary="What an order has to state")
-def missing(serial: str, version: int, service: ServiceDep) -> list[MissingFactResponse]:
-    """Each mandatory fact that the version does not state; a form asks for those that a table of the order can state.
+async def missing(request: Request, serial: str, version: int, service: ServiceDep) -> list[MissingFactResponse]:
+    """Each mandatory fact that the version and its readings do not state.
 
-    What the readings have to show is examined when the certificate is issued.
+    A form asks for those that a table of the order can state; no certificate can be issued while another is missing,
+    and its `remedy` says what to do.
     """
-    return missing_facts(service.store, serial, version)
+    return await while_connected(request, service, missing_facts, serial, version)
 
 
 @router.get(

@@ -11,6 +11,7 @@ from instruments.laboratory import Laboratory
 from instruments.standards import SIMULATED, Standard
 from labctl.answers.certificates import CertificateOrder
 from labctl.calibration import Calibration, read_calibration
+from labctl.services.certificates import remedies
 from labctl.services.certificates.missing import MissingFact, of_contact
 from labctl.services.certificates.sensors import Sensors, missing_of
 from labctl.services.standards.usage import performed
@@ -32,6 +33,7 @@ class Facts:
     campaign: CampaignRow | None  #: of the newest recording
     order: CertificateOrder
     laboratory: Laboratory
+    names_laboratory: bool  #: whether the bench file of the campaign names the laboratory, which then counts
     standards: tuple[Standard, ...]
     authorised: CertificationRow | None
     performed_from: date | None
@@ -50,53 +52,69 @@ class Facts:
         return self.order.method.name if self.campaign is None else f"recipe {self.campaign.recipe_name}"
 
     @property
+    def imported(self) -> bool:
+        """Whether the newest recording was imported: no campaign of this database measured it."""
+        return self.campaign is None
+
+    @property
     def manufacturer(self) -> str:
         """The manufacturer of the item, as the order states it."""
         return self.order.item.manufacturer
 
     def missing(self) -> Iterator[MissingFact]:
         """Yield each mandatory fact that is not stated, and where to state it."""
-        yield from of_contact(self.laboratory, "laboratory", BENCH)
+        yield from self._laboratory()
         yield from of_contact(self.order.customer, "customer", "[customer] of the order")
         if not self.manufacturer:
-            yield MissingFact("item's manufacturer", "[item] of the order", "item")
+            yield MissingFact("item's manufacturer", "[item] of the order", "item", "manufacturer")
         if not self.order.item.condition.strip():
-            yield MissingFact("item's condition", "[item] of the order", "item")
+            yield MissingFact("item's condition", "[item] of the order", "item", "condition")
         if not self.calibration.document["unit"]["model"]:
-            yield MissingFact("item's model", "model of [[gyros]] of the bench file, or of recording.toml")
+            where = "model of [[gyros]] of the bench file, or of recording.toml"
+            yield MissingFact("item's model", where, remedy=remedies.of_model(self.imported))
         if not self.recordings:
-            yield MissingFact("measured recording", f"`labctl fit {self.row.serial}` on one")
+            where = f"`labctl fit {self.row.serial}` on one"
+            yield MissingFact("measured recording", where, remedy=remedies.NO_RECORDING)
         if not self.method:
-            yield MissingFact("name of the method", "[method] of the order", "method")
+            yield MissingFact("name of the method", "[method] of the order", "method", "name")
         for day, name in ((self.performed_from, "performed_from"), (self.performed_until, "performed_until")):
             if day is None:
-                yield MissingFact(name, "[method] of the order", "method")
+                yield MissingFact(name, "[method] of the order", "method", name)
         yield from self._authorisation()
         yield from missing_of(self.order)
         yield from self._traceability()
 
+    def _laboratory(self) -> Iterator[MissingFact]:
+        """Yield what is missing of the laboratory; the order states none beside that of the bench file."""
+        for fact in of_contact(self.laboratory, "laboratory", BENCH):
+            yield fact._replace(table=None, key="", remedy=remedies.LABORATORY) if self.names_laboratory else fact
+
     def _authorisation(self) -> Iterator[MissingFact]:
         certify = f"`labctl certify {self.row.serial} {self.row.version}"
         if self.authorised is None:
-            yield MissingFact("authorisation", f"{certify} --by NAME --reason TEXT`")
+            where = f"{certify} --by NAME --reason TEXT`"
+            yield MissingFact("authorisation", where, remedy=remedies.of_authorisation(self.row.version))
         elif self.order.state_due and self.authorised.due_at is None:
             yield MissingFact(
                 "date of the next calibration, which state_due of the order asks for",
                 f"{certify} --due-days DAYS ...`, or leave state_due out",
+                remedy=remedies.DUE,
             )
 
     def _traceability(self) -> Iterator[MissingFact]:
+        remedy = remedies.of_standards(self.imported)
         if self.standards and not {standard.quantity for standard in self.standards} & RATE:
-            yield MissingFact("standard of the rate", STANDARDS)
+            yield MissingFact("standard of the rate", STANDARDS, remedy=remedy)
         if not self.standards:
-            yield MissingFact("reference standards", STANDARDS)
+            yield MissingFact("reference standards", STANDARDS, remedy=remedy)
         measured = any(standard.quantity in RATE and standard.certificate for standard in self.standards)
         for standard in self.standards:
             if standard.quantity in RATE and measured and not standard.certificate:
                 continue  # follows from the time base that has one
             lacking = [name for name in ("certificate", "issued_by", "due") if not getattr(standard, name)]
             if lacking and not standard.traceability:
-                yield MissingFact(f"{', '.join(lacking)} (or traceability) of standard {standard.label}", STANDARDS)
+                what = f"{', '.join(lacking)} (or traceability) of standard {standard.label}"
+                yield MissingFact(what, STANDARDS, remedy=remedy)
 
 
 def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -> Facts:
@@ -118,11 +136,13 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
         campaign=campaign,
         order=order,
         laboratory=(bench.laboratory if bench else None) or order.laboratory or Laboratory(),
+        names_laboratory=bench is not None and bench.laboratory is not None,
         standards=_standards(measured),
         authorised=next((act for act in store.calibrations.history(serial) if act.version == version), None),
         performed_from=min(since, default=None) if campaign else method.performed_from
         or min(since, default=None),
-        performed_until=max(until, default=None) if campaign else method.performed_until or max(until, default=None),
+        performed_until=max(until, default=None) if campaign else method.performed_until or max(until, default=None)
+        or method.performed_from,
         simulated=(bench is not None and bench.has_simulated)
         or any(standard.traceability == SIMULATED for standard in _standards(measured)),
         sensors=Sensors.of(store, row.serial, order),

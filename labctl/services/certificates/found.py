@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from labctl.certificates.document import Condition
-from labctl.services.certificates import measured
+from labctl.services.certificates import measured, remedies
 from labctl.services.certificates.facts import Facts
 from labctl.services.certificates.missing import MissingFact
 from labctl.services.criticism.measurements import Measurements
@@ -22,6 +22,7 @@ class Found:
     results: measured.Results = field(default_factory=measured.Results)
     conditions: tuple[Condition, ...] = ()
     room: tuple[Condition, ...] = ()
+    imported: bool = False  #: whether the newest recording was imported
 
     @staticmethod
     def of(store: Store, facts: Facts) -> Found:
@@ -32,12 +33,15 @@ class Found:
         results = measured.results(store, facts.row, facts.calibration)
         spans = [] if facts.campaign is None else of_campaign(store, facts.campaign.id)
         room = measured.environment_of_room(spans, facts.order.environment)
-        return Found(measurements, results, measured.environment(measurements.points), room)
+        return Found(measurements, results, measured.environment(measurements.points), room, facts.imported)
 
     def missing(self) -> Iterator[MissingFact]:
         """Yield what is not known of the results, and what makes it known."""
-        yield from self.results.missing()
+        for each in self.results.missing():
+            yield each._replace(remedy=remedies.of_uncertainty(each.where, self.imported))
         if self.measurements is not None and not any(condition.unit == "°C" for condition in self.conditions):
             yield MissingFact(
-                "temperature of the item or of the chamber", "a recording with temperature_c or chamber_c"
+                "temperature of the item or of the chamber",
+                "a recording with temperature_c or chamber_c",
+                remedy=remedies.NO_TEMPERATURE,
             )

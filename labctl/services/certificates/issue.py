@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from datetime import date, datetime
+from collections.abc import Sequence
+from datetime import date, datetime, timedelta
 
 from instruments.standards import Standard
 from labctl.acting_user import acting_key
@@ -13,6 +14,7 @@ from labctl.answers.certificates import (
     MissingFactResponse,
     WithdrawRequest,
 )
+from labctl.answers.json_object import JsonObject
 from labctl.certificates.document import hash_of_certificate
 from labctl.config import SIGN_KEY_VARIABLE
 from labctl.errors import Conflict
@@ -26,11 +28,29 @@ from labctl.services.certificates.states import certificate_by_number
 from labctl.services.standards.usage import Notices
 from labctl.store import CertificateRow, Store, Withdrawal
 
+#: An item comes at most so long before it is measured, ten years: an earlier date is a slip, such as 1900-01-01.
+MAX_BEFORE_MEASUREMENT = timedelta(days=3653)
+
 
 class CertificateRefused(Conflict):
     """A certificate may not be issued; the text says why, and what to do."""
 
     slug = "certificate-refused"
+
+    def __init__(self, text: str, errors: Sequence[JsonObject] = ()) -> None:
+        super().__init__(text)
+        self.errors = list(errors)  #: what is wrong with keys of the order, as errors of requests say it
+
+    @classmethod
+    def of_key(cls, table: str, key: str, words: str) -> CertificateRefused:
+        """Return the refusal of what a key of the order states; `words` begin with its value."""
+        place: JsonObject = {"place": ["body", "order", table, key], "text": words}
+        return cls(f"[{table}] of the order: {key} = {words}", [place])
+
+    @property
+    def members(self) -> JsonObject:
+        """What is wrong with keys of the order, each with its place in the request."""
+        return {"errors": [*self.errors]} if self.errors else {}
 
 
 def issue(store: Store, serial: str, version: int, request: CertificateRequest, at: datetime) -> CertificateResponse:
@@ -67,12 +87,13 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
 
 
 def missing_facts(store: Store, serial: str, version: int) -> list[MissingFactResponse]:
-    """Return the mandatory facts of a certificate that a version and an empty order do not state. Raises NotFound.
+    """Return the mandatory facts of a certificate that a version, its readings and an empty order do not state.
 
-    What the readings have to show, such as a temperature, is examined when the certificate is issued.
+    Raises NotFound; BadInput, NotEnoughData, NotConverged where the results of the version cannot be computed.
     """
     facts = facts_of(store, serial, version, CertificateOrder())
-    return [MissingFactResponse.model_validate(each._asdict()) for each in facts.missing()]
+    found = Found.of(store, facts)
+    return [MissingFactResponse.model_validate(each._asdict()) for each in (*facts.missing(), *found.missing())]
 
 
 def withdraw(store: Store, request: WithdrawRequest, at: datetime) -> CertificateResponse:
@@ -127,21 +148,31 @@ def refuse(facts: Facts, evidence: Found) -> None:
 
 
 def _refuse_dates(facts: Facts) -> None:
-    """Raise CertificateRefused for an item that came late, and for a standard that was not calibrated then."""
-    first, last, received = facts.performed_from, facts.performed_until, facts.order.item.received
+    """Raise CertificateRefused for days that cannot be, and for a standard that was not calibrated then."""
+    first, last = facts.performed_from, facts.performed_until
     if first is None or last is None:
         return
-    if received is not None and received > first:
-        raise CertificateRefused(
-            f"[item] of the order: received = {received} is after the calibration of {facts.what} began, {first}; "
-            "correct the date"
-        )
+    if last < first:
+        words = f"{last} is before the first day of the measurements of {facts.what}, {first}; correct the dates"
+        raise CertificateRefused.of_key("method", "performed_until", words)
+    _refuse_receipt(facts, first)
     if bad := [standard for standard in facts.standards if _off(standard, first, last)]:
         text = "; ".join(f"{each.label}: calibrated {each.calibrated or 'not stated'}, due {each.due}" for each in bad)
         raise CertificateRefused(
             f"no certificate of {facts.what}: measured from {first} to {last}, when the calibration of a "
             f"reference standard was not valid ({text}). Have the standard calibrated, and measure again"
         )
+
+
+def _refuse_receipt(facts: Facts, first: date) -> None:
+    """Raise CertificateRefused for an item that came after its first day of measurement, or long before."""
+    received = facts.order.item.received
+    if received is not None and received > first:
+        words = f"{received} is after the calibration of {facts.what} began, {first}; correct the date"
+        raise CertificateRefused.of_key("item", "received", words)
+    if received is not None and first - received > MAX_BEFORE_MEASUREMENT:
+        words = f"{received} is more than 10 years before the calibration of {facts.what} began, {first}"
+        raise CertificateRefused.of_key("item", "received", f"{words}; correct the date")
 
 
 def _refuse_bad(store: Store, facts: Facts) -> None:

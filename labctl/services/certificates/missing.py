@@ -20,6 +20,8 @@ class MissingFact(NamedTuple):
     fact: str
     where: str  #: where to state it, in words
     table: OrderTable | None = None  #: the table of the order that can state it; None: the order cannot
+    key: str = ""  #: its key in that table
+    remedy: str = ""  #: what a person does where the order cannot state it, in a sentence
 
 
 class MissingFacts(BadInput):
@@ -43,7 +45,7 @@ class MissingFacts(BadInput):
 
     @property
     def members(self) -> JsonObject:
-        """Each fact, where it is stated, and the table of the order that can state it."""
+        """Each fact, where it is stated, its table and key in the order, and the remedy where the order cannot."""
         return {"missing": [each._asdict() for each in self.facts]}
 
 
@@ -51,6 +53,6 @@ def of_contact(contact: Contact, whose: Literal["customer", "laboratory"], where
     """Yield what is missing of an address, and a way to reach it."""
     for name in ADDRESS:
         if not getattr(contact, name):
-            yield MissingFact(f"{whose}'s {name.replace('_', ' ')}", where, whose)
+            yield MissingFact(f"{whose}'s {name.replace('_', ' ')}", where, whose, name)
     if not (contact.email or contact.phone):
-        yield MissingFact(f"{whose}'s email or phone", where, whose)
+        yield MissingFact(f"{whose}'s email or phone", where, whose, "email")

@@ -167,6 +167,10 @@ export interface ProblemDocument {
   detail?: string;
   warnings?: Warning[];
   problems?: string[];
+  /** What is wrong with the request, each with its place in it. */
+  errors?: { place: string[]; text: string }[];
+  /** Facts of a certificate that are not stated. */
+  missing?: MissingFact[];
 }
 
 /* Requests: path, parameters, body and answer of each operation */

@@ -881,9 +881,10 @@ export interface paths {
         };
         /**
          * What an order has to state
-         * @description Each mandatory fact that the version does not state; a form asks for those that a table of the order can state.
+         * @description Each mandatory fact that the version and its readings do not state.
          *
-         *     What the readings have to show is examined when the certificate is issued.
+         *     A form asks for those that a table of the order can state; no certificate can be issued while another is missing,
+         *     and its `remedy` says what to do.
          */
         get: operations["missing_api_units__serial__calibrations__version__certificate_missing_get"];
         put?: never;
@@ -11825,6 +11826,18 @@ export interface components {
              * @description Table of the order that can state it (`order.laboratory`, ...); null: the order cannot.
              */
             table: ("laboratory" | "customer" | "item" | "method" | "accelerometer" | "magnetometer") | null;
+            /**
+             * Key
+             * @description Its key in that table; empty: the order cannot state it, or has several.
+             * @default
+             */
+            key: string;
+            /**
+             * Remedy
+             * @description What a person does where the order cannot state it, in a sentence; else empty.
+             * @default
+             */
+            remedy: string;
         };
         /**
          * ModelLines
@@ -12244,7 +12257,7 @@ export interface components {
             condition?: string;
             /**
              * Received
-             * @description Date of receipt; null: the results do not depend on it.
+             * @description Date of receipt, at most 10 years before the first day of measurement and not after it; null: the results do not depend on it.
              */
             received?: string | null;
         };

@@ -58,8 +58,8 @@ def test_over_http_it_is_issued_fetched_and_listed(lab: Lab) -> None:
         assert client.get(PATH).status_code == 404
         refused = client.post(PATH, json={"by": "I. Issuer"})
         assert (refused.status_code, refused.json()["type"]) == (400, "urn:labctl:problem:missing-facts")
-        named = {"fact": "customer's name", "where": "[customer] of the order", "table": "customer"}
-        assert named in refused.json()["missing"]
+        named = {"fact": "customer's name", "where": "[customer] of the order", "table": "customer", "key": "name"}
+        assert {**named, "remedy": ""} in refused.json()["missing"]
         answer = client.post(PATH, json={"by": "I. Issuer", "order": ORDER})
         assert answer.status_code == 201, answer.text
         number = answer.json()["number"]

@@ -12,10 +12,12 @@ from pathlib import Path
 
 import pytest
 
+from instruments.laboratory import Laboratory
 from instruments.standards import Standard
-from labctl.answers.certificates import CertificateRequest
+from labctl.answers.certificates import CertificateOrder, CertificateRequest
 from labctl.errors import BadInput, NotFound
 from labctl.recording import Recording
+from labctl.services.certificates.facts import facts_of
 from labctl.services.certificates.issue import CertificateRefused, issue, missing_facts
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.served import certificate_file, list_certificates
@@ -74,9 +76,9 @@ def test_every_missing_fact_is_named_at_once_and_nothing_is_written(empty: Store
     text = str(refused.value)
     assert f"{len(refused.value.facts)} facts are missing" in text
     assert all(fact in text for fact in facts)
-    assert {"fact": "customer's city", "where": "[customer] of the order", "table": "customer"} in (
-        refused.value.members["missing"]
-    )
+    city = {"fact": "customer's city", "where": "[customer] of the order", "table": "customer", "key": "city"}
+    assert {**city, "remedy": ""} in refused.value.members["missing"]
+    assert all((each.table is None) == bool(each.remedy) == (not each.key) for each in refused.value.facts)
     tables = {each.fact: each.table for each in refused.value.facts}
     assert tables["laboratory's name"] == "laboratory"
     assert tables["name of the method"] == "method"
@@ -179,6 +181,48 @@ def test_an_item_that_came_after_its_calibration_is_refused(store: Store) -> Non
         issue(store, SERIAL, 1, request(item={**ORDER["item"], "received": "2099-01-01"}), AT)
 
 
+@pytest.mark.parametrize(("years", "refused"), [(9, False), (11, True)])
+def test_an_item_that_came_more_than_ten_years_before_its_calibration_is_refused(
+    store: Store, years: int, refused: bool
+) -> None:
+    begun = simulated().info.started_at.date()
+    received = begun.replace(year=begun.year - years, day=1)
+    ordered = request(item={**ORDER["item"], "received": received.isoformat()})
+    if not refused:
+        assert issue(store, SERIAL, 1, ordered, AT).state == "valid"
+        return
+    with pytest.raises(CertificateRefused, match=f"received = {received} is more than 10 years before") as error:
+        issue(store, SERIAL, 1, ordered, AT)
+    words = str(error.value).removeprefix("[item] of the order: received = ")
+    assert error.value.members["errors"] == [{"place": ["body", "order", "item", "received"], "text": words}]
+    assert rows_of(store) == 0
+
+
+def test_measurements_end_on_the_day_they_begin_unless_the_order_says_more(store: Store) -> None:
+    day = simulated().info.started_at.date()
+    method = {**ORDER["method"], "performed_from": (day - timedelta(days=1)).isoformat()}
+    imported = replace(simulated(), info=simulated().info.model_copy(update={"date_known": False}))
+    version = add_version(store, imported)
+    issue(store, SERIAL, version, request(method={**method, "performed_from": day.isoformat()}), AT)
+    document = json.loads(certificate_file(store, SERIAL, version, "json").content)
+    assert document["performed_from"] == document["performed_until"] == day.isoformat()
+    with pytest.raises(CertificateRefused, match=r"performed_until = .* is before the first day"):
+        issue(store, SERIAL, 1, request(method={**method, "performed_until": "2000-01-01"}), AT)
+
+
+def test_what_the_readings_do_not_show_is_missing_before_the_order_with_what_to_do(empty: Store) -> None:
+    bare = replace(
+        simulated(),
+        info=simulated().info.model_copy(update={"standards": (), "datasheet": {}, "datasheet_conventions": {}}),
+    )
+    add_version(empty, bare, certified=False)
+    remedies = {each.fact: each.remedy for each in missing_facts(empty, SERIAL, 1) if each.table is None}
+    assert "[[standards]]" in remedies["reference standards"]
+    assert "import it again" in remedies["reference standards"]
+    assert "Certify: put in force" in remedies["authorisation"]
+    assert "bias_repeatability_dps" in remedies["uncertainty of the repeatability"]
+
+
 def test_a_simulated_bench_gives_a_specimen_that_claims_no_traceability(empty: Store) -> None:
     first = json.loads(issued()[1].document)["statements"]
     assert first[0].startswith("SPECIMEN")
@@ -222,3 +266,12 @@ def test_the_due_date_is_stated_where_the_customer_agreed(store: Store) -> None:
 def _document(store: Store, version: int) -> bytes:
     issue(store, SERIAL, version, request(), AT)
     return certificate_file(store, SERIAL, version, "json").content
+
+
+def test_an_order_cannot_complete_the_laboratory_of_a_bench_file(store: Store) -> None:
+    facts = facts_of(store, SERIAL, 1, CertificateOrder())
+    named = replace(facts, laboratory=Laboratory(name="Inertial Laboratory"), names_laboratory=True)
+    found = {each.fact: each for each in named.missing()}
+    assert found["laboratory's city"].table is None
+    assert "Complete [laboratory] in the bench file" in found["laboratory's city"].remedy
+    assert {each.fact: each.table for each in facts.missing()}["laboratory's city"] == "laboratory"

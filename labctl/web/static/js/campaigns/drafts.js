@@ -3,6 +3,7 @@
 import { h } from "../core/elements.js";
 import { card, chip, notice, table } from "../core/components.js";
 import { capitalised, idText, number } from "../core/format.js";
+import { withButtonNamed } from "./draft_text.js";
 
 /** @import { Draft } from "../../../types/api.js" */
 
@@ -43,7 +44,7 @@ function oneDraft(draft) {
         ? null
         : chip(report.within_limits ? "limits kept" : "limits not kept", report.within_limits ? "good" : "bad"),
     ),
-    h("p", {}, report.text),
+    h("p", {}, withButtonNamed(report.text)),
     figures(draft),
     report.limits.length ? limits(draft) : null,
     report.drift?.coefficients.length ? changes(draft) : null,

@@ -58,7 +58,7 @@ export async function page({ params, signal }) {
     unit.draft && !unit.draft.certified ? draftsCard([unit.draft]) : null,
     rows.length
       ? [
-          versionsCard(unit, rows, issued, explore),
+          versionsCard(unit, rows, issued, history, explore),
           ladder(asking),
           diagnosisCard(unit.serial, diagnoses, signal),
           unit.recordings.length > 1 ? trendCard(unit.serial, rows, signal) : null,

@@ -2,15 +2,18 @@
 
 import { download, get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { actButton, button, notice } from "../core/components.js";
+import { actButton, button, notice, toast, withCommands } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
+import { checkBefore, entriesOf, markProblems } from "../core/field_problems.js";
 import { capitalised } from "../core/format.js";
 import { Problem } from "../core/http/errors.js";
 import { show } from "../core/router.js";
 import { stateChip } from "./certificate_state.js";
+import { fieldAt, fieldsFor, orderOf, problemsOf, unstatable } from "./order_fields.js";
 
-/** @import { Certificate, MissingFact } from "../../../types/api.js" */
-/** @import { Answers, Field } from "../../../types/pages.js" */
+/** @import { Certificate, Certification, MissingFact } from "../../../types/api.js" */
+/** @import { Answers } from "../../../types/pages.js" */
+/** @import { OrderField } from "./order_fields.js" */
 
 /** @type {readonly ["pdf" | "xml" | "json", string][]} */
 const FORMATS = [
@@ -19,65 +22,21 @@ const FORMATS = [
   ["json", "JSON"],
 ];
 
-/** @type {readonly Field[]} */
-const FIELDS = [
-  { name: "by", label: "Issued by" },
-  { name: "name", label: "Customer" },
-  { name: "street", label: "Street and number" },
-  { name: "post_code", label: "Post code" },
-  { name: "city", label: "City" },
-  { name: "country", label: "Country", hint: "Two letters, such as DE (ISO 3166-1)." },
-  { name: "email", label: "E-mail", type: "email" },
-  { name: "contact", label: "Contact person", required: false },
-  { name: "order", label: "Number of the order", required: false },
-  { name: "manufacturer", label: "Manufacturer of the item" },
-  { name: "condition", label: "Condition of the item on receipt" },
-  { name: "received", label: "Received on", type: "date", required: false },
-  { name: "deviations", label: "Deviations from the method", hint: "Empty: none.", required: false },
-  { name: "specification", label: "Conformity to the specification", hint: "Empty: no statement.", required: false },
-  {
-    name: "limit_dps",
-    label: "Limit of the error in the specification, deg/s",
-    hint: "Needed where a specification is stated.",
-    required: false,
-  },
-  {
-    name: "own_axis",
-    label: "The item turns about the axis of one output at a time",
-    type: "checkbox",
-    hint: "Needed where U is known about the axis of each output alone (“own axis”).",
-    required: false,
-  },
-  {
-    name: "guard_band",
-    label: "With a guard band as wide as the uncertainty",
-    type: "checkbox",
-    required: false,
-  },
-];
-
-/** The laboratory, asked for where the measurement does not name it. @type {readonly Field[]} */
-const LABORATORY_FIELDS = [
-  { name: "laboratory_name", label: "Laboratory" },
-  { name: "laboratory_street", label: "Street and number of the laboratory" },
-  { name: "laboratory_post_code", label: "Post code of the laboratory" },
-  { name: "laboratory_city", label: "City of the laboratory" },
-  {
-    name: "laboratory_country",
-    label: "Country of the laboratory",
-    hint: "Two letters, such as DE (ISO 3166-1).",
-  },
-  { name: "laboratory_email", label: "E-mail of the laboratory", type: "email" },
-];
+/** Entries of forms that were cancelled or left, until the page is loaded anew. @type {Map<string, Answers>} */
+const kept = new Map();
 
 /**
- * The files of the newest certificate of a version with its state, or the button that issues one.
+ * The files of the newest certificate of a version with its state, or the button that issues one; neither that nor
+ * an amended one can be issued of a version that is not certified, or was revoked.
  * @param {string} serial
  * @param {number} version
  * @param {readonly Certificate[]} issued newest first
+ * @param {readonly Certification[]} history newest first
  */
-export function certificateFiles(serial, version, issued) {
+export function certificateFiles(serial, version, issued, history) {
+  const certified = history.find((act) => act.version === version)?.act === "certify";
   const newest = issued.find((each) => each.version === version);
+  if (!newest && !certified) return h("span", { class: "muted small" }, "Certificate: only once it is certified");
   if (!newest) return actButton("Issue certificate", () => askCertificate(serial, version), { kind: "tiny" });
   return h(
     "div",
@@ -102,123 +61,132 @@ export function certificateFiles(serial, version, issued) {
         ),
       ),
     ),
-    actButton("Amend", () => askCertificate(serial, version, newest), { kind: "tiny quiet" }),
+    certified ? actButton("Amend", () => askCertificate(serial, version, newest), { kind: "tiny quiet" }) : null,
   );
 }
 
 /**
- * Ask for the facts of the order, until a certificate is issued; a refusal is shown above what was filled in.
+ * Ask for the facts of the order, until a certificate is issued; a refusal is shown beside what was filled in. Where a
+ * fact is missing that no order can state, the form is not offered: it is said what to do.
  * @param {string} serial
  * @param {number} version
  * @param {Certificate} [replaced]
  */
 async function askCertificate(serial, version, replaced) {
-  const why = replaced ? [{ name: "amend", label: `Why certificate ${replaced.number} is replaced` }] : [];
-  const [imported, missing] = await Promise.all([wasImported(serial, version), missingFacts(serial, version)]);
-  /** @type {Answers} */
-  let given = {};
-  let refusal = "";
-  const asked = [...why, ...(asksLaboratory(missing) ? LABORATORY_FIELDS : []), ...FIELDS];
+  const path = { serial, version };
+  const missing = await get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path });
+  const never = unstatable(missing);
+  if (never.length) return void (await sayMissing(serial, version, never));
+  const why = replaced ? [reasonField(replaced)] : [];
+  const fields = [...why, ...fieldsFor(missing)];
+  const key = JSON.stringify([serial, version, replaced?.number]);
+  /** @type {Refusal} */
+  let refusal = { text: "", problems: {} };
   for (;;) {
-    const fields = asked.map((field) => ({ ...field, value: given[field.name] }));
-    const answers = await dialog(`Issue a certificate of version ${version}`, fields, {
-      text: "A certificate is a document for a customer; which version is in force does not change. The certificate is written to the audit trail.",
-      body: refusal ? notice("bad", h("p", {}, `${capitalised(refusal)}.`)) : notesOf(imported, missing),
-      confirm: "Issue certificate",
-    });
+    const answers = await ask(serial, version, fields, key, refusal, missing);
     if (!answers) return;
     const body = { by: answers.by, order: orderOf(answers), ...(replaced ? { amend: answers.amend } : {}) };
     try {
-      await post("/api/units/{serial}/calibrations/{version}/certificate", { path: { serial, version }, body });
+      await post("/api/units/{serial}/calibrations/{version}/certificate", { path, body });
+      kept.delete(key);
       return await show();
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
-      [given, refusal] = [answers, error.message];
+      refusal = refusalOf(error);
     }
   }
 }
 
+/** What the service refused: words for the form, and those beside fields. @typedef {{ text: string, problems: Record<string, string> }} Refusal */
+
 /**
- * The mandatory facts that the version does not state, each with the table of the order that can state it.
+ * @param {Certificate} replaced
+ * @returns {OrderField}
+ */
+const reasonField = ({ number }) => ({ name: "amend", place: "amend", label: `Why certificate ${number} is replaced` });
+
+/**
+ * One form, with the entries of before; what was filled in is kept however it ends. Null: it was cancelled or left.
  * @param {string} serial
  * @param {number} version
- */
-const missingFacts = (serial, version) =>
-  get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path: { serial, version } });
-
-/** @param {readonly MissingFact[]} missing */
-const asksLaboratory = (missing) => missing.some(({ table }) => table === "laboratory");
-
-/**
- * What the form says before anything is filled in: where the laboratory comes from, and what it does not ask for.
- * @param {boolean} imported
+ * @param {readonly OrderField[]} fields
+ * @param {string} key
+ * @param {Refusal} refusal
  * @param {readonly MissingFact[]} missing
  */
-const notesOf = (imported, missing) =>
-  h(
+async function ask(serial, version, fields, key, refusal, missing) {
+  const given = kept.get(key) ?? {};
+  const body = h(
     "div",
     { class: "stack" },
-    h(
-      "p",
-      {},
-      asksLaboratory(missing) ? NO_LABORATORY : "Laboratory and reference standards come from the bench file.",
-    ),
-    imported ? notice("warn", h("p", {}, IMPORTED)) : null,
+    refusal.text
+      ? notice("bad", h("p", {}, withCommands(refusal.text)))
+      : h("p", {}, missing.some(({ table }) => table === "laboratory") ? NO_LABORATORY : LABORATORY),
   );
-
-/** Where the campaign of the version states no laboratory. */
-const NO_LABORATORY =
-  "The measurement states no laboratory, so this form asks for it. A [laboratory] in the bench file states it in every certificate of later campaigns.";
-
-/** What the certificate of a version needs beyond this form where no campaign measured it. */
-const IMPORTED =
-  "This version was fitted to an imported recording. Its certificate also states the method, the days of the measurement, the reference standards and the repeatability, which this form does not ask for: give them in recording.toml, import it again, and issue the certificate with labctl certificate and a file of the order.";
+  const asked = dialog(
+    `Issue a certificate of ${serial} version ${version}`,
+    fields.map((field) => ({ ...field, value: given[field.name] })),
+    {
+      text: "A certificate is a document for a customer; which version is in force does not change. The certificate is written to the audit trail.",
+      body,
+      confirm: "Issue certificate",
+    },
+  );
+  const form = body.closest("form");
+  if (form) {
+    checkBefore(form, (entries) => problemsOf(fields, entries));
+    markProblems(form, refusal.problems);
+  }
+  const answers = await asked;
+  const entries = answers ?? (form ? entriesOf(form) : {});
+  kept.set(key, entries);
+  if (!answers && Object.values(entries).some(Boolean))
+    toast("good", "The entries are kept: the form shows them again until the page is reloaded.");
+  return answers;
+}
 
 /**
- * Whether a recording of a version is from another bench than that of a campaign.
- * @param {string} serial
- * @param {number} version
+ * What the service refused, beside the fields where it says which; what has no field is said above them.
+ * @param {Problem} problem
+ * @returns {Refusal}
  */
-async function wasImported(serial, version) {
-  const [rows, { recordings }] = await Promise.all([
-    get("/api/recordings", { query: { unit: serial } }),
-    get("/api/units/{serial}/calibrations/{version}", { path: { serial, version } }),
-  ]);
-  return rows.some((row) => recordings.includes(row.id) && row.origin === "import");
-}
-
-/** @param {Answers} given */
-function orderOf(given) {
-  const { name, street, post_code, city, country, email, contact, order } = given;
+function refusalOf({ message, errors = [], missing = [] }) {
+  const stated = [
+    ...errors.map(({ place, text }) => ({ field: fieldAt(place.slice(1).join(".")), text })),
+    ...missing.map(({ table, key, fact }) => ({ field: fieldAt(`order.${table}.${key}`), text: `${fact} is missing` })),
+  ];
+  const beside = stated.flatMap(({ field, text }) => (field ? [[field, `${capitalised(text)}.`]] : []));
+  const whole = stated.length > 0 && beside.length === stated.length;
   return {
-    ...(given.laboratory_name
-      ? {
-          laboratory: {
-            name: given.laboratory_name,
-            street: given.laboratory_street,
-            post_code: given.laboratory_post_code,
-            city: given.laboratory_city,
-            country: given.laboratory_country,
-            email: given.laboratory_email,
-          },
-        }
-      : {}),
-    customer: { name, street, post_code, city, country, email, contact, order },
-    item: {
-      manufacturer: given.manufacturer,
-      condition: given.condition,
-      ...(given.received ? { received: given.received } : {}),
-    },
-    method: { deviations: given.deviations },
-    ...(given.specification
-      ? {
-          conformity: {
-            specification: given.specification,
-            limit_dps: Number(given.limit_dps),
-            about: given.own_axis ? /** @type {const} */ ("own axis") : /** @type {const} */ ("any axis"),
-            rule: given.guard_band ? /** @type {const} */ ("guard-band") : /** @type {const} */ ("simple"),
-          },
-        }
-      : {}),
+    text: whole ? "Nothing was issued. Correct what is marked below." : `${capitalised(message)}.`,
+    problems: Object.fromEntries(beside),
   };
 }
+
+/**
+ * Say which facts are missing that no order can state, and what to do about each.
+ * @param {string} serial
+ * @param {number} version
+ * @param {readonly MissingFact[]} missing
+ */
+const sayMissing = (serial, version, missing) =>
+  dialog(`No certificate of ${serial} version ${version} yet`, [], {
+    text: "What is missing belongs to the measurement, so this page cannot add it. Nothing else is asked for before it is stated.",
+    body: notice(
+      "warn",
+      h(
+        "ul",
+        { class: "plain" },
+        missing.map(({ fact, where, remedy }) =>
+          h("li", {}, h("strong", {}, `Missing: ${fact}. `), withCommands(remedy || `State it: ${where}.`)),
+        ),
+      ),
+    ),
+    confirm: "Close",
+  });
+
+const LABORATORY = "Laboratory and reference standards come from the bench file.";
+
+/** Where the measurement states no laboratory. */
+const NO_LABORATORY =
+  "The measurement states no laboratory, so this form asks for it. A [laboratory] in the bench file states it in every certificate of later campaigns.";

@@ -8,7 +8,7 @@ import { askCertification, askRevocation, fetchTable } from "./certification.js"
 import { certificateFiles } from "./certificate.js";
 import { exportFiles } from "./export_files.js";
 
-/** @import { CalibrationRow, Certificate, Unit } from "../../../types/api.js" */
+/** @import { CalibrationRow, Certificate, Certification, Unit } from "../../../types/api.js" */
 
 /** Versions that are shown at first, and that one press shows more. */
 const PART = 10;
@@ -17,12 +17,13 @@ const PART = 10;
  * @param {Unit} unit
  * @param {readonly CalibrationRow[]} rows newest first
  * @param {readonly Certificate[]} issued
+ * @param {readonly Certification[]} history newest first
  * @param {string} explore
  */
-export function versionsCard(unit, rows, issued, explore) {
+export function versionsCard(unit, rows, issued, history, explore) {
   const place = h("div", { class: "stack" });
   const ordered = [...rows.filter((row) => row.certified), ...rows.filter((row) => !row.certified)];
-  const columns = columnsOf(unit, issued, explore);
+  const columns = columnsOf(unit, issued, history, explore);
   /**
    * @param {number} shown
    * @returns {void}
@@ -58,10 +59,11 @@ const act = (unit, row) =>
 /**
  * @param {Unit} unit
  * @param {readonly Certificate[]} issued
+ * @param {readonly Certification[]} history
  * @param {string} explore
  * @returns {Parameters<typeof table<CalibrationRow>>[0]}
  */
-const columnsOf = (unit, issued, explore) => [
+const columnsOf = (unit, issued, history, explore) => [
   {
     title: "Version",
     cell: (row) =>
@@ -103,7 +105,7 @@ const columnsOf = (unit, issued, explore) => [
         "div",
         { class: "row version-actions" },
         act(unit, row),
-        certificateFiles(unit.serial, row.version, issued),
+        certificateFiles(unit.serial, row.version, issued, history),
         h("details", {}, h("summary", {}, "Files"), exportFiles(unit, row.version)),
         fetchedBy(unit.serial, row.version),
       ),

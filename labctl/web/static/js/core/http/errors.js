@@ -1,6 +1,6 @@
 // Errors of requests, and what a page says of them.
 
-/** @import { ProblemDocument, Warning } from "../../../../types/api.js" */
+/** @import { MissingFact, ProblemDocument, Warning } from "../../../../types/api.js" */
 
 /** A problem document of the service (RFC 9457): `status`, `type`, `title`, and `detail` as the message. */
 export class Problem extends Error {
@@ -18,6 +18,10 @@ export class Problem extends Error {
     this.warnings = document.warnings;
     /** @type {string[] | undefined} */
     this.problems = document.problems;
+    /** What is wrong, with its place in the request. @type {{ place: string[], text: string }[] | undefined} */
+    this.errors = document.errors;
+    /** @type {MissingFact[] | undefined} */
+    this.missing = document.missing;
   }
 }
 
