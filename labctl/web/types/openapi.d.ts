@@ -2552,7 +2552,7 @@ export interface components {
             result: components["schemas"]["AccelerometerResponse-Input"];
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -3400,6 +3400,12 @@ export interface components {
              */
             objections: components["schemas"]["Objection"][];
             /**
+             * In Force
+             * @description Whether this version is in force: certified last, and not revoked.
+             * @default false
+             */
+            in_force: boolean;
+            /**
              * Override Needed
              * @description Whether the version can be certified only with `override`.
              */
@@ -3755,7 +3761,7 @@ export interface components {
             supplier?: string | null;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -5215,6 +5221,11 @@ export interface components {
              */
             withdrawn_certificates: string[];
             /**
+             * Already In Force
+             * @description Only in the answer to a certification of the version that was in force already. unchanged: by the same person, for the same reason, with the same verdict, objections and due date (day): nothing was written, and this is the act that stands; renewed: this act was written in addition. null: the version was not in force.
+             */
+            already_in_force: ("unchanged" | "renewed") | null;
+            /**
              * Fetched By
              * @description Only in the answer to a revocation: who has to be notified.
              */
@@ -5316,7 +5327,7 @@ export interface components {
         CertifyRequest: {
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -5615,7 +5626,7 @@ export interface components {
             reason: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -6133,7 +6144,7 @@ export interface components {
             round: number;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -6166,7 +6177,7 @@ export interface components {
             prompt: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -11432,7 +11443,7 @@ export interface components {
             result: components["schemas"]["MagnetometerResponse-Input"];
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -13248,7 +13259,7 @@ export interface components {
             reason: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed. Empty: not stated. Only the first 120 characters are kept.
              * @default
              */
             by?: string;
@@ -13554,7 +13565,7 @@ export interface components {
         ReleaseRequest: {
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -14071,7 +14082,7 @@ export interface components {
         ResumeRequest: {
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              * @default a person
              */
             by?: string;
@@ -14094,7 +14105,7 @@ export interface components {
         RevokeRequest: {
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -14856,7 +14867,7 @@ export interface components {
             reason: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -14911,7 +14922,7 @@ export interface components {
             reason?: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -15006,7 +15017,7 @@ export interface components {
             note?: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -15135,7 +15146,7 @@ export interface components {
             description?: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -16983,7 +16994,7 @@ export interface components {
             reason: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };

@@ -3,10 +3,8 @@
 import { download, get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { actButton, button, notice } from "../core/components.js";
-import { dialog } from "../core/dialog.js";
-import { capitalised } from "../core/format.js";
-import { Problem } from "../core/http/errors.js";
-import { show } from "../core/router.js";
+import { dialog, WHO } from "../core/dialog.js";
+import { show, visitSignal } from "../core/router.js";
 import { stateChip } from "./certificate_state.js";
 
 /** @import { Certificate, MissingFact } from "../../../types/api.js" */
@@ -21,7 +19,7 @@ const FORMATS = [
 
 /** @type {readonly Field[]} */
 const FIELDS = [
-  { name: "by", label: "Issued by" },
+  { ...WHO, label: "Issued by" },
   { name: "name", label: "Customer" },
   { name: "street", label: "Street and number" },
   { name: "post_code", label: "Post code" },
@@ -107,44 +105,42 @@ export function certificateFiles(serial, version, issued) {
 }
 
 /**
- * Ask for the facts of the order, until a certificate is issued; a refusal is shown above what was filled in.
+ * Ask for the facts of the order, until a certificate is issued.
  * @param {string} serial
  * @param {number} version
  * @param {Certificate} [replaced]
  */
 async function askCertificate(serial, version, replaced) {
   const why = replaced ? [{ name: "amend", label: `Why certificate ${replaced.number} is replaced` }] : [];
-  const [imported, missing] = await Promise.all([wasImported(serial, version), missingFacts(serial, version)]);
-  /** @type {Answers} */
-  let given = {};
-  let refusal = "";
-  const asked = [...why, ...(asksLaboratory(missing) ? LABORATORY_FIELDS : []), ...FIELDS];
-  for (;;) {
-    const fields = asked.map((field) => ({ ...field, value: given[field.name] }));
-    const answers = await dialog(`Issue a certificate of version ${version}`, fields, {
-      text: "A certificate is a document for a customer; which version is in force does not change. The certificate is written to the audit trail.",
-      body: refusal ? notice("bad", h("p", {}, `${capitalised(refusal)}.`)) : notesOf(imported, missing),
-      confirm: "Issue certificate",
-    });
-    if (!answers) return;
-    const body = { by: answers.by, order: orderOf(answers), ...(replaced ? { amend: answers.amend } : {}) };
-    try {
-      await post("/api/units/{serial}/calibrations/{version}/certificate", { path: { serial, version }, body });
-      return await show();
-    } catch (error) {
-      if (!(error instanceof Problem)) throw error;
-      [given, refusal] = [answers, error.message];
-    }
-  }
+  const left = visitSignal();
+  const [imported, missing] = await Promise.all([
+    wasImported(serial, version, left),
+    missingFacts(serial, version, left),
+  ]);
+  const fields = [...why, ...(asksLaboratory(missing) ? LABORATORY_FIELDS : []), ...FIELDS];
+  const answers = await dialog(`Issue a certificate of version ${version} of ${serial}`, fields, {
+    text: "A certificate is a document for a customer; which version is in force does not change. The certificate is written to the audit trail.",
+    body: notesOf(imported, missing),
+    confirm: "Issue certificate",
+    signal: left,
+    send: (given, signal) =>
+      post("/api/units/{serial}/calibrations/{version}/certificate", {
+        path: { serial, version },
+        body: { by: given.by, order: orderOf(given), ...(replaced ? { amend: given.amend } : {}) },
+        signal,
+      }),
+  });
+  if (answers) await show();
 }
 
 /**
  * The mandatory facts that the version does not state, each with the table of the order that can state it.
  * @param {string} serial
  * @param {number} version
+ * @param {AbortSignal} signal
  */
-const missingFacts = (serial, version) =>
-  get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path: { serial, version } });
+const missingFacts = (serial, version, signal) =>
+  get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path: { serial, version }, signal });
 
 /** @param {readonly MissingFact[]} missing */
 const asksLaboratory = (missing) => missing.some(({ table }) => table === "laboratory");
@@ -178,11 +174,12 @@ const IMPORTED =
  * Whether a recording of a version is from another bench than that of a campaign.
  * @param {string} serial
  * @param {number} version
+ * @param {AbortSignal} signal
  */
-async function wasImported(serial, version) {
+async function wasImported(serial, version, signal) {
   const [rows, { recordings }] = await Promise.all([
-    get("/api/recordings", { query: { unit: serial } }),
-    get("/api/units/{serial}/calibrations/{version}", { path: { serial, version } }),
+    get("/api/recordings", { query: { unit: serial }, signal }),
+    get("/api/units/{serial}/calibrations/{version}", { path: { serial, version }, signal }),
   ]);
   return rows.some((row) => recordings.includes(row.id) && row.origin === "import");
 }
