@@ -59,9 +59,7 @@ def _pages(record: Certificate) -> dict[str, object]:
         "specimen": next((text for text in record.statements if text.startswith("SPECIMEN")), ""),
         "facts": _facts(record),
         "issued": record.issued_on.isoformat(),
-        "issued_by": _breakable(
-            record.issued_by + (f" ({record.issued_by_identity})" if record.issued_by_identity else "")
-        ),
+        "issued_by": _issuer(record),
         "authorised": _breakable(f"{record.authorised.persons}, {record.authorised.at:%Y-%m-%d %H:%M} UTC"),
         "authorised_name": record.authorised.name,
         "signature": _signature(record),
@@ -101,6 +99,11 @@ def _pages(record: Certificate) -> dict[str, object]:
         "page": record.state_address,
         "manifests": [[f"Manifest {seal.manifest}, {seal.record}", seal.hash] for seal in record.manifests],
     }
+
+
+def _issuer(record: Certificate) -> str:
+    identity = f" ({record.issued_by_identity})" if record.issued_by_identity else ""
+    return _breakable(record.issued_by + identity)
 
 
 def _breakable(text: str) -> str:
