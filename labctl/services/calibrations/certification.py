@@ -108,7 +108,8 @@ def put_in_force(
     )  # fmt: skip
     due = None if days is None else at + timedelta(days=days)
     standing = _standing(store, known.serial, version)
-    if second is None and standing is not None and _is_same(standing, request, by_key, due, judgement):
+    is_same = standing is not None and second is None and _is_same(standing, request, at, by_key, due, judgement)
+    if standing is not None and is_same and not _withdrawn_since(store, standing):
         return certification_response(standing).model_copy(update={"already_in_force": "unchanged"})
     row = store.calibrations.certify(
         serial, version, "certify", by=request.by, reason=request.reason, at=at, due_at=due, judgement=judgement,
@@ -124,18 +125,30 @@ def _standing(store: Store, serial: str, version: int) -> CertificationRow | Non
 
 
 def _is_same(
-    standing: CertificationRow, request: CertifyRequest, by_key: str | None, due: datetime | None, found: Judgement
+    standing: CertificationRow,
+    request: CertifyRequest,
+    at: datetime,
+    by_key: str | None,
+    due: datetime | None,
+    found: Judgement,
 ) -> bool:
-    """Return whether a certification would say what the one that stands says: the due date counts as a day."""
+    """Return whether a certification would say what the one that stands says, on the same day (UTC)."""
     before = standing.judgement
     if before is None or standing.release is not None:
         return False
-    days = [None if each is None else each.date() for each in (standing.due_at, due)]
+    days = [[each and each.date() for each in times] for times in ((standing.at, standing.due_at), (at, due))]
     return (
         (standing.by, standing.by_key, standing.reason) == (request.by, by_key, request.reason)
         and days[0] == days[1]
         and replace(before, at=found.at) == found
     )
+
+
+def _withdrawn_since(store: Store, standing: CertificationRow) -> bool:
+    """Return whether a certificate of the version was withdrawn after the act, which vouches for it no longer."""
+    issued = store.certificates.of_unit(standing.serial)
+    gone = [row.withdrawal.at for row in issued if row.version == standing.version and row.withdrawal is not None]
+    return any(at >= standing.at for at in gone)
 
 
 def _refuse_objections(known: AssessmentResponse, request: CertifyRequest) -> None:

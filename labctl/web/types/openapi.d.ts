@@ -5222,7 +5222,7 @@ export interface components {
             withdrawn_certificates: string[];
             /**
              * Already In Force
-             * @description Only in the answer to a certification of the version that was in force already. unchanged: by the same person, for the same reason, with the same verdict, objections and due date (day): nothing was written, and this is the act that stands; renewed: this act was written in addition. null: the version was not in force.
+             * @description Only in the answer to a certification of the version that was in force already. unchanged: on the same day (UTC), by the same person, for the same reason, with the same verdict, objections and due date, and no certificate was withdrawn since: nothing was written, and this is the act that stands; renewed: this act was written in addition. null: the version was not in force.
              */
             already_in_force: ("unchanged" | "renewed") | null;
             /**
