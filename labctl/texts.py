@@ -8,6 +8,8 @@ import unicodedata
 _DIRECTIONS = frozenset(map(chr, (*range(0x202A, 0x202F), *range(0x2066, 0x206A))))
 #: Control characters, separators of lines and paragraphs, and halves of a character (Unicode categories).
 _CATEGORIES = frozenset({"Cc", "Zl", "Zp", "Cs"})
+#: First letters of the Unicode categories of separators, controls and formats.
+_UNSEEN = frozenset("ZC")
 #: What a text of several lines may have of these.
 _LINES = frozenset("\n\r\t")
 
@@ -31,6 +33,11 @@ def control_character(text: str, *, lines: bool = False) -> str:
 def cleaned(text: str) -> str:
     """Return a text with a space in place of each control character."""
     return "".join(" " if _is_control(each) else each for each in text)
+
+
+def is_blank(text: str) -> bool:
+    """Return whether nothing of a text can be seen: no letter, mark, digit, punctuation or symbol."""
+    return all(unicodedata.category(each)[0] in _UNSEEN for each in text)
 
 
 def _is_control(character: str) -> bool:

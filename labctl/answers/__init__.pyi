@@ -448,7 +448,6 @@ from labctl.answers.standards import (
     ChartLimits as ChartLimits,
     ChartState as ChartState,
     DriftPrediction as DriftPrediction,
-    Name as Name,
     StandardBadRequest as StandardBadRequest,
     StandardCertificateRequest as StandardCertificateRequest,
     StandardCertificateResponse as StandardCertificateResponse,

@@ -8,13 +8,21 @@ from typing import Literal
 from pydantic import Field, JsonValue
 
 from labctl.answers.base import Request, ResponseModel
-from labctl.answers.common_fields import BenchName, Distribution, DistributionVersion, DriverName, FileName, Serial
+from labctl.answers.common_fields import (
+    BenchName,
+    Distribution,
+    DistributionVersion,
+    DriverName,
+    FileName,
+    PersonName,
+    Serial,
+)
 
 
 class ClearRequest(Request):
     """Who has inspected a bench whose safe state was not confirmed."""
 
-    by: str = Field(min_length=1, max_length=200, description="Name of the person who has inspected the bench.")
+    by: PersonName = Field(description="Name of the person who has inspected the bench.")
     reason: str = Field(default="inspected the bench", description="What the person did, for the audit trail.")
 
 

@@ -16,7 +16,17 @@ from labctl.answers.campaign_parts import (
     TurnResponse,
     WatchedLimitResponse,
 )
-from labctl.answers.common_fields import BenchName, CampaignNumber, Clip, Person, Reason, RecipeName, StepCount
+from labctl.answers.common_fields import (
+    BenchName,
+    CampaignNumber,
+    Clip,
+    CutPersonName,
+    OptionalPersonName,
+    PersonName,
+    Reason,
+    RecipeName,
+    StepCount,
+)
 from labctl.answers.drafts import DraftResponse
 from labctl.answers.plans import RecipeSource
 from labctl.answers.sufficiency import TargetResponse
@@ -74,9 +84,8 @@ class CampaignRequest(Request):
         "missed start is skipped. Default: on a simulated bench no limit, a missed start begins late, once; on a real "
         "bench 3600, without the time behind a running campaign.",
     )
-    confirmed_by: str = Field(
+    confirmed_by: OptionalPersonName = Field(
         default="",
-        max_length=200,
         description="Needed for a bench that is not simulated: name of the person who confirms `checks`; for a later "
         "start, the person confirms that the checks will be met at that time.",
     )
@@ -112,8 +121,8 @@ class StartRequest(Request):
     simulated_start: AwareDatetime | None = Field(
         default=None, description="Date and time at which the time of a simulated bench begins."
     )
-    confirmed_by: str = Field(
-        default="", max_length=200, description="Has the same meaning as in `POST /api/campaigns`."
+    confirmed_by: OptionalPersonName = Field(
+        default="", description="Has the same meaning as in `POST /api/campaigns`."
     )
     checks: list[BenchCheck] = Field(
         default_factory=list, description="Has the same meaning as in `POST /api/campaigns`."
@@ -125,7 +134,7 @@ class ReasonRequest(Request):
 
     cleans_texts = True  # no abort is refused for the words that describe it
     reason: Reason = Field(min_length=1)
-    by: Person = Field(default="", max_length=200)
+    by: CutPersonName = ""  # no abort is refused for its length
 
     @property
     def text(self) -> str:
@@ -138,7 +147,7 @@ class ConfirmRequest(Request):
 
     cleans_texts = True  # as above
     prompt: str = Field(min_length=1, description="Id of the question that is answered.")
-    by: Person = Field(min_length=1, max_length=200)
+    by: PersonName
     confirmed: bool = Field(
         default=True,
         description="true: the requested action is done; false: the action cannot be done, and the campaign ends.",
@@ -153,7 +162,7 @@ class ResumeRequest(Request):
     """How a campaign that is paused or was interrupted goes on."""
 
     cleans_texts = True  # as above
-    by: Person = Field(default="a person", min_length=1, max_length=200)
+    by: PersonName = "a person"
     reason: Reason = ""
     power: Literal["lost", "kept"] | None = Field(
         default=None,

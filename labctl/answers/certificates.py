@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field
 
 from instruments.laboratory import Contact, Laboratory
 from labctl.answers.base import BY_KEY, LongText, Request, ResponseModel
-from labctl.answers.common_fields import CertificateNumber, Serial, VersionNumber
+from labctl.answers.common_fields import CertificateNumber, PersonName, Serial, VersionNumber
 
 #: Of ILAC-G8:09/2019: 4.2.1 simple acceptance; 4.2.2 a guard band as wide as the expanded uncertainty.
 DecisionRule = Literal["simple", "guard-band"]
@@ -189,7 +189,7 @@ class CertificateOrder(Request):
 class CertificateRequest(Request):
     """Issue the certificate of a version, or an amended one."""
 
-    by: str = Field(min_length=1, max_length=200, description="Name of the person who issues the certificate.")
+    by: PersonName = Field(description="Name of the person who issues the certificate.")
     order: CertificateOrder = Field(
         default=CertificateOrder(), description="The facts of the order; they are kept with the certificate."
     )
@@ -227,7 +227,7 @@ class WithdrawRequest(Request):
     """Withdraw a certificate; it stays withdrawn, and its bytes stay what they are."""
 
     number: CertificateNumber = Field(min_length=1, max_length=100)
-    by: str = Field(min_length=1, max_length=200, description="Name of the person who withdraws it.")
+    by: PersonName = Field(description="Name of the person who withdraws it.")
     reason: str = Field(min_length=1, max_length=TEXT, description="Why; the list, the file and the page say it.")
 
 

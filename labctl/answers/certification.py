@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
 
 from labctl.answers.base import BY_KEY, Request, ResponseModel
 from labctl.answers.budget import CrossRatesJson
@@ -14,8 +15,10 @@ from labctl.answers.common_fields import (
     CalibrationHash,
     FittedRms,
     HeldoutRms,
+    InForce,
     NoiseFloor,
     Person,
+    PersonName,
     RawRms,
     Reason,
     Serial,
@@ -23,6 +26,18 @@ from labctl.answers.common_fields import (
 )
 from labctl.answers.judgement import DueSource, Objection
 
+#: The longest interval between two calibrations of a unit, days.
+MAX_DUE_DAYS = 36_500
+
+
+def _due_days(days: int) -> int:
+    if not 0 <= days <= MAX_DUE_DAYS:
+        words = "the next calibration cannot be due in {days} days; give from 1 to {limit} days, or 0 for no due date"
+        raise PydanticCustomError("due_days", words, {"days": days, "limit": MAX_DUE_DAYS})
+    return days
+
+
+DueDays = Annotated[int, AfterValidator(_due_days), Field(json_schema_extra={"minimum": 0, "maximum": MAX_DUE_DAYS})]
 DUE_FROM = "Source of the number of days; null: no number is given, and there is no due date."
 WHEN = "Time of the verdict, which is the time of the certification."
 NO_VERDICT = (
@@ -46,12 +61,10 @@ class AnyAxisUncertainty(ResponseModel):
 class RevokeRequest(Request):
     """Who revokes a version, and why."""
 
-    by: Person = Field(min_length=1)
+    by: PersonName
     reason: Reason = Field(min_length=1)
-    due_days: int | None = Field(
+    due_days: DueDays | None = Field(
         default=None,
-        ge=0,
-        le=36_500,
         description="Only for a certification: days until the next calibration is due; 0: no due date; absent: "
         "the number in the recipe (`recalibrate_after_days`), else in the service ($LABCTL_DUE_DAYS), else no "
         "due date.",
@@ -69,7 +82,7 @@ class CertifyRequest(RevokeRequest):
 class ReleaseRequest(Request):
     """Who releases, as the second person, what a first one asked to certify, and why."""
 
-    by: Person = Field(min_length=1)
+    by: PersonName
     reason: Reason = Field(min_length=1)
 
 
@@ -116,6 +129,7 @@ class AssessmentResponse(ResponseModel):
         "version states none."
     )
     objections: list[Objection] = Field(description="Objections to certifying the version; empty: none.")
+    in_force: InForce = False
     override_needed: bool = Field(description="Whether the version can be certified only with `override`.")
     least_reason_characters: int = Field(description="Smallest number of characters of the reason for an override.")
     least_reason_words: int = Field(description="Smallest number of words of the reason for an override.")
@@ -202,6 +216,13 @@ class CertificationResponse(ResponseModel):
     )
     withdrawn_certificates: list[str] = Field(
         default_factory=list, description="Only in the answer to a revocation: certificates that it withdrew."
+    )
+    already_in_force: Literal["unchanged", "renewed"] | None = Field(
+        default=None,
+        description="Only in the answer to a certification of the version that was in force already. unchanged: on "
+        "the same day (UTC), by the same person, for the same reason, with the same verdict, objections and due date, "
+        "and no certificate was withdrawn since: nothing was written, and this is the act that stands; renewed: this "
+        "act was written in addition. null: the version was not in force.",
     )
     fetched_by: list[FetchResponse] = Field(
         default_factory=list, description="Only in the answer to a revocation: who has to be notified."

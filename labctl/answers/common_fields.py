@@ -5,7 +5,13 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
+
+from labctl.texts import is_blank
+
+#: Most characters of the name of a person in a request; a name that was stored before may be longer.
+MAX_PERSON_CHARACTERS = 120
 
 # descriptions of quantities whose types differ
 MOTION = (
@@ -54,7 +60,39 @@ DriverName = Annotated[str, Field(description="Name of the driver of the instrum
 Distribution = Annotated[str, Field(description="Python distribution (installed package) that provides the driver.")]
 DistributionVersion = Annotated[str, Field(description="Version of that distribution.")]
 
-# an act of a person
+
+def _short_name(name: str) -> str:
+    if len(name := name.strip(" ")) > MAX_PERSON_CHARACTERS:
+        words = "the name of a person has {length} characters, at most {limit} are allowed; shorten it"
+        raise PydanticCustomError("long_name", words, {"length": len(name), "limit": MAX_PERSON_CHARACTERS})
+    return name
+
+
+def _stated_name(name: str) -> str:
+    if is_blank(name):
+        words = "the name of a person is blank ({length} characters); give a name of 1 to {limit} characters"
+        raise PydanticCustomError("blank_name", words, {"length": len(name), "limit": MAX_PERSON_CHARACTERS})
+    return _short_name(name)
+
+
+def _cut_name(name: str) -> str:
+    return name.strip(" ")[:MAX_PERSON_CHARACTERS]
+
+
+# an act of a person: in a request, and as it was stored
+_LIMIT = {"maxLength": MAX_PERSON_CHARACTERS}
+_NAME = "Name of the person who acts; spaces around it are removed."
+PersonName = Annotated[
+    str, AfterValidator(_stated_name), Field(description=_NAME, json_schema_extra={"minLength": 1, **_LIMIT})
+]
+#: Of an act that a person may leave unnamed.
+OptionalPersonName = Annotated[str, AfterValidator(_short_name), Field(description=_NAME, json_schema_extra=_LIMIT)]
+#: Of an act that is not refused for the length of a name, such as an abort: only its beginning is kept.
+CutPersonName = Annotated[
+    str,
+    AfterValidator(_cut_name),
+    Field(description=f"{_NAME} Empty: not stated. Only the first {MAX_PERSON_CHARACTERS} characters are kept."),
+]
 Person = Annotated[str, Field(description="Name of the person who acted, as typed.")]
 Reason = Annotated[str, Field(description="Reason for the act, as typed.")]
 ActTime = Annotated[datetime, Field(description="Time of the act.")]

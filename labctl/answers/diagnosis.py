@@ -14,7 +14,7 @@ from labctl.answers.common_fields import (
     CriticismVerdict,
     HeldoutRms,
     NoiseFloor,
-    Person,
+    PersonName,
     Reason,
     Serial,
     VersionNumber,
@@ -69,7 +69,7 @@ class ConfirmExperimentRequest(Request):
 
     cleans_texts = True  # no answer is refused for the words that describe it
     round: int = Field(ge=1, description="Number of the round whose experiment is meant; another is refused.")
-    by: Person = Field(min_length=1, max_length=200)
+    by: PersonName
     confirmed: bool = Field(
         default=True,
         description="true: run the experiment; false: the experiment cannot be done, and the next best one is chosen.",

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 from labctl.answers.base import Request, ResponseModel
-from labctl.answers.common_fields import CriticismVerdict, Serial
+from labctl.answers.common_fields import CriticismVerdict, CutPersonName, Serial
 from labctl.answers.storage_url import StorageUrl
 
 #: What a job does with each unit.
@@ -116,7 +116,7 @@ class FleetCancelRequest(Request):
     """The end of a job before it is done."""
 
     cleans_texts = True
-    by: str = Field(default="", max_length=200, description="Name of the person who cancels it; empty: not stated.")
+    by: CutPersonName = Field(default="", description="Name of the person who cancels it; empty: not stated.")
     reason: str = Field(default="", max_length=2000, description="Reason for it; empty: not stated.")
 
 

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from labctl.answers.accelerometer import AccelerometerResponse
 from labctl.answers.base import BY_KEY, Request, ResponseModel
-from labctl.answers.common_fields import FormatTitle, Person, Serial
+from labctl.answers.common_fields import FormatTitle, Person, PersonName, Serial
 from labctl.answers.magnetometer import MagnetometerResponse
 
 SensorName = Literal["accelerometer", "magnetometer"]
@@ -38,7 +38,7 @@ class AccelerometerRequest(Request):
 
     data: MeasuredData = Field(description="The data that the result was fitted to.")
     result: AccelerometerResponse = Field(description="As `labctl accelerometer FILE --json` prints it.")
-    by: Person = Field(min_length=1, max_length=200)
+    by: PersonName
 
 
 class MagnetometerRequest(Request):
@@ -46,7 +46,7 @@ class MagnetometerRequest(Request):
 
     data: MeasuredData = Field(description="The data that the result was fitted to.")
     result: MagnetometerResponse = Field(description="As `labctl magnetometer FILE --json` prints it.")
-    by: Person = Field(min_length=1, max_length=200)
+    by: PersonName
 
 
 class SensorFormatResponse(ResponseModel):

@@ -14,6 +14,7 @@ from labctl.answers.common_fields import (
     CertificateNumber,
     InForce,
     Person,
+    PersonName,
     Reason,
     Sentences,
     Serial,
@@ -24,7 +25,6 @@ from labctl.answers.common_fields import (
 TEXT = 2000
 #: No certificate states a smaller uncertainty; the square of a much smaller one has no number.
 MIN_U = 1e-12
-Name = Field(min_length=1, max_length=200)
 NOMINAL = "Nominal value that it holds for, in the unit of the standard; null: it holds for all."
 #: valid: may be used. no certificate: nothing is known. check it: an intermediate check is out of limits.
 StandardState = Literal["valid", "no certificate", "overdue", "check it", "bad"]
@@ -44,7 +44,7 @@ class StandardRequest(Request):
     )
     serial: str = Field(default="", max_length=100, description="Serial number of the standard; empty: not stated.")
     description: LongText = Field(default="", max_length=TEXT, description="Description of the standard; empty: none.")
-    by: Person = Name
+    by: PersonName
 
 
 class CertifiedPointRequest(Request):
@@ -90,7 +90,7 @@ class StandardCertificateRequest(Request):
     reason: str = Field(
         default="", max_length=TEXT, description="Why this replaces an entry of the same number that was typed wrong."
     )
-    by: Person = Name
+    by: PersonName
 
     @model_validator(mode="after")
     def _consistent(self) -> StandardCertificateRequest:
@@ -112,7 +112,7 @@ class StandardCheckRequest(Request):
     nominal: float | None = Field(default=None, allow_inf_nan=False, description=NOMINAL)
     checked_at: AwareDatetime | None = Field(default=None, description="Default: now.")
     note: LongText = Field(default="", max_length=TEXT, description="Remark on the check; empty: none.")
-    by: Person = Name
+    by: PersonName
 
 
 class StandardBadRequest(Request):
@@ -121,7 +121,7 @@ class StandardBadRequest(Request):
     bad_from: date = Field(description="First day of which it is not known that the standard was good.")
     bad_until: date | None = Field(default=None, description="Last such day; null: it is still bad.")
     reason: Reason = Field(min_length=1, max_length=TEXT)
-    by: Person = Name
+    by: PersonName
 
     @model_validator(mode="after")
     def _in_order(self) -> StandardBadRequest:
@@ -134,7 +134,7 @@ class WithdrawFindingRequest(Request):
     """Withdraw a finding that was wrong."""
 
     reason: Reason = Field(min_length=1, max_length=TEXT)
-    by: Person = Name
+    by: PersonName
 
 
 class CertifiedPointResponse(ResponseModel):

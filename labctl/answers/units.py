@@ -15,7 +15,7 @@ from labctl.answers.common_fields import (
     MaxError,
     MeanError,
     OutputAxis,
-    Person,
+    PersonName,
     RecipeName,
     RecordingNumber,
     RmsError,
@@ -109,7 +109,7 @@ class BatchRequest(Request):
     supplier: str | None = Field(
         default=None, max_length=200, description="Supplier of the units; null: what is stated stays."
     )
-    by: Person = Field(min_length=1, max_length=200)
+    by: PersonName
 
 
 class BatchResponse(ResponseModel):

@@ -11,7 +11,7 @@ from labctl.answers.base import Request, ResponseModel
 from labctl.answers.common_fields import (
     ROOM_UNIT,
     OutputAxis,
-    Person,
+    PersonName,
     ReadingCount,
     Reason,
     RecordingNumber,
@@ -36,7 +36,7 @@ class CheckGyroRequest(Request):
         default=None, description="First day of the chart, such as after a repair; default: all recordings."
     )
     reason: Reason = Field(min_length=1, max_length=2000)
-    by: Person = Field(min_length=1, max_length=200)
+    by: PersonName
 
 
 class CheckGyroPoint(ResponseModel):
@@ -142,8 +142,8 @@ class RoomEnvironmentRequest(Request):
     bench: str = Field(
         default="", max_length=200, description="Name of the bench that they hold for; empty: all benches."
     )
-    by: str | None = Field(
-        default=None, min_length=1, max_length=200, description="The person who read and typed them; "
+    by: PersonName | None = Field(
+        default=None, description="The person who read and typed them; "
         "then the audit trail has a row. null: an instrument logged them."
     )  # fmt: skip
 

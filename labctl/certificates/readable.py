@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 
@@ -36,6 +37,9 @@ PLACES = {
     "other": "at another place",
 }
 MINUS = "−"
+#: A place where a line may end: a zero-width space; and a piece of a word that is followed by more of it.
+BREAK = "\u200b"
+_LONG_WORD = re.compile(r"\S{30}(?=\S)")
 #: Marks a standard uncertainty without the standards of the bench.
 FIT_ALONE = " *"
 
@@ -55,8 +59,8 @@ def _pages(record: Certificate) -> dict[str, object]:
         "specimen": next((text for text in record.statements if text.startswith("SPECIMEN")), ""),
         "facts": _facts(record),
         "issued": record.issued_on.isoformat(),
-        "issued_by": record.issued_by + (f" ({record.issued_by_identity})" if record.issued_by_identity else ""),
-        "authorised": f"{record.authorised.persons}, {record.authorised.at:%Y-%m-%d %H:%M} UTC",
+        "issued_by": _issuer(record),
+        "authorised": _breakable(f"{record.authorised.persons}, {record.authorised.at:%Y-%m-%d %H:%M} UTC"),
         "authorised_name": record.authorised.name,
         "signature": _signature(record),
         "method": _method(record),
@@ -95,6 +99,16 @@ def _pages(record: Certificate) -> dict[str, object]:
         "page": record.state_address,
         "manifests": [[f"Manifest {seal.manifest}, {seal.record}", seal.hash] for seal in record.manifests],
     }
+
+
+def _issuer(record: Certificate) -> str:
+    identity = f" ({record.issued_by_identity})" if record.issued_by_identity else ""
+    return _breakable(record.issued_by + identity)
+
+
+def _breakable(text: str) -> str:
+    """Return a text in which a word that is longer than a column may be broken, so that it prints over no other."""
+    return _LONG_WORD.sub(lambda part: part[0] + BREAK, text)
 
 
 def _signature(certificate: Certificate) -> str:

@@ -33,7 +33,8 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     certify.last.click()  # version 1
     expect(dialog).to_contain_text("Adequate: no effect is missing")
     expect(dialog.get_by_role("checkbox")).to_have_count(0)
-    expect(dialog).to_contain_text("Certify version 1: put it in force")  # and issuing a certificate is another act
+    # issuing a certificate is another act
+    expect(dialog).to_contain_text("Certify version 1 of OSU-FOG-2024: put it in force")
     expect(dialog).to_contain_text("It makes no document: a certificate for a customer is issued afterwards.")
     dialog.get_by_label("Who").fill("A. Person")
     dialog.get_by_label("Why").fill("fits")

@@ -140,11 +140,11 @@ def test_the_error_runs_from_the_one_version_to_the_other_and_ends_green(
     assert after["undistinguished"] == [{"effect": "sine_response", "others": ["scale_factor_odd"]}]
     expect(finish).to_contain_text("the cause is not known: sine response or scale factor odd")
     finish.get_by_role("button", name="Certify").click()
-    expect(page.get_by_role("dialog")).to_contain_text("Certify version 2: put it in force")
+    expect(page.get_by_role("dialog")).to_contain_text("Certify version 2 of")
     assert f"/units/{unit}" in page.url
     page.goto(f"{service.url}/explore?unit={unit}&version=2")  # the next step is there after a reload as well
     page.locator("main").get_by_role("button", name="Certify").click()
-    expect(page.get_by_role("dialog")).to_contain_text("Certify version 2: put it in force")
+    expect(page.get_by_role("dialog")).to_contain_text("Certify version 2 of")
 
 
 @pytest.mark.slow

@@ -108,12 +108,20 @@ def print_poses(poses: PosesJson) -> None:
     console.print(f"not determined: {poses['not_determined']}", style="dim", soft_wrap=True)
 
 
+#: What a certification has done, by whether the version was in force already.
+_CERTIFIED = {
+    None: "is now the calibration in force",
+    "renewed": "was in force already; this certification is written in addition",
+    "unchanged": "was in force already with the same facts; nothing was written",
+}
+
+
 def print_certification(answer: CertificationResponse | ReleaseRequestResponse) -> None:
     """Print an act of certifying or revoking and what was known of the version, or that it waits for its release."""
     if isinstance(answer, ReleaseRequestResponse):
         console.print(_waits(answer), soft_wrap=True)
         return
-    done = "is now the calibration in force" if answer.act == "certify" else "is no longer in force"
+    done = "is no longer in force" if answer.act == "revoke" else _CERTIFIED[answer.already_in_force]
     console.print(f"{answer.serial} version {answer.version} {done} ({_persons(answer)}: {answer.reason})")
     if answer.act == "certify":
         console.print(f"  verdict: {_verdict(answer)}", soft_wrap=True)

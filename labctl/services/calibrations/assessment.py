@@ -35,6 +35,7 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
     objections = [*unusable, *_of_verdict(criticism, _errors(row)), *_of_errors(store, row), *_of_data(store, row)]
     objections += _of_standards(store, row)
     due_days, due_from = interval_days(store, serial, version, None)
+    history = store.calibrations.history(row.serial)
     return AssessmentResponse(
         serial=serial,
         version=version,
@@ -50,6 +51,7 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
         least_reason_words=MIN_REASON_WORDS,
         due_days=due_days,
         due_from=due_from,
+        in_force=any((each.act, each.version) == ("certify", version) for each in history[:1]),
     )
 
 

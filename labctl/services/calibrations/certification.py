@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime, timedelta
 from typing import Literal
 
@@ -59,6 +60,7 @@ def certify(
 
     Raises NotFound; CertificationRefused where there are objections and `request` does not override that;
     BadInput for an override whose reason is no sentence; ReleaseRefused without a key where two persons are needed.
+    The same certification twice writes nothing.
     """
     if request.override:
         _refuse_short(request.reason)
@@ -76,7 +78,9 @@ def release(store: Store, serial: str, version: int, request: ReleaseRequest, at
     """
     key = key_of_person(f"releasing {serial} version {version}")
     waiting = waiting_request(store, store.units.get(serial).serial, version, key)
-    first = CertifyRequest(by=waiting.by, reason=waiting.reason, due_days=waiting.due_days, override=waiting.override)
+    first = CertifyRequest.model_construct(  # as it was stored: a name may be longer than a new one may be
+        by=waiting.by, reason=waiting.reason, due_days=waiting.due_days, override=waiting.override
+    )
     second = Release(request.by, key, request.reason, waiting.id)
     return put_in_force(store, serial, version, first, at, waiting.by_key, second)
 
@@ -103,11 +107,48 @@ def put_in_force(
         ),
     )  # fmt: skip
     due = None if days is None else at + timedelta(days=days)
+    standing = _standing(store, known.serial, version)
+    is_same = standing is not None and second is None and _is_same(standing, request, at, by_key, due, judgement)
+    if standing is not None and is_same and not _withdrawn_since(store, standing):
+        return certification_response(standing).model_copy(update={"already_in_force": "unchanged"})
     row = store.calibrations.certify(
         serial, version, "certify", by=request.by, reason=request.reason, at=at, due_at=due, judgement=judgement,
         who=acting_key() or request.by, by_key=by_key, release=second,
     )  # fmt: skip
-    return certification_response(row)
+    return certification_response(row).model_copy(update={"already_in_force": "renewed" if standing else None})
+
+
+def _standing(store: Store, serial: str, version: int) -> CertificationRow | None:
+    """Return the act by which a version is in force; None where it is not."""
+    last = next(iter(store.calibrations.history(serial)), None)
+    return last if last is not None and (last.act, last.version) == ("certify", version) else None
+
+
+def _is_same(
+    standing: CertificationRow,
+    request: CertifyRequest,
+    at: datetime,
+    by_key: str | None,
+    due: datetime | None,
+    found: Judgement,
+) -> bool:
+    """Return whether a certification would say what the one that stands says, on the same day (UTC)."""
+    before = standing.judgement
+    if before is None or standing.release is not None:
+        return False
+    days = [[each and each.date() for each in times] for times in ((standing.at, standing.due_at), (at, due))]
+    return (
+        (standing.by, standing.by_key, standing.reason) == (request.by, by_key, request.reason)
+        and days[0] == days[1]
+        and replace(before, at=found.at) == found
+    )
+
+
+def _withdrawn_since(store: Store, standing: CertificationRow) -> bool:
+    """Return whether a certificate of the version was withdrawn after the act, which vouches for it no longer."""
+    issued = store.certificates.of_unit(standing.serial)
+    gone = [row.withdrawal.at for row in issued if row.version == standing.version and row.withdrawal is not None]
+    return any(at >= standing.at for at in gone)
 
 
 def _refuse_objections(known: AssessmentResponse, request: CertifyRequest) -> None:

@@ -6,12 +6,11 @@ import re
 from datetime import timedelta
 
 from labctl import config
+from labctl.answers.certification import MAX_DUE_DAYS
 from labctl.answers.judgement import DueSource
 from labctl.errors import BadInput
 from labctl.store import Store
 
-#: The longest interval between two calibrations of a unit, days; a recipe has the same limit.
-MAX_DAYS = 36_500
 _UNITS = {"h": 1 / 24, "d": 1.0, "w": 7.0}
 _SPAN = re.compile(r"(\d{1,6})([hdw])", re.ASCII)
 
@@ -47,10 +46,10 @@ def _of_environment() -> int | None:
     text = config.variable(config.DUE_VARIABLE)
     if not text:
         return None
-    if not (text.isascii() and text.isdecimal() and 0 < int(text) <= MAX_DAYS):
+    if not (text.isascii() and text.isdecimal() and 0 < int(text) <= MAX_DUE_DAYS):
         raise BadInput(
             f"${config.DUE_VARIABLE} = {text[:40]!r}: give the days between two calibrations as a whole number "
-            f"from 1 to {MAX_DAYS}, or unset the variable"
+            f"from 1 to {MAX_DUE_DAYS}, or unset the variable"
         )
     return int(text)
 

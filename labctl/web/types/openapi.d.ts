@@ -2553,7 +2553,7 @@ export interface components {
             result: components["schemas"]["AccelerometerResponse-Input"];
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -3401,6 +3401,12 @@ export interface components {
              */
             objections: components["schemas"]["Objection"][];
             /**
+             * In Force
+             * @description Whether this version is in force: certified last, and not revoked.
+             * @default false
+             */
+            in_force: boolean;
+            /**
              * Override Needed
              * @description Whether the version can be certified only with `override`.
              */
@@ -3756,7 +3762,7 @@ export interface components {
             supplier?: string | null;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -5216,6 +5222,11 @@ export interface components {
              */
             withdrawn_certificates: string[];
             /**
+             * Already In Force
+             * @description Only in the answer to a certification of the version that was in force already. unchanged: on the same day (UTC), by the same person, for the same reason, with the same verdict, objections and due date, and no certificate was withdrawn since: nothing was written, and this is the act that stands; renewed: this act was written in addition. null: the version was not in force.
+             */
+            already_in_force: ("unchanged" | "renewed") | null;
+            /**
              * Fetched By
              * @description Only in the answer to a revocation: who has to be notified.
              */
@@ -5317,7 +5328,7 @@ export interface components {
         CertifyRequest: {
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -5616,7 +5627,7 @@ export interface components {
             reason: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -6134,7 +6145,7 @@ export interface components {
             round: number;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -6167,7 +6178,7 @@ export interface components {
             prompt: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -11433,7 +11444,7 @@ export interface components {
             result: components["schemas"]["MagnetometerResponse-Input"];
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -13261,7 +13272,7 @@ export interface components {
             reason: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed. Empty: not stated. Only the first 120 characters are kept.
              * @default
              */
             by?: string;
@@ -13567,7 +13578,7 @@ export interface components {
         ReleaseRequest: {
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -14084,7 +14095,7 @@ export interface components {
         ResumeRequest: {
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              * @default a person
              */
             by?: string;
@@ -14107,7 +14118,7 @@ export interface components {
         RevokeRequest: {
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
             /**
@@ -14869,7 +14880,7 @@ export interface components {
             reason: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -14924,7 +14935,7 @@ export interface components {
             reason?: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -15019,7 +15030,7 @@ export interface components {
             note?: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -15148,7 +15159,7 @@ export interface components {
             description?: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };
@@ -16996,7 +17007,7 @@ export interface components {
             reason: string;
             /**
              * By
-             * @description Name of the person who acted, as typed.
+             * @description Name of the person who acts; spaces around it are removed.
              */
             by: string;
         };

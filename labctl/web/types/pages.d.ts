@@ -75,6 +75,9 @@ export interface Field {
   type?: string;
   required?: boolean;
   minlength?: number | null;
+  maxlength?: number | null;
+  min?: number | null;
+  max?: number | null;
 }
 
 /** The answers of a dialog by the name of the field. */

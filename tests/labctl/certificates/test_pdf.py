@@ -17,7 +17,7 @@ import pytest
 
 from labctl.certificates.document import Certificate
 from labctl.certificates.pdf import pdf_of
-from labctl.certificates.readable import readable_certificate, rounded
+from labctl.certificates.readable import BREAK, readable_certificate, rounded
 from labctl.errors import BadInput
 from tests.helpers.certificates import issued
 
@@ -102,6 +102,16 @@ def test_texts_of_the_order_are_data_and_no_program() -> None:
     given = certificate()
     customer = given.customer.model_copy(update={"name": '#read("main.typ") $x$ *b*'})
     assert pdf_of(given.model_copy(update={"customer": customer}), b"<a/>")
+
+
+def test_a_long_word_in_a_name_can_be_broken_and_other_names_stay_as_they_are() -> None:
+    given = certificate()
+    changed = given.model_copy(update={"issued_by": "x" * 5000, "issued_by_identity": ""})
+    printed = json.loads(readable_certificate(changed))["issued_by"]
+    assert max(len(each) for each in printed.split(BREAK)) <= 30
+    assert printed.replace(BREAK, "") == "x" * 5000
+    assert pdf_of(changed, b"<a/>")
+    assert BREAK not in readable_certificate(given).decode()
 
 
 @pytest.mark.parametrize(

@@ -189,3 +189,27 @@ def test_a_version_whose_fit_was_worse_than_none_is_refused(lab: Lab, monkeypatc
     assert objection["what"] == "worse"
     assert "residual of the model on the data of the fit is 109.4 deg/s RMS" in objection["text"]
     assert "104.9 deg/s" in objection["text"]
+
+
+@pytest.mark.slow
+def test_the_same_certification_twice_is_said_and_written_once(lab: Lab) -> None:
+    lab.run("fit", FOG, "--model", "ojeda2000")
+    certify = ("certify", FOG, "1", *BY, "--reason", "fits", "--due-days", "30")
+    first, second = lab.json(*certify), lab.json(*certify)
+    assert (first["already_in_force"], second["already_in_force"]) == (None, "unchanged")
+    assert second["at"] == first["at"]
+    assert "was in force already with the same facts; nothing was written" in lab.run(*certify).stdout
+    assert len(lab.json("certifications", FOG)) == 1
+    assert [each["action"] for each in lab.json("audit", "list")].count("certify") == 1
+    other = [
+        lab.json("certify", FOG, "1", *changed)["already_in_force"]
+        for changed in (
+            ("--by", "B. Person", "--reason", "fits", "--due-days", "30"),
+            ("--by", "B. Person", "--reason", "fits well", "--due-days", "30"),
+            ("--by", "B. Person", "--reason", "fits well", "--due-days", "60"),
+        )
+    ]
+    assert other == ["renewed"] * 3
+    lab.run("revoke", FOG, "1", *BY, "--reason", "dropped")
+    assert lab.json(*certify)["already_in_force"] is None  # it was not in force
+    assert len(lab.json("certifications", FOG)) == 6

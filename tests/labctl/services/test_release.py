@@ -21,7 +21,7 @@ from labctl.services.calibrations.certification import certify, list_certificati
 from labctl.services.calibrations.release import ReleaseRefused, list_waiting
 from labctl.services.certificates.issue import CertificateRefused, issue
 from labctl.services.certificates.served import certificate_file
-from labctl.store import Store, check, copy_database, open_store
+from labctl.store import NewReleaseRequest, Store, check, copy_database, open_store
 from tests.helpers.certificates import AT, ORDER, SERIAL, add_version, request
 from tests.helpers.lab import Lab
 from tests.helpers.service import open_client, service_of
@@ -81,6 +81,13 @@ def test_nothing_is_in_force_until_a_second_key_has_released_it(store: Store) ->
     rows = {row.action: row for row in store.audit.rows()}
     assert (rows["certify request"].who, rows["certify"].who) == ("ada", "bob")
     assert rows["certify"].detail["released_by"] == "Bob B."
+
+
+def test_a_request_that_was_stored_with_a_longer_name_is_released(store: Store) -> None:
+    name = "x" * 5000
+    store.release_requests.add(NewReleaseRequest(SERIAL, 1, name, "ada", ASKED.reason, AT, None, True))
+    with acting(BOB):
+        assert release(store, SERIAL, 1, SECOND, AT + DAY).by == name
 
 
 @pytest.mark.parametrize("who", [Actor("ada", "command line"), Actor("ada", "loopback")])

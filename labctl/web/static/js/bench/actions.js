@@ -4,7 +4,7 @@ import { get, post } from "../core/http/api.js";
 import { messageOf } from "../core/http/errors.js";
 import { h } from "../core/elements.js";
 import { actButton, toast } from "../core/components.js";
-import { dialog } from "../core/dialog.js";
+import { dialog, WHO } from "../core/dialog.js";
 import { navigate } from "../core/router.js";
 import { stopCampaign, tableStands, unconfirmedStop } from "../core/stop/overlay.js";
 import { canResume } from "../campaigns/states.js";
@@ -14,7 +14,7 @@ import { canResume } from "../campaigns/states.js";
 
 const OPERATOR_NAME_KEY = "labctl.who";
 const operatorNameField = () => ({
-  name: "by",
+  ...WHO,
   label: "Your name",
   value: localStorage.getItem(OPERATOR_NAME_KEY) ?? "",
 });
@@ -98,8 +98,7 @@ export const stopButton = (campaign) =>
 export const askingButton = (label, question, send) =>
   actButton(label, async () => {
     const fields = [operatorNameField(), { name: "reason", label: "Why" }];
-    const answers = await askOperator(question, fields, { confirm: label });
-    if (answers) await send({ by: answers.by, reason: answers.reason });
+    await askOperator(question, fields, { confirm: label, send: ({ by, reason }) => send({ by, reason }) });
   });
 
 /** @param {number} campaign */

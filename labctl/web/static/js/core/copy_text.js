@@ -2,25 +2,29 @@
 
 import { h } from "./elements.js";
 import { toast } from "./components.js";
+import { openModal } from "./dialog.js";
+import { visitSignal } from "./router.js";
 
 /**
  * @param {string} text
  * @param {string} what
  */
 export async function copyText(text, what) {
+  const signal = visitSignal();
   try {
     await navigator.clipboard.writeText(text);
     toast("good", `${what} copied.`);
   } catch {
-    showToCopy(text, what);
+    if (!signal.aborted) showToCopy(text, what, signal);
   }
 }
 
 /**
  * @param {string} text
  * @param {string} what
+ * @param {AbortSignal} signal
  */
-function showToCopy(text, what) {
+function showToCopy(text, what, signal) {
   const area = h("textarea", { rows: "8", "aria-label": what, style: "width: min(80vw, 44rem)" });
   Object.assign(area, { value: text, readOnly: true });
   /** @type {HTMLDialogElement} */
@@ -31,8 +35,6 @@ function showToCopy(text, what) {
     area,
     h("button", { type: "button", class: "button", onclick: () => dialog.close() }, "Close"),
   );
-  dialog.addEventListener("close", () => dialog.remove());
-  document.body.append(dialog);
-  dialog.showModal();
+  openModal(dialog, signal);
   area.select();
 }

@@ -72,3 +72,16 @@ export function toggleGroup(label, options, value, onchange) {
   );
   return h("div", { class: "tabs", role: "group", "aria-label": label }, buttons);
 }
+
+/**
+ * A message about a request that names each field of a form as the form does, without a full stop at its end.
+ * @param {string} message such as "body.due_days: ..."
+ * @param {readonly { name: string, label: string }[]} fields
+ */
+export const inLabels = (message, fields) =>
+  message
+    .replace(/\bbody\.(\w+): /g, (path, name) => {
+      const field = fields.find((each) => each.name === name);
+      return field ? `${field.label}: ` : path;
+    })
+    .replace(/\.$/, "");

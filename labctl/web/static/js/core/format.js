@@ -171,6 +171,16 @@ export function inWords(text, ids) {
     .join("`");
 }
 
+/** Most characters of a name of a person that a page shows; a request takes no longer one. */
+const MAX_PERSON_CHARACTERS = 120;
+
+/**
+ * The name of a person; one that an older version of labctl stored may be longer than a line, and is cut.
+ * @param {string} name
+ */
+export const personText = (name) =>
+  name.length > MAX_PERSON_CHARACTERS ? `${name.slice(0, MAX_PERSON_CHARACTERS)}…` : name;
+
 /** @param {string} text */
 export const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 

@@ -13,6 +13,7 @@ import { setPageName } from "./tab_mark.js";
 /** @type {Route[]} */
 const routes = [];
 let pageAbort = new AbortController();
+let visit = new AbortController(); // of the page, until another address is shown; it outlasts a refresh
 let navigated = false; // focus moves to the page from the second page on
 let shown = ""; // path and query of the page that is shown
 const SCROLLED_MS = 150;
@@ -27,17 +28,25 @@ export const route = (pattern, name, load) => routes.push(routeOf(pattern, name,
 
 const address = () => location.pathname + location.search;
 
+/** Aborted when the page is left: what a dialog asks, and what it sends, is about the page that it was opened on. */
+export const visitSignal = () => visit.signal;
+
 /**
  * Navigate to an address as if its link had been clicked: the new page begins at its top, or at the part of its anchor.
+ * Resolves to the signal of this visit, which is aborted where another page was asked for meanwhile.
  * @param {string} path
  */
 export async function navigate(path) {
   keepPlace();
   clearTimeout(scrolling);
   history.pushState(null, "", path);
-  await show();
+  const showing = show();
+  const { signal } = visit;
+  await showing;
+  if (signal.aborted) return signal;
   if (location.hash) scrollToAnchor(location.hash);
   else window.scrollTo(0, 0);
+  return signal;
 }
 
 /** Writes down how far the entry is scrolled, once scrolling has ended.
@@ -80,6 +89,10 @@ export async function show({ quiet = false } = {}) {
   const { signal } = pageAbort;
   const main = document.querySelector("main");
   if (!main) return;
+  if (address() !== shown) {
+    visit.abort();
+    visit = new AbortController();
+  }
   shown = address();
   const found = matchRoute(routes, location.pathname);
   window.dispatchEvent(new CustomEvent("labctl:moved"));

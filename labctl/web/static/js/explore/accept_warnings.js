@@ -4,6 +4,7 @@ import { Problem } from "../core/http/errors.js";
 import { h } from "../core/elements.js";
 import { notice } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
+import { visitSignal } from "../core/router.js";
 
 /**
  * Make a fit or a change: `fit(accepted)` posts it. Where the data or the result are certainly wrong the person decides;
@@ -14,6 +15,7 @@ import { dialog } from "../core/dialog.js";
  * @returns {Promise<Answer | null>}
  */
 export async function postFit(fit, confirm) {
+  const signal = visitSignal();
   try {
     return await fit({});
   } catch (error) {
@@ -23,6 +25,7 @@ export async function postFit(fit, confirm) {
       body: against(error),
       confirm,
       kind: "danger",
+      signal,
     });
     return answers && fit({ accept_warnings: true });
   }

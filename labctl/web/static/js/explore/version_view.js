@@ -81,7 +81,7 @@ export function versionView(given) {
   asking
     .then(([criticism, catalogue]) => {
       endWait();
-      const end = finish ? null : toCertify(given, criticism);
+      const end = finish ? null : nextStep(given, criticism);
       setChildren(place, finish?.element ?? null, sections(given, criticism, comparing, catalogue.effects, end));
       finish?.settle(nextSteps(given, criticism));
       if (query.tour) import("../tour/tour.js").then(({ showTour }) => showTour(place, signal));
@@ -128,7 +128,7 @@ function countWait(place, signal) {
  * @param {Criticism} criticism
  * @param {Promise<Comparison> | null} comparing
  * @param {readonly Effect[]} effects
- * @param {HTMLElement | null} end what is done with a version that nothing is missing from
+ * @param {HTMLElement | null} end the step after this version
  */
 function sections({ unit, calibration, versions, chosen, motion, query, signal }, criticism, comparing, effects, end) {
   const axes = axisNames(criticism);
@@ -178,25 +178,28 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
  * @param {Given} given
  */
 const certify = async ({ unit: { serial }, calibration: { version } }) => {
-  await navigate(`/units/${encodeURIComponent(serial)}?version=${version}`);
+  const left = await navigate(`/units/${encodeURIComponent(serial)}?version=${version}`);
   const { askCertification } = await import("../unit/certification.js"); // no weight of a first visit
-  await askCertification(serial, version);
+  await askCertification(serial, version, left);
 };
 
 /**
- * The step after a version that nothing is missing from; null while something is, and for the version in force.
+ * The step after a version: the experiment where it is not adequate, in force or not, else its certification; null for
+ * an adequate version in force.
  * @param {Given} given
  * @param {Criticism} criticism
  */
-const toCertify = (given, criticism) =>
-  criticism.verdict !== "adequate" || given.unit.certified_version === given.calibration.version
-    ? null
-    : h(
-        "div",
-        { class: "row" },
-        actButton("Certify: put in force", () => certify(given), { kind: "primary" }),
-        h("span", { class: "muted" }, "Programs that ask for the calibration of this unit then get this version."),
-      );
+const nextStep = (given, criticism) =>
+  criticism.verdict !== "adequate"
+    ? h("div", { class: "row" }, nextExperiment(given, criticism, "primary"))
+    : given.unit.certified_version === given.calibration.version
+      ? null
+      : h(
+          "div",
+          { class: "row" },
+          actButton("Certify: put in force", () => certify(given), { kind: "primary" }),
+          h("span", { class: "muted" }, "Programs that ask for the calibration of this unit then get this version."),
+        );
 
 /**
  * What the new version has come to, and what can be done next.
@@ -205,7 +208,6 @@ const toCertify = (given, criticism) =>
  */
 function nextSteps(given, criticism) {
   const isEnd = criticism.verdict === "adequate";
-  const plan = criticism.experiments.find((each) => each.toml)?.toml;
   return [
     notice(
       isEnd ? "good" : "warn",
@@ -225,16 +227,21 @@ function nextSteps(given, criticism) {
       "div",
       { class: "row" },
       actButton("Certify: put in force", () => certify(given), { kind: isEnd ? "primary" : "" }),
-      h(
-        "a",
-        {
-          class: `button ${isEnd ? "" : "primary"}`,
-          href: planAddress(plan ?? "", given.unit.serial),
-        },
-        plan ? "Next experiment" : "Plan a campaign",
-      ),
+      nextExperiment(given, criticism, isEnd ? "" : "primary"),
     ),
   ];
+}
+
+/**
+ * A link to the plan of the experiment that is advised, or to the recipes where none is.
+ * @param {Given} given
+ * @param {Criticism} criticism
+ * @param {string} kind
+ */
+function nextExperiment({ unit }, { experiments }, kind) {
+  const plan = experiments.find((each) => each.toml)?.toml;
+  const href = planAddress(plan ?? "", unit.serial);
+  return h("a", { class: `button ${kind}`, href }, plan ? "Next experiment" : "Plan a campaign");
 }
 
 /**

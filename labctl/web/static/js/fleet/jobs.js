@@ -1,9 +1,9 @@
 // Fleet jobs: how far each is, what it has cost, why units failed, and the button that cancels one.
 
 import { actButton, button, card, chip, notice, table } from "../core/components.js";
-import { dialog } from "../core/dialog.js";
+import { dialog, WHO } from "../core/dialog.js";
 import { h, setChildren } from "../core/elements.js";
-import { count, duration, instant, number } from "../core/format.js";
+import { count, duration, instant, number, personText } from "../core/format.js";
 import { get, post } from "../core/http/api.js";
 import { isAbort, messageOf } from "../core/http/errors.js";
 import { untilVisible } from "../core/visible.js";
@@ -104,7 +104,7 @@ function jobTable(jobs, reasons, signal, again) {
         cell: (job) => (job.processor_s_per_unit === null ? "–" : `${number(job.processor_s_per_unit, 2)} s`),
       },
       { title: "Time left", number: true, cell: (job) => (job.ended ? "" : duration(job.left_s)) },
-      { title: "Requested", cell: (job) => [instant(job.created_at), job.by ? ` by ${job.by}` : ""] },
+      { title: "Requested", cell: (job) => [instant(job.created_at), job.by ? ` by ${personText(job.by)}` : ""] },
       {
         title: "",
         cell: (job) => [
@@ -159,20 +159,12 @@ async function showReasons(place, job, signal) {
  * @param {() => Promise<void>} again
  */
 async function askCancel(job, again) {
-  const answers = await dialog(
-    `Cancel job ${job.id}`,
-    [
-      { name: "by", label: "Who" },
-      { name: "reason", label: "Why" },
-    ],
-    {
-      text: "Results already written are kept. The same request, made again, continues after them.",
-      confirm: "Cancel job",
-      kind: "danger",
-    },
-  );
-  if (!answers) return;
-  const body = { by: answers.by, reason: answers.reason };
-  await post("/api/fleet/jobs/{job}/cancel", { path: { job: job.id }, body });
-  await again();
+  const answers = await dialog(`Cancel job ${job.id}`, [WHO, { name: "reason", label: "Why" }], {
+    text: "Results already written are kept. The same request, made again, continues after them.",
+    confirm: "Cancel job",
+    kind: "danger",
+    send: ({ by, reason }, signal) =>
+      post("/api/fleet/jobs/{job}/cancel", { path: { job: job.id }, body: { by, reason }, signal }),
+  });
+  if (answers) await again();
 }

@@ -3,7 +3,7 @@
 import { get, getPart, remove } from "../core/http/api.js";
 import { Problem } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
-import { duration, instant, percent } from "../core/format.js";
+import { duration, instant, percent, personText } from "../core/format.js";
 import { actButton, card, chip, emptyState, pageHeader, table } from "../core/components.js";
 import { longList } from "../core/long_list.js";
 import { setTrouble } from "../core/freshness/line.js";
@@ -159,7 +159,7 @@ function scheduleCard(rows, again) {
               ? h(
                   "span",
                   { class: "muted small secondary" },
-                  `${row.confirmed_by} confirmed that the bench will be clear`,
+                  `${personText(row.confirmed_by)} confirmed that the bench will be clear`,
                 )
               : null,
           ],

@@ -3,6 +3,7 @@
 import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { card, chip, notice, pageHeader } from "../core/components.js";
+import { personText } from "../core/format.js";
 import { setTrouble } from "../core/freshness/line.js";
 import { show } from "../core/router.js";
 import { followLive, goesOn } from "../live/live_stream.js";
@@ -22,7 +23,13 @@ export async function page({ query, signal }) {
     pageHeader(
       "Live",
       runs
-        ? h("span", { class: "row" }, unitLink(state.serial), h("span", {}, state.stream), chip(`by ${state.by}`))
+        ? h(
+            "span",
+            { class: "row" },
+            unitLink(state.serial),
+            h("span", {}, state.stream),
+            chip(`by ${personText(state.by)}`),
+          )
         : "Calibrate a unit while you turn it.",
     ),
   );

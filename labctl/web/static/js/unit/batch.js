@@ -2,7 +2,7 @@
 
 import { post } from "../core/http/api.js";
 import { actButton, toast } from "../core/components.js";
-import { dialog } from "../core/dialog.js";
+import { dialog, WHO } from "../core/dialog.js";
 import { show } from "../core/router.js";
 
 /** @import { Unit } from "../../../types/api.js" */
@@ -29,13 +29,17 @@ async function askBatch(unit) {
     [
       { name: "batch", label: "Batch", value: unit.batch, required: false, hint: "Empty: no batch is stated." },
       { name: "supplier", label: "Supplier", value: unit.supplier, required: false },
-      { name: "by", label: "Who" },
+      WHO,
     ],
-    { text: "Lists of units are filtered by batch. The change is written to the audit trail.", confirm: "Set batch" },
+    {
+      text: "Lists of units are filtered by batch. The change is written to the audit trail.",
+      confirm: "Set batch",
+      send: ({ batch, supplier, by }, signal) =>
+        post("/api/batches", { body: { batch, supplier, by, serials: [unit.serial] }, signal }),
+    },
   );
   if (!answers) return;
-  const { batch, supplier, by } = answers;
-  await post("/api/batches", { body: { batch, supplier, by, serials: [unit.serial] } });
+  const { batch } = answers;
   toast("good", batch ? `${unit.serial} is of batch ${batch}.` : `No batch of ${unit.serial} is stated.`);
   await show();
 }

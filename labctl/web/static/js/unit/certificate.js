@@ -7,7 +7,7 @@ import { dialog } from "../core/dialog.js";
 import { checkBefore, entriesOf, markProblems } from "../core/field_problems.js";
 import { capitalised } from "../core/format.js";
 import { Problem } from "../core/http/errors.js";
-import { show } from "../core/router.js";
+import { show, visitSignal } from "../core/router.js";
 import { stateChip } from "./certificate_state.js";
 import { fieldAt, fieldsFor, orderOf, problemsOf, unstatable } from "./order_fields.js";
 
@@ -74,16 +74,17 @@ export function certificateFiles(serial, version, issued, history) {
  */
 async function askCertificate(serial, version, replaced) {
   const path = { serial, version };
-  const missing = await get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path });
+  const left = visitSignal();
+  const missing = await get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path, signal: left });
   const never = unstatable(missing);
-  if (never.length) return void (await sayMissing(serial, version, never));
+  if (never.length) return void (await sayMissing(serial, version, never, left));
   const why = replaced ? [reasonField(replaced)] : [];
   const fields = [...why, ...fieldsFor(missing)];
   const key = JSON.stringify([serial, version, replaced?.number]);
   /** @type {Refusal} */
   let refusal = { text: "", problems: {} };
   for (;;) {
-    const answers = await ask(serial, version, fields, key, refusal, missing);
+    const answers = await ask(serial, version, fields, key, refusal, missing, left);
     if (!answers) return;
     const body = { by: answers.by, order: orderOf(answers), ...(replaced ? { amend: answers.amend } : {}) };
     try {
@@ -113,8 +114,9 @@ const reasonField = ({ number }) => ({ name: "amend", place: "amend", label: `Wh
  * @param {string} key
  * @param {Refusal} refusal
  * @param {readonly MissingFact[]} missing
+ * @param {AbortSignal} signal of the visit of the page
  */
-async function ask(serial, version, fields, key, refusal, missing) {
+async function ask(serial, version, fields, key, refusal, missing, signal) {
   const given = kept.get(key) ?? {};
   const body = h(
     "div",
@@ -130,6 +132,7 @@ async function ask(serial, version, fields, key, refusal, missing) {
       text: "A certificate is a document for a customer; which version is in force does not change. The certificate is written to the audit trail.",
       body,
       confirm: "Issue certificate",
+      signal,
     },
   );
   const form = body.closest("form");
@@ -168,8 +171,9 @@ function refusalOf({ message, errors = [], missing = [] }) {
  * @param {string} serial
  * @param {number} version
  * @param {readonly MissingFact[]} missing
+ * @param {AbortSignal} signal of the visit of the page
  */
-const sayMissing = (serial, version, missing) =>
+const sayMissing = (serial, version, missing, signal) =>
   dialog(`No certificate of ${serial} version ${version} yet`, [], {
     text: "What is missing belongs to the measurement, so this page cannot add it. Nothing else is asked for before it is stated.",
     body: notice(
@@ -183,6 +187,7 @@ const sayMissing = (serial, version, missing) =>
       ),
     ),
     confirm: "Close",
+    signal,
   });
 
 const LABORATORY = "Laboratory and reference standards come from the bench file.";

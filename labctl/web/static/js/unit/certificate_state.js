@@ -2,9 +2,9 @@
 
 import { post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { instant } from "../core/format.js";
+import { instant, personText } from "../core/format.js";
 import { actButton, chip, table } from "../core/components.js";
-import { dialog } from "../core/dialog.js";
+import { dialog, WHO } from "../core/dialog.js";
 import { show } from "../core/router.js";
 
 /** @import { Certificate } from "../../../types/api.js" */
@@ -21,7 +21,7 @@ export const stateChip = (state) => chip(state, KINDS[state]);
 export const stateText = (known) =>
   known.state === "valid"
     ? `Certificate ${known.number} is valid.`
-    : `Certificate ${known.number} is ${known.state}: since ${instant(known.state_since)}, by ${known.state_by}.`;
+    : `Certificate ${known.number} is ${known.state}: since ${instant(known.state_since)}, by ${personText(known.state_by)}.`;
 
 /**
  * Every certificate of a unit, newest first.
@@ -48,7 +48,7 @@ export function certificateTable(issued) {
       {
         title: "Action",
         cell: (row) =>
-          row.state === "withdrawn" ? null : actButton("Withdraw", () => askWithdrawal(row.number), { kind: "tiny" }),
+          row.state === "withdrawn" ? null : actButton("Withdraw", () => askWithdrawal(row), { kind: "tiny" }),
       },
     ],
     issued,
@@ -56,18 +56,14 @@ export function certificateTable(issued) {
   );
 }
 
-/** @param {string} number */
-async function askWithdrawal(number) {
-  const fields = [
-    { name: "by", label: "Who" },
-    { name: "reason", label: "Why" },
-  ];
-  const answers = await dialog(`Withdraw certificate ${number}`, fields, {
+/** @param {Certificate} certificate */
+async function askWithdrawal({ number, serial, version }) {
+  const title = `Withdraw certificate ${number} of version ${version} of ${serial}`;
+  const answers = await dialog(title, [WHO, { name: "reason", label: "Why" }], {
     text: "It stays withdrawn. The list, the page behind its QR code and every copy that is served say so; the version stays in force.",
     confirm: "Withdraw",
     kind: "danger",
+    send: ({ by, reason }, signal) => post("/api/certificates/withdraw", { body: { number, by, reason }, signal }),
   });
-  if (!answers) return;
-  await post("/api/certificates/withdraw", { body: { number, by: answers.by, reason: answers.reason } });
-  await show();
+  if (answers) await show();
 }

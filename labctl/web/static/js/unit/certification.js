@@ -2,10 +2,10 @@
 
 import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { dated, instant, number } from "../core/format.js";
+import { dated, instant, number, personText } from "../core/format.js";
 import { actButton, chip, factList, notice, table, toast } from "../core/components.js";
-import { dialog } from "../core/dialog.js";
-import { show } from "../core/router.js";
+import { dialog, WHO } from "../core/dialog.js";
+import { show, visitSignal } from "../core/router.js";
 import { withoutPart } from "./uncertainty_parts.js";
 
 /** @import { AnyAxisUncertainty, Assessment, Certification, Fetch, ReleaseRequest } from "../../../types/api.js" */
@@ -36,24 +36,29 @@ export function verdictChip(known) {
 export const overridden = (act) =>
   notice(
     "warn",
-    h("p", {}, h("strong", {}, "Certified despite objections. "), `${act.by}: ${act.reason}`),
+    h("p", {}, h("strong", {}, "Certified despite objections. "), `${personText(act.by)}: ${act.reason}`),
     act.objections.map((each) => h("p", { class: "small" }, each.text)),
   );
+
+/** The longest interval between two calibrations that the service takes, days. */
+const MAX_DUE_DAYS = 36_500;
+/** What the request says for no due date. */
+const NO_DUE_DATE = 0;
 
 /**
  * Ask who certifies a version and why; the verdict on it is shown, and what would have to be overridden.
  * @param {string} serial
  * @param {number} version
+ * @param {AbortSignal} [left] aborted when the page is left that this is asked on
  */
-export async function askCertification(serial, version) {
-  const known = await get("/api/units/{serial}/calibrations/{version}/assessment", {
-    path: { serial, version },
-  });
+export async function askCertification(serial, version, left = visitSignal()) {
+  const path = { serial, version };
+  const known = await get("/api/units/{serial}/calibrations/{version}/assessment", { path, signal: left });
   const needed = known.override_needed;
   const words = `A sentence: at least ${known.least_reason_characters} characters and ${known.least_reason_words} words.`;
   /** @type {Field[]} */
   const fields = [
-    { name: "by", label: "Who" },
+    WHO,
     {
       name: "reason",
       label: "Why",
@@ -63,52 +68,67 @@ export async function askCertification(serial, version) {
     {
       name: "due_days",
       label: "Due again in days",
-      hint: known.due_from ? `This number of days comes from the ${known.due_from}.` : "Empty: no date.",
+      hint: `${known.due_from ? `This number of days comes from the ${known.due_from}. ` : ""}From 1 to ${MAX_DUE_DAYS}; empty: no due date.`,
       type: "number",
+      min: 1,
+      max: MAX_DUE_DAYS,
       value: known.due_days === null ? "" : String(known.due_days),
       required: false,
     },
   ];
   if (needed) fields.push({ name: "override", label: "Certify this version despite the objections", type: "checkbox" });
-  const answers = await dialog(`Certify version ${version}: put it in force`, fields, {
+  /** @type {keyof typeof AGAIN | null} */
+  let already = null;
+  const answers = await dialog(`Certify version ${version} of ${serial}: put it in force`, fields, {
     text: "After this, every request for the calibration of this unit gets this version. The certification is written to the audit trail. It makes no document: a certificate for a customer is issued afterwards.",
     body: assessed(known),
     confirm: "Certify: put in force",
     kind: needed ? "danger" : "primary",
+    signal: left,
+    send: async ({ by, reason, due_days, override }, signal) => {
+      const done = await post("/api/units/{serial}/calibrations/{version}/certify", {
+        path,
+        body: {
+          by,
+          reason,
+          due_days: due_days ? Number(due_days) : NO_DUE_DATE,
+          ...(override ? { override: true } : {}),
+        },
+        signal,
+      });
+      already = "already_in_force" in done ? done.already_in_force : null;
+    },
   });
   if (!answers) return;
-  const body = {
-    by: answers.by,
-    reason: answers.reason,
-    due_days: answers.due_days ? Number(answers.due_days) : 0,
-    ...(answers.override ? { override: true } : {}),
-  };
-  await post("/api/units/{serial}/calibrations/{version}/certify", { path: { serial, version }, body });
   await show();
+  if (already) toast("warn", `Version ${version} was in force already. ${AGAIN[already]}`, { stays: true });
 }
+
+/** What a certification of the version in force has done. */
+const AGAIN = {
+  unchanged: "Person, reason, verdict and due date are the same: nothing was written.",
+  renewed: "Your certification is written as another entry.",
+};
 
 /**
  * @param {string} serial
  * @param {number} version
  */
 export async function askRevocation(serial, version) {
-  const answers = await dialog(
-    `Revoke version ${version}`,
-    [
-      { name: "by", label: "Who" },
-      { name: "reason", label: "Why" },
-    ],
-    {
-      text: "The unit then has no calibration in force, and every certificate of the version is withdrawn for good. The revocation is written to the audit trail.",
-      confirm: "Revoke",
-      kind: "danger",
+  let said = "";
+  const answers = await dialog(`Revoke version ${version} of ${serial}`, [WHO, { name: "reason", label: "Why" }], {
+    text: "The unit then has no calibration in force, and every certificate of the version is withdrawn for good. The revocation is written to the audit trail.",
+    confirm: "Revoke",
+    kind: "danger",
+    send: async ({ by, reason }, signal) => {
+      const path = { serial, version };
+      said = consequences(
+        await post("/api/units/{serial}/calibrations/{version}/revoke", { path, body: { by, reason }, signal }),
+      );
     },
-  );
+  });
   if (!answers) return;
-  const body = { by: answers.by, reason: answers.reason };
-  const done = await post("/api/units/{serial}/calibrations/{version}/revoke", { path: { serial, version }, body });
   await show();
-  const said = consequences(done);
   if (said) toast("warn", `Version ${version} is revoked. ${said}`, { stays: true });
 }
 
@@ -152,7 +172,7 @@ export const waitingNotice = (waiting) =>
               "p",
               {},
               h("strong", {}, `Version ${each.version} waits for a second person. `),
-              `${each.by} (key ${each.by_key}): ${each.reason}`,
+              `${personText(each.by)} (key ${each.by_key}): ${each.reason}`,
             ),
             actButton("Release", () => askRelease(each), { kind: "tiny" }),
           ),
@@ -162,18 +182,18 @@ export const waitingNotice = (waiting) =>
 
 /** @param {ReleaseRequest} waiting */
 async function askRelease({ serial, version, by_key }) {
-  const fields = [
-    { name: "by", label: "Who" },
-    { name: "reason", label: "Why" },
-  ];
-  const answers = await dialog(`Release version ${version}`, fields, {
+  const fields = [WHO, { name: "reason", label: "Why" }];
+  const answers = await dialog(`Release version ${version} of ${serial}`, fields, {
     text: `You release it as the second person, with another key than ${by_key}. It is in force then.`,
     confirm: "Release",
+    send: ({ by, reason }, signal) =>
+      post("/api/units/{serial}/calibrations/{version}/release", {
+        path: { serial, version },
+        body: { by, reason },
+        signal,
+      }),
   });
-  if (!answers) return;
-  const body = { by: answers.by, reason: answers.reason };
-  await post("/api/units/{serial}/calibrations/{version}/release", { path: { serial, version }, body });
-  await show();
+  if (answers) await show();
 }
 
 /**
@@ -182,8 +202,8 @@ async function askRelease({ serial, version, by_key }) {
  */
 export const persons = (act) =>
   [
-    act.by_key ? `${act.by} (key ${act.by_key})` : act.by,
-    act.released_by ? `released by ${act.released_by} (key ${act.released_key})` : "",
+    act.by_key ? `${personText(act.by)} (key ${act.by_key})` : personText(act.by),
+    act.released_by ? `released by ${personText(act.released_by)} (key ${act.released_key})` : "",
   ]
     .filter(Boolean)
     .join(", ");
@@ -196,6 +216,9 @@ function assessed(known) {
   return h(
     "div",
     { class: "stack" },
+    known.in_force
+      ? notice("warn", `Version ${known.version} is in force already; this certification would be another entry.`)
+      : null,
     factList([
       ["Verdict", verdictChip(known), null, known.verdict_recording ? `recording ${known.verdict_recording}` : null],
       [

@@ -5,6 +5,7 @@ import { h, setChildren } from "../core/elements.js";
 import { idText, inWords } from "../core/format.js";
 import { actButton, cardWithHeader, chip, table, withCommands } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
+import { visitSignal } from "../core/router.js";
 import { askBenchClear, askingButton } from "../bench/actions.js";
 import { diagnosisState, effectsOfRounds, lineOfRound, suspectColumns } from "./diagnosis_rounds.js";
 
@@ -124,7 +125,8 @@ function confirmButtons(diagnosis, again) {
     actButton(
       "Run this experiment",
       async () => {
-        const bench = (await get("/api/benches")).find((each) => each.name === diagnosis.bench);
+        const left = visitSignal();
+        const bench = (await get("/api/benches", { signal: left })).find((each) => each.name === diagnosis.bench);
         const clear = bench ? await askBenchClear(bench) : null;
         if (!clear) return;
         const body = { round, by: clear.confirmed_by ?? "", confirmed: true, checks: clear.checks ?? [] };
@@ -151,9 +153,9 @@ const startButton = (serial, again) =>
       {
         text: "The newest version is judged by all its recordings together. On a real bench each experiment waits for your confirmation.",
         confirm: "Diagnose",
+        send: ({ hours }, signal) =>
+          post("/api/units/{serial}/diagnoses", { path: { serial }, body: { hours: Number(hours) }, signal }),
       },
     );
-    if (!answers) return;
-    await post("/api/units/{serial}/diagnoses", { path: { serial }, body: { hours: Number(answers.hours) } });
-    await again();
+    if (answers) await again();
   });

@@ -3,7 +3,7 @@
 import { download } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { button, card, chip, table } from "../core/components.js";
-import { instant, withUncertainty } from "../core/format.js";
+import { instant, personText, withUncertainty } from "../core/format.js";
 
 /** @import { SensorVersion } from "../../../types/api.js" */
 
@@ -21,7 +21,10 @@ export function sensorsCard(versions) {
         { title: "Version", number: true, cell: (row) => `${row.version}` },
         { title: "Verdict", cell: (row) => chip(row.verdict, row.verdict === "adequate" ? "good" : "warn") },
         { title: "Result", prose: true, cell: (row) => row.summary.join(" ") },
-        { title: "Stored", cell: (row) => h("div", { class: "nowrap" }, instant(row.at), h("br", {}), row.by) },
+        {
+          title: "Stored",
+          cell: (row) => h("div", { class: "nowrap" }, instant(row.at), h("br", {}), personText(row.by)),
+        },
         { title: "Data", cell: (row) => row.data.files.map((file) => h("div", { title: file.sha256 }, file.name)) },
         { title: "Files", cell: files },
       ],
