@@ -6,6 +6,7 @@ from datetime import datetime
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
+from pydantic.config import JsonDict
 from pydantic_core import PydanticCustomError
 
 from labctl.texts import is_blank
@@ -80,7 +81,7 @@ def _cut_name(name: str) -> str:
 
 
 # an act of a person: in a request, and as it was stored
-_LIMIT = {"maxLength": MAX_PERSON_CHARACTERS}
+_LIMIT: JsonDict = {"maxLength": MAX_PERSON_CHARACTERS}
 _NAME = "Name of the person who acts; spaces around it are removed."
 PersonName = Annotated[
     str, AfterValidator(_stated_name), Field(description=_NAME, json_schema_extra={"minLength": 1, **_LIMIT})
