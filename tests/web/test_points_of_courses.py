@@ -54,7 +54,7 @@ def clicked(page: Page, name: str, series: int, k: int) -> Locator:
 def facts_of(card: Locator) -> dict[str, list[str]]:
     """Return the list of facts of a card: name -> value with unit, what stands beside it."""
     rows = card.locator(".fact").all_inner_texts()
-    return {name: rest for name, *rest in (row.split("\n") for row in rows)}
+    return {name: rest for name, *rest in (row.replace("\xa0", " ").split("\n") for row in rows)}
 
 
 def value(text: str) -> float:

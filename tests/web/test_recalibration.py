@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from instruments.bench_config import shipped_benches
-from tests.helpers.browser import Service, settled
+from tests.helpers.browser import Service, on_page, settled
 from tests.helpers.certifying import OVERRIDE_OPTIONS
 from tests.helpers.drafted_recipe import DRAFTED
 from tests.helpers.lab import Lab
@@ -92,7 +92,7 @@ def test_the_trend_covers_the_ageing_on_the_command_line_over_http_and_on_the_pa
     page = visit(f"/units/{UNIT}")
     card = page.get_by_role("region", name="Over the years")
     for line in found["text"]:
-        expect(card.get_by_text(line)).to_be_visible()
+        expect(card.get_by_text(on_page(line).replace("scale_factor", "scale factor"))).to_be_visible()
     page.goto(f"{service.url}/campaigns/2")
     settled(page)
     expect(page.get_by_text("As found (version 1)").first).to_be_visible()

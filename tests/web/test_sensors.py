@@ -31,7 +31,7 @@ RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 def parsed(cell: str) -> tuple[float, float, float, str]:
     """Return value, expanded uncertainty, half of the last digit that is written, and the unit."""
-    found = CELL.fullmatch(cell.strip())
+    found = CELL.fullmatch(cell.strip().replace("\xa0", " "))
     assert found is not None, cell
     value, expanded, power, unit = found.groups()
     factor = 10.0 ** int((power or "0").translate(RAISED))

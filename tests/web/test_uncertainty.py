@@ -41,7 +41,9 @@ def two_digits(value: float) -> float:
 
 def shown_number(text: str) -> float:
     """Return a number as the page writes it, with a power of ten where it is far from 1."""
-    return float(text.replace(" × 10", "e").translate(str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")))
+    return float(
+        text.replace("\xa0", " ").replace(" × 10", "e").translate(str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789"))
+    )
 
 
 def cells(region: Locator) -> list[list[str]]:
