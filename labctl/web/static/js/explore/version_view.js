@@ -191,7 +191,7 @@ const certify = async ({ unit: { serial }, calibration: { version } }) => {
  */
 const nextStep = (given, criticism) =>
   criticism.verdict !== "adequate"
-    ? h("div", { class: "row" }, nextExperiment(given, criticism, "primary"))
+    ? h("div", { class: "row" }, nextExperiment(given, criticism, "")) // the advised effect has the prominent button
     : given.unit.certified_version === given.calibration.version
       ? null
       : h(
