@@ -24,6 +24,9 @@ WARNING, ACTION = 2.0, 3.0
 #: Values of a history without which it gives no limits. By limits from 8 values one good value in 33 is out (from 6
 #: one in 22, of limits that are known one in 370).
 MIN_HISTORY = 8
+#: A spread of a history below these is rounding of the computation and no scatter: a part of the values themselves, and
+#: a part of their standard uncertainty (a bias near zero is computed from readings of hundreds of deg/s).
+ROUNDING_OF_VALUE, ROUNDING_OF_U = 1e-12, 1e-6
 
 State = Literal["in", "warning", "out", "unknown"]
 Basis = Literal["history", "stated u"]
@@ -112,6 +115,13 @@ def _limits(point: ChartPoint, history: Sequence[ChartPoint]) -> Iterator[Limits
         centre = float(np.mean([each.value for each in history]))
         u_centre = math.sqrt(sum(u**2 for u in u_values)) / len(history)
         yield Limits("stated u", centre, math.hypot(point.u, u_centre), len(history))
+    if len(history) >= MIN_HISTORY and _scattered(history):
+        yield limits_from_history([each.value for each in history])
+
+
+def _scattered(history: Sequence[ChartPoint]) -> bool:
+    """Whether a history shows a scatter: equal values, as coarse steps give, say nothing of it."""
     values = [each.value for each in history]
-    if len(history) >= MIN_HISTORY and len(set(values)) > 1:  # equal values, as coarse steps give, say nothing of it
-        yield limits_from_history(values)
+    of_value = ROUNDING_OF_VALUE * max(map(abs, values))
+    of_u = ROUNDING_OF_U * min((each.u for each in history if each.u is not None), default=0.0)
+    return max(values) - min(values) > max(of_value, of_u)

@@ -76,3 +76,14 @@ def test_equal_values_of_a_coarse_display_give_no_limits() -> None:
     found = judged([ChartPoint(0.01, 0.02)] * MIN_HISTORY + [ChartPoint(0.02, 0.02)])
     assert [each.basis for each in found[-1].limits] == ["stated u"]
     assert found[-1].state == "in"
+
+
+@pytest.mark.parametrize(("centre", "u"), [(0.0245, None), (0.0245, 1e-7), (0.0, 1e-4)])
+def test_differences_by_rounding_give_no_limits(centre: float, u: float | None) -> None:
+    step = max(abs(centre) * 1e-15, (u or 0.0) * 1e-9)
+    history = [ChartPoint(centre + step * (number % 3), u) for number in range(MIN_HISTORY)]
+    (*_, last) = judged([*history, ChartPoint(centre + 20 * step, u)])
+    assert "history" not in {limits.basis for limits in last.limits}
+    scatter = (u or 1e-6) / 2
+    seen = judged([ChartPoint(centre + number % 3 * scatter, u) for number in range(MIN_HISTORY + 1)])[-1]
+    assert "history" in {limits.basis for limits in seen.limits}
