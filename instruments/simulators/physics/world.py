@@ -287,6 +287,7 @@ class SimulatedGyro:
         self._rng = np.random.default_rng([*seed, world.settings.noise_seed])
         # one generator for both noises: instability draws first here, white noise first in every sample
         self._instability = BiasInstability(self._rng, truth.instability_dps, truth.instability_taus_s, len(truth.axes))
+        self.drifts = True  #: whether its bias wanders; a third of the time that a sample takes
         self._hidden: list[HiddenEffect] = hidden_effects(world.settings.hidden, seed)
         self._rows = ["xyz".index(axis) for axis in truth.axes]
         self._past_s, self._weights = _memory_of(self._hidden)
@@ -316,8 +317,9 @@ class SimulatedGyro:
                 rate = rate + effect.error_dps(state, rate)
                 shown = shown + effect.thermometer_c(state)
         white = self._rng.standard_normal((n, len(truth.axes) + 1))
-        drift = self._instability.sample(t_s)
-        rate = rate + drift + truth.white_dps_rthz * np.sqrt(self.sample_rate_hz) * white[:, :-1]
+        if self.drifts:
+            rate = rate + self._instability.sample(t_s)
+        rate = rate + truth.white_dps_rthz * np.sqrt(self.sample_rate_hz) * white[:, :-1]
         thermometer = shown[:, None] + truth.thermometer_noise_c * white[:, -1:]
         warm_c = np.repeat(thermometer, len(truth.axes), axis=1)
         return GyroSample(rate, warm_c, world.supply_v(t_s, truth.supply_v), table_dps)

@@ -20,26 +20,32 @@ SLOPE_ERROR = 0.5
 
 def base_of(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArray[np.float64], Array]:
     """Return the coordinates of the base (R, m, k), and the prior precision of each column (k,)."""
-    base, _, precision = base_rows(data, model, axis)
+    of_model, _, precision = base_rows(data, model, axis)
+    base = of_model
     shifts, largest = shift_contrasts(data.nodes, axis, placed_rad(data.info.standards))
     if len(largest):
         base = np.concatenate([base, data.rows_of(shifts)], axis=2)
         precision = np.concatenate([precision, largest**-2.0])
     lattice, lattice_precision = lattice_columns(data, base, precision, axis)
     base, precision = np.concatenate([base, lattice], axis=2), np.concatenate([precision, lattice_precision])
-    slopes = _slope_errors(data, model, axis)
+    slopes = _slope_errors(data, model, axis, of_model)
     if slopes is None:
         return base, precision
     return np.concatenate([base, slopes], axis=2), np.concatenate([precision, np.ones(slopes.shape[2])])
 
 
-def _slope_errors(data: ReducedRecording, model: ErrorModel, axis: str) -> NDArray[np.float64] | None:
+def _slope_errors(
+    data: ReducedRecording, model: ErrorModel, axis: str, base: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
     """Return columns for errors of a table's slope on both sides of each node, (R, m, 2 nodes); None without a table.
 
     A table is exact at its nodes, whatever the unit's law is, but it takes the slope there from the neighbouring nodes.
     The temperatures of a level scatter by hundredths of a kelvin, so where the law is steep a wrong slope is visible.
+    `base` (R, m, k) are the columns of the model.
     """
-    if not isinstance(model.temperature, LagrangeTable) or (slope := temperature_slope(data, model, axis)) is None:
+    if not isinstance(model.temperature, LagrangeTable):
+        return None
+    if (slope := temperature_slope(data, model, axis, base)) is None:
         return None
     nodes_c = np.asarray(model.temperature.nodes_c)
     temperature_c = data.nodes.temperature_c(axis)

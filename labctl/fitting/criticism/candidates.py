@@ -179,20 +179,25 @@ def thermometer_options(data: ReducedRecording, model: ErrorModel, axis: str) ->
     return [CandidateShape(THERMOMETER, None, (slope * elapsed)[:, :, None], ("thermometer drift",), ("K",))]
 
 
-def temperature_slope(data: ReducedRecording, model: ErrorModel, axis: str) -> NDArray[np.float64] | None:
-    """Return the slope of the fitted base over temperature, (R, m) deg/s/K; None where it has none."""
+def temperature_slope(
+    data: ReducedRecording, model: ErrorModel, axis: str, base: NDArray[np.float64] | None = None
+) -> NDArray[np.float64] | None:
+    """Return the slope of the fitted base over temperature, (R, m) deg/s/K; None where it has none.
+
+    `base` (R, m, k) are the coordinates that `base_rows` gives for the same, where they are known already.
+    """
     name = f"temperature_{axis}_c" if f"temperature_{axis}_c" in data.nodes else "temperature_c"
     if name not in data.nodes:
         return None
-    base, _, precision = base_rows(data, model, axis)
+    base = base_rows(data, model, axis)[0] if base is None else base
     size = np.linalg.norm(base[0], axis=0)
     size = np.where(size > 0, size, np.inf)  # a column that the schedule does not excite has no part in it
     values, *_ = np.linalg.lstsq(base[0] / size, data.error_dps(axis)[0], rcond=1e-9)
     ends = []
     for shift_k in (SHIFT_K, -SHIFT_K):
         columns = {**data.nodes.columns, name: np.asarray(data.nodes[name], dtype=np.float64) + shift_k}
-        moved, _, other = base_rows(replace(data, nodes=replace(data.nodes, columns=columns)), model, axis)
-        if len(other) != len(precision):
+        moved, _, _ = base_rows(replace(data, nodes=replace(data.nodes, columns=columns)), model, axis)
+        if moved.shape != base.shape:
             return None
         ends.append(moved @ (values / size))
     slope = np.asarray((ends[0] - ends[1]) / (2 * SHIFT_K))

@@ -16,7 +16,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from labctl.answers.recording_head import Motion
 from labctl.fitting.criticism.criticism import Criticism
@@ -76,7 +75,7 @@ class OpenQuestion:
     @property
     def probabilities(self) -> Array:
         """The posterior probability of each hypothesis, (h,)."""
-        return np.asarray(np.exp(self.log_odds - logsumexp(self.log_odds)))
+        return np.asarray(np.exp(self.log_odds - np.logaddexp.reduce(self.log_odds)))
 
     @property
     def entropy_bit(self) -> float:
@@ -195,8 +194,8 @@ def forecast(question: OpenQuestion, planned: ReducedRecording, seed: int = 1) -
         outcomes = {axis: forecast_of.draw(question.ids[h], n, rng) for axis, forecast_of in axes.items()}
         before_it, after_it = _evidence(question, axes, outcomes, n)
         log_odds = question.log_odds + after_it - before_it
-        log_p = log_odds - logsumexp(log_odds, axis=1, keepdims=True)
-        of_cause = logsumexp(log_p[:, question.nodes == question.nodes[h]], axis=1)
+        log_p = log_odds - np.logaddexp.reduce(log_odds, axis=1, keepdims=True)
+        of_cause = np.logaddexp.reduce(log_p[:, question.nodes == question.nodes[h]], axis=1)
         before = np.log(p[question.nodes == question.nodes[h]].sum())
         gained.append(np.maximum(of_cause, before - MAX_LOSS) - before)
         weights.append(probability)

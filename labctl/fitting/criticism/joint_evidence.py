@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.candidates import option_of
@@ -27,6 +26,7 @@ from labctl.fitting.criticism.planned_addition import variance_of
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.effects import Effect, Term
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.log_evidence import mean_evidence
 
 #: Directions of a base that are seen with less than this share (squared) are taken as not seen.
 UNSEEN = 1e-10
@@ -69,7 +69,8 @@ class Known:
             return self.drawn.draw(products, n, rng)
         shrunk = self.g / (1 + self.g)
         mean = shrunk * self.factor @ (self.factor.T @ products)
-        return np.asarray(mean + rng.standard_normal((n, self.directions)) @ (np.sqrt(shrunk) * self.factor.T))
+        root = np.sqrt(shrunk) * _root(self.factor @ self.factor.T)
+        return np.asarray(mean + rng.standard_normal((n, len(root))) @ root.T)
 
 
 @dataclass(frozen=True)
@@ -98,21 +99,22 @@ class AxisForecast:
 
     def __init__(self, design: Design, measured: int, whitened: _Whitened, y: Array) -> None:
         self.g = float(measured), float(len(design.t_s))
-        first, second = whitened.first, ~whitened.first
         base, columns = whitened.base, whitened.columns
+        base_now, columns_now = base[whitened.first], columns[whitened.first]
+        base_new, columns_new = base[~whitened.first], columns[~whitened.first]
         _, alone = _orthonormal(whitened.alone, whitened.prior_alone)
         alone = alone[: len(y)]
-        remaining_now = columns[first] - alone @ (alone.T @ columns[first])
+        remaining_now = columns_now - alone @ (alone.T @ columns_now)
         b_now = remaining_now.T @ y
-        seen, beside = _orthonormal(base[first], whitened.prior)
+        seen, beside = _orthonormal(base_now, whitened.prior)
         beside = beside[: len(y)]
-        left_now = columns[first] - beside @ (beside.T @ columns[first])
+        left_now = columns_now - beside @ (beside.T @ columns_now)
         _, both = _orthonormal(base, whitened.prior)
         inner = both[: len(base)].T @ columns
         remaining = columns - both[: len(base)] @ inner
         self.gram = remaining.T @ columns
-        gram_now, gram_before = remaining_now.T @ columns[first], left_now.T @ columns[first]
-        norms_now, norms = (columns[first] ** 2).sum(axis=0), (columns**2).sum(axis=0)
+        gram_now, gram_before = remaining_now.T @ columns_now, left_now.T @ columns_now
+        norms_now, norms = (columns_now**2).sum(axis=0), (columns**2).sum(axis=0)
         self.shapes = [
             Shape(
                 option.candidate,
@@ -124,12 +126,13 @@ class AxisForecast:
             )
             for option, place in zip(design.options, slices_of(design.options), strict=True)
         ]
-        moved = remaining[second].T @ base[second]  # (K, kb): what the base's coefficients do to the products
+        remaining_first, remaining_second = remaining[whitened.first], remaining[~whitened.first]
+        moved = remaining_second.T @ base_new  # (K, kb): what the base's coefficients do to the products
         through = moved @ seen  # base's coefficients are normal with covariance seen @ seen.T, given the first part
-        of_base = seen.T @ base[first].T
-        self._known = remaining[first].T @ y + through @ (of_base @ y)
-        self._response = remaining[second].T @ columns[second] - through @ (of_base @ columns[first])
-        self._root = _root(remaining[second].T @ remaining[second] + through @ through.T)
+        of_base = seen.T @ base_now.T
+        self._known = remaining_first.T @ y + through @ (of_base @ y)
+        self._response = remaining_second.T @ columns_new - through @ (of_base @ columns_now)
+        self._root = _root(remaining_second.T @ remaining_second + through @ through.T)
         self._b_now, self._b_before = b_now, left_now.T @ y
         rows = [option.rows[0] for option in design.options]
         self._size = np.sqrt(np.mean(np.concatenate(rows, axis=1) ** 2, axis=0)) if rows else np.zeros(0)
@@ -152,7 +155,7 @@ class AxisForecast:
         It is averaged over the shapes. What is shifts between runs there cannot count for an effect.
         """
         each = [s.before.log_bf(self._b_before[s.columns]) for s in self.shapes_of(effect)]
-        return float(logsumexp(each) - np.log(len(each))) if each else None
+        return float(mean_evidence(each, len(each))) if each else None
 
     def draw(self, effect: str, n: int, rng: np.random.Generator) -> Outcomes:
         """Return n outcomes where an effect is the cause, its shape and size as the first recording leaves them."""
@@ -160,7 +163,7 @@ class AxisForecast:
         products = np.tile(self._known, (n, 1)) + rng.standard_normal((n, k)) @ self._root.T
         shapes, now = self.shapes_of(effect), self._now(effect)
         if shapes:
-            chosen = rng.choice(len(shapes), n, p=np.exp(now - logsumexp(now)))
+            chosen = rng.choice(len(shapes), n, p=np.exp(now - np.logaddexp.reduce(now)))
             for i, shape in enumerate(shapes):
                 rows = np.flatnonzero(chosen == i)
                 coefficients = shape.now.draw(self._b_now[shape.columns], len(rows), rng)
@@ -210,6 +213,7 @@ class Outcomes:
     def __init__(self, axis: AxisForecast, products: NDArray[np.float64]) -> None:
         self._axis, self._products = axis, products
         self._known: dict[str, NDArray[np.float64]] = {}
+        self._best: dict[str, list[int]] = {}
 
     def _shapes(self, effect: str) -> NDArray[np.float64]:
         """Return the log Bayes factor of each shape of an effect by both recordings, (s, n) nats."""
@@ -223,7 +227,7 @@ class Outcomes:
     def evidence(self, effect: str) -> Array | None:
         """Return the log evidence for an effect by both recordings, (n,) nats; None where it is not on the axis."""
         each = self._shapes(effect)
-        return np.asarray(logsumexp(each, axis=0) - np.log(len(each))) if len(each) else None
+        return mean_evidence(each, len(each)) if len(each) else None
 
     def evidence_of_sizes(self, effect: str) -> Array | None:
         """Return the same where the size of the effect is averaged over as that of draws is, (n,) nats."""
@@ -231,12 +235,15 @@ class Outcomes:
         if not len(each):
             return None
         of_sizes = [s.after.size_nats(self._products[:, s.columns]) for s in self._axis.shapes_of(effect)]
-        return np.asarray(logsumexp(each + np.array(of_sizes), axis=0) - np.log(len(each)))
+        return mean_evidence(each + np.array(of_sizes), len(each))
 
     def best(self, effect: str, k: int) -> Shape | None:
         """Return the shape of an effect with the most evidence in outcome `k`."""
-        each = self._shapes(effect)
-        return self._axis.shapes_of(effect)[int(np.argmax(each[:, k]))] if len(each) else None
+        if effect not in self._best:
+            each = self._shapes(effect)
+            self._best[effect] = np.argmax(each, axis=0).tolist() if len(each) else []
+        numbers = self._best[effect]
+        return self._axis.shapes_of(effect)[numbers[k]] if numbers else None
 
     def fitted(self, effect: str, k: int) -> Fitted | None:
         """Return the signal of an effect as it is fitted in outcome `k`, in its best shape."""
@@ -352,7 +359,8 @@ def _orthonormal(base: NDArray[np.float64], prior: Array) -> tuple[NDArray[np.fl
     whole = np.concatenate([base, np.diag(prior)])
     size = np.linalg.norm(whole, axis=0)
     size = np.where(size > 0, size, 1.0)
-    values, vectors = np.linalg.eigh((whole / size).T @ (whole / size))
+    scaled = whole / size
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)  # one array twice is half the work
     kept = values > UNSEEN * max(float(values[-1]), 1e-300) if len(values) else np.zeros(0, dtype=bool)
     root = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
     return root, whole @ root
@@ -376,7 +384,11 @@ def _new_columns(option: CandidateShape, seen_now: Array, norms: Array) -> NDArr
 
 
 def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a root (K, K) of a covariance that may be singular."""
+    """Return the root (K, K) of a covariance that may be singular, of the two sides the same.
+
+    Equal variances leave the eigenvectors open, to be rotated by rounding; that root they do not rotate, so the same
+    numbers are drawn on every machine.
+    """
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    return np.asarray(size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+    return np.asarray(size[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)

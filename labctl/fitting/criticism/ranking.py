@@ -166,8 +166,8 @@ def _candidate(
             values = values + priors[axis][places]
         if not np.any(np.isfinite(values)):
             continue
-        per_axis.append(mean_evidence(values, tried))
-        of_sizes.append(mean_evidence(values + axes[axis].size_nats[places], tried))
+        per_axis.append(float(mean_evidence(values, tried)))
+        of_sizes.append(float(mean_evidence(values + axes[axis].size_nats[places], tried)))
         best[axis] = places[int(np.argmax(values))]
         gain += float(axes[axis].gain[best[axis]])
         for i, value in zip(places, values.tolist(), strict=True):

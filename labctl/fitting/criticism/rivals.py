@@ -118,9 +118,13 @@ def cannot_be_distinguished(pair: Pair) -> bool:
     makes them so large, whatever its evidence: the price of so many coefficients hides small shifts.
     """
     near = pair.rival_log_bf > pair.leader_log_bf - LEAD or (pair.rival_log_bf > 0 and _is_indistinguishable(pair))
+    return _stays_in(pair, near=near) or are_aliases_by_draws(pair)
+
+
+def _stays_in(pair: Pair, *, near: bool) -> bool:
+    """Return whether the evidence leaves a rival in, which is `near` where it is not far behind or is the leader's
+    signal."""
     is_random = is_drawn(pair.rival)
-    if are_aliases_by_draws(pair):
-        return True
     if not (near or is_random) or pair.further_directions <= 0 or not pair.contains_leader:
         return near
     if is_random:

@@ -29,15 +29,18 @@ from procedures.planning.step_writer import MOUNTING_S, ROOM_C
 ENVIRONMENT_S = 10.0
 
 
-def simulate(plan: Plan, bench: BenchFile, gyro: GyroSettings) -> Recording:
-    """Return the recording that a plan gives in the simulated world, one row per reading. Raises BadInput."""
+def simulate(plan: Plan, bench: BenchFile, gyro: GyroSettings, *, drifts: bool = True) -> Recording:
+    """Return the recording that a plan gives in the simulated world, one row per reading. Raises BadInput.
+
+    Without `drifts` the bias of the unit does not wander, for a question about the plan and not about the output.
+    """
     if plan.recipe.turns is not None or bench.table is None or bench.chamber is None:
         raise BadInput(
             f"recipe {plan.recipe.name} on bench {bench.name}: turns by hand cannot be simulated without a "
             "campaign; run `labctl campaign start` on a simulated bench, such as by-hand-sim"
         )
     try:
-        walk = _Walk(plan, bench, gyro)
+        walk = _Walk(plan, bench, gyro, drifts=drifts)
     except ValueError as error:
         raise BadInput(f"bench {bench.name}: {error}") from error
     walk.run()
@@ -47,11 +50,12 @@ def simulate(plan: Plan, bench: BenchFile, gyro: GyroSettings) -> Recording:
 class _Walk:
     """State of a walk through a plan."""
 
-    def __init__(self, plan: Plan, bench: BenchFile, gyro: GyroSettings) -> None:
+    def __init__(self, plan: Plan, bench: BenchFile, gyro: GyroSettings, *, drifts: bool) -> None:
         self._plan, self._bench, self._settings = plan, bench, gyro
         self._clock = VirtualClock()
         self._world = open_simulation(bench, self._clock).world
         self._unit = self._world.gyro(gyro.name)
+        self._unit.drifts = drifts
         self._period = 1.0 / self._unit.sample_rate_hz
         self._t = 0.0
         self._power_on_s: float | None = None
@@ -223,8 +227,9 @@ class _Walk:
 
 
 def hidden_recording(
-    plan: Plan, bench: BenchFile, gyro: GyroSettings, seed: int, hidden: Mapping[str, float]
+    plan: Plan, bench: BenchFile, gyro: GyroSettings, seed: int, hidden: Mapping[str, float], *, drifts: bool = True
 ) -> Recording:
     """Return a simulated recording with effects hidden in its unit, effect id -> size in its coefficient unit."""
     settings = (bench.simulation or SimulationSettings()).model_copy(update={"seed": seed, "hidden": dict(hidden)})
-    return simulate(plan, bench.model_copy(update={"gyros": (gyro,), "simulation": settings}), gyro)
+    alone = bench.model_copy(update={"gyros": (gyro,), "simulation": settings})
+    return simulate(plan, alone, gyro, drifts=drifts)

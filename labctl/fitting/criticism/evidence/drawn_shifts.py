@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -30,6 +29,7 @@ class DrawnShifts:
     """
 
     root: NDArray[np.float64]  #: (w, w) from an amplitude of variance 1 in each direction to the coefficients
+    directions: NDArray[np.float64]  #: (w, w) orthonormal, of draws of variance 1, one in each column
     known: Array  #: (w,) what is known of each amplitude, 1/(deg/s)^2 for a coefficient in deg/s; 0: nothing
     variances: Array  #: (s,) of the draws
 
@@ -46,11 +46,12 @@ class DrawnShifts:
         best = float(known.max(initial=0.0))
         seen = known > max(UNSEEN * best, 0.0)
         variances = np.geomspace(1.0, max(g, 1.0), SIZES) / best if np.any(seen) else np.zeros(1)
-        return DrawnShifts(np.asarray(factor @ vectors, dtype=np.float64), np.where(seen, known, 0.0), variances)
+        root = np.asarray(factor @ vectors, dtype=np.float64)
+        return DrawnShifts(root, np.asarray(vectors), np.where(seen, known, 0.0), variances)
 
     def log_bf(self, products: NDArray[np.float64]) -> Array:
         """Return the log Bayes factor (...) against the base for products (..., w) of the columns with the data."""
-        return np.asarray(logsumexp(self._log_bf_by_size(products), axis=-1) - np.log(len(self.variances)))
+        return np.asarray(np.logaddexp.reduce(self._log_bf_by_size(products), axis=-1) - np.log(len(self.variances)))
 
     def draw(self, products: Array, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return n draws, (n, w), of the coefficients as products (w,) of the columns with the data leave them.
@@ -58,9 +59,11 @@ class DrawnShifts:
         Their standard deviation is drawn first. Shifts that the data do not show, as those still to come, have it.
         """
         log_p = self._log_bf_by_size(products)
-        variance = rng.choice(self.variances, n, p=np.exp(log_p - logsumexp(log_p)))[:, None]
+        variance = rng.choice(self.variances, n, p=np.exp(log_p - np.logaddexp.reduce(log_p)))[:, None]
         left = variance / (1.0 + variance * self.known)
-        amplitudes = left * self._amplitudes(products) + np.sqrt(left) * rng.standard_normal((n, len(self.known)))
+        # directions that are known alike are open, to be rotated by rounding: what is drawn does not depend on them
+        scatter = rng.standard_normal((n, len(self.known))) @ self.directions
+        amplitudes = left * self._amplitudes(products) + np.sqrt(left) * scatter
         return np.asarray(amplitudes @ self.root.T)
 
     def _amplitudes(self, products: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -82,7 +85,7 @@ def size_average_nats(gain: Array, directions: NDArray[np.int64], g: float) -> A
     """
     by_g = np.geomspace(1.0, max(g, 1.0), SIZES)
     log_bf = 0.5 * np.multiply.outer(gain, by_g / (1 + by_g)) - 0.5 * np.multiply.outer(directions, np.log1p(by_g))
-    return np.asarray(logsumexp(log_bf, axis=-1) - np.log(SIZES) - log_bf[..., -1])
+    return np.asarray(np.logaddexp.reduce(log_bf, axis=-1) - np.log(SIZES) - log_bf[..., -1])
 
 
 def reproduced_by_draws(gram: NDArray[np.float64], inner: Array, number: int) -> float:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from labctl.answers.fitted_model import Coefficient
 from labctl.errors import LabctlError
@@ -96,7 +95,7 @@ def laws_of(criticism: Criticism) -> list[Law]:
         law = _fitted(criticism, comparison, base, state)
         if law is not None and not any(_are_alike(law, other) for other in laws):
             laws.append(law)
-    total = logsumexp([law.evidence for law in laws]) if laws else 0.0
+    total = np.logaddexp.reduce([law.evidence for law in laws]) if laws else 0.0
     return [replace(law, probability=float(np.exp(law.evidence - total))) for law in laws]
 
 
