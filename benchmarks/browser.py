@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 import httpx
 from playwright.sync_api import sync_playwright
 
+from benchmarks.machine import processor_s
+
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
@@ -23,6 +25,8 @@ ARGUMENTS = (
     "--remote-debugging-port=0", "--window-size=1280,860",
 )  # fmt: skip
 PATIENCE_S = 30.0
+#: A browser has started when it takes less than this share of a core for so long, s.
+STILL_SHARE, STILL_S = 0.1, 0.5
 
 
 @dataclass(frozen=True)
@@ -35,16 +39,24 @@ class Chromium:
 
 @contextmanager
 def chromium() -> Iterator[Chromium]:
-    """Start a browser with an empty profile."""
+    """Start a browser with an empty profile, and wait until it has started."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         words = [shutil.which("chromium") or "chromium", *ARGUMENTS, f"--user-data-dir={folder}", "about:blank"]
         with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
             try:
                 reported = Path(folder) / "DevToolsActivePort"
                 _until(lambda: reported.exists() and bool(reported.read_text().strip()))
+                _until(lambda: _stands_still(browser.pid))
                 yield Chromium(f"http://127.0.0.1:{reported.read_text().split()[0]}", browser.pid)
             finally:
                 browser.terminate()
+
+
+def _stands_still(process: int) -> bool:
+    """Wait a moment; return whether a browser did next to nothing in it: one that still starts takes all cores."""
+    before_s = processor_s(process)
+    time.sleep(STILL_S)
+    return processor_s(process) - before_s <= STILL_SHARE * STILL_S
 
 
 def version(browser: Chromium) -> str:

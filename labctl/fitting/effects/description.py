@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 
 from labctl.answers.effects import EquationJson, ParameterJson, SourceJson, SymbolJson, SymbolKind
 from labctl.fitting.effects.base import Effect
@@ -14,6 +15,7 @@ from labctl.fitting.effects.mathml import equation_mathml, symbol_mathml
 WITHOUT_MEANING = frozenset({"e", "pi"})
 
 
+@cache  # drawing it takes most of the time of an answer, and an effect does not change
 def equation_of(effect: Effect) -> EquationJson | None:
     """Return the equation of an effect as JSON; None where the effect declares none."""
     equation = effect.equation

@@ -17,9 +17,11 @@ ColumnTs = TypeVarTuple("ColumnTs")
 
 def records_of(kind: type[RecordT], result: sa.Result[*ColumnTs]) -> list[RecordT]:
     """Return the rows of a query as records. Raises TypeError where its columns are not the record's fields."""
-    _check_columns(kind, result.keys())
+    names = list(result.keys())
+    _check_columns(kind, names)
     make: Callable[..., RecordT] = kind
-    return [make(**row) for row in result.mappings()]
+    # a mapping for each row takes twice as long
+    return [make(**dict(zip(names, row, strict=True))) for row in result]
 
 
 def record_of(kind: type[RecordT], row: sa.RowMapping) -> RecordT:
