@@ -21,7 +21,7 @@ def records_of(kind: type[RecordT], result: sa.Result[*ColumnTs]) -> list[Record
     _check_columns(kind, names)
     make: Callable[..., RecordT] = kind
     # a mapping for each row takes twice as long
-    return [make(**dict(zip(names, row, strict=True))) for row in result]
+    return [make(**dict(zip(names, tuple[object, ...](row), strict=True))) for row in result]
 
 
 def record_of(kind: type[RecordT], row: sa.RowMapping) -> RecordT:
