@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field
 
 from instruments.laboratory import Contact, Laboratory
 from labctl.answers.base import BY_KEY, LongText, Request, ResponseModel
-from labctl.answers.common_fields import CertificateNumber, PersonName, Serial, VersionNumber
+from labctl.answers.common_fields import CertificateNumber, PersonName, Serial, StatedReason, VersionNumber
 
 #: Of ILAC-G8:09/2019: 4.2.1 simple acceptance; 4.2.2 a guard band as wide as the expanded uncertainty.
 DecisionRule = Literal["simple", "guard-band"]
@@ -193,7 +193,7 @@ class CertificateRequest(Request):
     order: CertificateOrder = Field(
         default=CertificateOrder(), description="The facts of the order; they are kept with the certificate."
     )
-    amend: str | None = Field(
+    amend: StatedReason | None = Field(
         default=None,
         min_length=1,
         max_length=TEXT,
@@ -228,7 +228,9 @@ class WithdrawRequest(Request):
 
     number: CertificateNumber = Field(min_length=1, max_length=100)
     by: PersonName = Field(description="Name of the person who withdraws it.")
-    reason: str = Field(min_length=1, max_length=TEXT, description="Why; the list, the file and the page say it.")
+    reason: StatedReason = Field(
+        min_length=1, max_length=TEXT, description="Why; the list, the file and the page say it."
+    )
 
 
 class CertificateResponse(ResponseModel):

@@ -22,6 +22,7 @@ from labctl.answers.common_fields import (
     RawRms,
     Reason,
     Serial,
+    StatedReason,
     VersionNumber,
 )
 from labctl.answers.judgement import DueSource, Objection
@@ -62,7 +63,7 @@ class RevokeRequest(Request):
     """Who revokes a version, and why."""
 
     by: PersonName
-    reason: Reason = Field(min_length=1)
+    reason: StatedReason = Field(min_length=1)
     due_days: DueDays | None = Field(
         default=None,
         description="Only for a certification: days until the next calibration is due; 0: no due date; absent: "
@@ -83,7 +84,7 @@ class ReleaseRequest(Request):
     """Who releases, as the second person, what a first one asked to certify, and why."""
 
     by: PersonName
-    reason: Reason = Field(min_length=1)
+    reason: StatedReason = Field(min_length=1)
 
 
 class ReleaseRequestResponse(ResponseModel):

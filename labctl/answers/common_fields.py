@@ -76,6 +76,12 @@ def _stated_name(name: str) -> str:
     return _short_name(name)
 
 
+def _stated_reason(reason: str) -> str:
+    if is_blank(reason):
+        raise PydanticCustomError("blank_reason", "the reason is blank; state in words why")
+    return reason
+
+
 def _cut_name(name: str) -> str:
     return name.strip(" ")[:MAX_PERSON_CHARACTERS]
 
@@ -96,6 +102,8 @@ CutPersonName = Annotated[
 ]
 Person = Annotated[str, Field(description="Name of the person who acted, as typed.")]
 Reason = Annotated[str, Field(description="Reason for the act, as typed.")]
+#: Of an act that needs a reason; an abort is not refused for its reason.
+StatedReason = Annotated[str, AfterValidator(_stated_reason), Field(description="Reason for the act, as typed.")]
 ActTime = Annotated[datetime, Field(description="Time of the act.")]
 
 # options of a campaign and of a plan

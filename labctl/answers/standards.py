@@ -19,6 +19,7 @@ from labctl.answers.common_fields import (
     Sentences,
     Serial,
     StandardLabel,
+    StatedReason,
     VersionNumber,
 )
 
@@ -120,7 +121,7 @@ class StandardBadRequest(Request):
 
     bad_from: date = Field(description="First day of which it is not known that the standard was good.")
     bad_until: date | None = Field(default=None, description="Last such day; null: it is still bad.")
-    reason: Reason = Field(min_length=1, max_length=TEXT)
+    reason: StatedReason = Field(min_length=1, max_length=TEXT)
     by: PersonName
 
     @model_validator(mode="after")
@@ -133,7 +134,7 @@ class StandardBadRequest(Request):
 class WithdrawFindingRequest(Request):
     """Withdraw a finding that was wrong."""
 
-    reason: Reason = Field(min_length=1, max_length=TEXT)
+    reason: StatedReason = Field(min_length=1, max_length=TEXT)
     by: PersonName
 
 

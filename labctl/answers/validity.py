@@ -13,10 +13,10 @@ from labctl.answers.common_fields import (
     OutputAxis,
     PersonName,
     ReadingCount,
-    Reason,
     RecordingNumber,
     Sentences,
     Serial,
+    StatedReason,
     VersionNumber,
 )
 from labctl.answers.standards import ChartLimits, ChartState
@@ -35,7 +35,7 @@ class CheckGyroRequest(Request):
     chart_from: date | None = Field(
         default=None, description="First day of the chart, such as after a repair; default: all recordings."
     )
-    reason: Reason = Field(min_length=1, max_length=2000)
+    reason: StatedReason = Field(min_length=1, max_length=2000)
     by: PersonName
 
 

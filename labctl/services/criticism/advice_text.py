@@ -117,14 +117,23 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
     return [text]
 
 
-def advice_sentences(advice: Sequence[Advice]) -> list[str]:
-    """Return what to add and what not, one sentence for each effect that was named."""
-    return [_advised(each) if each["add"] else f"Do not add {each['effect']}: {each['why']}." for each in advice]
+def advice_sentences(advice: Sequence[Advice], groups: Sequence[Sequence[str]]) -> list[str]:
+    """Return what to add and what not, one sentence for each effect that was named; `groups` are those of the verdict.
+
+    What is advised of several effects that cannot be distinguished is the one with the most evidence, also where
+    another one would leave a little less error.
+    """
+    alike = {name: len(group) for group in groups for name in group}
+    return [
+        _advised(each, alike.get(each["effect"], 1)) if each["add"] else f"Do not add {each['effect']}: {each['why']}."
+        for each in advice
+    ]
 
 
-def _advised(advice: Advice) -> str:
+def _advised(advice: Advice, alike: int) -> str:
+    why = f", of {alike} effects that cannot be distinguished the one with the most evidence" if alike > 1 else ""
     return (
-        f"Adding {advice['effect']} is advised: on the parts left out of the fit, the exported calibration then "
+        f"Adding {advice['effect']} is advised{why}: on the parts left out of the fit, the exported calibration then "
         f"leaves an error of {advice['after_dps']:.3g} deg/s, now {advice['before_dps']:.3g} deg/s."
     )
 

@@ -177,7 +177,7 @@ def sentences(criticism: Criticism, experiments: Sequence[Experiment] = ()) -> l
         )
     if verdict.form == "ambiguous" and verdict.indistinguishable:
         answer_text += to_distinguish(verdict.indistinguishable, experiments)
-    answer_text += advice_sentences(criticism.advice)
+    answer_text += advice_sentences(criticism.advice, verdict.groups)
     if verdict.not_physical and verdict.groups:
         technology = criticism.data.info.technology or "this technology"
         answer_text.append(

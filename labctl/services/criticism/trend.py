@@ -309,9 +309,8 @@ def _leaving_text(leaves: Sequence[Leaving], drifts: Sequence[Drift], limit: flo
             for name, value in (("expected", each.expected), ("earliest", each.earliest), ("latest", each.latest))
         }
         if each.axis not in drifting:  # the date at which a line of no known sign passes a limit means nothing
-            first = f"not before {when['earliest']}" if each.earliest else when["earliest"]
-            passes = f"by this uncertainty the bias passes the limit of {limit:.3g} deg/s"
-            yield f"Axis {each.axis}: {passes} {first} (95 %)."
+            until = f"until {each.earliest:%Y-%m-%d}" if each.earliest else "for at least 50 years"
+            yield f"Axis {each.axis}: with 95 % confidence the bias stays within {limit:.3g} deg/s {until}."
             continue
         yield (
             f"Axis {each.axis}: the bias passes the limit of {limit:.3g} deg/s: expected {when['expected']}, earliest "

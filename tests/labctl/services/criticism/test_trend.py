@@ -111,8 +111,8 @@ def test_a_drift_that_is_not_significant_has_no_expected_date_in_the_text(tmp_pa
         np.interp(0.02, [-low for low in bias["line"]["low"]], at),
     ]
     assert datetime.fromisoformat(leaves["earliest"]).timestamp() == pytest.approx(min(crossing), abs=5e6)
-    limit = "Axis z: by this uncertainty the bias passes the limit of 0.02 deg/s"
-    assert f"{limit} not before {leaves['earliest'][:10]} (95 %)." in found["text"]
+    limit = "Axis z: with 95 % confidence the bias stays within 0.02 deg/s until"
+    assert f"{limit} {leaves['earliest'][:10]}." in found["text"]
     assert not any("expected" in line for line in found["text"])
 
 

@@ -39,6 +39,8 @@ def test_an_adequate_version_names_what_would_explain_its_data_as_well(store: St
         {"effect": "sine_response", "others": [name for name in before.named if name != "sine_response"]}
     ]
     assert after.text[1].startswith("These data do not show that the cause is sine_response")
+    why = f"of {len(before.named)} effects that cannot be distinguished the one with the most evidence"
+    assert any(line.startswith(f"Adding sine_response is advised, {why}: on the parts") for line in before.text)
 
 
 @pytest.mark.slow
