@@ -61,7 +61,7 @@ export function visibilityReport(rows) {
     h(
       "p",
       { class: "muted small" },
-      "The number beside each effect is the smallest size that the plan can detect, in the unit of the effect. ppm: millionths of the rate; %: of the full effect.",
+      "The number beside each effect is the smallest size that the plan can detect, in the unit of the effect. ppm: millionths of the rate; %: of the full effect. A surface over rate and temperature is a form of a model, not a cause, and is not counted here.",
     ),
     unseen.length
       ? table(
