@@ -50,6 +50,15 @@ def printed_page(service: Service, number: str) -> str:
     return f"{address.path}?{address.query}"
 
 
+def test_a_diagnosis_without_a_bench_is_refused_before_anything_is_asked(visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit(f"/units/{SERIAL}")
+    page.get_by_role("button", name="Diagnose").click()
+    expect(page.get_by_text("This service drives no bench, so it runs no experiment")).to_be_visible()
+    expect(page.get_by_role("dialog")).to_have_count(0)
+
+
 @pytest.mark.parametrize("keys", [True])
 def test_whoever_has_the_paper_sees_the_state_without_a_key(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect

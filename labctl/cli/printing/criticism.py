@@ -197,7 +197,7 @@ def print_improvement(answer: ImproveResponse) -> None:
     for effect_id, span in answer.plausible.items():
         if not span["inside"]:
             console.print(
-                f"  {effect_id}: larger than is usual ({span['from']:g} to {span['to']:g}); another effect may "
+                f"  {effect_id}: outside of what is usual ({span['from']:g} to {span['to']:g}); another effect may "
                 "explain the same error: criticise the new version",
                 style="yellow",
             )

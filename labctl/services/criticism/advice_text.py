@@ -161,10 +161,11 @@ def why_not_named(criticism: Criticism) -> str:
 
 
 def _worth(criticism: Criticism, suspects: Sequence[Suspect]) -> str:
-    """Return how far the error falls at best with one of the suspects, after a space; "" where it does not."""
+    """Return how far the error falls with the best of the suspects, after a space; "" where it does not."""
     before = criticism.base.error.rms_dps if criticism.base is not None else None
     fits = (suspect.after.error.rms_dps for suspect in suspects if suspect.after is not None)
     least = min((rms_dps for rms_dps in fits if rms_dps is not None), default=None)
     if before is None or least is None or least >= before:
         return ""
-    return f" At best the error falls from {before:.4g} to {least:.4g} deg/s."
+    which = "With it" if len(suspects) == 1 else "With the best of them"
+    return f" {which} the error falls from {before:.4g} to {least:.4g} deg/s."

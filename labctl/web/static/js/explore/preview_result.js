@@ -112,7 +112,7 @@ export function plausibility(state, found, change, effects) {
             `${idText(id)}: `,
             inside
               ? h("span", { class: "good-text" }, "of a usual size")
-              : h("span", { class: "bad-text" }, "larger than is usual"),
+              : h("span", { class: "bad-text" }, "outside of what is usual"),
             h(
               "span",
               { class: "muted" },

@@ -74,16 +74,24 @@ export function residualDiagnostics(state) {
   return cardWithHeader(
     "Where the model fails",
     h("span", { class: "muted small" }, "data sets selected in one picture are marked in all pictures"),
-    h(
-      "p",
-      { class: "muted small" },
-      `The model of version ${state.version} was refitted to ${recordingsText(state)}, so the residual shows what this model cannot describe. Compare, above, shows the version without refitting.${piecesText(state)}`,
-    ),
+    h("p", { class: "muted small" }, `${refittedText(state)}${piecesText(state)}`),
     picture,
     h("div", { class: "columns", style: "--column-min: 19rem" }, against),
     list,
     point,
   );
+}
+
+/**
+ * What the residual is of: the model as the version was fitted, or fitted again to other recordings.
+ * @param {ExploreState} state
+ */
+function refittedText(state) {
+  const { calibration, recordings, version } = state;
+  const isOwn = [...calibration.recordings].sort().join() === [...recordings].sort().join();
+  return isOwn
+    ? `The residual of version ${version}, which was fitted to ${recordingsText(state)}, shows what its model cannot describe.`
+    : `The model of version ${version} was refitted to ${recordingsText(state)}, so the residual shows what this model cannot describe. Compare, above, shows the version without refitting.`;
 }
 
 /**

@@ -3,7 +3,7 @@
 import { get, post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { idText, inWords } from "../core/format.js";
-import { actButton, cardWithHeader, chip, table, withCommands } from "../core/components.js";
+import { actButton, cardWithHeader, chip, table, toast, withCommands } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { visitSignal } from "../core/router.js";
 import { askBenchClear, askingButton } from "../bench/actions.js";
@@ -13,6 +13,10 @@ import { diagnosisState, effectsOfRounds, lineOfRound, suspectColumns } from "./
 
 /** How often a diagnosis that goes on is read again, ms. */
 const POLL_MS = 2000;
+
+/** Said at once, and not after the hours were asked for. */
+const NO_BENCH =
+  "This service drives no bench, so it runs no experiment: start it with labctl serve --bench FILE, or with --simulate for a simulated bench.";
 
 /**
  * A card of the newest diagnosis, with the button that starts one; it is read again as long as it goes on.
@@ -147,6 +151,11 @@ function confirmButtons(diagnosis, again) {
  */
 const startButton = (serial, again) =>
   actButton("Diagnose", async () => {
+    const left = visitSignal();
+    if (!(await get("/api/benches", { signal: left })).length) {
+      toast("bad", NO_BENCH);
+      return;
+    }
     const answers = await dialog(
       "Run experiments until one missing effect is left?",
       [{ name: "hours", label: "Hours on the bench, at most", value: "24" }],
