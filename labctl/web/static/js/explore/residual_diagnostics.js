@@ -90,7 +90,7 @@ function refittedText(state) {
   const { calibration, recordings, version } = state;
   const isOwn = [...calibration.recordings].sort().join() === [...recordings].sort().join();
   return isOwn
-    ? `The residual of version ${version}, which was fitted to ${recordingsText(state)}, shows what its model cannot describe.`
+    ? `The residual is what the model of version ${version} leaves of ${recordingsText(state)}, to which it was fitted: what this model cannot describe.`
     : `The model of version ${version} was refitted to ${recordingsText(state)}, so the residual shows what this model cannot describe. Compare, above, shows the version without refitting.`;
 }
 
