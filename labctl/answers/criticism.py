@@ -105,10 +105,14 @@ class Suspect(TypedDict):
     """Whether the technology of the unit can have an effect of this size."""
     plausible: list[float] | None
     """Least and largest plausible first coefficient for the technology of the unit, in its unit; null: unknown."""
+    usual_size: bool | None
+    """Whether its first coefficients are inside `plausible`, to two standard uncertainties; null: unknown."""
     rms_after_dps: float | None
     """RMS residual of a fit of the model with the effect, deg/s; null: not fitted, or cannot be."""
     heldout_rms_after_dps: float | None
     """RMS error of that fit on data sets left out in turn, deg/s; null: not fitted, or none can be left out."""
+    fit_refused: str | None
+    """Why the model with the effect cannot be fitted, and so not be made; null: it is fitted, or was not tried."""
     alias_group: list[str]
     """Ids of the effects that the recording cannot distinguish from it, itself first."""
     origin: Origin

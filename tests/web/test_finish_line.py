@@ -163,6 +163,14 @@ def test_suspects_beside_an_adequate_model_say_why_none_is_named_and_what_the_no
     said = re.sub("(?<=[a-z])_(?=[a-z])", " ", answer["why_not_named"])  # the page names effects in words
     expect(suspects).to_contain_text(said)
     expect(suspects).not_to_contain_text("distinguished from noise")
+    for suspect in (each for each in answer["suspects"] if each["log_bayes_factor"] > 0):
+        row = suspects.get_by_role("listitem").filter(has=page.locator(f"a[href='/effects/{suspect['effect']}']"))
+        expect(row.get_by_role("button")).to_have_count(0 if suspect["fit_refused"] else 3)
+        if suspect["fit_refused"]:
+            expect(row).to_contain_text("It cannot be added to this model: ")
+        if suspect["plausible"]:
+            expect(row).to_contain_text("of a usual size" if suspect["usual_size"] else "outside of what is usual")
+    assert any(each["fit_refused"] for each in answer["suspects"])
     verdict = page.get_by_role("region", name="Verdict")
     expect(verdict).not_to_contain_text(said)  # stands beside the odds, once
     expect(verdict).not_to_contain_text("nothing is missing")

@@ -10,6 +10,8 @@ from labctl.cli.printing.joint import print_joint
 from labctl.probability_text import probability_text
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from labctl.answers.calibrations import ImproveResponse
     from labctl.answers.criticism import CriticismResponse, ResidualMap, Suspect
     from labctl.answers.ladder import LadderResponse
@@ -66,16 +68,7 @@ def print_criticism(answer: CriticismResponse) -> None:
         _print_static(static)
     for picture in answer.maps:
         _print_map(picture)
-    if answer.suspects:
-        rows = table("suspects", "effect", "origin", "log BF", "after", "held-out", "alike", numbers=4)
-        for suspect in answer.suspects:
-            others = [e for e in suspect["alias_group"] if e != suspect["effect"]]
-            rows.add_row(
-                _name_of(suspect), suspect["origin"], format_number(suspect["log_bayes_factor"], 3),
-                format_number(suspect["rms_after_dps"]), format_number(suspect["heldout_rms_after_dps"]),
-                ", ".join(others[:3]),
-            )  # fmt: skip
-        console.print(rows)
+    _print_suspects(answer.suspects, whole=prints_all)
     purpose = "to show whether one is missing of" if answer.verdict == "adequate" else "to distinguish"
     for experiment in answer.experiments[:SHOWN_EXPERIMENTS]:
         console.print(
@@ -88,6 +81,25 @@ def print_criticism(answer: CriticismResponse) -> None:
     if answer.next_effect is not None:
         console.print(f"next: labctl improve {answer.serial} --add {answer.next_effect}", style="dim")
     _print_laws(answer)
+
+
+def _print_suspects(suspects: Sequence[Suspect], *, whole: bool) -> None:
+    """Print the suspects with the error of a fit with each, and why one cannot be fitted."""
+    if not suspects:
+        return
+    rows = table("suspects", "effect", "origin", "log BF", "after", "held-out", "alike", numbers=4)
+    for suspect in suspects:
+        others = [e for e in suspect["alias_group"] if e != suspect["effect"]]
+        rows.add_row(
+            _name_of(suspect), suspect["origin"], format_number(suspect["log_bayes_factor"], 3),
+            format_number(suspect["rms_after_dps"]), format_number(suspect["heldout_rms_after_dps"]),
+            ", ".join(others[:3]),
+        )  # fmt: skip
+    console.print(rows)
+    for suspect in suspects:
+        if suspect["fit_refused"]:
+            text = f"cannot be added: {suspect['effect']}: {suspect['fit_refused']}"
+            console.print(text, style="dim", soft_wrap=whole)
 
 
 def _print_laws(answer: CriticismResponse) -> None:

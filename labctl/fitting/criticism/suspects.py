@@ -20,7 +20,7 @@ from labctl.fitting.criticism.verdict import (
     share_removed,
 )
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.effects import Term
+from labctl.fitting.effects import CATALOGUE, Effect, Term, kind_of
 from labctl.fitting.effects.derived import with_derived
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.estimation.result import FitResult
@@ -52,6 +52,21 @@ class Suspect:
     share_removed: float  #: of the excess chi2, 0 to 1
     after: FitResult | None  #: fit with the effect added; None where it was not or cannot be fitted
     group: tuple[str, ...]  #: ids of the effects that cannot be distinguished from it, itself first
+    refused: str = ""  #: why the model with the effect cannot be fitted; empty where it is fitted, or was not tried
+
+    @property
+    def kind(self) -> Effect:
+        """The effect in its shape."""
+        return kind_of(self.candidate.term) if self.candidate.term is not None else CATALOGUE[self.candidate.id]
+
+    def is_usual(self, technology: str) -> bool | None:
+        """Return whether a technology usually has its first coefficient on every axis; None where no range is known."""
+        firsts = [next(iter(by_name.values())) for by_name in self.coefficients.values() if by_name]
+        outside = [
+            self.kind.outside(technology, float(first["value"]), np.nan if first["u"] is None else float(first["u"]))
+            for first in firsts
+        ]
+        return None if not outside or None in outside else not any(outside)
 
 
 def suspects_of(
@@ -75,7 +90,7 @@ def suspects_of(
     shown_candidates += [c for c in effects if not c.physical and c.log_bf >= ENOUGH][:UNPHYSICAL_SHOWN]
     suspects = []
     for candidate in shown_candidates:
-        after = _fit_with(comparison, candidate, data, model, shape_of)
+        after, refused = _fit_with(comparison, candidate, data, model, shape_of)
         if after is not None and _is_worse(before, after):
             continue  # another shape of an effect that the model has: what it would replace fits better
         share = _share(before, after, share_removed(fuller, candidate))
@@ -83,7 +98,7 @@ def suspects_of(
         suspect = Suspect(
             candidate, probability[candidate.id], _p_value(comparison, fuller, candidate),
             fitted or coefficients_of(fuller, candidate), bool(fitted), share, after,
-            alias_group(comparison, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,),
+            alias_group(comparison, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,), refused,
         )  # fmt: skip
         suspects.append(suspect)
     return suspects
@@ -141,15 +156,15 @@ def _fit_with(
     data: FitData,
     model: ErrorModel,
     shape_of: Callable[[Comparison, Candidate], Term],
-) -> FitResult | None:
-    """Return a fit of the model with the candidate added; None without evidence for it, or where it cannot be had."""
+) -> tuple[FitResult | None, str]:
+    """Return a fit of the model with the candidate added, and why there is none: it is refused, or has no evidence."""
     if candidate.log_bf < 0 or candidate.term is None:
-        return None
+        return None, ""
     report_stage(f"fitting the model with {candidate.id}")
     try:
-        return fit_preset(data, changed(model, (shape_of(comparison, candidate),)))
-    except LabctlError:  # it cannot be fitted beside the base, or not be inverted: there is no figure
-        return None
+        return fit_preset(data, changed(model, (shape_of(comparison, candidate),))), ""
+    except LabctlError as error:  # it cannot be determined beside the base, or not be inverted
+        return None, str(error)
 
 
 def _fitted_coefficients(after: FitResult, candidate: Candidate) -> dict[str, dict[str, Coefficient]]:

@@ -83,19 +83,38 @@ def doubtful(criticism: Criticism) -> str:
 def _doubt(name: str, suspect: Suspect | None, criticism: Criticism, technology: str) -> str:
     if suspect is None:
         return f"{name} would have a size that is not physical for {technology}"
-    values = next(iter(next(iter(suspect.coefficients.values())).values()))
-    usual = CATALOGUE[name].ranges.get(technology) if name in CATALOGUE else None
-    shown = shown_unit(values["unit"], name)
-    size = f"its size would be {shown.number(values['value'])} {shown.unit}"
-    limit = (
-        f", where {shown.number(usual[0], 6)} to {shown.number(usual[1], 6)} is usual for {technology}" if usual else ""
-    )
     before = criticism.base.error.rms_dps if criticism.base is not None else None
     after = suspect.after.error.rms_dps if suspect.after is not None else None
     change = ""
     if before is not None and after is not None:
         change = f" would lower the error from {before:.3g} to {after:.3g} deg/s, but"
-    return f"{name}{change} {size}{limit}"
+    return f"{name}{change} {_size(name, suspect, technology)}"
+
+
+def _size(name: str, suspect: Suspect, technology: str) -> str:
+    """Return the size that an effect would have, on the axis where it is largest, and what is usual."""
+    firsts = [next(iter(by_name.values())) for by_name in suspect.coefficients.values() if by_name]
+    values = max(firsts, key=lambda first: abs(first["value"]))
+    usual = suspect.kind.ranges.get(technology)
+    shown = shown_unit(values["unit"], name)
+    size = f"its size would be {shown.number(values['value'])} {shown.unit}"
+    if usual is None:
+        return size
+    return f"{size}, where {shown.number(usual[0], 6)} to {shown.number(usual[1], 6)} is usual for {technology}"
+
+
+def unusual_sizes(criticism: Criticism) -> list[str]:
+    """Return which of the effects that cannot be distinguished would be of an unusual size, where another would not."""
+    named, technology = criticism.verdict.indistinguishable, criticism.data.info.technology or ""
+    suspects = [suspect for suspect in criticism.suspects if suspect.candidate.id in named]
+    usual = [suspect.candidate.id for suspect in suspects if suspect.is_usual(technology)]
+    unusual = [suspect for suspect in suspects if suspect.is_usual(technology) is False]
+    if criticism.verdict.form != "ambiguous" or not usual or not unusual:
+        return []
+    sizes = "; ".join(
+        f"{each.candidate.id} would not: {_size(each.candidate.id, each, technology)}" for each in unusual
+    )
+    return [f"{', '.join(usual)} would be of a usual size; {sizes}."]
 
 
 def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) -> list[str]:
@@ -147,7 +166,7 @@ def why_not_named(criticism: Criticism) -> str:
         (suspect for suspect in criticism.suspects if suspect.candidate.id in names),
         key=lambda suspect: -suspect.candidate.log_bf,
     )
-    odds = {suspect.candidate.id: f" ({odds_text(suspect.candidate.log_bf)})" for suspect in suspects}
+    odds = {suspect.candidate.id: f" ({_odds(suspect)})" for suspect in suspects}
     listed = ", ".join(f"{name}{odds.get(name, '')}" for name in (*odds, *sorted(names - set(odds))))
     reasons = ["these odds hold only where the noise is exactly as it was estimated"] if odds else []
     chance = criticism.lack_of_fit[1]
@@ -158,6 +177,11 @@ def why_not_named(criticism: Criticism) -> str:
         reasons.append(f"{each} less than {probability_text(MIN_CAUSE)} of the error above the noise floor")
     because = f": {'; '.join(reasons)}" if reasons else ""
     return f"Suspected and not named: {listed}{because}.{_worth(criticism, suspects)}"
+
+
+def _odds(suspect: Suspect) -> str:
+    without_fit = ", but the model with it cannot be fitted" if suspect.refused else ""
+    return f"{odds_text(suspect.candidate.log_bf)}{without_fit}"
 
 
 def _worth(criticism: Criticism, suspects: Sequence[Suspect]) -> str:

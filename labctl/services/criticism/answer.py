@@ -19,7 +19,7 @@ from labctl.fitting.criticism import (
     worst_data_sets,
 )
 from labctl.fitting.data.noise_floor import correlation_times
-from labctl.fitting.effects import CATALOGUE, kind_of
+from labctl.fitting.effects import CATALOGUE
 from labctl.probability_text import probability_text
 from labctl.services.criticism.advice_text import (
     advice_sentences,
@@ -28,6 +28,7 @@ from labctl.services.criticism.advice_text import (
     drifts,
     not_logged,
     to_distinguish,
+    unusual_sizes,
     what_to_log,
     why_not_named,
 )
@@ -125,8 +126,7 @@ def _lack_of_fit(criticism: Criticism) -> LackOfFit:
 
 
 def _suspect(suspect: Suspect, criticism: Criticism) -> SuspectJson:
-    candidate = suspect.candidate
-    kind = kind_of(candidate.term) if candidate.term is not None else CATALOGUE[candidate.id]
+    candidate, kind = suspect.candidate, suspect.kind
     after = suspect.after.error if suspect.after else None
     technology = criticism.data.info.technology or ""
     return {
@@ -140,8 +140,10 @@ def _suspect(suspect: Suspect, criticism: Criticism) -> SuspectJson:
         "parameters": _shape(suspect),
         "physical": candidate.physical,
         "plausible": list(kind.ranges[technology]) if technology in kind.ranges else None,
+        "usual_size": suspect.is_usual(technology),
         "rms_after_dps": after.rms_dps if after else None,
         "heldout_rms_after_dps": after.heldout_rms_dps if after else None,
+        "fit_refused": suspect.refused or None,
         "alias_group": list(suspect.group),
         "origin": kind.origin,
         "explanation": kind.sentence,
@@ -175,6 +177,7 @@ def sentences(criticism: Criticism, experiments: Sequence[Experiment] = ()) -> l
             "Since the temperature only rises in this recording, an error that grows with time cannot be "
             "distinguished from one that grows with temperature."
         )
+    answer_text += unusual_sizes(criticism)
     if verdict.form == "ambiguous" and verdict.indistinguishable:
         answer_text += to_distinguish(verdict.indistinguishable, experiments)
     answer_text += advice_sentences(criticism.advice, verdict.groups)

@@ -15522,6 +15522,11 @@ export interface components {
              */
             plausible: number[] | null;
             /**
+             * Usual Size
+             * @description Whether its first coefficients are inside `plausible`, to two standard uncertainties; null: unknown.
+             */
+            usual_size: boolean | null;
+            /**
              * Rms After Dps
              * @description RMS residual of a fit of the model with the effect, deg/s; null: not fitted, or cannot be.
              */
@@ -15531,6 +15536,11 @@ export interface components {
              * @description RMS error of that fit on data sets left out in turn, deg/s; null: not fitted, or none can be left out.
              */
             heldout_rms_after_dps: number | null;
+            /**
+             * Fit Refused
+             * @description Why the model with the effect cannot be fitted, and so not be made; null: it is fitted, or was not tried.
+             */
+            fit_refused: string | null;
             /**
              * Alias Group
              * @description Ids of the effects that the recording cannot distinguish from it, itself first.

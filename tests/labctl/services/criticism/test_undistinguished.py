@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from labctl.answers.calibrations import FitRequest, ImproveRequest
+from labctl.errors import LabctlError
+from labctl.fitting.effects import CATALOGUE
 from labctl.recording import read_recording
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.revision import improve_unit
@@ -41,6 +43,37 @@ def test_an_adequate_version_names_what_would_explain_its_data_as_well(store: St
     assert after.text[1].startswith("These data do not show that the cause is sine_response")
     why = f"of {len(before.named)} effects that cannot be distinguished the one with the most evidence"
     assert any(line.startswith(f"Adding sine_response is advised, {why}: on the parts") for line in before.text)
+
+
+@pytest.mark.slow
+def test_a_size_that_is_not_usual_is_said_beside_one_that_is(store: Store) -> None:
+    before, odd = criticise_unit(store, GYRO, 1, None), "scale_factor_odd"
+    usual = {suspect["effect"]: suspect["usual_size"] for suspect in before.suspects}
+    assert (usual["sine_response"], usual[odd]) == (True, False)
+    largest = max(CATALOGUE[odd].ranges["fog"])
+    improve_unit(store, GYRO, ImproveRequest(add=[odd], version=1), AT)
+    value = store.calibrations.get(GYRO, 3).answer["axes"]["z"]["coefficients"]["scale_factor_r3"]["value"]
+    assert abs(value) > largest
+    assert (
+        f"sine_response would be of a usual size; {odd} would not: its size would be {value * 1e6:.2g}e-06 (deg/s)^-2, "
+        f"where 0 to {largest * 1e7:.0f}e-07 is usual for fog."
+    ) in before.text
+
+
+@pytest.mark.slow
+def test_a_suspect_that_cannot_be_fitted_beside_the_model_says_why(store: Store) -> None:
+    answer = criticise_unit(store, GYRO, 2, None)
+    refused = {suspect["effect"]: suspect["fit_refused"] for suspect in answer.suspects if suspect["fit_refused"]}
+    assert refused
+    for effect, why in refused.items():
+        with pytest.raises(LabctlError) as raised:
+            improve_unit(store, GYRO, ImproveRequest(add=[effect], version=2), AT)
+        assert why == str(raised.value)
+        assert (
+            f"{effect} (" not in answer.why_not_named
+            or "but the model with it cannot be fitted" in answer.why_not_named
+        )
+    assert all(suspect["rms_after_dps"] is None for suspect in answer.suspects if suspect["fit_refused"])
 
 
 @pytest.mark.slow

@@ -2,9 +2,10 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { idText, sizeText } from "../core/format.js";
+import { idText } from "../core/format.js";
 import { channelTitle, inDatasetOrder, scaled, setText, shownText } from "./dataset_rows.js";
 import { selectedRows } from "./residual_map.js";
+import { usualSizeText } from "./suspect_notes.js";
 
 /** @import { Effect, Preview } from "../../../types/api.js" */
 /** @import { ExploreState } from "./state.js" */
@@ -105,21 +106,9 @@ export function plausibility(state, found, change, effects) {
         "ul",
         { class: "plain" },
         hint,
-        ranges.map(({ id, from, to, inside }) => {
-          return h(
-            "li",
-            {},
-            `${idText(id)}: `,
-            inside
-              ? h("span", { class: "good-text" }, "of a usual size")
-              : h("span", { class: "bad-text" }, "outside of what is usual"),
-            h(
-              "span",
-              { class: "muted" },
-              ` (usual: ${sizeText(from, unitOf(id), id)} to ${sizeText(to, unitOf(id), id)})`,
-            ),
-          );
-        }),
+        ranges.map(({ id, from, to, inside }) =>
+          h("li", {}, `${idText(id)}: `, usualSizeText(id, inside, [from, to], unitOf(id))),
+        ),
       )
     : null;
 }

@@ -1,7 +1,7 @@
 // What stands beside the suspected effects: why none is named, formulas, experiments, what cannot be tested.
 
 import { h } from "../core/elements.js";
-import { inWords, number, probabilityText, idText } from "../core/format.js";
+import { inWords, number, probabilityText, idText, sizeText } from "../core/format.js";
 import { button, notice } from "../core/components.js";
 import { planAddress } from "../core/routes.js";
 import { channelName } from "../recordings/channels.js";
@@ -36,6 +36,20 @@ export function whyNoneIsNamed({ why_not_named: why, suspects }) {
  */
 export const unbroken = (text) =>
   text.replaceAll(/ (%|± )|([<>]) /g, (gap) => gap.replaceAll(" ", "\u00a0")).replaceAll("× ", "×\u00a0");
+
+/**
+ * Whether a type of gyro usually has an effect of this size, and the range that is usual.
+ * @param {string} effect
+ * @param {boolean} inside the usual range, by two standard uncertainties
+ * @param {readonly number[]} range least and largest first coefficient that is usual, in `unit`
+ * @param {string | undefined} unit
+ */
+export const usualSizeText = (effect, inside, [from, to], unit) => [
+  inside
+    ? h("span", { class: "good-text" }, "of a usual size")
+    : h("span", { class: "bad-text" }, "outside of what is usual"),
+  h("span", { class: "muted" }, ` (usual: ${sizeText(from, unit, effect)} to ${sizeText(to, unit, effect)})`),
+];
 
 /** @param {Criticism} criticism */
 export function aliasNotice(criticism) {

@@ -7,7 +7,15 @@ import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { heldOutName } from "./first_models.js";
-import { aliasNotice, experimentList, lawList, unbroken, untestableEffects, whyNoneIsNamed } from "./suspect_notes.js";
+import {
+  aliasNotice,
+  experimentList,
+  lawList,
+  unbroken,
+  untestableEffects,
+  usualSizeText,
+  whyNoneIsNamed,
+} from "./suspect_notes.js";
 
 /** @import { Criticism, Effect, Suspect } from "../../../types/api.js" */
 /** @import { Child } from "../../../types/pages.js" */
@@ -184,15 +192,17 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
               s.physical !== false ? null : chip("not physical for this type of gyro"),
             ),
             h("div", { class: "muted small" }, s.explanation),
-            h(
-              "div",
-              { class: "row tight" },
-              button("Add", () => onadd(s.effect), {
-                kind: `tiny ${s.effect === criticism.next_effect ? "primary" : ""}`,
-              }),
-              draw(s),
-              openWhatIf(s),
-            ),
+            s.fit_refused
+              ? h("p", { class: "small" }, `It cannot be added to this model: ${inWords(s.fit_refused, ids)}.`)
+              : h(
+                  "div",
+                  { class: "row tight" },
+                  button("Add", () => onadd(s.effect), {
+                    kind: `tiny ${s.effect === criticism.next_effect ? "primary" : ""}`,
+                  }),
+                  draw(s),
+                  openWhatIf(s),
+                ),
           ),
           evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
           evidenceItem(
@@ -203,7 +213,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
           evidenceItem(
             "Error with it, deg/s",
             s.rms_after_dps === null
-              ? h("span", { class: "muted small" }, "no fit with it was made")
+              ? h("span", { class: "muted small" }, s.fit_refused ? "cannot be fitted" : "no fit with it was made")
               : [
                   h("span", { class: "number" }, number(s.rms_after_dps)),
                   h("span", { class: "muted small" }, heldOutText(s, state.motion)),
@@ -212,6 +222,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
           evidenceItem(
             `Coefficient ± U (95.45 %)${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
             coefficientText(s, state.axis),
+            usualSize(s, effects),
           ),
           equationDetails(effects, s.effect),
         ),
@@ -259,6 +270,17 @@ const evidenceItem = (title, ...children) =>
  */
 const heldOutText = ({ heldout_rms_after_dps: heldOut }, motion) =>
   heldOut === null ? "" : `${number(heldOut)} ${heldOutName(motion)}`;
+
+/**
+ * Whether this type of gyro usually has an effect of this size.
+ * @param {Suspect} suspect
+ * @param {readonly Effect[]} effects
+ */
+function usualSize({ effect, plausible, usual_size: inside }, effects) {
+  if (!plausible || inside === null) return null;
+  const unit = effects.find(({ id }) => id === effect)?.unit;
+  return h("div", { class: "small" }, usualSizeText(effect, inside, plausible, unit));
+}
 
 /** @param {number} nats */
 function evidenceMeter(nats) {
