@@ -15,6 +15,30 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 
+#: Keep the middle of each square that outlines a cell before Plotly has drawn it, in px of the page.
+WATCH_OUTLINES = """() => {
+  window.outlined = [];
+  new MutationObserver((changes) => {
+    for (const { addedNodes } of changes)
+      for (const node of addedNodes)
+        if (node.classList?.contains("point-outlines"))
+          window.outlined.push([...node.children].map((square) => {
+            const { x, y, width, height } = square.getBoundingClientRect();
+            return [x + width / 2 + scrollX, y + height / 2 + scrollY];
+          }));
+  }).observe(document.querySelector("main"), { childList: true, subtree: true });
+}"""
+#: The middle of each square of Plotly's trace of picked cells.
+PICKED = """(plot) => {
+  const scatters = plot.data.filter((trace) => trace.type === "scatter").map((trace) => trace.name);
+  const trace = plot.querySelectorAll(".scatterlayer .trace")[scatters.indexOf("picked")];
+  return [...trace.querySelectorAll("path.point")].map((point) => {
+    const { x, y, width, height } = point.getBoundingClientRect();
+    return [x + width / 2 + scrollX, y + height / 2 + scrollY];
+  });
+}"""
+
+
 @pytest.fixture(scope="module")
 def template(furnish: Callable[..., Path]) -> Path:
     def fitted(service: Service) -> None:
@@ -28,6 +52,31 @@ def template(furnish: Callable[..., Path]) -> Path:
 @pytest.fixture
 def explored(service: Service) -> str:
     return f"/explore?unit={service.get('/api/recordings/1')['serial']}"
+
+
+@pytest.mark.slow
+def test_a_picked_cell_is_outlined_at_once_where_it_is_drawn_then(visit: Callable[..., Page], explored: str) -> None:
+    from playwright.sync_api import expect
+
+    page = visit(explored)
+    fails = page.get_by_role("region", name="Where the model fails")
+    fails.scroll_into_view_if_needed()
+    picture = fails.locator(".plot").first
+    expect(picture.locator(".heatmaplayer image").first).to_be_attached()
+    page.evaluate(WATCH_OUTLINES)
+    for across in (0.45, 0.25):
+        picture.scroll_into_view_if_needed()
+        box = picture.bounding_box()
+        assert box is not None
+        page.mouse.click(box["x"] + across * box["width"], box["y"] + 0.4 * box["height"])
+        expect(fails).to_contain_text("1 data set selected")
+        expect(fails.locator(".point-outlines")).to_have_count(0)
+        ((x, y),) = picture.evaluate(PICKED)
+        ((outlined_x, outlined_y),) = page.evaluate("() => window.outlined.at(-1)")
+        assert (outlined_x, outlined_y) == (pytest.approx(x, abs=1.0), pytest.approx(y, abs=1.0))
+        assert abs(x - box["x"] - across * box["width"]) < 0.05 * box["width"]
+        fails.get_by_role("button", name="Clear selection").click()
+        expect(fails).to_contain_text("No data set is selected")
 
 
 @pytest.mark.slow

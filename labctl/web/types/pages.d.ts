@@ -119,6 +119,8 @@ export interface Picture {
 export interface Plot extends HTMLElement {
   data?: PlotTrace[];
   layout?: PlotLayout;
+  /** Of a plot that is drawn: each axis with its place in the plot, px, and what gives the px of a number along it. */
+  _fullLayout: Record<`${"x" | "y"}axis${string}`, { _offset: number; c2p: (value: number) => number }>;
   on: (name: string, act: (event: PlotEvent) => unknown) => void;
 }
 
@@ -135,7 +137,7 @@ export type CsvRows = readonly (readonly unknown[])[];
 export interface Figure extends HTMLElement {
   plot: Plot;
   update: () => Promise<void>;
-  redraw: () => unknown;
+  redraw: () => Promise<void> | undefined;
   /** Draw now, so wide in px; null: as wide as the page lets it be. */
   drawAt: (width: number | null) => void;
   /** Put a picture of a figure in three dimensions beside it, for paper; null: it is flat, and prints as it is. */

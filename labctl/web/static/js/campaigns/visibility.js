@@ -44,7 +44,9 @@ export function visibilityReport(rows) {
       {},
       h("strong", {}, `This plan can detect ${seen.length} of ${rows.length} effects`),
       unseen.length ? ` and cannot detect ${unseen.length}; ` : "; ",
-      fitted.length ? `${fitted.length} are part of the usual model and are fitted.` : null,
+      fitted.length
+        ? `${fitted.length} are part of the model that a first fit to this plan's data has, and are fitted.`
+        : null,
     ),
     h(
       "ul",
@@ -84,7 +86,7 @@ export function visibilityReport(rows) {
       ? h(
           "p",
           { class: "muted small" },
-          "Already in the usual model: ",
+          "Already in the model of a first fit, which follows from the axes, rates and temperatures of the plan: ",
           fitted.flatMap((row, k) => (k ? [", ", effectLink(row)] : [effectLink(row)])),
           ".",
         )

@@ -149,7 +149,7 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
         cell ? cellButton(name, cell) : null,
       ),
     ),
-    { plot, update, redraw: () => plot.data && update(), drawAt, solidPicture },
+    { plot, update, redraw: () => (plot.data ? update() : undefined), drawAt, solidPicture },
   );
 
   /** What the page shows figures of, as it says in `data-source`: "unit A1, version 2 (0f3a...), recording 7". */
@@ -173,15 +173,20 @@ export function figure(name, caption, draw, { height = "20rem", csv, slug = file
   }
 
   const rows = () => csv?.() ?? traceRows(plot.data ?? [], plot.layout);
-  let waiting = false;
+  /** @type {Promise<void> | null} */
+  let waiting = null;
   /** @type {number | null} */
   let paper_px = null; // an update that ends while the page is printed keeps the width of the paper
-  async function update() {
-    if (waiting) return;
-    waiting = true;
+  function update() {
+    return (waiting ??= drawAfterFrame());
+  }
+
+  /** Draw once for all that asks for it in a frame, after the frame: what else changed with it is seen first. */
+  async function drawAfterFrame() {
     await loadPlotly();
     await new Promise(requestAnimationFrame);
-    waiting = false;
+    await new Promise((resolve) => setTimeout(resolve));
+    waiting = null;
     const picture = draw();
     await drawWith(await loadPlotly(picture.data), picture);
     performance.mark("labctl:picture");

@@ -23,6 +23,15 @@ import { channelName, channelTitle, scaled, setText, shownText } from "./dataset
 const DEFAULT_CHANNELS = ["table_rate_dps", "temperature_c", "t_s", "order"];
 const MAX_LISTED = 12;
 
+/**
+ * What one noise floor for all data sets hides, where no readings say what each has; with a space before it.
+ * @param {ExploreState["criticism"]} criticism
+ */
+const oneFloorText = ({ error: { noise_floor_source: source } }) =>
+  source === "repeats" || source === "scatter about a smooth surface"
+    ? " Here it is one number for all data sets, since the recording has no readings within them: where the noise grows with the rate, an error at low rates is larger against the noise than its cell shows, and at high rates smaller."
+    : "";
+
 /** @param {ExploreState} state */
 export function residualDiagnostics(state) {
   const rows = () => selectedRows(state);
@@ -30,7 +39,7 @@ export function residualDiagnostics(state) {
     ? null
     : residualMap(
         "Residual over floor",
-        `Each measured cell shows the mean residual of its data sets divided by the noise floor. ${cellsText(state.criticism)} Faded cells are less than two noise floors from zero; a single faded cell is not significant. Drag over cells to select them, or click one cell.`,
+        `Each measured cell shows the mean residual of its data sets divided by the noise floor. ${cellsText(state.criticism)}${oneFloorText(state.criticism)} Faded cells are less than two noise floors from zero; a single faded cell is not significant. Drag over cells to select them, or click one cell.`,
         () => ({
           maps: mapsOf(state.criticism, state.axis),
           limit: colourLimit(mapsOf(state.criticism, state.axis)),
@@ -67,8 +76,8 @@ export function residualDiagnostics(state) {
   listed();
   state.onchange((what) => {
     if (what !== "overlay") {
+      picture?.redraw(); // first: it outlines what was selected in the next frame
       listed();
-      picture?.redraw();
     }
   });
   return cardWithHeader(

@@ -5,6 +5,7 @@ import { colour, figure } from "../core/figure.js";
 import { number, plainNumber } from "../core/format.js";
 import { datasetRows, distinctLabels } from "./dataset_rows.js";
 import { reachByKeyboard } from "../core/keyboard_points.js";
+import { outlinePoints } from "../core/point_outlines.js";
 import { mapCells } from "./residual_cells.js";
 
 /** @import { ResidualMap } from "../../../types/api.js" */
@@ -13,7 +14,7 @@ import { mapCells } from "./residual_cells.js";
 /** @import { Cell } from "./residual_cells.js" */
 /** @import { ExploreState } from "./state.js" */
 /** @typedef {ReturnType<typeof mapCells>} Cells */
-/** @typedef {Cell & { x: string | number, y: string | number }} PlacedCell */
+/** @typedef {Cell & { x: string | number, y: string | number, at: readonly number[] }} PlacedCell */
 
 const DIMMED_BELOW = 2;
 /** Cells that fill less than this share of their rows and columns are drawn where they are, not in a grid. */
@@ -25,8 +26,22 @@ const [WHOLE_TITLE_PX, ONE_LINE_PX] = [260, 560];
 /** Height of the tool bar of a figure. */
 const TOOLBAR_PX = 26;
 
+/** The squares around cells: of those that are selected, and of the one that the keyboard is at. */
+const PICKED = { side_px: 13, line_px: 2.5, color: "text" };
+const CURSOR = { side_px: 20, line_px: 4, color: "accent" };
+
 /** @param {Cell} cell */
 const isDim = (cell) => Math.abs(cell.mean) * Math.sqrt(cell.sets.length) < DIMMED_BELOW;
+/**
+ * @param {Cell} cell
+ * @param {ReadonlySet<number>} pick
+ */
+const isPicked = ({ sets }, pick) => sets.some((set) => pick.has(set));
+/**
+ * @param {Cell} cell
+ * @param {Place | null} cursor
+ */
+const isUnder = ({ sets }, cursor) => cursor?.sets[0] === sets[0];
 /**
  * @param {Cell} cell
  * @param {string} position
@@ -51,7 +66,7 @@ function gridTraces({ rates, temperatures, cells }, position, shared) {
     sets[row][column] = cell.sets;
     texts[row][column] = cellText(cell, position);
     if (isDim(cell)) dim[row][column] = 1;
-    return { ...cell, x: labels[0][column], y: labels[1][row] };
+    return { ...cell, x: labels[0][column], y: labels[1][row], at: [column, row] };
   });
   const shade = colour("surface");
   const heat = { type: "heatmap", ...shared, x: labels[0], y: labels[1], xgap: 1, ygap: 1 };
@@ -116,7 +131,7 @@ function scatteredTraces({ cells }, position, shared) {
     ],
     x: {},
     y: {},
-    placed: cells.map((cell) => ({ ...cell, x: cell.rate, y: cell.temperature })),
+    placed: cells.map((cell) => ({ ...cell, x: cell.rate, y: cell.temperature, at: [cell.rate, cell.temperature] })),
   };
 }
 
@@ -151,14 +166,22 @@ function positionPanel(map, id, pick, cursor) {
     selected: { marker: { opacity: marker.opacity ?? 1 } },
     unselected: { marker: { opacity: marker.opacity ?? 1 } },
   });
-  const picked = placed.filter((cell) => cell.sets.some((set) => pick.has(set)));
-  const under = placed.filter((cell) => cursor?.sets[0] === cell.sets[0]);
+  /** @param {typeof PICKED} square */
+  const around = ({ side_px: size, line_px: width, color }) => ({
+    size,
+    symbol: "square-open",
+    color: colour(color),
+    line: { width },
+  });
+  const picked = placed.filter((cell) => isPicked(cell, pick));
+  const under = placed.filter((cell) => isUnder(cell, cursor));
   return {
+    placed,
     data: [
       ...traces,
       mark(placed, { size: 18, opacity: 0.01, symbol: "square" }, "cells"),
-      mark(picked, { size: 13, symbol: "square-open", color: colour("text"), line: { width: 2.5 } }, "picked"),
-      mark(under, { size: 20, symbol: "square-open", color: colour("accent"), line: { width: 4 } }, "keyboard"),
+      mark(picked, around(PICKED), "picked"),
+      mark(under, around(CURSOR), "keyboard"),
     ],
     x: { ...x, showgrid: false, title: { text: "table rate, deg/s" } },
     y: { ...y, showgrid: false, title: id === "" ? { text: "temperature, deg C" } : undefined },
@@ -199,7 +222,10 @@ export function cellPlaces(maps) {
 export function residualMap(name, caption, give, { onselect, height = "22rem" } = {}) {
   /** @type {Place | null} */
   let cursor = null;
+  /** @type {(PlacedCell & { panel: number })[]} */
+  let drawn = [];
   const draw = () => {
+    drawn = [];
     const { maps, limit, pick = new Set() } = give();
     const several = maps.length > 1;
     const below = several && window.innerWidth < 760;
@@ -224,7 +250,8 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
     layout.annotations = [];
     const data = maps.flatMap((map, k) => {
       const id = k ? String(k + 1) : "";
-      const { data: traces, x, y, text } = positionPanel(map, id, pick, cursor?.panel === k ? cursor : null);
+      const { data: traces, placed, x, y, text } = positionPanel(map, id, pick, cursor?.panel === k ? cursor : null);
+      drawn.push(...placed.map((cell) => ({ ...cell, panel: k })));
       layout[`xaxis${id}`] = below && k < maps.length - 1 ? { ...x, title: undefined } : x; // one title for all panels
       layout[`yaxis${id}`] = y;
       layout.annotations.push({
@@ -243,7 +270,24 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
     return { data, layout };
   };
   const element = figure(name, caption, draw, { height, csv: () => mapRows(give().maps) });
+  const { redraw } = element;
+  const outlines = () => {
+    const { pick = new Set() } = give();
+    return drawn.flatMap(({ panel, at: [x, y], ...cell }) => {
+      const squares = [
+        isPicked(cell, pick) ? PICKED : null,
+        cursor?.panel === panel && isUnder(cell, cursor) ? CURSOR : null,
+      ];
+      const axes = panel ? String(panel + 1) : "";
+      return squares.flatMap((square) => (square ? [{ ...square, color: colour(square.color), axes, x, y }] : []));
+    });
+  };
   if (onselect) {
+    element.redraw = () => {
+      if (!element.plot.data) return;
+      const clear = outlinePoints(element, outlines());
+      return redraw()?.then(clear);
+    };
     const onmove = (/** @type {Place | null} */ place) => {
       cursor = place;
       element.redraw();

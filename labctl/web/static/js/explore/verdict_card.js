@@ -45,12 +45,17 @@ const FLOORS = {
   "within and between data sets": "by the scatter within and between data sets",
   "within data sets, and by the data sheet": "by the scatter within data sets, and the drift of the data sheet",
   "within data sets": "by the scatter within data sets",
-  repeats: "by data sets that repeat each other, at nearly equal rate and temperature",
-  "scatter about a smooth surface": "by the scatter about a smooth surface",
+  repeats: "by data sets that repeat each other, at nearly equal rate and temperature; one number for all rates",
+  "scatter about a smooth surface": "by the scatter about a smooth surface; one number for all rates",
 };
 
-const TWO_NOISES =
-  "The noise floor is that of the recording, the same for every model. The variance is compared with noise and drift as they are estimated beside this model, each data set by its own: slow changes that no model follows count as drift there.";
+/**
+ * Why a residual of more than one noise floor can be what noise and drift leave.
+ * @param {number} ratio of the residual to the floor
+ * @param {number} statistic variance of the residual over that of noise and drift
+ */
+const twoNoises = (ratio, statistic) =>
+  `The noise floor is that of the recording, the same for every model: ${number(ratio, 2)} floors are ${number(ratio ** 2, 2)} times its variance. The ratio ${number(statistic, 2)} compares each data set with its own noise, which may grow with the rate, and with the drift, both as they are estimated beside this model: slow changes that no model follows count as drift there.`;
 
 const DRAW =
   "“Draw” shows the part of the residual that an effect would explain. “Add” previews a model with the effect; nothing is stored before you make a version.";
@@ -118,7 +123,7 @@ export function verdictCard(state, effects) {
           ],
     ]),
     Number.isFinite(ratio) && criticism.lack_of_fit.statistic !== null
-      ? h("p", { class: "muted small" }, TWO_NOISES)
+      ? h("p", { class: "muted small" }, twoNoises(ratio, criticism.lack_of_fit.statistic))
       : null,
   );
 }
