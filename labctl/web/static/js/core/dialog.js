@@ -2,7 +2,7 @@
 
 import { inLabels, labelledField } from "./fields.js";
 import { setChildren, uniqueId, h } from "./elements.js";
-import { capitalised } from "./format.js";
+import { capitalised, MAX_PERSON_CHARACTERS } from "./format.js";
 import { isAbort, messageOf, Problem } from "./http/errors.js";
 import { show, visitSignal } from "./router.js";
 
@@ -10,9 +10,6 @@ import { show, visitSignal } from "./router.js";
 
 /** A dialog of more fields than these has them in two columns, where the screen is wide enough. */
 const NARROW_FIELDS = 7;
-
-/** Most characters of the name of a person in a request. */
-const MAX_PERSON_CHARACTERS = 120;
 
 /** The field of the person who acts. @type {Field} */
 export const WHO = { name: "by", label: "Who", maxlength: MAX_PERSON_CHARACTERS };
