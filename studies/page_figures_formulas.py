@@ -101,13 +101,31 @@ def full_turns(error_dps: Array, rate_dps: Array, temperature_c: Array, position
         )
 
 
-def straight_line(error_dps: Array, rate_dps: Array) -> tuple[Array, Array]:
-    """Return offset and slope of errors over rates by least squares, and their standard uncertainties."""
-    columns = np.column_stack([np.ones(len(rate_dps)), rate_dps])
+def straight_line(values_dps: Array, rate_dps: Array) -> tuple[Array, Array]:
+    """Return offset and slope of values over rates by least squares, and their standard uncertainties."""
+    found, u, _ = _least_squares(np.column_stack([np.ones(len(rate_dps)), rate_dps]), values_dps)
+    return found, u
+
+
+def asymmetry(output_dps: Array, rate_dps: Array) -> tuple[float, float]:
+    """Return the slope at positive rates less that at negative ones, over their mean, ppm, and its u."""
+    (_, mean, difference), u, _ = _least_squares(
+        np.column_stack([np.ones(len(rate_dps)), rate_dps, np.abs(rate_dps) / 2]), output_dps
+    )
+    return 1e6 * difference / mean, 1e6 * u[2] / mean
+
+
+def nonlinearity(output_dps: Array, rate_dps: Array, full_scale_dps: float) -> float:
+    """Return the largest deviation from the straight line over the full scale, referred to the input, ppm."""
+    found, _, left = _least_squares(np.column_stack([np.ones(len(rate_dps)), rate_dps]), output_dps)
+    return float(1e6 * np.abs(left).max() / (found[1] * full_scale_dps))
+
+
+def _least_squares(columns: Array, values: Array) -> tuple[Array, Array, Array]:
     inverse = np.linalg.inv(columns.T @ columns)
-    found = inverse @ columns.T @ error_dps
-    left = error_dps - columns @ found
-    return found, np.sqrt(np.diag(inverse) * (left @ left) / (len(left) - 2))
+    found = inverse @ columns.T @ values
+    left = values - columns @ found
+    return found, np.sqrt(np.diag(inverse) * (left @ left) / (len(left) - columns.shape[1])), left
 
 
 def waves(angle_rad: Array, turned_rad: Array, position: Array, axis: str) -> list[Array]:

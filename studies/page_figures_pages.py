@@ -17,12 +17,14 @@ import numpy as np
 from studies.page_figures_formulas import (
     Law,
     allan_deviation,
+    asymmetry,
     in_bins,
+    nonlinearity,
     straight_line,
     waves,
     without_waves,
 )
-from studies.page_figures_recomputed import Sets, environment_of, law_of, residuals_of, sets_of, steps_of
+from studies.page_figures_recomputed import Sets, clock_u_of, environment_of, law_of, residuals_of, sets_of, steps_of
 
 #: Sums in another order.
 ROUNDING = 1e-12
@@ -36,6 +38,9 @@ FIVE_DIGITS, SINGLE_PRECISION = 5e-5, 6e-8
 BESIDE_OTHER_OUTPUTS = 1e-3
 #: Columns of the trace that is compared: fewer than the readings, so that bins have several.
 POINTS = 1200
+
+#: Figures of the data sheet that a straight line through the output over the rate gives.
+STRAIGHT_LINE = ("bias", "scale_factor", "scale_factor_asymmetry", "scale_factor_nonlinearity")
 
 Get = Callable[..., Any]
 
@@ -205,6 +210,7 @@ def unit_page(c: Compared) -> Iterator[Row]:
         )
         yield figure("u of coefficients", [each["u"] for each in shown], np.sqrt(np.diag(c.law.covariance[axis])))
     yield from _uncertainty(c, answer["validity"])
+    yield from _datasheet(c)
     yield from _trend(c)
 
 
@@ -225,6 +231,28 @@ def _uncertainty(c: Compared, validity: Any) -> Iterator[Row]:
             shown = [budget["combined"], budget["expanded"], k * one["combined_dps"]]
             yield figure("combined and expanded uncertainty", shown,
                          [combined, budget["k"] * combined, budget["k"] * combined])  # fmt: skip
+
+
+def _datasheet(c: Compared) -> Iterator[Row]:
+    """Yield the figures of the data sheet that a straight line through the output over the rate gives."""
+    sets, clock_u = c.sets, clock_u_of(c.database, c.recording)
+    for shown in c.get(f"/api/units/{c.serial}/datasheet")["characteristics"]:
+        name, axis = shown["id"], shown["axis"]
+        if shown["value"] is None or name not in STRAIGHT_LINE:
+            continue
+        low, high = shown["conditions"]["temperature_c"]
+        rows = np.array([up[-1] == axis for up in sets.position])
+        rows &= (sets.temperature_c >= low - 1e-9) & (sets.temperature_c <= high + 1e-9)
+        rate, output = sets.own_rate_dps[axis][rows], sets.output_dps[axis][rows]
+        (bias, slope), (u_bias, u_slope) = straight_line(output, rate)
+        own = {
+            "bias": [bias, u_bias],
+            "scale_factor": [slope, np.hypot(u_slope, clock_u * slope)],
+            "scale_factor_asymmetry": asymmetry(output, rate),
+            "scale_factor_nonlinearity": [nonlinearity(output, rate, float(np.abs(rate).max()))],
+        }[name]
+        said = [shown["value"], shown["u"]][: len(own)]
+        yield figure(f"data sheet: {name.replace('_', ' ')}", said, own, SMALL_DIFFERENCE)
 
 
 def _trend(c: Compared) -> Iterator[Row]:

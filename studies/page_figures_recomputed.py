@@ -127,6 +127,14 @@ def _valid(by_set: list[dict[str, Array]], channels: list[dict[str, Any]]) -> tu
     return raw, np.concatenate([[0], np.cumsum(rows)[ends - 1]])
 
 
+def clock_u_of(database: Path, recording: int) -> float:
+    """Return the relative standard uncertainty of the clock that sets the rates, which it states in ppm; 0: none is."""
+    with sqlite3.connect(database) as file:
+        (info,) = file.execute("select info from recordings where id = ?", (recording,)).fetchone()
+    clocks = [each for each in json.loads(info)["standards"] if each["quantity"] == "clock"]
+    return sum(1e-6 * each["expanded"] / each["k"] for each in clocks)
+
+
 def environment_of(database: Path, recording: int) -> dict[str, Array]:
     """Return what was logged beside the readings, by column (n,), in order of time."""
     names = ("t_s", "temperature_c", "chamber_c", "chamber_setpoint_c")

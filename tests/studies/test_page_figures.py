@@ -38,7 +38,8 @@ KINDS = {
     "unit": {
         "RMS error without a correction", "RMS error of a version", "coefficients", "u of coefficients",
         "u of the coefficients in use", "contributions in use", "combined and expanded uncertainty",
-        "bias left by a version", "u of bias and scale factor left",
+        "bias left by a version", "u of bias and scale factor left", "data sheet: bias", "data sheet: scale factor",
+        "data sheet: scale factor asymmetry", "data sheet: scale factor nonlinearity",
     },
     "campaign": {
         "samples of the course", "course of a campaign", "begin and end of a step", "channels of a campaign",
