@@ -3,6 +3,12 @@
 A real gyro (points), a campaign on one axis and a recording of three axes (readings). The pages show what their
 answers over HTTP say, which browser tests compare; here these answers are compared with
 `studies.page_figures_recomputed`.
+
+Taken from the answers, and so not recomputed: which readings share a bin and which data sets a cell, the size of the
+noise floor, the direction of north, and u and sensitivity of the lines of a budget beside that of the fit. Not compared
+at all: the evidence for effects and the odds, errors at what a fit left out, intervals and figures of an Allan
+deviation, U about any axis, U of a campaign that stops when it is enough, and the figures of a data sheet that no
+straight line gives.
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ import numpy as np
 from studies.page_figures_formulas import centres, full_turns
 from studies.page_figures_pages import FIVE_DIGITS, SMALL_DIFFERENCE, Compared, Row, figure, rms
 
-#: Rates, temperatures and other channels beside a residual are means over the pieces of a data set.
-PIECES = 1e-4
+#: Rates and temperatures of the map are means over the pieces of a data set.
+PIECES = 1e-6
 #: Errors per turn are these times as large as the errors themselves.
 TURNS = 10
 #: Half a unit of the eighth digit.
@@ -123,7 +123,7 @@ def _sets(c: Compared, shown: Any, fitted: Any) -> Iterator[Row]:
     for name, values in shown["channels"].items():
         own = _channel(c, name)
         if own is not None:
-            yield figure("channels of the residual", values, own[rows], PIECES)
+            yield figure("channels of the residual", values, own[rows], FIVE_DIGITS)
 
 
 def _channel(c: Compared, name: str) -> Any:
