@@ -7,6 +7,7 @@ HTTP. A printed U is rounded up to two digits, a printed value to the place of i
 from __future__ import annotations
 
 import json
+import math
 import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -50,6 +51,11 @@ ORDER: dict[str, Any] = {
     "item": {"manufacturer": "M", "condition": "good"}, "method": {"name": "rate sweep"},
 }  # fmt: skip
 
+#: Units of printed numbers that are parts of 1, and of rad: how they begin.
+PARTS = {"mrad": 1e-3, "ppm": 1e-6, "%": 1e-2}
+#: Raised digits of a printed power of ten: × 10⁻⁶.
+RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
 
 @dataclass(frozen=True)
 class Unit:
@@ -72,11 +78,23 @@ UNITS = (
 
 
 @dataclass(frozen=True)
+class Printed:
+    """A printed number in its unit without a prefix, and how much its last place is."""
+
+    text: str
+    value: float
+    step: float
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True)
 class Figure:
     """A quantity, and what each document says of it; a text was printed, and so is rounded."""
 
     quantity: str
-    said: Mapping[str, float | str]
+    said: Mapping[str, float | str | Printed]
 
     @property
     def agrees(self) -> bool:
@@ -86,14 +104,29 @@ class Figure:
         return all(_is_same(exact, value) for value in self.said.values())
 
 
-def _is_same(exact: float, value: float | str) -> bool:
-    if isinstance(value, float):
-        return abs(value - exact) <= 1e-8 * abs(exact)
-    text = value.replace("−", "-").rstrip(" *%")
-    decimals = len(text.partition(".")[2].partition("e")[0])
-    power = float(f"1e{text.partition('e')[2] or 0}")
-    step = power * 10.0**-decimals
-    return abs(float(text) - exact) <= 1.001 * step
+def _is_same(exact: float, said: float | str | Printed) -> bool:
+    if isinstance(said, float):
+        return abs(said - exact) <= 1e-8 * abs(exact)
+    printed = said if isinstance(said, Printed) else printed_in(said)
+    return abs(printed.value - exact) <= 1.001 * printed.step
+
+
+def printed_in(text: str, unit: str = "", beside: str = "") -> Printed:
+    """Read a printed number in a unit; its last place is that of the two digits of the uncertainty `beside` it."""
+    value, step = _number_in(text)
+    if beside.strip("–"):
+        u, step = _number_in(beside)
+        step = max(step, 10.0 ** (math.floor(math.log10(u)) - 1)) if u else step
+    factor = next((each for begin, each in PARTS.items() if unit.startswith(begin)), 1.0)
+    return Printed(text, factor * value, factor * step)
+
+
+def _number_in(text: str) -> tuple[float, float]:
+    """Return a printed number and one unit of its last decimal."""
+    printed, _, exponent = text.replace("−", "-").rstrip(" *%").partition(" × 10")
+    number, _, written = printed.partition("e")
+    power = 10.0 ** int(exponent.translate(RAISED) or written or 0)
+    return float(number) * power, power * 10.0 ** -len(number.partition(".")[2])
 
 
 def figures(store: Store, unit: Unit) -> Iterator[Figure]:
@@ -129,9 +162,10 @@ def figures(store: Store, unit: Unit) -> Iterator[Figure]:
         yield from _about_any(axis, stated, document, pages, header, served)
     for row, each in zip(pages["coefficients"], document["coefficients"], strict=True):
         quantity = f"{each['name']} of {each['axis']} at {each['temperature_c'] or 0:.0f}"
-        yield Figure(quantity, {"json": each["value"], "pages": row[3], "dcc": _nearest(dcc, each["value"])})
+        value, u = printed_in(row[3], row[5], row[4]), printed_in(row[4], row[5], row[4])
+        yield Figure(quantity, {"json": each["value"], "pages": value, "dcc": _nearest(dcc, each["value"])})
         if each["u"]:
-            yield Figure(f"u({quantity})", {"json": each["u"], "pages": row[4], "dcc": _nearest(dcc, each["u"])})
+            yield Figure(f"u({quantity})", {"json": each["u"], "pages": u, "dcc": _nearest(dcc, each["u"])})
     yield from _of_conformity(document, pages, dcc)
 
 
@@ -193,7 +227,7 @@ def _made(store: Store, unit: Unit) -> None:
     store.calibrations.certify(unit.serial, 1, "certify", by="A", reason="meets the criteria", at=AT)
 
 
-def _figures_of(unit: Unit) -> list[Figure]:
+def figures_of(unit: Unit) -> list[Figure]:
     """Make a unit in a database of its own, which the service closes in the end, and read its figures."""
     with tempfile.TemporaryDirectory() as folder, open_store(str(Path(folder) / "lab.sqlite"), write=True) as store:
         _made(store, unit)
@@ -205,7 +239,7 @@ def run() -> str:
     lines, wrong, n = [], 0, 0
     for unit in UNITS:
         lines.append(f"\n{unit.serial}: " + "  ".join(NAMES))
-        for figure in _figures_of(unit):
+        for figure in figures_of(unit):
             n += 1
             wrong += not figure.agrees
             shown = "  ".join(f"{name}={figure.said[name]}" for name in NAMES if name in figure.said)

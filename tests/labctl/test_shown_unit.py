@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from labctl.fitting.effects import CATALOGUE
-from labctl.shown_unit import shown_unit, size_text
+from labctl.shown_unit import ANGLES, PARTS, RATIOS, shown_unit, size_text
 
 #: The pages' `shownUnit` is tested with the same cases.
 CASES = json.loads(Path("tests/pages/shown_units.json").read_text(encoding="utf-8"))
@@ -33,6 +33,14 @@ def test_the_cases_contain_every_plain_number_of_the_catalogue() -> None:
         pattern = re.sub(r"\\\{\w+\\\}", r"\\w+", re.escape(symbol.name))
         assert any(re.fullmatch(pattern, name) for name in names), (effect, symbol.name)
     assert len(symbols) >= 10
+
+
+@pytest.mark.parametrize(("kind", "names"), [("ANGLES", ANGLES), ("PARTS", PARTS), ("RATIOS", RATIOS)])
+def test_the_pages_list_the_same_names_of_plain_numbers(kind: str, names: tuple[str, ...]) -> None:
+    script = Path("labctl/web/static/js/core/shown_unit.js").read_text(encoding="utf-8")
+    pattern = script.partition(f"const {kind} =")[2].partition(";")[0]
+    listed = pattern.partition("[. ])?")[2].partition("(?![a-z])")[0]
+    assert listed.removeprefix("(?:").removesuffix(")").split("|") == list(names)
 
 
 def test_an_angle_is_the_same_number_as_a_coefficient_and_as_a_change_between_mountings() -> None:

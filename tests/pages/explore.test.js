@@ -18,7 +18,7 @@ import {
   scaled,
   toRanges,
 } from "../../labctl/web/static/js/explore/dataset_rows.js";
-import { usualRecording, usualVersion } from "../../labctl/web/static/js/explore/chosen_recordings.js";
+import { residualText, usualRecording, usualVersion } from "../../labctl/web/static/js/explore/chosen_recordings.js";
 import { sharedReasons } from "../../labctl/web/static/js/explore/experiment_reasons.js";
 import { cellsText, colourLimit, mapCells } from "../../labctl/web/static/js/explore/residual_cells.js";
 
@@ -150,4 +150,20 @@ test("without a version in the address, the one in force is shown; else the newe
   assert.equal(usualVersion({ calibrations: [1, 2, 3], certified_version: 2 }), 2);
   assert.equal(usualVersion({ calibrations: [3, 1, 2], certified_version: null }), 3);
   assert.equal(usualVersion({ calibrations: [], certified_version: null }), undefined);
+});
+
+test("the residual is of the fit itself, or of a fit to other recordings, and the sentence says which", () => {
+  /** @type {(recordings: number[], of: number[]) => string} */
+  const words = (recordings, of) =>
+    residualText({ version: 3, recording: recordings.at(-1) ?? 0, recordings, calibration: { recordings: of } });
+  assert.match(words([7], [7]), /model of version 3 leaves of recording 7, to which it was fitted/);
+  assert.match(words([8, 10], [10, 8]), /leaves of recordings 8 and 10, to which it was fitted/); // in any order
+  for (const [chosen, of] of [
+    [[8], [7]],
+    [[8, 10], [8]],
+    [[8], [8, 10]],
+  ]) {
+    assert.match(words(chosen, of), /^The model of version 3 was refitted to recordings? 8/);
+    assert.doesNotMatch(words(chosen, of), /to which it was fitted/);
+  }
 });

@@ -108,6 +108,7 @@ def test_the_map_is_saved_with_each_data_set_and_with_what_it_is_of(
     fails = page.get_by_role("region", name="Where the model fails")
     fails.scroll_into_view_if_needed()
     fails.locator(".plot .main-svg").first.wait_for()
+    fails.get_by_text("of version 1 leaves of recording 1, to which it was fitted").wait_for()
     with page.expect_download() as download:
         fails.get_by_role("button", name="as CSV").first.click()
     first, *lines = download.value.path().read_text().splitlines()

@@ -73,4 +73,6 @@ def _decoded(content: bytes) -> Recording:
             {name.removeprefix(kind): arrays[name] for name in arrays.files if name.startswith(kind)}
             for kind in (READINGS, ENVIRONMENT)
         )
+    if len({values.shape for values in readings.values()}) != 1:
+        raise ValueError("damaged file: columns of unequal lengths")
     return Recording(info, readings, environment or None)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -73,3 +75,13 @@ def test_a_longer_name_that_was_stored_is_read() -> None:
 def test_a_due_date_beyond_the_limits_is_refused_in_words(days: int) -> None:
     with pytest.raises(ValidationError, match=rf"cannot be due in {days} days; give from 1 to 36500 days, or 0 for no"):
         CertifyRequest(by="A", reason="r", due_days=days)
+
+
+def test_the_pages_take_and_show_names_of_the_same_length() -> None:
+    pages = Path("labctl/web/static/js/core")
+    stated = [
+        int(number)
+        for file in pages.rglob("*.js")
+        for number in re.findall(r"MAX_PERSON_CHARACTERS = (\d+)", file.read_text(encoding="utf-8"))
+    ]
+    assert stated == [MAX_PERSON_CHARACTERS]

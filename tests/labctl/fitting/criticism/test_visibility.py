@@ -8,6 +8,7 @@ import pytest
 
 from labctl.fitting.criticism import effect_visibilities, visibility
 from labctl.fitting.criticism.ranking import FARTHEST, largest_physical
+from labctl.fitting.effects import CATALOGUE
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.simulation.visibility import planned_schedule
 from procedures.planning.plan import make_plan
@@ -48,3 +49,11 @@ def test_a_size_beyond_what_is_physical_is_not_detectable() -> None:
     assert hidden.share > visibility.MIN_VISIBLE  # the schedule alone would not hide it
     assert hidden.experiment
     assert found["scale_factor_asymmetry"].visible
+
+
+def test_every_effect_counts_but_the_surface_which_is_a_form_of_a_model() -> None:
+    bench = load_bench("single-axis-sim")
+    schedule = planned_schedule(make_plan(load_recipe("short"), limits_of(bench)), bench)
+    found = [each.effect for each in effect_visibilities(schedule)]
+    assert len(found) == len(set(found))
+    assert set(CATALOGUE) - set(found) == {"rate_temperature_surface"}

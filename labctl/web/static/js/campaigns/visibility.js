@@ -81,7 +81,7 @@ export function visibilityReport(rows) {
           unseen,
           { label: "Effects this plan cannot detect" },
         )
-      : notice("good", "This plan can detect every effect of the catalogue."),
+      : notice("good", "This plan can detect every effect that is not part of the usual model."),
     fitted.length
       ? h(
           "p",

@@ -1,8 +1,10 @@
 // A modal dialog that asks for some values, and sends them where it is told how.
 
+import { withCommands } from "./components.js";
+import { entriesOf, markProblems } from "./field_problems.js";
 import { inLabels, labelledField } from "./fields.js";
 import { setChildren, uniqueId, h } from "./elements.js";
-import { capitalised } from "./format.js";
+import { capitalised, MAX_PERSON_CHARACTERS } from "./format.js";
 import { isAbort, messageOf, Problem } from "./http/errors.js";
 import { show, visitSignal } from "./router.js";
 
@@ -10,9 +12,6 @@ import { show, visitSignal } from "./router.js";
 
 /** A dialog of more fields than these has them in two columns, where the screen is wide enough. */
 const NARROW_FIELDS = 7;
-
-/** Most characters of the name of a person in a request. */
-const MAX_PERSON_CHARACTERS = 120;
 
 /** The field of the person who acts. @type {Field} */
 export const WHO = { name: "by", label: "Who", maxlength: MAX_PERSON_CHARACTERS };
@@ -39,9 +38,6 @@ const inputOf = (field) =>
     autocomplete: "off",
   });
 
-/** @param {HTMLInputElement} input */
-const valueOf = (input) => (input.type === "checkbox" && !input.checked ? "" : input.value);
-
 /**
  * Show a modal dialog until it is closed, or until the page that it was opened on is left.
  * @param {HTMLDialogElement} box
@@ -59,20 +55,39 @@ export function openModal(box, signal) {
 }
 
 /**
+ * What is wrong with the entries: words for the whole, and those beside fields, by name.
+ * @typedef {{ text: string, problems?: Record<string, string> }} Refusal
+ */
+
+/**
  * Modal dialog with a form: resolves to {name: value}, or null when cancelled and when the page is left (`signal`). A
  * checkbox resolves to "on" or "". `body`: an element above the fields.
- * With `send` the dialog stays open until that has succeeded: an error is shown in it, beside what was filled in. Its
- * signal is aborted when the dialog is closed. A conflict also shows the page again, because what it shows is old.
+ * Entries that `check` finds wrong are marked, and nothing is sent. With `send` the dialog stays open until that has
+ * succeeded: an error is shown in it, as `refused` says it, beside what was filled in. The signal of `send` is aborted
+ * when the dialog is closed. A conflict also shows the page again, because what it shows is old. `onclose` is given the
+ * entries however the dialog ends.
  * @param {string} title
  * @param {readonly Field[]} fields
  * @param {{ text?: string | null, body?: Child, confirm?: string, kind?: string, signal?: AbortSignal,
- *   send?: (answers: Answers, signal: AbortSignal) => Promise<unknown> }} [options]
+ *   check?: (answers: Answers) => Record<string, string>,
+ *   send?: (answers: Answers, signal: AbortSignal) => Promise<unknown>,
+ *   refused?: (error: unknown) => Refusal, onclose?: (answers: Answers) => void }} [options]
  * @returns {Promise<Answers | null>}
  */
 export function dialog(
   title,
   fields,
-  { text, body, confirm = "Continue", kind = "primary", signal = visitSignal(), send } = {},
+  {
+    text,
+    body,
+    confirm = "Continue",
+    kind = "primary",
+    signal = visitSignal(),
+    check = () => ({}),
+    send,
+    refused = (error) => ({ text: capitalised(`${inLabels(messageOf(error), fields)}.`) }),
+    onclose,
+  } = {},
 ) {
   if (signal.aborted) return Promise.resolve(null);
   const name = uniqueId("dialog");
@@ -106,18 +121,23 @@ export function dialog(
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     if (accept.disabled) return; // it is being sent
-    const answers = Object.fromEntries(inputs.map((input) => [input.name, valueOf(input)]));
+    const answers = entriesOf(form);
+    const problems = check(answers);
+    markProblems(form, problems);
+    setChildren(trouble);
+    if (Object.keys(problems).length) return;
     accept.disabled = true;
     accept.classList.add("busy");
-    setChildren(trouble);
     try {
       await send?.(answers, closed.signal);
       given = answers;
       box.close();
     } catch (error) {
       if (closed.signal.aborted || isAbort(error)) return;
-      setChildren(trouble, refusal(error, fields));
+      const said = refused(error);
+      setChildren(trouble, h("div", { class: "notice bad", role: "alert" }, h("p", {}, withCommands(said.text))));
       trouble.scrollIntoView({ block: "nearest" });
+      markProblems(form, said.problems ?? {});
       if (error instanceof Problem && error.status === 409) show({ quiet: true });
     } finally {
       accept.disabled = false;
@@ -127,16 +147,10 @@ export function dialog(
   return new Promise((resolve) => {
     box.addEventListener("close", () => {
       closed.abort();
+      onclose?.(entriesOf(form));
       resolve(signal.aborted ? null : given);
     });
     openModal(box, signal);
     inputs[0]?.focus();
   });
 }
-
-/**
- * @param {unknown} error
- * @param {readonly Field[]} fields
- */
-const refusal = (error, fields) =>
-  h("div", { class: "notice bad", role: "alert" }, h("p", {}, capitalised(`${inLabels(messageOf(error), fields)}.`)));

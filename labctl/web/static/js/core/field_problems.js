@@ -39,22 +39,3 @@ export function markProblems(form, problems) {
   }
   first?.focus();
 }
-
-/**
- * Let a form be sent only when nothing is wrong with its entries; until then its problems stand beside the fields.
- * @param {HTMLFormElement} form
- * @param {(given: Answers) => Record<string, string>} check
- */
-export function checkBefore(form, check) {
-  form.addEventListener(
-    "submit",
-    (event) => {
-      const problems = check(entriesOf(form));
-      markProblems(form, problems);
-      if (!Object.keys(problems).length) return;
-      event.preventDefault();
-      event.stopImmediatePropagation();
-    },
-    { capture: true },
-  );
-}

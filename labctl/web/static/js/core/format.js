@@ -172,7 +172,7 @@ export function inWords(text, ids) {
 }
 
 /** Most characters of a name of a person that a page shows; a request takes no longer one. */
-const MAX_PERSON_CHARACTERS = 120;
+export const MAX_PERSON_CHARACTERS = 120;
 
 /**
  * The name of a person; one that an older version of labctl stored may be longer than a line, and is cut.

@@ -1,6 +1,6 @@
 // Which version is compared with which recordings: one, or several as one; in the address, in a query and in words.
 
-/** @import { RecordingRow, Unit } from "../../../types/api.js" */
+/** @import { RecordingRow, Unit, Version } from "../../../types/api.js" */
 
 /** @typedef {{ recording: number, recordings: readonly number[] }} Chosen `recording` is the newest of them */
 
@@ -36,6 +36,18 @@ export const inAddress = ({ recording, recordings }) =>
 export function recordingsText({ recording, recordings }) {
   if (recordings.length < 2) return `recording ${recording}`;
   return `recordings ${recordings.slice(0, -1).join(", ")} and ${recordings.at(-1)}`;
+}
+
+/**
+ * What a residual is of: the model as the version was fitted, or fitted again to other recordings.
+ * @param {Chosen & { version: number, calibration: Pick<Version, "recordings"> }} state
+ */
+export function residualText({ version, recording, recordings, calibration }) {
+  const own = [...calibration.recordings].sort().join();
+  const which = recordingsText({ recording, recordings });
+  return own === [...recordings].sort().join()
+    ? `The residual is what the model of version ${version} leaves of ${which}, to which it was fitted: what this model cannot describe.`
+    : `The model of version ${version} was refitted to ${which}, so the residual shows what this model cannot describe. Compare, above, shows the version without refitting.`;
 }
 
 /**

@@ -8,7 +8,7 @@ import { cardWithHeader, table } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
 import { recordingMarks } from "../core/recording_marks.js";
-import { recordingsText } from "./chosen_recordings.js";
+import { residualText } from "./chosen_recordings.js";
 import { residualCell } from "./notebook_cell.js";
 import { pointCard } from "./point_card.js";
 import { cellsText, colourLimit, hasMap, mapsOf } from "./residual_cells.js";
@@ -83,24 +83,12 @@ export function residualDiagnostics(state) {
   return cardWithHeader(
     "Where the model fails",
     h("span", { class: "muted small" }, "data sets selected in one picture are marked in all pictures"),
-    h("p", { class: "muted small" }, `${refittedText(state)}${piecesText(state)}`),
+    h("p", { class: "muted small" }, `${residualText(state)}${piecesText(state)}`),
     picture,
     h("div", { class: "columns", style: "--column-min: 19rem" }, against),
     list,
     point,
   );
-}
-
-/**
- * What the residual is of: the model as the version was fitted, or fitted again to other recordings.
- * @param {ExploreState} state
- */
-function refittedText(state) {
-  const { calibration, recordings, version } = state;
-  const isOwn = [...calibration.recordings].sort().join() === [...recordings].sort().join();
-  return isOwn
-    ? `The residual is what the model of version ${version} leaves of ${recordingsText(state)}, to which it was fitted: what this model cannot describe.`
-    : `The model of version ${version} was refitted to ${recordingsText(state)}, so the residual shows what this model cannot describe. Compare, above, shows the version without refitting.`;
 }
 
 /**

@@ -4,9 +4,8 @@ import { download, get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { actButton, button, notice, toast, withCommands } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
-import { checkBefore, entriesOf, markProblems } from "../core/field_problems.js";
 import { capitalised } from "../core/format.js";
-import { Problem } from "../core/http/errors.js";
+import { messageOf, Problem } from "../core/http/errors.js";
 import { show, visitSignal } from "../core/router.js";
 import { stateChip } from "./certificate_state.js";
 import { fieldAt, fieldsFor, orderOf, problemsOf, unstatable } from "./order_fields.js";
@@ -78,27 +77,32 @@ async function askCertificate(serial, version, replaced) {
   const missing = await get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path, signal: left });
   const never = unstatable(missing);
   if (never.length) return void (await sayMissing(serial, version, never, left));
-  const why = replaced ? [reasonField(replaced)] : [];
-  const fields = [...why, ...fieldsFor(missing)];
+  const fields = [...(replaced ? [reasonField(replaced)] : []), ...fieldsFor(missing)];
   const key = JSON.stringify([serial, version, replaced?.number]);
-  /** @type {Refusal} */
-  let refusal = { text: "", problems: {} };
-  for (;;) {
-    const answers = await ask(serial, version, fields, key, refusal, missing, left);
-    if (!answers) return;
-    const body = { by: answers.by, order: orderOf(answers), ...(replaced ? { amend: answers.amend } : {}) };
-    try {
-      await post("/api/units/{serial}/calibrations/{version}/certificate", { path, body });
-      kept.delete(key);
-      return await show();
-    } catch (error) {
-      if (!(error instanceof Problem)) throw error;
-      refusal = refusalOf(error);
-    }
-  }
+  const given = kept.get(key) ?? {};
+  const done = await dialog(
+    `Issue a certificate of ${serial} version ${version}`,
+    fields.map((field) => ({ ...field, value: given[field.name] })),
+    {
+      text: "A certificate is a document for a customer; which version is in force does not change. The certificate is written to the audit trail.",
+      body: h("p", {}, missing.some(({ table }) => table === "laboratory") ? NO_LABORATORY : LABORATORY),
+      confirm: "Issue certificate",
+      signal: left,
+      check: (entries) => problemsOf(fields, entries),
+      send: (answers, signal) => {
+        const body = { by: answers.by, order: orderOf(answers), ...(replaced ? { amend: answers.amend } : {}) };
+        return post("/api/units/{serial}/calibrations/{version}/certificate", { path, body, signal });
+      },
+      refused: refusalOf,
+      onclose: (entries) => kept.set(key, entries),
+    },
+  );
+  if (done) {
+    kept.delete(key);
+    await show();
+  } else if (Object.values(kept.get(key) ?? {}).some(Boolean))
+    toast("good", "The entries are kept: the form shows them again until the page is reloaded.");
 }
-
-/** What the service refused: words for the form, and those beside fields. @typedef {{ text: string, problems: Record<string, string> }} Refusal */
 
 /**
  * @param {Certificate} replaced
@@ -107,53 +111,11 @@ async function askCertificate(serial, version, replaced) {
 const reasonField = ({ number }) => ({ name: "amend", place: "amend", label: `Why certificate ${number} is replaced` });
 
 /**
- * One form, with the entries of before; what was filled in is kept however it ends. Null: it was cancelled or left.
- * @param {string} serial
- * @param {number} version
- * @param {readonly OrderField[]} fields
- * @param {string} key
- * @param {Refusal} refusal
- * @param {readonly MissingFact[]} missing
- * @param {AbortSignal} signal of the visit of the page
- */
-async function ask(serial, version, fields, key, refusal, missing, signal) {
-  const given = kept.get(key) ?? {};
-  const body = h(
-    "div",
-    { class: "stack" },
-    refusal.text
-      ? notice("bad", h("p", {}, withCommands(refusal.text)))
-      : h("p", {}, missing.some(({ table }) => table === "laboratory") ? NO_LABORATORY : LABORATORY),
-  );
-  const asked = dialog(
-    `Issue a certificate of ${serial} version ${version}`,
-    fields.map((field) => ({ ...field, value: given[field.name] })),
-    {
-      text: "A certificate is a document for a customer; which version is in force does not change. The certificate is written to the audit trail.",
-      body,
-      confirm: "Issue certificate",
-      signal,
-    },
-  );
-  const form = body.closest("form");
-  if (form) {
-    checkBefore(form, (entries) => problemsOf(fields, entries));
-    markProblems(form, refusal.problems);
-  }
-  const answers = await asked;
-  const entries = answers ?? (form ? entriesOf(form) : {});
-  kept.set(key, entries);
-  if (!answers && Object.values(entries).some(Boolean))
-    toast("good", "The entries are kept: the form shows them again until the page is reloaded.");
-  return answers;
-}
-
-/**
  * What the service refused, beside the fields where it says which; what has no field is said above them.
- * @param {Problem} problem
- * @returns {Refusal}
+ * @param {unknown} error
  */
-function refusalOf({ message, errors = [], missing = [] }) {
+function refusalOf(error) {
+  const { errors = [], missing = [] } = error instanceof Problem ? error : {};
   const stated = [
     ...errors.map(({ place, text }) => ({ field: fieldAt(place.slice(1).join(".")), text })),
     ...missing.map(({ table, key, fact }) => ({ field: fieldAt(`order.${table}.${key}`), text: `${fact} is missing` })),
@@ -161,7 +123,7 @@ function refusalOf({ message, errors = [], missing = [] }) {
   const beside = stated.flatMap(({ field, text }) => (field ? [[field, `${capitalised(text)}.`]] : []));
   const whole = stated.length > 0 && beside.length === stated.length;
   return {
-    text: whole ? "Nothing was issued. Correct what is marked below." : `${capitalised(message)}.`,
+    text: whole ? "Nothing was issued. Correct what is marked." : `${capitalised(messageOf(error))}.`,
     problems: Object.fromEntries(beside),
   };
 }

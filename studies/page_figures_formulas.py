@@ -1,0 +1,180 @@
+"""Formulas of the figures of the pages, written here from the documentation: NumPy only, nothing of labctl."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray
+#: The error after a full turn is stated from this rate on; below the other one the table is at rest, deg/s.
+LEAST_TURN_DPS, AT_REST_DPS = 5.0, 0.01
+
+
+@dataclass(frozen=True)
+class Law:
+    """A version: output = rate + bias + (scale factor and misalignment) rate, each a polynomial of the temperature."""
+
+    axes: tuple[str, ...]
+    reference_c: float
+    coefficients: Mapping[str, Mapping[str, float]]  #: axis -> name -> value
+    names: Mapping[str, Sequence[str]]  #: axis -> coefficients of the covariance, in its order
+    covariance: Mapping[str, Array]
+
+    @staticmethod
+    def of(document: Mapping[str, Any]) -> Law:
+        """Read the document of a version."""
+        model, stored = document["model"], document["coefficients"]
+        return Law(
+            tuple(stored), model["reference"]["temperature_c"],
+            {axis: {name: each["value"] for name, each in own.items()} for axis, own in stored.items()},
+            {axis: each["names"] for axis, each in model["axes"].items()},
+            {axis: np.array(each["covariance"]) for axis, each in model["axes"].items()},
+        )  # fmt: skip
+
+    def at(self, temperature_c: Array) -> tuple[Array, Array]:
+        """Return bias (n, axes) and the matrix (n, axes, axes) from rates to outputs."""
+        n, k = len(temperature_c), len(self.axes)
+        bias, matrix = np.zeros((n, k)), np.tile(np.eye(k), (n, 1, 1))
+        for row, axis in enumerate(self.axes):
+            for name, value in self.coefficients[axis].items():
+                stem, column, factor = self._place(name, row, temperature_c)
+                if stem == "bias":
+                    bias[:, row] += value * factor
+                else:
+                    matrix[:, row, column] += value * factor
+        return bias, matrix
+
+    def _place(self, name: str, row: int, temperature_c: Array) -> tuple[str, int, Array]:
+        stem, power = name.rsplit("_t", 1) if name.rsplit("_t", 1)[-1].isdigit() else (name, "0")
+        factor = (temperature_c - self.reference_c) ** int(power)
+        if stem in {"bias", "scale_factor"}:
+            return stem, row, factor
+        if stem.startswith("misalignment_"):
+            return stem, self.axes.index(stem[-1]), factor
+        raise ValueError(f"{name}: a coefficient of a model that is not written here; write it, or leave its unit out")
+
+    def error(self, rate_dps: Array, temperature_c: Array) -> Array:
+        """Return the error (n, axes) of outputs at true rates (n, axes), deg/s."""
+        bias, matrix = self.at(temperature_c)
+        return bias + np.einsum("nij,nj->ni", matrix, rate_dps) - rate_dps
+
+    def corrected(self, output_dps: Array, temperature_c: Array) -> Array:
+        """Return the rates (n, axes) of outputs (n, axes), deg/s."""
+        bias, matrix = self.at(temperature_c)
+        return np.linalg.solve(matrix, (output_dps - bias)[:, :, None])[:, :, 0]
+
+    def u_of_fit(self, axis: str, rate_dps: float, temperature_c: float) -> float:
+        """Return u of a corrected rate by the covariance of the fit, deg/s, where the unit turns about that axis."""
+        warm = np.array([temperature_c])
+        inverse = np.linalg.inv(self.at(warm)[1][0])
+        rates = np.where(np.array(self.axes) == axis, rate_dps, 0.0)
+        variance = 0.0
+        for row, each in enumerate(self.axes):
+            places = [self._place(name, row, warm) for name in self.names[each]]
+            slope = np.array([f[0] * (1.0 if stem == "bias" else rates[column]) for stem, column, f in places])
+            variance += inverse[self.axes.index(axis), row] ** 2 * float(slope @ self.covariance[each] @ slope)
+        return float(np.sqrt(variance))
+
+
+def centres(values: Array, level: Array) -> Array:
+    """Return for each value the mean of those that a page puts into the same cell."""
+    which = np.unique(level, return_inverse=True)[1]
+    return (np.bincount(which, values) / np.bincount(which))[which]
+
+
+def full_turns(error_dps: Array, rate_dps: Array, temperature_c: Array, position: Array, turning: Array) -> Array:
+    """Return the error after a turn of 360 deg, deg, less the error at rest in the same position; NaN below 5 deg/s."""
+    still = np.abs(rate_dps) < AT_REST_DPS
+    bias = np.full(len(error_dps), np.nan)
+    for up in np.unique(position):
+        here = position == up
+        rest = still & here if np.any(still & here) else still
+        if np.any(rest):
+            warm, which = np.unique(temperature_c[rest], return_inverse=True)
+            bias[here] = np.interp(temperature_c[here], warm, np.bincount(which, error_dps[rest]) / np.bincount(which))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(
+            turning & (np.abs(rate_dps) >= LEAST_TURN_DPS), (error_dps - bias) * 360 / np.abs(rate_dps), np.nan
+        )
+
+
+def straight_line(values_dps: Array, rate_dps: Array) -> tuple[Array, Array]:
+    """Return offset and slope of values over rates by least squares, and their standard uncertainties."""
+    found, u, _ = _least_squares(np.column_stack([np.ones(len(rate_dps)), rate_dps]), values_dps)
+    return found, u
+
+
+def asymmetry(output_dps: Array, rate_dps: Array) -> tuple[float, float]:
+    """Return the slope at positive rates less that at negative ones, over their mean, ppm, and its u."""
+    (_, mean, difference), u, _ = _least_squares(
+        np.column_stack([np.ones(len(rate_dps)), rate_dps, np.abs(rate_dps) / 2]), output_dps
+    )
+    return 1e6 * difference / mean, 1e6 * u[2] / mean
+
+
+def nonlinearity(output_dps: Array, rate_dps: Array, full_scale_dps: float) -> float:
+    """Return the largest deviation from the straight line over the full scale, referred to the input, ppm."""
+    found, _, left = _least_squares(np.column_stack([np.ones(len(rate_dps)), rate_dps]), output_dps)
+    return float(1e6 * np.abs(left).max() / (found[1] * full_scale_dps))
+
+
+def _least_squares(columns: Array, values: Array) -> tuple[Array, Array, Array]:
+    inverse = np.linalg.inv(columns.T @ columns)
+    found = inverse @ columns.T @ values
+    left = values - columns @ found
+    return found, np.sqrt(np.diag(inverse) * (left @ left) / (len(left) - columns.shape[1])), left
+
+
+def waves(angle_rad: Array, turned_rad: Array, position: Array, axis: str) -> list[Array]:
+    """Return the means of a cosine and a sine of the table's angle over each data set, for each position.
+
+    `angle_rad` is where the table was at the beginning, `turned_rad` how far it went. An axis along that of the table
+    has none.
+    """
+    half = turned_rad / 2
+    shrink = np.sinc(half / np.pi)
+    middle = angle_rad + half
+    return [
+        np.where(position == up, of(middle) * shrink, 0.0)
+        for up in np.unique(position) if up[-1] != axis for of in (np.cos, np.sin)
+    ]  # fmt: skip
+
+
+def without_waves(
+    law: Law, temperature_c: Array, residual_dps: Array, shown_dps: Array, waves_of: Sequence[Sequence[Array]]
+) -> tuple[Array, dict[str, Array]]:
+    """Return residuals (n, axes) less the waves of the outputs that explain `shown_dps` best, and their amplitudes.
+
+    The waves pass through the correction, as outputs do. Their direction, which a version does not store, is all that
+    is taken from what is shown.
+    """
+    inverse = np.linalg.inv(law.at(temperature_c)[1])
+    columns = np.array([
+        (inverse[:, :, k] * wave[:, None]).ravel() for k, own in enumerate(waves_of) for wave in own
+    ]).T  # fmt: skip
+    found = np.linalg.lstsq(columns, (residual_dps - shown_dps).ravel(), rcond=None)[0]
+    ends = np.cumsum([len(own) for own in waves_of])
+    sizes = {axis: np.hypot(part[0::2], part[1::2])
+             for axis, part in zip(law.axes, np.split(found, ends[:-1]), strict=True)}  # fmt: skip
+    return residual_dps - (columns @ found).reshape(residual_dps.shape), sizes
+
+
+def in_bins(values: Array, n: Sequence[int]) -> dict[str, Array]:
+    """Return least, largest and mean of readings in order of time that a figure puts together, n in each bin."""
+    parts = np.split(values, np.cumsum(n)[:-1])
+    return {name: np.array([of(part) for part in parts]) for name, of in
+            (("min", np.min), ("max", np.max), ("mean", np.mean))}  # fmt: skip
+
+
+def allan_deviation(values: Array, seconds: float, tau_s: Sequence[float]) -> Array:
+    """Return the overlapping Allan deviation of evenly spaced readings: clusters of m begin at each reading."""
+    total = np.concatenate([[0.0], np.cumsum(values - values.mean())])
+    found = []
+    for tau in tau_s:
+        m = round(tau / seconds)
+        means = (total[m:] - total[:-m]) / m
+        found.append(np.sqrt(0.5 * np.mean((means[m:] - means[:-m]) ** 2)))
+    return np.array(found)
