@@ -74,7 +74,7 @@ def test_explore_says_what_its_buttons_do_and_what_an_experiment_can_decide(
     page = visit(f"/explore?unit={unit}&version=1")
     settled(page)
     expect(page.get_by_role("region", name="Verdict")).to_contain_text(
-        "No experiment that this bench can run is expected to name one cause alone"
+        "No experiment that labctl can plan from these data is expected to name one cause alone"
     )
     expect(page.locator("main")).not_to_contain_text("To distinguish them")
     for link in page.get_by_role("navigation", name="On this page").get_by_role("link").all():
