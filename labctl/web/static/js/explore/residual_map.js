@@ -5,7 +5,7 @@ import { colour, figure } from "../core/figure.js";
 import { number, plainNumber } from "../core/format.js";
 import { datasetRows, distinctLabels } from "./dataset_rows.js";
 import { reachByKeyboard } from "../core/keyboard_points.js";
-import { mapCells } from "./residual_cells.js";
+import { COLOUR_LIMIT, mapCells } from "./residual_cells.js";
 
 /** @import { ResidualMap } from "../../../types/api.js" */
 /** @import { PlotEvent, PlotLayout } from "../../../types/pages.js" */
@@ -32,7 +32,7 @@ const isDim = (cell) => Math.abs(cell.mean) * Math.sqrt(cell.sets.length) < DIMM
  * @param {string} position
  */
 const cellText = (cell, position) =>
-  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.temperature)} deg C, ${position} up<br>${number(cell.mean, 2)} times the noise floor<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
+  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.temperature)} °C, ${position} up<br>${number(cell.mean, 2)} times the noise floor<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
 
 /**
  * Cells as a grid, with a faded layer over those within the noise.
@@ -161,7 +161,7 @@ function positionPanel(map, id, pick, cursor) {
       mark(under, { size: 20, symbol: "square-open", color: colour("accent"), line: { width: 4 } }, "keyboard"),
     ],
     x: { ...x, showgrid: false, title: { text: "table rate, deg/s" } },
-    y: { ...y, showgrid: false, title: id === "" ? { text: "temperature, deg C" } : undefined },
+    y: { ...y, showgrid: false, title: id === "" ? { text: "temperature, °C" } : undefined },
     text: `${map.position} up: ${map.dataset.length} data sets${found.cells.length < map.dataset.length ? ` in ${found.cells.length} cells` : ""}`,
   };
 }
@@ -187,11 +187,11 @@ export function cellPlaces(maps) {
 }
 
 /**
- * The map of an axis, a panel for each position. `give()` returns {maps, limit, pick}; `onselect` gets the data sets
+ * The map of an axis, a panel for each position. `give()` returns {maps, pick}; `onselect` gets the data sets
  * that the keyboard selects, and makes the cells reachable by it.
  * @param {string} name
  * @param {string | null} caption
- * @param {() => { maps: ResidualMap[], limit: number, pick?: ReadonlySet<number> }} give
+ * @param {() => { maps: ResidualMap[], pick?: ReadonlySet<number> }} give
  * @param {object} [options]
  * @param {string} [options.height]
  * @param {(sets: readonly number[], beside: boolean) => unknown} [options.onselect] absent: no cell can be selected
@@ -200,7 +200,7 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
   /** @type {Place | null} */
   let cursor = null;
   const draw = () => {
-    const { maps, limit, pick = new Set() } = give();
+    const { maps, pick = new Set() } = give();
     const several = maps.length > 1;
     const below = several && window.innerWidth < 760;
     const width = element.plot.clientWidth;
@@ -211,8 +211,8 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
       dragmode: onselect ? "select" : false,
       coloraxis: {
         colorscale: DIVERGING,
-        cmin: -limit,
-        cmax: limit,
+        cmin: -COLOUR_LIMIT,
+        cmax: COLOUR_LIMIT,
         colorbar: { title: { text: "residual /<br>noise floor" }, thickness: 12, outlinewidth: 0 },
       },
     };
@@ -259,15 +259,7 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
  * @returns {unknown[][]}
  */
 export const mapRows = (maps) => [
-  [
-    "axis",
-    "position",
-    "data set",
-    "table rate, deg/s",
-    "temperature, deg C",
-    "residual, deg/s",
-    "residual / noise floor",
-  ],
+  ["axis", "position", "data set", "table rate, deg/s", "temperature, °C", "residual, deg/s", "residual / noise floor"],
   ...maps.flatMap((map) =>
     map.dataset.map((set, k) => [
       map.axis,

@@ -134,7 +134,7 @@ function columnsFigure(name, columns, front) {
   const draw = () => ({
     data: columns.map(line),
     layout: {
-      xaxis: { title: { text: "temperature, deg C" } },
+      xaxis: { title: { text: "temperature, °C" } },
       yaxis: {
         title: { text: shown ? `${idText(name)}, ${shown}` : idText(name), font: { color: colour("text-muted") } },
       },
