@@ -171,8 +171,8 @@ def test_on_a_phone_the_links_of_the_page_fit_and_tools_lie_over_no_figure(visit
     page = visit(f"/explore?unit={UNIT}&version=1", size=NARROW)
     settled(page)
     assert page.locator(".page-nav").evaluate("bar => bar.scrollWidth <= bar.clientWidth")
-    figure(page, "Error by version")
-    plot = page.locator('.plot[aria-label^="Error by version"]')
+    figure(page, "Error ladder")
+    plot = page.locator('.plot[aria-label^="Error ladder"]')
     places = plot.evaluate(
         "plot => ['.modebar-container', '.main-svg'].map(name => plot.querySelector(name).getBoundingClientRect())"
     )

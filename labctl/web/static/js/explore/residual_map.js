@@ -18,6 +18,8 @@ import { COLOUR_LIMIT, mapCells } from "./residual_cells.js";
 const DIMMED_BELOW = 2;
 /** Cells that fill less than this share of their rows and columns are drawn where they are, not in a grid. */
 const MIN_FILLED = 0.3;
+/** A screen below this width is narrow. */
+const NARROW_PX = 760;
 /** Height of a panel on a narrow screen, where panels are stacked, px. */
 const PANEL_PX = 210;
 /** A panel has room for its title in whole from this width on; a figure for title and tool bar in one line. */
@@ -202,12 +204,13 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
   const draw = () => {
     const { maps, pick = new Set() } = give();
     const several = maps.length > 1;
-    const below = several && window.innerWidth < 760;
+    const isNarrow = window.innerWidth < NARROW_PX; // there the tools stand above the figure
+    const below = several && isNarrow;
     const width = element.plot.clientWidth;
     const isShort = width / (several && !below ? maps.length : 1) < WHOLE_TITLE_PX;
     /** @type {PlotLayout} */
     const layout = {
-      margin: { l: 52, r: 8, t: 28 + (width < ONE_LINE_PX ? TOOLBAR_PX : 0), b: 46 },
+      margin: { l: 52, r: 8, t: 28 + (width < ONE_LINE_PX && !isNarrow ? TOOLBAR_PX : 0), b: 46 },
       dragmode: onselect ? "select" : false,
       coloraxis: {
         colorscale: DIVERGING,
