@@ -23,7 +23,7 @@ def refuse_taken(store: Store, serial: str, expected: int | None) -> None:
     parent = "by a fit" if known.parent is None else f"from version {known.parent}"
     raise VersionTaken(
         f"{serial} version {expected} exists already: {known.model}, made {parent} at "
-        f"{known.created_at:%Y-%m-%d %H:%M} UTC; look at it, or make version {number} beside it"
+        f"{known.created_at:%Y-%m-%d %H:%M} UTC; inspect it, or make version {number} beside it"
     )
 
 
