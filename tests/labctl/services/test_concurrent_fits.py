@@ -68,7 +68,7 @@ def test_a_fit_ends_when_other_fits_keep_taking_its_number(store: Store) -> None
 
 
 def test_a_version_that_is_expected_under_a_taken_number_is_not_made(store: Store) -> None:
-    """Two tabs make the same version: the second is told of the first, before it fits and also while it fits."""
+    """Two tabs make the same version: the second is refused, before it fits and also while it fits."""
     keep_next_version(store, "G-1", AT, calibration, 1)
     for expected in (1, 3):
         with pytest.raises(VersionTaken):
