@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from labctl.services.planning.plan_answer import describe_plan
-from tests.helpers.browser import MINUS, NARROW, Faults, Service, figure, number_of
+from tests.helpers.browser import MINUS, NARROW, Faults, Service, figure, number_of, on_page
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -102,7 +102,7 @@ def test_u_of_a_campaign_is_drawn_against_its_target(service: Service, visit: Ca
 
     card = visit("/campaigns/1").get_by_role("region", name="Uncertainty")
     card.scroll_into_view_if_needed()
-    expect(card).to_contain_text(unit["text"])
+    expect(card).to_contain_text(on_page(unit["text"]))
     plot = card.locator(".plot")
     expect(plot.locator(".main-svg").first).to_be_attached()
     drawn = json.loads(
